@@ -1,0 +1,77 @@
+"""What can go wrong, as exceptions that carry the evidence.
+
+Bad arguments are `ValueError` or `TypeError`; everything else derives from `DeadtimeError`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+__all__ = [
+    "ContourError",
+    "ConvergenceError",
+    "CountMismatchError",
+    "DeadtimeError",
+    "NotIdentifiableError",
+    "RecordingError",
+]
+
+
+class DeadtimeError(Exception):
+    """Base of every error that `deadtime` raises for other reasons than a bad argument."""
+
+
+class ConvergenceError(DeadtimeError):
+    """An iteration used up its budget.
+
+    Attributes
+    ----------
+    best : complex
+        The last iterate.
+    """
+
+    def __init__(self, message: str, best: complex = complex("nan")) -> None:
+        super().__init__(message)
+        self.best = best
+
+
+class ContourError(DeadtimeError):
+    """A root lies on the edge of a region, or too close to it to tell the side.
+
+    Attributes
+    ----------
+    place : complex
+        Where on the contour.
+    distance : float
+        How far to move the edge at least.
+    """
+
+    def __init__(self, message: str, place: complex, distance: float) -> None:
+        super().__init__(message)
+        self.place = place
+        self.distance = distance
+
+
+class CountMismatchError(DeadtimeError):
+    """Roots counted and roots located disagree.
+
+    Attributes
+    ----------
+    counted : int
+        The number of roots by the argument principle.
+    found : list of (complex, int)
+        The roots that were located, with their multiplicities.
+    """
+
+    def __init__(self, message: str, counted: int, found: Sequence[tuple[complex, int]]) -> None:
+        super().__init__(message)
+        self.counted = counted
+        self.found = list(found)
+
+
+class NotIdentifiableError(DeadtimeError):
+    """The recording does not determine what was asked for; the message names why."""
+
+
+class RecordingError(DeadtimeError, ValueError):
+    """A recording cannot be used as it is; the message says what is wrong and where."""

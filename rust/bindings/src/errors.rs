@@ -1,0 +1,39 @@
+//! The one table from the core's errors to Python's exceptions.
+//!
+//! The exception classes themselves are Python (`deadtime._errors`), so that they carry
+//! docstrings and attributes like any other class of the package.
+
+use deadtime::Error;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::prelude::*;
+
+/// The Python exception for a core error.
+pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
+    let message = error.to_string();
+    match error {
+        Error::Argument(_) | Error::TooMuch { .. } => PyValueError::new_err(message),
+        Error::Interrupted => PyKeyboardInterrupt::new_err(message),
+        Error::Convergence { best, .. } => own(py, "ConvergenceError", (message, best)),
+        Error::Contour {
+            place, distance, ..
+        } => own(py, "ContourError", (message, place, distance)),
+        Error::CountMismatch { counted, found, .. } => {
+            own(py, "CountMismatchError", (message, counted, found))
+        }
+    }
+}
+
+/// An instance of a class of `deadtime._errors`.
+fn own<'py, A>(py: Python<'py>, class: &str, arguments: A) -> PyErr
+where
+    A: pyo3::call::PyCallArgs<'py>,
+{
+    let instance = py
+        .import("deadtime._errors")
+        .and_then(|module| module.getattr(class))
+        .and_then(|class| class.call1(arguments));
+    match instance {
+        Ok(exception) => PyErr::from_value(exception),
+        Err(error) => error,
+    }
+}

@@ -1,0 +1,207 @@
+//! The one place where Python is left: thread pool, GIL, Ctrl-C, panics.
+//!
+//! A kernel runs inside one process-local rayon pool while the calling thread, detached from the
+//! interpreter, waits and looks for signals. Any number of Python threads may call at once. The
+//! pool belongs to the process that built it: threads do not survive a fork, so a child builds
+//! its own. The pool is held without a lock, because a lock taken by another thread at the
+//! moment of the fork would stay locked in the child.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, LazyLock};
+use std::time::Duration;
+
+use arc_swap::ArcSwapOption;
+use deadtime::{Error, Task};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::errors::to_python;
+
+/// How often the waiting thread looks for signals and reports progress.
+const POLL: Duration = Duration::from_millis(20);
+
+/// Environment variables that limit the number of threads, the first one set wins.
+const THREAD_VARIABLES: [&str; 2] = ["DEADTIME_NUM_THREADS", "RAYON_NUM_THREADS"];
+
+struct Pool {
+    process: u32,
+    threads: usize,
+    pool: ThreadPool,
+}
+
+static POOL: LazyLock<ArcSwapOption<Pool>> = LazyLock::new(ArcSwapOption::empty);
+
+/// Run `work` in the pool with the interpreter released; Ctrl-C stops it at its next check.
+///
+/// `progress`, if given, is called now and then with the number of finished items.
+pub(crate) fn run<T, F>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    progress: Option<&Py<PyAny>>,
+    work: F,
+) -> PyResult<T>
+where
+    T: Send,
+    F: FnOnce(&Task) -> Result<T, Error> + Send,
+{
+    let pool = pool(threads)?;
+    let task = Task::new();
+    let outcome = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (tell, hear) = channel();
+            let (task, pool) = (&task, &pool.pool);
+            scope.spawn(move || {
+                let result = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(task))));
+                // The receiver outlives this thread: it waits below until it has the result.
+                let _ = tell.send(result);
+            });
+            let mut refused = None;
+            loop {
+                match hear.recv_timeout(POLL) {
+                    Ok(result) => return (Some(result), refused),
+                    Err(RecvTimeoutError::Disconnected) => return (None, refused),
+                    Err(RecvTimeoutError::Timeout) if refused.is_none() => {
+                        if let Err(error) = Python::attach(|py| look_up(py, task, progress)) {
+                            task.stop();
+                            refused = Some(error);
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                }
+            }
+        })
+    });
+    match outcome {
+        (_, Some(error)) => Err(error),
+        (Some(Ok(result)), None) => result.map_err(|error| to_python(py, error)),
+        (Some(Err(panic)), None) => Err(internal(panic.as_ref())),
+        (None, None) => Err(internal(&"the worker vanished")),
+    }
+}
+
+/// Run short `work` (well below a millisecond) on the calling thread, interpreter released.
+pub(crate) fn run_here<T, F>(py: Python<'_>, work: F) -> PyResult<T>
+where
+    T: Send,
+    F: FnOnce(&Task) -> Result<T, Error> + Send,
+{
+    let task = Task::new();
+    match py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task)))) {
+        Ok(result) => result.map_err(|error| to_python(py, error)),
+        Err(panic) => Err(internal(panic.as_ref())),
+    }
+}
+
+fn look_up(py: Python<'_>, task: &Task, progress: Option<&Py<PyAny>>) -> PyResult<()> {
+    py.check_signals()?;
+    if let Some(progress) = progress {
+        progress.call1(py, (task.done(),))?;
+    }
+    Ok(())
+}
+
+fn internal(panic: &(dyn Any + Send)) -> PyErr {
+    let reason = panic
+        .downcast_ref::<&str>()
+        .map(|text| (*text).to_owned())
+        .or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "unknown reason".to_owned());
+    PyRuntimeError::new_err(format!(
+        "deadtime failed internally ({reason}); this is a defect, please report it with the \
+         arguments of the call"
+    ))
+}
+
+/// The pool of this process with the wanted number of threads, built where there is none.
+fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
+    let threads = wanted(threads)?;
+    let process = std::process::id();
+    let current = POOL.load_full();
+    if let Some(pool) = &current {
+        if pool.process == process && pool.threads == threads {
+            return Ok(Arc::clone(pool));
+        }
+    }
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|index| format!("deadtime-{index}"))
+        .build()
+        .map_err(|error| PyRuntimeError::new_err(format!("no threads to be had: {error}")))?;
+    let built = Arc::new(Pool {
+        process,
+        threads,
+        pool,
+    });
+    let replaced = POOL.swap(Some(Arc::clone(&built)));
+    // A pool inherited through a fork has no threads left to join: forget it, never drop it.
+    for inherited in [current, replaced].into_iter().flatten() {
+        if inherited.process != process {
+            std::mem::forget(inherited);
+        }
+    }
+    Ok(built)
+}
+
+/// Number of threads: argument, then environment, then the machine.
+fn wanted(threads: Option<usize>) -> PyResult<usize> {
+    if let Some(threads) = threads {
+        return at_least_one("threads", threads);
+    }
+    for variable in THREAD_VARIABLES {
+        if let Ok(text) = std::env::var(variable) {
+            if text.trim().is_empty() {
+                continue;
+            }
+            let threads = text.trim().parse().map_err(|_| {
+                PyValueError::new_err(format!(
+                    "{variable}={text:?} is not a number of threads: set it to a whole number \
+                     of at least 1"
+                ))
+            })?;
+            // Rayon reads 0 as "the machine decides".
+            if threads > 0 {
+                return Ok(threads);
+            }
+        }
+    }
+    Ok(std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+fn at_least_one(name: &str, threads: usize) -> PyResult<usize> {
+    if threads == 0 {
+        return Err(PyValueError::new_err(format!(
+            "{name}=0: give a whole number of at least 1, or None for all cores"
+        )));
+    }
+    Ok(threads)
+}
+
+/// Number of threads that kernels use.
+#[pyfunction]
+#[pyo3(signature = (threads=None))]
+pub(crate) fn thread_count(threads: Option<usize>) -> PyResult<usize> {
+    Ok(pool(threads)?.threads)
+}
+
+/// Keep the pool busy for a while: a stand-in for a long kernel in tests of this file.
+#[pyfunction]
+#[pyo3(signature = (seconds, threads=None, progress=None))]
+pub(crate) fn spin(
+    py: Python<'_>,
+    seconds: f64,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<u64> {
+    run(py, threads, progress.as_ref(), move |task| {
+        let start = std::time::Instant::now();
+        while start.elapsed().as_secs_f64() < seconds {
+            task.check()?;
+            std::hint::spin_loop();
+            task.advance(1);
+        }
+        Ok(task.done())
+    })
+}

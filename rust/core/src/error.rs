@@ -1,0 +1,72 @@
+//! What can go wrong, with the numbers in it.
+
+use num_complex::Complex64;
+
+/// Every failure a kernel can report. The message says what was wrong and what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// An argument outside what the function is defined for.
+    #[error("{0}")]
+    Argument(String),
+
+    /// The caller asked to stop (Ctrl-C).
+    #[error("interrupted")]
+    Interrupted,
+
+    /// An iteration used up its budget; `best` is the last iterate.
+    #[error("{what} did not converge from {best}: {advice}")]
+    Convergence {
+        /// What was being computed.
+        what: &'static str,
+        /// The last iterate.
+        best: Complex64,
+        /// What to change.
+        advice: String,
+    },
+
+    /// A zero lies on the contour, or too close to it for double precision to tell.
+    #[error(
+        "a root lies on the contour near {place}, or closer to it than double precision can tell: \
+         move the edge of the region by more than {distance:.1e}"
+    )]
+    Contour {
+        /// Where the contour meets the root.
+        place: Complex64,
+        /// Size of the segment on which the winding could not be proved.
+        distance: f64,
+    },
+
+    /// Roots found and roots counted disagree; both are given.
+    #[error(
+        "{counted} roots were counted in the region but {} could be located: {advice}",
+        found.iter().map(|(_, m)| m).sum::<u32>()
+    )]
+    CountMismatch {
+        /// What the argument principle says.
+        counted: u64,
+        /// What was located: root and multiplicity.
+        found: Vec<(Complex64, u32)>,
+        /// What to change.
+        advice: String,
+    },
+
+    /// More work than the caller can have meant.
+    #[error("{what} needs more than {limit} {unit}: {advice}")]
+    TooMuch {
+        /// What was being computed.
+        what: &'static str,
+        /// The limit that was hit.
+        limit: u64,
+        /// What is being counted.
+        unit: &'static str,
+        /// What to change.
+        advice: String,
+    },
+}
+
+impl Error {
+    /// Shorthand for [`Error::Argument`].
+    pub fn argument(message: impl Into<String>) -> Self {
+        Self::Argument(message.into())
+    }
+}

@@ -1,0 +1,17 @@
+//! Time-delay systems: Lambert W, quasi-polynomials and their roots, stability maps, delay
+//! differential equations.
+//!
+//! Everything numerical of the `deadtime` Python package is here, and nothing of Python.
+//! Dependencies run one way: error ← lambertw, quasipoly ← roots ← stability; quasipoly ← dde.
+
+pub mod dde;
+pub mod error;
+pub mod lambertw;
+pub mod quasipoly;
+pub mod roots;
+pub mod stability;
+pub mod status;
+pub mod task;
+
+pub use error::Error;
+pub use task::Task;
