@@ -252,6 +252,19 @@ def test_range_of_the_delay_of_a_sampled_loop():
     assert weak.stable_range("delay") == (0.0, math.inf)
 
 
+def test_range_of_the_sample_time():
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.0, sample_time=0.1)
+    # 1 - Kp Ts > -1.
+    low, high = loop.stable_range("sample_time")
+    assert low == 0.0
+    assert high == pytest.approx(1.0, rel=1e-12)
+    late = loop.replace(delay=0.36)
+    low, high = late.stable_range("sample_time")
+    assert low == 0.0
+    # z^2 - (1 - 2 (Ts - Td)) z + 2 Td = 0 meets z = -1 there.
+    assert high == pytest.approx(1.72, rel=1e-12)
+
+
 def test_sampled_poles_carry_their_rounding_error():
     loop = dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.1, sample_time=0.1)
     found = loop.rightmost(2)

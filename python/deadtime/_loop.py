@@ -33,8 +33,8 @@ __all__ = ["ControlLoop"]
 _FIELDS = ("plant", "controller", "delay", "sample_time", "limit", "delay_path")
 _PATHS = ("command", "measurement")
 
-# Samples in the delay at which the search for its stable range ends: the transition matrix grows
-# with them.
+# Samples in the delay at which the search for a stable range ends: the transition matrix grows with
+# them.
 _MOST_SAMPLES = 200
 
 
@@ -406,9 +406,10 @@ class ControlLoop:
         Returns
         -------
         (low, high) : tuple of float
-            An end is infinite where stability is not lost within a million times the value (for
-            the delay of a sampled loop: within 200 samples), and 0 for numbers that cannot be
-            negative.
+            An end is infinite where stability is not lost within a thousand times the value (for
+            the delay of a sampled loop: within 200 samples), and 0 for a number that cannot be
+            negative where stability is not lost on the way down (the walk then ends at a
+            millionth of the value, for a sample time at 200 samples in the delay).
 
         Raises
         ------
@@ -431,11 +432,17 @@ class ControlLoop:
                 f"{name!r} is not a number whose range can be sought: choose one of "
                 f"{', '.join(known for known in values if known != 'limit')}"
             )
-        farthest = math.inf
+        nearest, farthest = 0.0, math.inf
         if self.sample_time is not None and name == "delay":
             farthest = _MOST_SAMPLES * self.sample_time
+        if name == "sample_time":
+            nearest = self._known_delay() / _MOST_SAMPLES
         return stable_range(
-            lambda value: self._abscissa(values | {name: value}), name, values[name], farthest
+            lambda value: self._abscissa(values | {name: value}),
+            name,
+            values[name],
+            nearest,
+            farthest,
         )
 
     def _abscissa(self, values: Mapping[str, float]) -> float:

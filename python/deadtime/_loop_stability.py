@@ -40,7 +40,7 @@ _KEEPS_SIGN = frozenset({"time_constant"})
 # what counts as zero on the way down; lengths as parts of the value.
 _FIRST_STEP = 1.0 / 64.0
 _GROWTH = 1.2
-_FARTHEST = 1e6
+_FARTHEST = 1e3
 _NEARLY_ZERO = 1e-6
 
 
@@ -98,9 +98,12 @@ def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> Ro
 
 
 def stable_range(
-    abscissa: Callable[[float], float], name: str, value: float, farthest: float
+    abscissa: Callable[[float], float], name: str, value: float, nearest: float, farthest: float
 ) -> tuple[float, float]:
-    """Walk from `value` both ways to the first sign change of `abscissa`, up to `farthest`."""
+    """Walk from `value` both ways to the first sign change of `abscissa`.
+
+    The walk ends at `farthest`, and on the way down to zero at `nearest`.
+    """
     if not abscissa(value) < 0.0:
         raise ValueError(
             f"the loop is not stable at {name}={value}: start from a stable one, for example with "
@@ -115,7 +118,7 @@ def stable_range(
             outside = inside + direction * step
             if stops_at_zero and direction < 0.0:
                 outside = max(outside, 0.5 * inside)
-                if outside < _NEARLY_ZERO * size:
+                if outside < max(nearest, _NEARLY_ZERO * size):
                     if name not in _MAY_BE_ZERO or abscissa(0.0) < 0.0:
                         return 0.0
                     return _refine(abscissa, inside, 0.0)

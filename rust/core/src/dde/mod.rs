@@ -12,4 +12,7 @@ pub mod linear;
 pub mod propagator;
 pub mod sampled;
 
+#[cfg(test)]
+mod tests;
+
 pub use linear::{Equations, LinearLoop, Reference, Start, Trajectory};

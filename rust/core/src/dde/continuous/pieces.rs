@@ -160,7 +160,10 @@ impl Pieces {
                 what: "the continuous response",
                 limit: MOST_PIECES as u64,
                 unit: "pieces of the command in one delay",
-                advice: "shorten the time simulated or the list of reference jumps".to_owned(),
+                advice:
+                    "shorten the time simulated or the list of reference jumps, and set a lag of \
+                         almost nothing to zero"
+                        .to_owned(),
             });
         }
         self.rest.push_back(piece);

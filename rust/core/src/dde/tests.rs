@@ -1,10 +1,11 @@
 //! The stepper through its public names: closed forms, and its engines against one another.
 
-use deadtime::Task;
-use deadtime::dde::sampled::{self, LoopCells};
-use deadtime::dde::{Equations, LinearLoop, Reference, Start, Trajectory};
-use deadtime::status::CellStatus;
 use proptest::prelude::*;
+
+use super::sampled::{self, LoopCells};
+use super::{Equations, LinearLoop, Reference, Start, Trajectory};
+use crate::status::CellStatus;
+use crate::{Error, Task};
 
 /// y′ = w, u = kp (r − y) − kv y′.
 fn drone(kp: f64, kv: f64) -> Equations {
@@ -166,7 +167,7 @@ fn a_stopped_task_stops_the_run() {
     };
     let reference = Reference::step(0.0, 1.0).unwrap();
     let found = plant.simulate(&start, &reference, &[1.0], &[], &task);
-    assert_eq!(found, Err(deadtime::Error::Interrupted));
+    assert_eq!(found, Err(Error::Interrupted));
 }
 
 #[test]
