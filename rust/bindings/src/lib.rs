@@ -15,4 +15,6 @@ use pyo3::prelude::*;
 mod _deadtime {
     #[pymodule_export]
     use super::runtime::{spin, thread_count};
+    #[pymodule_export]
+    use super::special::{dde_roots, lambertw};
 }
