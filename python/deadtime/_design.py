@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -112,7 +113,7 @@ def design(
     True
     """
     delays = _delays(loop, delay)
-    template = controller() if isinstance(controller, type) else controller
+    template = _template(controller)
     template_loop = loop.replace(controller=template, delay=delays[len(delays) // 2])
     names = tuple(template.gains)
     if len(names) != 2:
@@ -168,6 +169,16 @@ def design(
         value=cost(gains),
         charts=charts,
     )
+
+
+def _template(controller: type[Controller] | Controller) -> Controller:
+    """A controller of the wanted class; its gains are replaced throughout."""
+    if isinstance(controller, Controller):
+        return controller
+    if isinstance(controller, type) and issubclass(controller, Controller):
+        names = inspect.signature(controller).parameters
+        return controller(**{name: 1.0 for name in names if name.startswith("K")})
+    raise TypeError(f"controller={controller!r} is no controller: give PV, PD or PI, or one of them")
 
 
 def _delays(loop: ControlLoop, delay: float | tuple[float, float] | None) -> tuple[float, ...]:

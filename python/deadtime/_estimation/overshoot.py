@@ -165,7 +165,7 @@ def estimate_by_overshoot(
 ) -> DelayEstimate:
     """Delay from the overshoot of the one step in the window."""
     if map not in get_args(OvershootMap):
-        raise ValueError(f"map={map!r} is not one of {', '.join(map_ for map_ in get_args(OvershootMap))}")
+        raise ValueError(f"map={map!r} is not one of {', '.join(get_args(OvershootMap))}")
     stiffness = _stiffness(loop)
     simulated = SimulatedRecording(recording, loop, window)
     read = read_overshoot(simulated.recording)
@@ -265,11 +265,11 @@ def read_overshoot(recording: Recording) -> Overshoot:
     settled = max(0.0, float(np.mean((tail - start) / size)) - 1.0)
     sigma = noise / abs(size)
     if value - settled <= max(CLEARANCE * sigma, 1e-9):
+        beyond = max(0.0, value - settled)
         raise NotIdentifiableError(
-            f"no overshoot: the output exceeds its final value by {100 * (value - settled):.2g} % "
-            f"of the step, noise alone gives {100 * CLEARANCE * sigma:.2g} %. Kp·Td is below or "
-            "near 1/e, where the overshoot says nothing of the delay: raise Kp, or use "
-            "method='waveform'"
+            f"no overshoot: the output exceeds its final value by {100 * beyond:.2g} % of the "
+            f"step, noise alone gives {100 * CLEARANCE * sigma:.2g} %. Kp·Td is below or near 1/e, "
+            "where the overshoot says nothing of the delay: raise Kp, or use method='waveform'"
         )
     deviation = sigma * math.sqrt(1.0 + 1.0 / before.size)
     return Overshoot(value, deviation, start, step, float(recording.time[step.index + row]))

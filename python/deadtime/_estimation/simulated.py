@@ -62,14 +62,14 @@ class SimulatedRecording:
         return self.recording.output - self.output(values, start)
 
 
-def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array | None:
+def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array:
     """Commands issued before row `start`, where the loop is sampled and the rows tell them."""
     if loop.sample_time is None or start == 0:
-        return None
+        return np.empty(0)
     if recording.command is not None:
         return recording.command[:start]
     if not isinstance(loop.controller, P):
-        return None
+        return np.empty(0)
     command = loop.controller.Kp * (recording.reference[:start] - recording.output[:start])
     limit = np.inf if loop.limit is None else loop.limit
     return np.clip(command, -limit, limit)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from deadtime._errors import DeadtimeError, NotIdentifiableError
+from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.residuals import robust_covariance, test_whiteness, white_covariance
 from deadtime._estimation.result import CramerRaoBound, DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
@@ -42,6 +42,9 @@ REFINED = 3
 #: Ratio of singular values of the scaled Jacobian below which data do not tell two numbers apart:
 #: rounding in difference quotients is at about 1e-8.
 INDISTINGUISHABLE = 1e-6
+
+#: A lag that changes the cost by less than this share is none: least squares itself stops there.
+VANISHING = 1e-6
 
 #: A residual for simulations that leave all bounds, in units of the step.
 HOPELESS = 1e3
@@ -112,7 +115,7 @@ class _Problem:
         bound = HOPELESS * self.size
         try:
             output = self.simulated.output(values, float(parameters[-1]))
-        except DeadtimeError:
+        except ValueError:  # the response with these numbers grows without bound
             return np.full(len(self.simulated.recording), bound)
         return np.clip(output - self.simulated.recording.output, -bound, bound)
 
@@ -126,7 +129,24 @@ class _Problem:
             if best is None or solution.cost < best.cost:
                 best = solution
         assert best is not None
-        return best
+        return self._without_vanishing_lag(best)
+
+    def _without_vanishing_lag(self, found: OptimizeResult) -> OptimizeResult:
+        """Put a lag at zero that is there for rounding's sake only.
+
+        A small lag delays like a delay, to first order exactly so; next to zero the two cannot
+        be told apart, and the search stops wherever it entered that valley.
+        """
+        if "lag" not in self.names or found.x[self.names.index("lag")] == 0.0:
+            return found
+        delay, lag = self.names.index("delay"), self.names.index("lag")
+        moved = found.x.copy()
+        moved[delay] += moved[lag]
+        moved[lag] = 0.0
+        residuals = self.residuals(moved)
+        if 0.5 * float(residuals @ residuals) <= found.cost * (1.0 + VANISHING):
+            found.x, found.fun = moved, residuals
+        return found
 
     def _grid(self) -> list[Array]:
         plant = self.simulated.loop.parameters

@@ -68,7 +68,7 @@ def read_recording(
         names["command"] = command
     header, lines = _table(path, delimiter)
     places = {signal: _place(path, header, signal, name) for signal, name in names.items()}
-    low, high = (None, None) if window is None else window
+    low, high = _ends(window)
     columns: dict[str, list[float]] = {signal: [] for signal in names}
     last = None
     for number, cells in lines:
@@ -80,7 +80,7 @@ def read_recording(
                 "the rows and keep one of each time stamp"
             )
         last = now
-        if (low is not None and now < low) or (high is not None and now > high):
+        if not low <= now <= high:
             continue  # what lies outside the window need not be valid: setpoints are often NaN
         columns["time"].append(now)
         for signal, place in places.items():
@@ -97,6 +97,14 @@ def read_recording(
             "is no step to see a delay by; choose another column or window"
         )
     return recording
+
+
+def _ends(window: tuple[float | None, float | None] | None) -> tuple[float, float]:
+    """Ends of the window, open where None, with room for a last printed digit."""
+    low, high = (None, None) if window is None else window
+    start = -math.inf if low is None else low - 1e-9 * max(1.0, abs(low))
+    stop = math.inf if high is None else high + 1e-9 * max(1.0, abs(high))
+    return start, stop
 
 
 def _table(path: Path, delimiter: str | None) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
