@@ -1,0 +1,187 @@
+//! Sums, products and derivatives of quasi-polynomials.
+//!
+//! Everything is exact but for the rounding of coefficients and of the sums of delays that a
+//! product forms. Such sums depend on the order of their summands by an ulp or two, so a product
+//! takes delays that agree to 4 ulp for the same one; where one factor has no delays, nothing is
+//! rounded and nothing merged.
+
+use super::QuasiPolynomial;
+use crate::Error;
+
+/// A product with more coefficients than this is a slip of the pen.
+const MAX_COEFFICIENTS: usize = 1_000_000;
+
+/// Delays of a product closer than this (relative) are the same sum in another order.
+const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
+
+/// `sum += row`.
+pub(super) fn accumulate(sum: &mut Vec<f64>, row: &[f64]) {
+    if sum.len() < row.len() {
+        sum.resize(row.len(), 0.0);
+    }
+    for (total, value) in sum.iter_mut().zip(row) {
+        *total += value;
+    }
+}
+
+fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
+    for (shift, x) in a.iter().enumerate() {
+        for (total, y) in product.iter_mut().skip(shift).zip(b) {
+            *total += x * y;
+        }
+    }
+    product
+}
+
+impl QuasiPolynomial {
+    /// The constant function.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] unless `value` is finite.
+    pub fn constant(value: f64) -> Result<Self, Error> {
+        Self::new(vec![vec![value]], vec![0.0])
+    }
+
+    /// The function s.
+    pub fn variable() -> Self {
+        Self {
+            coefficients: vec![vec![0.0, 1.0]],
+            delays: vec![0.0],
+        }
+    }
+
+    /// The function e^(−s `delay`).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] unless `delay` is finite and not negative.
+    pub fn exponential(delay: f64) -> Result<Self, Error> {
+        Self::new(vec![vec![1.0]], vec![delay])
+    }
+
+    fn rows(&self) -> Vec<(Vec<f64>, f64)> {
+        self.terms()
+            .map(|(row, delay)| (row.to_vec(), delay))
+            .collect()
+    }
+
+    /// `self + other`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when a coefficient overflows.
+    pub fn add(&self, other: &Self) -> Result<Self, Error> {
+        let mut rows = self.rows();
+        rows.extend(other.rows());
+        Self::from_rows(rows)
+    }
+
+    /// `factor · self`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when `factor` is not finite or a coefficient overflows.
+    pub fn scale(&self, factor: f64) -> Result<Self, Error> {
+        if !factor.is_finite() {
+            return Err(Error::argument(format!(
+                "factor {factor}: give a finite number"
+            )));
+        }
+        let mut rows = self.rows();
+        for value in rows.iter_mut().flat_map(|(row, _)| row) {
+            *value *= factor;
+        }
+        Self::from_rows(rows)
+    }
+
+    /// `self − other`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when a coefficient overflows.
+    pub fn sub(&self, other: &Self) -> Result<Self, Error> {
+        self.add(&other.scale(-1.0)?)
+    }
+
+    /// `self · other`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when a coefficient or a delay overflows, [`Error::TooMuch`] when the
+    /// product has too many coefficients.
+    pub fn mul(&self, other: &Self) -> Result<Self, Error> {
+        let size = self
+            .delays
+            .len()
+            .saturating_mul(other.delays.len())
+            .saturating_mul(self.degree() + other.degree() + 1);
+        if size > MAX_COEFFICIENTS {
+            return Err(Error::TooMuch {
+                what: "the product of two quasi-polynomials",
+                limit: MAX_COEFFICIENTS as u64,
+                unit: "coefficients",
+                advice: "keep it factored: the roots of a product are those of its factors".into(),
+            });
+        }
+        let mut rows = Vec::with_capacity(self.delays.len() * other.delays.len());
+        for (a, first) in self.terms() {
+            for (b, second) in other.terms() {
+                let delay = first + second;
+                if !delay.is_finite() {
+                    return Err(Error::argument(format!(
+                        "delays {first} s and {second} s add up to more than double precision holds"
+                    )));
+                }
+                rows.push((convolve(a, b), delay));
+            }
+        }
+        let rounded = |h: &Self| h.delays.iter().any(|delay| *delay > 0.0);
+        if rounded(self) && rounded(other) {
+            rows.sort_by(|a, b| a.1.total_cmp(&b.1));
+            let mut last = f64::NEG_INFINITY;
+            for (_, delay) in &mut rows {
+                if *delay - last <= SAME_DELAY * *delay {
+                    *delay = last;
+                } else {
+                    last = *delay;
+                }
+            }
+        }
+        Self::from_rows(rows)
+    }
+
+    /// `self` to a whole power.
+    ///
+    /// # Errors
+    /// As [`QuasiPolynomial::mul`].
+    pub fn pow(&self, exponent: u32) -> Result<Self, Error> {
+        let mut result = Self::constant_unchecked(1.0);
+        for bit in (0..u32::BITS - exponent.leading_zeros()).rev() {
+            result = result.mul(&result)?;
+            if exponent >> bit & 1 == 1 {
+                result = result.mul(self)?;
+            }
+        }
+        Ok(result)
+    }
+
+    /// The `order`-th derivative by s: row p becomes p′ − τp, `order` times.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when a coefficient overflows.
+    pub fn derivative(&self, order: u32) -> Result<Self, Error> {
+        let mut rows = self.rows();
+        for _ in 0..order {
+            for (row, delay) in &mut rows {
+                let mut power = 0.0;
+                for k in 0..row.len() {
+                    power += 1.0;
+                    let above = row.get(k + 1).copied().unwrap_or(0.0);
+                    if let Some(value) = row.get_mut(k) {
+                        *value = power * above - *delay * *value;
+                    }
+                }
+            }
+            if rows.iter().all(|(row, _)| row.iter().all(|c| *c == 0.0)) {
+                return Ok(Self::zero());
+            }
+        }
+        Self::from_rows(rows)
+    }
+}

@@ -1,0 +1,60 @@
+//! Values of a quasi-polynomial at single points.
+
+use num_complex::Complex64;
+
+use super::{Probe, QuasiPolynomial};
+
+/// A value of h without its largest exponential: h(s) = `value` · e^(−s `delay`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scaled {
+    /// g(s) = h(s) e^(s `delay`).
+    pub value: Complex64,
+    /// The error of `value` is at most this.
+    pub error: f64,
+    /// Delay of the term that dominates at s, in seconds.
+    pub delay: f64,
+}
+
+impl QuasiPolynomial {
+    /// h(s) without the exponential of its dominating term, with a bound on the error.
+    ///
+    /// Finite wherever the powers of s are; the bound is NaN or infinite where they are not.
+    pub fn scaled_value(&self, s: Complex64) -> Scaled {
+        let mut probe = Probe::new(self);
+        probe.refer_to_dominant(s);
+        let jet = probe.jet(s);
+        Scaled {
+            value: jet.value,
+            error: jet.value_error,
+            delay: probe.delay(),
+        }
+    }
+
+    /// h(s); infinite where it exceeds the range of double precision.
+    ///
+    /// ```
+    /// # use deadtime::quasipoly::QuasiPolynomial;
+    /// # use num_complex::Complex64;
+    /// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![1.0]], vec![0.0, 1.0])?;
+    /// assert_eq!(h.value(Complex64::new(0.0, 0.0)), Complex64::new(1.0, 0.0));
+    /// # Ok::<(), deadtime::Error>(())
+    /// ```
+    pub fn value(&self, s: Complex64) -> Complex64 {
+        let Scaled { value, delay, .. } = self.scaled_value(s);
+        if delay == 0.0 {
+            return value;
+        }
+        let (sine, cosine) = libm::sincos(delay * s.im);
+        let turned = value * Complex64::new(cosine, -sine);
+        // In two halves, so that the result overflows only where h itself does.
+        let half = libm::exp(-0.5 * delay * s.re);
+        let grow = |part: f64| {
+            if part == 0.0 {
+                part
+            } else {
+                part * half * half
+            }
+        };
+        Complex64::new(grow(turned.re), grow(turned.im))
+    }
+}
