@@ -55,7 +55,7 @@ def test_the_demo_writes_a_flight_and_a_self_contained_report(demo):
     page = (folder / "demo" / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 3
     assert "the truth" in page
-    # nothing is fetched: the only addresses are names of XML vocabularies and of the picture's own parts
+    # nothing is fetched: addresses only name XML vocabularies and parts of the pictures
     assert "<script" not in page
     assert "<link" not in page
     assert 'src="' not in page
@@ -110,9 +110,7 @@ def test_roots_of_the_papers_loop():
     out = found("roots", "--kp", 2, "--kv", 0.3, "--delay", 0.36)
     assert out["spectral_abscissa"] == pytest.approx(-3.3168, abs=5e-5)
     assert out["chain_abscissa"] == pytest.approx(-3.3444, abs=5e-5)
-    region = found(
-        "roots", "--kp", 2, "--delay", 0.36, "--re", -12, 2, "--im", 0, 100
-    )
+    region = found("roots", "--kp", 2, "--delay", 0.36, "--re", -12, 2, "--im", 0, 100)
     assert region["counted"] == 6
     assert run("roots", "--kp", 5, "--delay", 0.36).stdout.rstrip().endswith("unstable")
 
@@ -246,10 +244,7 @@ def test_a_file_that_cannot_be_written(demo):
 
 
 def test_without_its_extras_it_says_how_to_get_them():
-    code = (
-        "import sys; sys.modules['typer'] = None; "
-        "from deadtime._cli import main; main()"
-    )
+    code = "import sys; sys.modules['typer'] = None; from deadtime._cli import main; main()"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
     )

@@ -1,9 +1,8 @@
 """Design: the best gains are better than the map's, and hold over the delay's interval."""
 
+import deadtime as dtm
 import numpy as np
 import pytest
-
-import deadtime as dtm
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
 SAMPLED = dtm.ControlLoop(
@@ -48,7 +47,9 @@ def test_the_settling_time_is_that_of_the_simulated_loop():
 
 @pytest.mark.parametrize("controller", [dtm.PD, dtm.PI])
 def test_other_controllers_with_two_gains(controller):
-    filtered = controller(1.0, 0.1, dtm.DerivativeFilter(38.0)) if controller is dtm.PD else controller
+    filtered = (
+        controller(1.0, 0.1, dtm.DerivativeFilter(38.0)) if controller is dtm.PD else controller
+    )
     best = dtm.design(SAMPLED, controller=filtered, shape=(21, 21))
     assert best.loop.is_stable()
     assert isinstance(best.loop.controller, controller)

@@ -2,16 +2,15 @@
 
 import math
 
+import deadtime as dtm
 import mpmath
 import numpy as np
 import pytest
+from deadtime._estimation.overshoot import dominant_x, exact_overshoot, exact_x
+from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
 from flights import flight_path
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-import deadtime as dtm
-from deadtime._estimation.overshoot import dominant_x, exact_overshoot, exact_x
-from deadtime._estimation.residuals import robust_covariance, test_whiteness, white_covariance
 
 TS = 0.065
 
@@ -166,7 +165,7 @@ def test_the_overshoot_method_gives_no_interval_and_says_why():
 
 def test_no_overshoot_is_refused_by_name():
     flight, known = fly(Kp=0.9)  # x = 0.324 < 1/e
-    with pytest.raises(dtm.NotIdentifiableError, match="no overshoot.*1/e"):
+    with pytest.raises(dtm.NotIdentifiableError, match=r"no overshoot.*1/e"):
         dtm.estimate_delay(flight, known, method="overshoot")
 
 
@@ -179,9 +178,7 @@ def test_an_overshoot_within_the_noise_is_refused():
 def test_the_overshoot_method_is_for_an_integrator_under_p_control():
     flight, known = fly(Kp=2.0)
     with pytest.raises(ValueError, match="Integrator under P control"):
-        dtm.estimate_delay(
-            flight, known.replace(controller=dtm.PV(2.0, 0.1)), method="overshoot"
-        )
+        dtm.estimate_delay(flight, known.replace(controller=dtm.PV(2.0, 0.1)), method="overshoot")
 
 
 def test_two_steps_in_the_window_are_refused():
@@ -350,15 +347,15 @@ def test_wrong_types_are_named():
 def test_white_residuals_pass_and_coloured_ones_do_not():
     rng = np.random.default_rng(0)
     white = rng.normal(size=400)
-    assert test_whiteness(white).white
+    assert whiteness_of(white).white
     coloured = np.convolve(white, [1, 0.6, 0.3], mode="valid")
-    assert not test_whiteness(coloured).white
-    assert test_whiteness(np.zeros(50)).white
+    assert not whiteness_of(coloured).white
+    assert whiteness_of(np.zeros(50)).white
 
 
 def test_white_residuals_are_rejected_about_as_often_as_promised():
     rng = np.random.default_rng(1)
-    rejected = sum(not test_whiteness(rng.normal(size=200)).white for _ in range(600))
+    rejected = sum(not whiteness_of(rng.normal(size=200)).white for _ in range(600))
     # 1 % of 600 is 6; more than 18 has probability below 1e-4
     assert rejected <= 18
 
@@ -384,9 +381,7 @@ def test_robust_standard_errors_hold_under_colour_and_white_ones_do_not():
 
 
 def real(name, Kp):
-    flight = dtm.read_recording(
-        flight_path(name), time="t_s", reference="ref_m", output="height_m"
-    )
+    flight = dtm.read_recording(flight_path(name), time="t_s", reference="ref_m", output="height_m")
     return flight, dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=TS, limit=1.0)
 
 

@@ -2,12 +2,11 @@
 
 import math
 
+import deadtime as dtm
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-import deadtime as dtm
 
 ROWS = [(k * 0.1, 0.0 if k < 5 else 1.0, 0.01 * k) for k in range(20)]
 
@@ -102,7 +101,7 @@ def test_bad_rows_are_refused_with_their_place(tmp_path, rows, words):
 
 
 def test_a_missing_column_is_named_with_the_likely_one(tmp_path):
-    with pytest.raises(dtm.RecordingError, match="no column 'heigth_m'.*did you mean 'height_m'"):
+    with pytest.raises(dtm.RecordingError, match=r"no column 'heigth_m'.*did you mean 'height_m'"):
         read(write(tmp_path), output="heigth_m")
 
 
@@ -195,7 +194,7 @@ def test_a_recording_cannot_be_changed_afterwards():
 
 
 def test_a_window_without_samples_says_where_the_recording_is():
-    with pytest.raises(dtm.RecordingError, match="0 samples.*from 0 to 9 s"):
+    with pytest.raises(dtm.RecordingError, match=r"0 samples.*from 0 to 9 s"):
         make().window(100, 200)
     with pytest.raises(dtm.RecordingError, match="earlier time first"):
         make().window(5, 2)

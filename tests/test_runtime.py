@@ -9,7 +9,6 @@ import threading
 import time
 
 import pytest
-
 from deadtime import _deadtime as native
 
 

@@ -5,7 +5,8 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
-#from deadtime._design import Design, design
+
+# from deadtime._design import Design, design
 from deadtime._errors import (
     ContourError,
     ConvergenceError,
@@ -42,7 +43,7 @@ __all__ = [
     "DeadtimeError",
     "DelayEstimate",
     "DerivativeFilter",
-#    "Design",
+    #    "Design",
     "FirstOrder",
     "Integrator",
     "NotIdentifiableError",
@@ -56,7 +57,7 @@ __all__ = [
     "Whiteness",
     "damping_ratio",
     "dde_roots",
-#    "design",
+    #    "design",
     "estimate_delay",
     "kit_plant",
     "lambertw",

@@ -178,7 +178,9 @@ def _template(controller: type[Controller] | Controller) -> Controller:
     if isinstance(controller, type) and issubclass(controller, Controller):
         names = inspect.signature(controller).parameters
         return controller(**{name: 1.0 for name in names if name.startswith("K")})
-    raise TypeError(f"controller={controller!r} is no controller: give PV, PD or PI, or one of them")
+    raise TypeError(
+        f"controller={controller!r} is no controller: give PV, PD or PI, or one of them"
+    )
 
 
 def _delays(loop: ControlLoop, delay: float | tuple[float, float] | None) -> tuple[float, ...]:
@@ -241,7 +243,9 @@ def _start(
     order = np.argsort(worst, axis=None, kind="stable")
     order = order[np.isfinite(worst.ravel()[order])]
     cells = [
-        np.array([axis[i] for axis, i in zip(axes, np.unravel_index(flat, worst.shape), strict=True)])
+        np.array(
+            [axis[i] for axis, i in zip(axes, np.unravel_index(flat, worst.shape), strict=True)]
+        )
         for flat in (order[:1] if cost is None else order[:: max(1, order.size // SIMULATED_CELLS)])
     ]
     return cells[0] if cost is None else min(cells, key=cost)

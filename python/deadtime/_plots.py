@@ -29,8 +29,8 @@ __all__ = [
     "plot_stability_map",
 ]
 
-DATA = {"color": "0.35", "lw": 0.9, "marker": ".", "ms": 3}
-REFERENCE = {"color": "0.6", "lw": 1.0, "ls": "--"}
+DATA: dict[str, Any] = {"color": "0.35", "lw": 0.9, "marker": ".", "ms": 3}
+REFERENCE: dict[str, Any] = {"color": "0.6", "lw": 1.0, "ls": "--"}
 COLOURS = ("#0b6fb8", "#d1481f", "#2f8f4e", "#8a4fbf")
 
 
@@ -108,7 +108,9 @@ def plot_root_set(ax: Axes, roots: RootSet) -> None:
     ax.plot(values.real, values.imag, "x", color=COLOURS[0], ms=7, mew=1.8)
     for root, multiplicity in zip(values, roots.multiplicities, strict=True):
         if multiplicity > 1:
-            ax.annotate(f"×{multiplicity}", (root.real, root.imag), (5, 5), textcoords="offset points")
+            ax.annotate(
+                f"×{multiplicity}", (root.real, root.imag), (5, 5), textcoords="offset points"
+            )
     ax.set(xlabel="Re s / (1/s)", ylabel="Im s / (rad/s)")
 
 

@@ -86,9 +86,7 @@ def estimate(
     as_json: opt.As_json = False,
 ) -> None:
     """Estimate the delay of a loop from a recording of its step response."""
-    recording = read_recording(
-        file, time=time, reference=reference, output=output, command=command
-    )
+    recording = read_recording(file, time=time, reference=reference, output=output, command=command)
     loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit)
     if method == "all":
         _estimate_all(recording, loop, window, plot, as_json)
@@ -180,9 +178,7 @@ def roots(
     if np.isfinite(chain):
         console.print(f"neutral: a chain of roots approaches Re s = {chain:.6g}", highlight=False)
     state = "stable" if loop.is_stable() else "unstable"
-    console.print(
-        f"spectral abscissa {loop.spectral_abscissa():.6g} 1/s: {state}", highlight=False
-    )
+    console.print(f"spectral abscissa {loop.spectral_abscissa():.6g} 1/s: {state}", highlight=False)
 
 
 def _roots_table(found: RootSet) -> Table:
@@ -324,7 +320,9 @@ def simulate(
     duration: Annotated[float, typer.Option(min=1e-6, help="How long, s.")] = 10.0,
     amplitude: Annotated[float, typer.Option(help="Size of the step.")] = 1.0,
     points: Annotated[int, typer.Option(min=2, max=10_000_000, help="Output times.")] = 501,
-    out: Annotated[Path | None, typer.Option(help="Write time, reference, output, command.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write time, reference, output, command.")
+    ] = None,
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
@@ -388,9 +386,7 @@ def report(
     as_json: opt.As_json = False,
 ) -> None:
     """Write one page about a recording: delay, map of gains, a controller to try."""
-    recording = read_recording(
-        file, time=time, reference=reference, output=output, command=command
-    )
+    recording = read_recording(file, time=time, reference=reference, output=output, command=command)
     loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit)
     with stages(5, quiet=as_json) as begin:
         found = study(recording, loop, window=window, progress=begin)

@@ -27,7 +27,7 @@ from scipy.optimize import brentq
 
 from deadtime._controllers import P
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.residuals import test_whiteness
+from deadtime._estimation.residuals import whiteness_of
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
 from deadtime._loop import ControlLoop
@@ -150,7 +150,7 @@ def _error(theta: float, x: float) -> float:
     """``e(θ)`` of the delayed exponential, summed from its largest terms down."""
     terms = []
     term_base = 1.0
-    for j in range(int(math.floor(theta)) + 2):
+    for j in range(math.floor(theta) + 2):
         if j > 0:
             term_base *= -x / j
         terms.append(term_base * (theta - j + 1.0) ** j)
@@ -184,7 +184,7 @@ def estimate_by_overshoot(
     stderr = slope * read.noise
     fitted = loop.replace(delay=delay)
     residuals = simulated.residuals({"delay": delay}, read.start)
-    whiteness = test_whiteness(residuals)
+    whiteness = whiteness_of(residuals)
     details = {"map": map, "overshoot": read.value, "overshoot_noise": read.noise}
     if 0.0 < read.value < 1.0:
         details["damping_ratio"] = damping_ratio(read.value)

@@ -1,4 +1,4 @@
-"""What the residuals of a fit say: are they white, and how uncertain is the fit if not?
+"""What the residuals of a fit say: whether they are white, and how uncertain the fit is if not.
 
 Least squares gives the covariance ``σ² (JᵀJ)⁻¹`` only for residuals that are white. Coloured
 ones (a model that is not quite the vehicle, sensor noise that circulates in the loop) carry
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-__all__ = ["Whiteness", "robust_covariance", "test_whiteness", "white_covariance"]
+__all__ = ["Whiteness", "robust_covariance", "white_covariance", "whiteness_of"]
 
 #: Residuals are called coloured when white ones would look so only this seldom.
 SIGNIFICANCE = 0.01
@@ -50,7 +50,7 @@ class Whiteness:
         return self.p_value > SIGNIFICANCE
 
 
-def test_whiteness(residuals: Array, parameters: int = 0) -> Whiteness:
+def whiteness_of(residuals: Array, parameters: int = 0) -> Whiteness:
     """Test residuals of a fit with so many `parameters` for whiteness.
 
     Residuals that vanish to rounding pass: there is nothing left in them.
@@ -67,14 +67,11 @@ def test_whiteness(residuals: Array, parameters: int = 0) -> Whiteness:
     return Whiteness(statistic, float(stats.chi2.sf(statistic, freedom)), lags, float(rho[0]))
 
 
-# pytest would take the function for a test of its own where it is imported
-test_whiteness.__test__ = False  # type: ignore[attr-defined]
-
-
 def white_covariance(jacobian: Array, residuals: Array) -> Array:
     """Covariance of the parameters for white residuals, ``σ² (JᵀJ)⁻¹``."""
     n, k = jacobian.shape
-    return float(residuals @ residuals) / (n - k) * _inverse_information(jacobian)
+    variance = float(residuals @ residuals) / (n - k)
+    return np.asarray(variance * _inverse_information(jacobian))
 
 
 def robust_covariance(jacobian: Array, residuals: Array) -> Array:
@@ -88,7 +85,7 @@ def robust_covariance(jacobian: Array, residuals: Array) -> Array:
         spread += (1.0 - lag / (bandwidth + 1)) * (product + product.T)
     bread = _inverse_information(jacobian)
     # n/(n-k): the small-sample factor that makes the white case agree with the usual estimate
-    return bread @ spread @ bread * (n / (n - k))
+    return np.asarray(bread @ spread @ bread * (n / (n - k)))
 
 
 def _bandwidth(residuals: Array) -> int:
@@ -107,4 +104,4 @@ def _inverse_information(jacobian: Array) -> Array:
     scale[scale == 0.0] = 1.0
     r = np.linalg.qr(jacobian / scale, mode="r")
     inverse = np.linalg.inv(r)
-    return (inverse @ inverse.T) / np.outer(scale, scale)
+    return np.asarray((inverse @ inverse.T) / np.outer(scale, scale))

@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import least_squares
 
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.residuals import robust_covariance, test_whiteness, white_covariance
+from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime._estimation.result import CramerRaoBound, DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
 from deadtime._loop import ControlLoop
@@ -65,13 +66,13 @@ def estimate_by_waveform(
     _check_excitation(data, len(names))
     problem = _Problem(simulated, names)
     solution = problem.solve()
-    jacobian, residuals = solution.jac, -solution.fun
-    values = dict(zip(names, (float(value) for value in solution.x), strict=False))
+    jacobian, residuals = solution.jacobian, -solution.misfit
+    values = dict(zip(names, (float(value) for value in solution.parameters), strict=False))
 
     held = [name for name in names if name != "gain" and values[name] <= 1e-9]
     loose = [i for i, name in enumerate((*names, "start")) if name not in held]
     _check_distinguishable(jacobian[:, loose], [(*names, "initial output")[i] for i in loose])
-    whiteness = test_whiteness(residuals, len(names))
+    whiteness = whiteness_of(residuals, len(names))
     exact = float(np.max(np.abs(residuals))) <= 1e-9 * float(np.ptp(data.output))
     adequate = (whiteness.white or exact) and not held
     white = _embed(white_covariance(jacobian[:, loose], residuals), loose, jacobian.shape[1])
@@ -80,7 +81,7 @@ def estimate_by_waveform(
         robust = robust_covariance(jacobian[:, loose], residuals)
         spread = _embed(robust, loose, jacobian.shape[1])
     count = len(names)
-    noise = float(np.sqrt(residuals @ residuals / (residuals.size - solution.x.size)))
+    noise = float(np.sqrt(residuals @ residuals / (residuals.size - solution.parameters.size)))
     return DelayEstimate(
         method="waveform",
         loop=loop.replace(**values),
@@ -93,8 +94,21 @@ def estimate_by_waveform(
         whiteness=whiteness,
         adequate=adequate,
         message=_message(names, held, adequate),
-        details={"initial_output": float(solution.x[count])},
+        details={"initial_output": float(solution.parameters[count])},
     )
+
+
+@dataclass(frozen=True)
+class _Minimum:
+    """Where a search ended: parameters, misfit (simulated minus recorded), its derivatives."""
+
+    parameters: Array
+    misfit: Array
+    jacobian: Array
+
+    @property
+    def cost(self) -> float:
+        return float(self.misfit @ self.misfit)
 
 
 class _Problem:
@@ -119,11 +133,11 @@ class _Problem:
             return np.full(len(self.simulated.recording), bound)
         return np.clip(output - self.simulated.recording.output, -bound, bound)
 
-    def solve(self) -> OptimizeResult:
+    def solve(self) -> _Minimum:
         """The best minimum reached from the best points of a grid."""
         points = [np.array([*point, self.start]) for point in itertools.product(*self._grid())]
         costs = [float(np.sum(self.residuals(point) ** 2)) for point in points]
-        best: OptimizeResult | None = None
+        best: _Minimum | None = None
         for index in np.argsort(costs)[:REFINED]:
             solution = self._refine(points[int(index)])
             if best is None or solution.cost < best.cost:
@@ -131,22 +145,20 @@ class _Problem:
         assert best is not None
         return self._without_vanishing_lag(best)
 
-    def _without_vanishing_lag(self, found: OptimizeResult) -> OptimizeResult:
+    def _without_vanishing_lag(self, found: _Minimum) -> _Minimum:
         """Put a lag at zero that is there for rounding's sake only.
 
         A small lag delays like a delay, to first order exactly so; next to zero the two cannot
         be told apart, and the search stops wherever it entered that valley.
         """
-        if "lag" not in self.names or found.x[self.names.index("lag")] == 0.0:
+        if "lag" not in self.names or found.parameters[self.names.index("lag")] == 0.0:
             return found
         delay, lag = self.names.index("delay"), self.names.index("lag")
-        moved = found.x.copy()
+        moved = found.parameters.copy()
         moved[delay] += moved[lag]
         moved[lag] = 0.0
-        residuals = self.residuals(moved)
-        if 0.5 * float(residuals @ residuals) <= found.cost * (1.0 + VANISHING):
-            found.x, found.fun = moved, residuals
-        return found
+        shifted = replace(found, parameters=moved, misfit=self.residuals(moved))
+        return shifted if shifted.cost <= found.cost * (1.0 + VANISHING) else found
 
     def _grid(self) -> list[Array]:
         plant = self.simulated.loop.parameters
@@ -157,7 +169,7 @@ class _Problem:
         }
         return [grids[name] for name in self.names]
 
-    def _refine(self, start: Array) -> OptimizeResult:
+    def _refine(self, start: Array) -> _Minimum:
         gain = self.simulated.loop.parameters.get("gain", 1.0)
         ends = {
             "delay": (0.0, self.span),
@@ -167,7 +179,7 @@ class _Problem:
         low = [ends[name][0] for name in self.names] + [-np.inf]
         high = [ends[name][1] for name in self.names] + [np.inf]
         scale = {"delay": 0.1 * self.span, "gain": abs(gain), "lag": 0.1 * self.span}
-        return least_squares(
+        found = least_squares(
             self.residuals,
             start,
             bounds=(low, high),
@@ -178,6 +190,7 @@ class _Problem:
             gtol=1e-14,
             max_nfev=200,
         )
+        return _Minimum(found.x, found.fun, found.jac)
 
 
 def _checked(free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ def read_recording(
     window: tuple[float | None, float | None] | None = None,
     delimiter: str | None = None,
 ) -> Recording:
-    """Read a recording from a CSV file with a header line.
+    r"""Read a recording from a CSV file with a header line.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def read_recording(
     >>> import deadtime as dtm, pathlib, tempfile
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "flight.csv"
     >>> rows = [f"{k / 10},{int(k > 4)},{max(0, k - 6) / 10}" for k in range(20)]
-    >>> _ = file.write_text("t_s,ref_m,height_m\\n" + "\\n".join(rows))
+    >>> _ = file.write_text("t_s,ref_m,height_m\n" + "\n".join(rows))
     >>> flight = dtm.read_recording(file, time="t_s", reference="ref_m", output="height_m")
     >>> len(flight), flight.sample_time
     (20, 0.1)
@@ -87,7 +87,13 @@ def read_recording(
             if signal != "time":
                 columns[signal].append(_value(path, number, cells, place, names[signal]))
     try:
-        recording = Recording(**columns, source=path.name)
+        recording = Recording(
+            columns["time"],
+            columns["reference"],
+            columns["output"],
+            columns.get("command"),
+            source=path.name,
+        )
     except RecordingError as error:
         where = "" if window is None else f" in the window {window} s"
         raise RecordingError(f"{path}{where}: {error}") from None
