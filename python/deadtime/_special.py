@@ -141,9 +141,9 @@ def dde_roots(
     Proportional control of an integrator, gain 2/s, delay 0.36 s:
 
     >>> import deadtime as dtm
-    >>> s = dtm.dde_roots(0.0, -2.0, 0.36, [0, -1, 1, -2])
-    >>> s.round(4)
-    array([-0.7949+3.2992j, -0.7949-3.2992j, -6.8103+20.7018j, -6.8103-20.7018j])
+    >>> dtm.dde_roots(0.0, -2.0, 0.36, [0, -1, 1, -2]).round(4)
+    array([-1.5154 +3.1005j, -1.5154 -3.1005j, -6.6601+20.9621j,
+           -6.6601-20.9621j])
     """
     own, delayed = _numbers("a0", a0, np.float64), _numbers("a1", a1, np.float64)
     lag = _numbers("delay", delay, np.float64)
@@ -152,12 +152,19 @@ def dde_roots(
         _refuse(values, ~np.isfinite(values), f"{name} must be finite")
     _refuse(lag, lag < 0, "delay must not be negative")
     shape = _common_shape(a0=own, a1=delayed, delay=lag, k=branches)
-    arguments = [
-        _native(a if a.size == 1 else np.broadcast_to(a, shape), np.float64)
-        for a in (own, delayed, lag)
-    ]
-    branches = _native(np.broadcast_to(branches, shape), np.int64)
-    return _deadtime.dde_roots(*arguments, branches, threads)[()]
+    s = _deadtime.dde_roots(
+        _one_or_all(own, shape),
+        _one_or_all(delayed, shape),
+        _one_or_all(lag, shape),
+        _native(np.broadcast_to(branches, shape), np.int64),
+        threads,
+    )
+    return s[()]
+
+
+def _one_or_all(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Broadcast, except a single value, which the native code repeats."""
+    return _native(values if values.size == 1 else np.broadcast_to(values, shape), np.float64)
 
 
 def _native(values: NDArray[Any], dtype: type) -> NDArray[Any]:
