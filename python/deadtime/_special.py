@@ -75,8 +75,8 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
     narrow = points.dtype == np.complex64
     shape = _common_shape(z=points, k=branches)
     w = _deadtime.lambertw(
-        _native(np.broadcast_to(points, shape), np.complex128),
-        branches if branches.size == 1 else _native(np.broadcast_to(branches, shape), np.int64),
+        _native(_spread(points, shape), np.complex128),
+        branches if branches.size == 1 else _spread(branches, shape),
         threads,
     )
     return (w.astype(np.complex64) if narrow else w)[()]
@@ -156,7 +156,7 @@ def dde_roots(
         _one_or_all(own, shape),
         _one_or_all(delayed, shape),
         _one_or_all(lag, shape),
-        _native(np.broadcast_to(branches, shape), np.int64),
+        _spread(branches, shape),
         threads,
     )
     return s[()]
@@ -164,11 +164,17 @@ def dde_roots(
 
 def _one_or_all(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Broadcast, except a single value, which the native code repeats."""
-    return _native(values if values.size == 1 else np.broadcast_to(values, shape), np.float64)
+    return _native(values if values.size == 1 else _spread(values, shape), np.float64)
+
+
+def _spread(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    return values if values.shape == shape else np.broadcast_to(values, shape)
 
 
 def _native(values: NDArray[Any], dtype: type) -> NDArray[Any]:
     """Values as the native code reads them: aligned, machine byte order, `dtype`."""
+    if values.dtype == dtype and values.flags.aligned:
+        return values
     return np.require(values, dtype, "A")
 
 
@@ -202,8 +208,11 @@ def _largest(array: NDArray[Any]) -> int:
 
 
 def _common_shape(**arrays: NDArray[Any]) -> tuple[int, ...]:
+    present = [array.shape for array in arrays.values()]
+    if present.count(present[0]) == len(present):
+        return present[0]
     try:
-        return np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        return np.broadcast_shapes(*present)
     except ValueError:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ValueError(f"shapes do not broadcast: {shapes}") from None
