@@ -6,6 +6,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["dde_roots", "lambertw", "spin", "thread_count"]
+
 def thread_count(threads: int | None = None) -> int: ...
 def spin(
     seconds: float, threads: int | None = None, progress: Callable[[int], object] | None = None

@@ -75,8 +75,8 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
     narrow = points.dtype == np.complex64
     shape = _common_shape(z=points, k=branches)
     w = _deadtime.lambertw(
-        _native(np.broadcast_to(points, shape), np.complex128),
-        branches if branches.size == 1 else _native(np.broadcast_to(branches, shape), np.int64),
+        _native(_spread(points, shape), np.complex128),
+        branches if branches.size == 1 else _spread(branches, shape),
         threads,
     )
     return (w.astype(np.complex64) if narrow else w)[()]
@@ -141,9 +141,9 @@ def dde_roots(
     Proportional control of an integrator, gain 2/s, delay 0.36 s:
 
     >>> import deadtime as dtm
-    >>> s = dtm.dde_roots(0.0, -2.0, 0.36, [0, -1, 1, -2])
-    >>> s.round(4)
-    array([-0.7949+3.2992j, -0.7949-3.2992j, -6.8103+20.7018j, -6.8103-20.7018j])
+    >>> dtm.dde_roots(0.0, -2.0, 0.36, [0, -1, 1, -2]).round(4)
+    array([-1.5154 +3.1005j, -1.5154 -3.1005j, -6.6601+20.9621j,
+           -6.6601-20.9621j])
     """
     own, delayed = _numbers("a0", a0, np.float64), _numbers("a1", a1, np.float64)
     lag = _numbers("delay", delay, np.float64)
@@ -152,16 +152,29 @@ def dde_roots(
         _refuse(values, ~np.isfinite(values), f"{name} must be finite")
     _refuse(lag, lag < 0, "delay must not be negative")
     shape = _common_shape(a0=own, a1=delayed, delay=lag, k=branches)
-    arguments = [
-        _native(a if a.size == 1 else np.broadcast_to(a, shape), np.float64)
-        for a in (own, delayed, lag)
-    ]
-    branches = _native(np.broadcast_to(branches, shape), np.int64)
-    return _deadtime.dde_roots(*arguments, branches, threads)[()]
+    s = _deadtime.dde_roots(
+        _one_or_all(own, shape),
+        _one_or_all(delayed, shape),
+        _one_or_all(lag, shape),
+        _spread(branches, shape),
+        threads,
+    )
+    return s[()]
+
+
+def _one_or_all(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Broadcast, except a single value, which the native code repeats."""
+    return _native(values if values.size == 1 else _spread(values, shape), np.float64)
+
+
+def _spread(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    return values if values.shape == shape else np.broadcast_to(values, shape)
 
 
 def _native(values: NDArray[Any], dtype: type) -> NDArray[Any]:
     """Values as the native code reads them: aligned, machine byte order, `dtype`."""
+    if values.dtype == dtype and values.flags.aligned:
+        return values
     return np.require(values, dtype, "A")
 
 
@@ -195,8 +208,11 @@ def _largest(array: NDArray[Any]) -> int:
 
 
 def _common_shape(**arrays: NDArray[Any]) -> tuple[int, ...]:
+    present = [array.shape for array in arrays.values()]
+    if present.count(present[0]) == len(present):
+        return present[0]
     try:
-        return np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        return np.broadcast_shapes(*present)
     except ValueError:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ValueError(f"shapes do not broadcast: {shapes}") from None

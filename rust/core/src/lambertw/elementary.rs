@@ -130,3 +130,45 @@ pub(super) fn cos_sin(b: f64) -> (TwoWord, TwoWord) {
 pub(super) fn power_of_two(n: i32) -> f64 {
     f64::from_bits(((n.clamp(-1022, 1023) + 1023) as u64) << 52)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const BOUND: f64 = 1.0 / (1_u64 << 63) as f64;
+
+    proptest! {
+        #[test]
+        fn exponentials_of_opposite_arguments_multiply_to_one(a in -2000.0..2000.0_f64) {
+            let ((p, up), (q, down)) = (exp(a, 0.0), exp(-a, 0.0));
+            let one = p.times(q).scaled(power_of_two(up + down));
+            prop_assert!(((one.hi - 1.0) + one.lo).abs() < BOUND);
+            prop_assert!((0.7..1.42).contains(&p.hi));
+        }
+
+        #[test]
+        fn the_second_word_of_the_argument_counts(a in -10.0..10.0_f64, low in -1e-17..1e-17_f64) {
+            let ((p, n), (q, m)) = (exp(a, low), exp(a, 0.0));
+            prop_assert_eq!(n, m);
+            let change = ((p.hi - q.hi) + (p.lo - q.lo)) / q.hi;
+            prop_assert!((change - low).abs() < BOUND);
+        }
+
+        #[test]
+        fn the_squares_of_cosine_and_sine_add_to_one(b in -8e6..8e6_f64) {
+            let (c, s) = cos_sin(b);
+            let one = c.times(c).plus(s.times(s));
+            prop_assert!(((one.hi - 1.0) + one.lo).abs() < BOUND);
+        }
+
+        #[test]
+        fn first_words_agree_with_the_library(a in -700.0..700.0_f64, b in -1e3..1e3_f64) {
+            let (factor, n) = exp(a, 0.0);
+            let near = |x: f64, y: f64| (x - y).abs() <= 2.0 * f64::EPSILON * y.abs();
+            prop_assert!(near(factor.hi * power_of_two(n), libm::exp(a)));
+            let (c, s) = cos_sin(b);
+            prop_assert!(near(c.hi, libm::cos(b)) && near(s.hi, libm::sin(b)));
+        }
+    }
+}

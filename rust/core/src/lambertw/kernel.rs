@@ -77,3 +77,88 @@ fn upper(z: Complex64, k: u64) -> Complex64 {
     let w = Complex64::new(start.re, start.im.abs());
     w + correction(w, residual(Scaled::new(z), w))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Numbers where something happens: any exponent, next to -1/e, on the axes.
+    fn troublesome() -> impl Strategy<Value = Complex64> {
+        let anywhere = (-1070.0..1020.0_f64, -4.0..4.0_f64)
+            .prop_map(|(power, angle)| Complex64::from_polar(power.exp2(), angle));
+        let near_branch_point = (-54.0..1.0_f64, -4.0..4.0_f64)
+            .prop_map(|(power, angle)| Complex64::from_polar(power.exp2(), angle) - INVERSE_E);
+        let on_axes = (-60.0..60.0_f64, 0..4_u8, any::<bool>()).prop_map(|(power, axis, side)| {
+            let (length, zero) = (power.exp2(), if side { 0.0 } else { -0.0 });
+            match axis {
+                0 => Complex64::new(length, zero),
+                1 => Complex64::new(-length, zero),
+                2 => Complex64::new(zero, length),
+                _ => Complex64::new(zero, -length),
+            }
+        });
+        prop_oneof![anywhere, near_branch_point, on_axes]
+    }
+
+    fn branch() -> impl Strategy<Value = i64> {
+        prop_oneof![
+            -2..3_i64,
+            -1000..1000_i64,
+            -(1_i64 << 21)..(1_i64 << 21),
+            any::<i64>()
+        ]
+    }
+
+    fn bits(w: Complex64) -> (u64, u64) {
+        (w.re.to_bits(), w.im.to_bits())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4096))]
+
+        #[test]
+        fn conjugates_belong_together(z in troublesome(), k in branch()) {
+            prop_assume!(k != i64::MIN);
+            prop_assert_eq!(bits(lambertw(z.conj(), -k)), bits(lambertw(z, k).conj()));
+        }
+
+        #[test]
+        fn the_branch_is_the_one_asked_for(z in troublesome(), k in branch()) {
+            let w = lambertw(z, k);
+            prop_assume!(w != Complex64::ZERO);
+            let angle = |z: Complex64| libm::atan2(z.im, z.re);
+            let turns = (w.im + angle(w) - angle(z)) / TAU;
+            // Rounding of w, and of the angle where 1 + w nearly vanishes.
+            prop_assert!((turns - k as f64).abs() <= 1e-7 + 1e-15 * turns.abs(), "{w} {turns}");
+        }
+
+        #[test]
+        fn it_solves_its_equation(z in troublesome(), k in -1000..1000_i64) {
+            let w = lambertw(z, k);
+            prop_assume!(w.norm() > 1e-300);
+            let lost = residual(Scaled::new(z), w).norm() / w.norm();
+            // Half an ulp of w moves w e^w by |1 + w| times as much; the residual itself is
+            // good to 2^-64.
+            let allowed = 0.51 * f64::EPSILON * (1.0 + w).norm() + 1.0 / (1_u64 << 62) as f64;
+            prop_assert!(lost <= allowed, "{w} {lost:e}");
+        }
+    }
+
+    #[test]
+    fn rational_and_series_meet_without_a_step() {
+        for distance in [SERIES_ANSWERS, SERIES_STARTS, BEHIND_RADIUS] {
+            for k in [-1, 0, 1] {
+                for side in [0.0, -0.0] {
+                    let at = |d: f64| lambertw(Complex64::new(d - INVERSE_E, side), k);
+                    let (below, above) =
+                        (at(distance * (1.0 - 1e-13)), at(distance * (1.0 + 1e-13)));
+                    assert!((below - above).norm() < 1e-12);
+                }
+            }
+        }
+    }
+}
