@@ -190,7 +190,7 @@ class _Problem:
             gtol=1e-14,
             max_nfev=200,
         )
-        return _Minimum(found.x, found.fun, found.jac)
+        return _Minimum(found.x, found.fun, np.asarray(found.jac))
 
 
 def _checked(free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:

@@ -120,10 +120,11 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
     let threads = wanted(threads)?;
     let process = std::process::id();
     let current = POOL.load_full();
-    if let Some(pool) = &current {
-        if pool.process == process && pool.threads == threads {
-            return Ok(Arc::clone(pool));
-        }
+    if let Some(pool) = &current
+        && pool.process == process
+        && pool.threads == threads
+    {
+        return Ok(Arc::clone(pool));
     }
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
