@@ -24,9 +24,11 @@ from deadtime._estimation import (
 )
 from deadtime._loop import ControlLoop
 from deadtime._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
+from deadtime._quasipolynomial import QuasiPolynomial, delay, s
 from deadtime._readers import read_recording
 from deadtime._recording import Recording, Step
 from deadtime._response import Response
+from deadtime._rootset import RootSet
 from deadtime._special import dde_roots, lambertw
 
 __all__ = [
@@ -49,17 +51,21 @@ __all__ = [
     "NotIdentifiableError",
     "P",
     "Plant",
+    "QuasiPolynomial",
     "RationalPlant",
     "Recording",
     "RecordingError",
     "Response",
+    "RootSet",
     "Step",
     "Whiteness",
     "damping_ratio",
     "dde_roots",
-    #    "design",
+    #    "delay",
+    "design",
     "estimate_delay",
     "kit_plant",
     "lambertw",
     "read_recording",
+    "s",
 ]
