@@ -6,7 +6,6 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 
-# from deadtime._design import Design, design
 from deadtime._errors import (
     ContourError,
     ConvergenceError,
@@ -62,7 +61,6 @@ __all__ = [
     "damping_ratio",
     "dde_roots",
     #    "delay",
-    "design",
     "estimate_delay",
     "kit_plant",
     "lambertw",
