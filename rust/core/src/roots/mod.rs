@@ -1,1 +1,28 @@
-//! (room roots)
+//! Characteristic roots: counted, located, each with a proof.
+//!
+//! `winding` proves how arg h turns along a line; `cell` builds rectangles with counts from it,
+//! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
+//! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains;
+//! `bounds` says where roots cannot be. All proofs take exp, sin and cos of the `libm` crate to
+//! be right within 2 ulp.
+
+mod bounds;
+mod cell;
+mod count;
+mod isolate;
+mod neutral;
+mod newton;
+mod real;
+mod region;
+mod rightmost;
+mod set;
+mod winding;
+
+pub use count::{count, count_right_of};
+pub use neutral::{chain_abscissa, is_chain_strongly_stable};
+pub use region::Region;
+pub use rightmost::{rightmost, spectral_abscissa};
+pub use set::{RootSet, roots};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,195 @@
+//! Where roots cannot be: proved bounds that close the open sides of a region.
+//!
+//! 1. Let n be the highest degree and c a row of that degree. On the strip a ≤ Re s ≤ b,
+//!    |e^(−s(τ_j−τ_c))| ≤ w_j, the larger of its values on the two edges. Where
+//!    |s|ⁿ (|b_cn| − Σ w_j |b_jn|) > Σ_{k<n} |s|ᵏ Σ_j w_j |b_jk| the leading term of row c exceeds
+//!    all the others together. Both sides divided by |s|ⁿ, this holds beyond a radius if the
+//!    bracket is positive (Cauchy's bound with weights). For b = ∞ it is the condition that the
+//!    line Re s = a lies right of the chains; where it fails, nothing is said.
+//! 2. In a strip |Im s| ≤ H, the first row exceeds the others far to the right whatever the
+//!    kind, since each of them carries an e^(−x d). Far to the left: the same for h(−s).
+//!
+//! Inequalities are tested with a relative margin that covers their rounding.
+
+use crate::quasipoly::QuasiPolynomial;
+
+/// What an inequality must be fulfilled by, relative to its larger side.
+const MARGIN: f64 = 1e-9;
+
+/// The leading term that exceeds all others together outside a disc.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Dominance {
+    /// Index of the row.
+    pub(super) row: usize,
+    /// Its exceeds all others where |s| is at least this.
+    pub(super) radius: f64,
+}
+
+/// Bound 1 on the strip `re`; `None` where no single term dominates.
+pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
+    let degree = h.degree();
+    let leading = |row: &[f64]| row.get(degree).copied().unwrap_or(0.0).abs();
+    let mut best: Option<Dominance> = None;
+    for (index, (own_row, own_delay)) in h.terms().enumerate() {
+        let own = leading(own_row);
+        if own == 0.0 {
+            continue;
+        }
+        let mut others = vec![0.0; degree + 1];
+        for (row, delay) in h.terms() {
+            let gap = delay - own_delay;
+            let weight = if gap == 0.0 {
+                1.0
+            } else {
+                let edge = if gap > 0.0 { re.0 } else { re.1 };
+                libm::exp(-gap * edge) * (1.0 + MARGIN)
+            };
+            for (total, c) in others.iter_mut().zip(row).filter(|(_, c)| **c != 0.0) {
+                *total += weight * c.abs();
+            }
+        }
+        let rest: f64 = others.pop().map_or(0.0, |sum| (sum - own) * (1.0 + MARGIN));
+        let rest = rest.max(0.0) + MARGIN * own;
+        if own > rest {
+            let radius = cauchy_radius(own - rest, &others);
+            if radius.is_finite() && best.is_none_or(|b| radius < b.radius) {
+                best = Some(Dominance { row: index, radius });
+            }
+        }
+    }
+    best
+}
+
+/// A radius beyond which `top` rⁿ > Σ `lower`_k rᵏ, within a percent of the least one.
+fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
+    let degree = lower.len() as f64;
+    // Fujiwara 1916: twice the largest of the n-th roots is a bound.
+    let outer = lower
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| **c > 0.0)
+        .map(|(k, c)| 2.0 * libm::pow(c / top, 1.0 / (degree - k as f64)))
+        .fold(0.0, f64::max);
+    let exceeds = |r: f64| {
+        let others = lower.iter().fold(0.0, |sum, c| (sum + c) / r);
+        others * (1.0 + MARGIN) < top
+    };
+    if outer == 0.0 {
+        return 0.0;
+    }
+    let mut low = outer / (2.0 * degree.max(1.0)) * 0.5;
+    let mut high = outer * (1.0 + 1e-6);
+    if !exceeds(high) {
+        // The coefficients span more than double precision does.
+        return f64::INFINITY;
+    }
+    while high > 1.01 * low {
+        let middle = libm::sqrt(low * high);
+        if exceeds(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
+
+/// Bound 2: no root with |Im s| ≤ `height` has a real part of this or more.
+pub(super) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
+    let mut terms = h.terms();
+    let Some((first, own_delay)) = terms.next() else {
+        return f64::INFINITY;
+    };
+    let own_degree = first.len().saturating_sub(1) as f64;
+    let own = first.last().copied().unwrap_or(0.0).abs();
+    let others: Vec<(&[f64], f64)> = terms.map(|(row, tau)| (row, tau - own_delay)).collect();
+    // From here on every summand below falls with x.
+    let falling = others
+        .iter()
+        .map(|(row, gap)| ((row.len() as f64 - 1.0 - own_degree) / gap).max(0.0))
+        .fold(0.0, f64::max);
+    let holds = |x: f64| {
+        let stretch = libm::sqrt(1.0 + (height / x) * (height / x));
+        let summand = |k: usize, c: f64, modulus: f64| {
+            // In logarithms, since high powers of x overflow where the exponential is small.
+            c.abs() * libm::exp(k as f64 * libm::log(modulus) - own_degree * libm::log(x))
+        };
+        let lower = first.iter().rev().skip(1).rev().enumerate();
+        let mut sum: f64 = lower.map(|(k, c)| summand(k, *c, x * stretch)).sum();
+        for (row, gap) in &others {
+            for (k, c) in row.iter().enumerate().filter(|(_, c)| **c != 0.0) {
+                let exponent =
+                    k as f64 * libm::log(x * stretch) - own_degree * libm::log(x) - gap * x;
+                sum += c.abs() * libm::exp(exponent);
+            }
+        }
+        sum * (1.0 + MARGIN) < own
+    };
+    let mut x = falling.max(1e-6);
+    while !holds(x) && x < 1e150 {
+        x *= 2.0;
+    }
+    if x < 1e150 { x } else { f64::INFINITY }
+}
+
+/// Bound 2 on the other side: no root with |Im s| ≤ `height` has a real part of this or less.
+pub(super) fn left_edge(h: &QuasiPolynomial, height: f64) -> f64 {
+    let last = h.delays().last().copied().unwrap_or(0.0);
+    let alternate = |row: &[f64]| {
+        row.iter()
+            .enumerate()
+            .map(|(k, c)| if k % 2 == 0 { *c } else { -c })
+            .collect()
+    };
+    let (rows, delays) = h
+        .terms()
+        .map(|(row, tau)| (alternate(row), last - tau))
+        .unzip();
+    QuasiPolynomial::new(rows, delays).map_or(f64::NEG_INFINITY, |h| -right_edge(&h, height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_complex::Complex64;
+
+    fn make(rows: &[&[f64]], delays: &[f64]) -> QuasiPolynomial {
+        QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec())
+            .unwrap_or_else(|_| QuasiPolynomial::zero())
+    }
+
+    #[test]
+    fn the_radius_is_close_to_the_least_one() {
+        let h = make(&[&[0.0, 1.0], &[2.0]], &[0.0, 1.0]);
+        let radius = dominance(&h, (0.0, f64::INFINITY)).map(|d| d.radius);
+        assert!(radius.is_some_and(|r| (2.0..2.03).contains(&r)));
+        assert!(dominance(&h, (f64::NEG_INFINITY, 0.0)).is_none());
+    }
+
+    #[test]
+    fn neutral_lines_need_to_be_clear_of_the_chain() {
+        let h = make(&[&[0.0, 1.0], &[2.0, 0.3]], &[0.0, 0.36]);
+        let chain = 0.3f64.ln() / 0.36;
+        assert!(dominance(&h, (chain - 1e-6, f64::INFINITY)).is_none());
+        assert_eq!(
+            dominance(&h, (chain + 1e-3, f64::INFINITY)).map(|d| d.row),
+            Some(0)
+        );
+        // Left of the chain the delayed term leads.
+        assert_eq!(
+            dominance(&h, (f64::NEG_INFINITY, chain - 1e-3)).map(|d| d.row),
+            Some(1)
+        );
+    }
+
+    #[test]
+    fn no_root_lies_beyond_the_edges_of_a_strip() {
+        let h = make(&[&[1.0], &[0.0, 0.0, 1.0]], &[0.0, 0.5]);
+        let (left, right) = (left_edge(&h, 10.0), right_edge(&h, 10.0));
+        assert!(left < 0.0 && right > 0.0 && right.is_finite() && left.is_finite());
+        for x in [right, 2.0 * right, 10.0 * right] {
+            let g = h.value(Complex64::new(x, 7.0));
+            assert!((g - 1.0).norm() < 1.0);
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! Proved numbers of roots in rectangles and half planes.
+//!
+//! Half planes: with R such that one leading term a sⁿ e^(−sτ) exceeds all others together where
+//! Re s ≥ σ and |s| ≥ R, no root lies beyond R, and along the arc |s| = R arg h follows that of
+//! the leading term, up to the principal argument of their quotient. Only the chord Re s = σ is
+//! walked, and of that, coefficients being real, only the upper half.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex64;
+
+use super::bounds::{self, Dominance};
+use super::cell::Cell;
+use super::neutral::chain_abscissa;
+use super::real::count_real;
+use super::region::Region;
+use super::winding::{Turn, Walker, is_clear};
+use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
+use crate::{Error, Task};
+
+/// Coefficients are not scaled down to less than two to this power.
+const LOWEST_EXPONENT: i32 = -1000;
+
+/// The function with its coefficients scaled by a power of two, to a largest one between 1 and 2
+/// unless that would make the smallest one underflow: roots stay exactly what they are.
+///
+/// # Errors
+/// [`Error::Argument`] for the zero function.
+pub(super) fn prepared(h: &QuasiPolynomial) -> Result<QuasiPolynomial, Error> {
+    let sizes = || {
+        h.coefficients()
+            .iter()
+            .flatten()
+            .map(|c| c.abs())
+            .filter(|c| *c > 0.0)
+    };
+    let (smallest, largest) = sizes().fold((f64::INFINITY, 0.0f64), |(low, high), c| {
+        (low.min(c), high.max(c))
+    });
+    if largest == 0.0 {
+        return Err(Error::argument(
+            "the zero function: every s is a root, there is nothing to count",
+        ));
+    }
+    let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
+    // In two steps: 2^1074 itself overflows.
+    let half = shift / 2;
+    h.scale(libm::ldexp(1.0, half))?
+        .scale(libm::ldexp(1.0, shift - half))
+}
+
+/// A region with its open sides closed by proved bounds, in the upper half plane as far as
+/// symmetry allows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Closed {
+    pub(super) re: (f64, f64),
+    /// Height of the part that is symmetric about the real axis, if any.
+    pub(super) symmetric: Option<f64>,
+    /// Imaginary parts of what lies above it, if anything.
+    pub(super) above: Option<(f64, f64)>,
+    /// Is the lower edge the real axis? Roots below it do not belong to the region then.
+    pub(super) half: bool,
+    /// Was the region mirrored at the real axis to bring it here?
+    pub(super) mirrored: bool,
+}
+
+/// Close the open sides of `region`; `None` when it is empty of roots for sure.
+///
+/// # Errors
+/// [`Error::Argument`] for a bad region, or one that cannot be shown to hold finitely many roots.
+pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Closed>, Error> {
+    region.check()?;
+    let mirrored = region.im.1 + region.im.0 < 0.0;
+    let Region { mut re, mut im } = if mirrored { region.mirrored() } else { *region };
+    if im.0.is_infinite() || im.1.is_infinite() {
+        let radius = bounds::dominance(h, re)
+            .map(|d| d.radius)
+            .ok_or_else(|| endless(h, re))?;
+        // A little beyond, so that the edge itself is clear.
+        let radius = 1.01 * radius.max(1e-100);
+        im = (im.0.max(-radius), im.1.min(radius));
+        re = (re.0.max(-radius), re.1.min(radius));
+    }
+    let height = im.0.abs().max(im.1.abs());
+    if re.1.is_infinite() {
+        re.1 = bounds::right_edge(h, height);
+    }
+    if re.0.is_infinite() {
+        re.0 = bounds::left_edge(h, height);
+    }
+    if !(re.0.is_finite() && re.1.is_finite()) {
+        return Err(Error::argument(
+            "no bound for the roots within the open side was found in double precision: close \
+             the region",
+        ));
+    }
+    if re.0 >= re.1 || im.0 >= im.1 {
+        return Ok(None);
+    }
+    let symmetric = (im.0 <= 0.0).then_some(if im.0 == 0.0 { im.1 } else { -im.0 });
+    let above = match symmetric {
+        None => Some(im),
+        Some(height) => (height < im.1).then_some((height, im.1)),
+    };
+    Ok(Some(Closed {
+        re,
+        symmetric,
+        above,
+        half: im.0 == 0.0,
+        mirrored,
+    }))
+}
+
+fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
+    let reason = match h.kind() {
+        Kind::Polynomial => "its coefficients span more than double precision holds".to_owned(),
+        Kind::Retarded => format!(
+            "the real part is open to the left or reaches far left ({})",
+            re.0
+        ),
+        Kind::Neutral | Kind::Difference => {
+            format!(
+                "a chain of roots lies at or left of Re s = {:.6}",
+                chain_abscissa(h)
+            )
+        }
+        Kind::Advanced => "the equation is advanced".to_owned(),
+    };
+    Error::argument(format!(
+        "the region re=({}, {}) with an open imaginary part holds infinitely many roots, or cannot \
+         be shown to hold finitely many: {reason}; give both ends of im, or move re",
+        re.0, re.1
+    ))
+}
+
+/// The number of roots in a region, counted with their multiplicity.
+///
+/// Open sides are closed by proved bounds. Roots on the real axis belong to a region whose lower
+/// (or upper) edge it is.
+///
+/// # Errors
+/// [`Error::Argument`] for the zero function, a bad region, or one that holds infinitely many
+/// roots; [`Error::Contour`] where a root lies on the edge or too close to it to tell the side;
+/// [`Error::TooMuch`]; [`Error::Interrupted`].
+///
+/// ```
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Region, count}};
+/// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![1.0]], vec![0.0, 1.0])?;
+/// let region = Region::new((-12.0, 2.0), (0.0, 1000.0))?;
+/// assert_eq!(count(&h, &region, &Task::new())?, 159);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, Error> {
+    let h = prepared(h)?;
+    let Some(closed) = close(&h, region)? else {
+        return Ok(0);
+    };
+    let mut walker = Walker::new(&h, task);
+    let mut total = 0;
+    if let Some(height) = closed.symmetric {
+        let cell = Cell::new(&mut walker, closed.re, (0.0, height), true)?;
+        total += if closed.half {
+            let real = count_real(&mut walker, closed.re)?;
+            // Those off the axis come in pairs.
+            real + cell.count.saturating_sub(real) / 2
+        } else {
+            cell.count
+        };
+    }
+    if let Some(im) = closed.above {
+        total += Cell::new(&mut walker, closed.re, im, false)?.count;
+    }
+    Ok(total)
+}
+
+/// The number of roots right of the line Re s = `sigma`.
+///
+/// # Errors
+/// As [`count`]; [`Error::Argument`] also where the line does not lie right of the chains of a
+/// neutral equation.
+///
+/// ```
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::count_right_of};
+/// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![5.0]], vec![0.0, 0.36])?;
+/// assert_eq!(count_right_of(&h, 0.0, &Task::new())?, 2);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn count_right_of(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<u64, Error> {
+    Region::right_of(sigma).check()?;
+    let h = prepared(h)?;
+    half_plane(&mut Walker::new(&h, task), sigma)
+}
+
+/// [`count_right_of`] for a finite `sigma` with a walker that is already there; its hints are
+/// those of the chord.
+pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Error> {
+    let h = walker.probe.function();
+    let re = (sigma, f64::INFINITY);
+    let Dominance { row, radius } = bounds::dominance(h, re).ok_or_else(|| endless(h, re))?;
+    let degree = h.degree();
+    let radius = radius * (1.0 + 1e-9);
+    if sigma.abs() > radius {
+        return Ok(if sigma > 0.0 { 0 } else { degree as u64 });
+    }
+    // Just beyond the circle.
+    let top = ((radius - sigma) * (radius + sigma)).sqrt() * (1.0 + 1e-9) + f64::MIN_POSITIVE;
+    let end = Complex64::new(sigma, top);
+    walker.probe.refer_to(row);
+    let jet = walker.probe.jet(end);
+    if !is_clear(&jet) {
+        return Err(super::winding::overflow(end));
+    }
+    let direction = (end / modulus(end)).powu(u32::try_from(degree).unwrap_or(u32::MAX));
+    let leading = h
+        .coefficients()
+        .get(row)
+        .and_then(|row| row.last())
+        .copied()
+        .unwrap_or(1.0);
+    let quotient = direction.conj() * jet.value * leading.signum();
+    let arc = Turn {
+        angle: degree as f64 * libm::atan2(top, sigma) + libm::atan2(quotient.im, quotient.re)
+            - walker.probe.delay() * top,
+        slack: 1.58 * jet.value_error / modulus(jet.value)
+            + 1e-15 * (4.0 * degree as f64 + walker.probe.delay() * top + 4.0),
+    };
+    let chord = walker.walk(end, Complex64::new(sigma, 0.0))?;
+    arc.then(chord).revolutions(PI).ok_or(Error::Contour {
+        place: Complex64::new(sigma, 0.0),
+        distance: 1e-3 * radius,
+    })
+}

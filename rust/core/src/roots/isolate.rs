@@ -1,0 +1,246 @@
+//! All roots of a region: divide it into cells with proved counts, iterate within.
+//!
+//! In a cell Newton's iteration starts from the roots found just below, shifted by the spacing
+//! 2π/(τ_max − τ_min) at which chains repeat, then from points of the golden-ratio sequence; every
+//! limit becomes a disc proved to hold exactly its multiplicity. A cell is done when its discs add
+//! up to its count; else it is cut. Where values drown in rounding, the cluster is taken as one
+//! disc. At the end the discs are disjoint, lie inside the region and add up to its count: then
+//! none is missing, whatever the search did.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::cell::Cell;
+use super::newton::{Disc, Outcome, cluster, newton};
+use super::winding::Walker;
+use crate::Error;
+
+/// Cells with more roots missing are cut before anything is tried.
+const PATIENCE: u64 = 8;
+
+/// Fractional parts of multiples of these fill a square evenly: powers of the plastic number.
+const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
+
+/// Discs found so far, by height of their centre.
+pub(super) struct Search<'a, 'w> {
+    walker: &'w mut Walker<'a>,
+    found: Vec<Disc>,
+    widest: f64,
+    spacing: f64,
+}
+
+impl<'a, 'w> Search<'a, 'w> {
+    pub(super) fn new(walker: &'w mut Walker<'a>) -> Self {
+        let delays = walker.probe.function().delays();
+        let span = delays.last().copied().unwrap_or(0.0) - delays.first().copied().unwrap_or(0.0);
+        Self {
+            walker,
+            found: Vec::new(),
+            widest: 0.0,
+            spacing: TAU / span,
+        }
+    }
+
+    /// Iterate from `starts`; those discs are kept whose centre `wanted` holds.
+    pub(super) fn iterate_from(
+        &mut self,
+        starts: &[Complex64],
+        window: impl Fn(Complex64) -> bool,
+    ) -> Result<(), Error> {
+        for start in starts {
+            self.walker.pause()?;
+            if let Outcome::Simple(disc) = newton(&mut self.walker.probe, *start, &window) {
+                self.insert(disc);
+            }
+        }
+        Ok(())
+    }
+
+    /// The discs, ordered by the height of their centres.
+    pub(super) fn found(&self) -> &[Disc] {
+        &self.found
+    }
+
+    /// Roots located in the cell.
+    fn located(&self, cell: &Cell) -> u64 {
+        let from = if cell.symmetric { -1.0 } else { cell.im.0 };
+        let start = self.found.partition_point(|disc| disc.center.im < from);
+        self.found
+            .iter()
+            .skip(start)
+            .take_while(|disc| disc.center.im <= cell.im.1)
+            .filter(|disc| cell.holds(disc.center))
+            .map(|disc| {
+                if cell.symmetric {
+                    disc.weight()
+                } else {
+                    disc.multiplicity.into()
+                }
+            })
+            .sum()
+    }
+
+    /// Keep a disc unless its root is known; a cluster swallows the discs inside it.
+    fn insert(&mut self, disc: Disc) -> bool {
+        let reach = self.widest + disc.radius;
+        let first = self
+            .found
+            .partition_point(|d| d.center.im < disc.center.im - reach);
+        let last = self
+            .found
+            .partition_point(|d| d.center.im <= disc.center.im + reach);
+        let mut swallowed = Vec::new();
+        for index in first..last {
+            let Some(other) = self.found.get(index) else {
+                break;
+            };
+            let apart = (disc.center - other.center).norm() * (1.0 + 1e-12);
+            let inside = apart + other.radius <= disc.radius;
+            if inside && disc.multiplicity > other.multiplicity {
+                swallowed.push(index);
+            } else if apart + disc.radius <= other.isolation || apart <= disc.radius + other.radius
+            {
+                return false;
+            }
+        }
+        for index in swallowed.into_iter().rev() {
+            self.found.remove(index);
+        }
+        self.widest = self.widest.max(disc.isolation).max(disc.radius);
+        let place = self.found.partition_point(|d| d.center.im < disc.center.im);
+        self.found.insert(place, disc);
+        true
+    }
+
+    /// Locate every root of `cell`.
+    ///
+    /// # Errors
+    /// [`Error::CountMismatch`] where double precision does not suffice; those of the walks.
+    pub(super) fn locate_all(&mut self, cell: Cell) -> Result<(), Error> {
+        let mut cells = vec![cell];
+        while let Some(cell) = cells.pop() {
+            self.walker.pause()?;
+            let missing = cell.count.saturating_sub(self.located(&cell));
+            if missing == 0 {
+                continue;
+            }
+            if missing <= PATIENCE && self.try_here(&cell)? {
+                continue;
+            }
+            let tall = cell.height() > cell.width();
+            let parts = if cell.count > PATIENCE && tall {
+                cell.slice(self.walker, 4.0 / cell.count as f64)
+            } else if self.is_divisible(&cell) {
+                cell.halves(self.walker)
+            } else {
+                return Err(self.mismatch(cell.count, &cell));
+            };
+            match parts {
+                Ok((first, second)) => cells.extend([second, first]),
+                Err(Error::Contour { .. }) => return Err(self.mismatch(cell.count, &cell)),
+                Err(other) => return Err(other),
+            }
+        }
+        Ok(())
+    }
+
+    fn is_divisible(&self, cell: &Cell) -> bool {
+        let size = cell.im.1.abs().max(cell.re.0.abs()).max(cell.re.1.abs());
+        cell.width().max(cell.height()) > 64.0 * f64::EPSILON * size
+    }
+
+    /// Iterate within the cell; is everything found?
+    fn try_here(&mut self, cell: &Cell) -> Result<bool, Error> {
+        let margin = cell.width() + cell.height();
+        let (re, im) = (cell.re, cell.im);
+        let window = move |s: Complex64| {
+            s.re > re.0 - margin && s.re < re.1 + margin && s.im.abs() < im.1 + margin
+        };
+        let mut stalled = Vec::new();
+        let tries = 8 + 3 * cell.count as usize;
+        let starts = self
+            .shifted(cell)
+            .into_iter()
+            .chain((0..tries).map(|k| even(cell, k)));
+        for start in starts {
+            self.walker.pause()?;
+            match newton(&mut self.walker.probe, start, window) {
+                Outcome::Simple(disc) => {
+                    if self.insert(disc) && self.located(cell) >= cell.count {
+                        return Ok(self.located(cell) == cell.count);
+                    }
+                }
+                Outcome::Stalled(place) => {
+                    let place = Complex64::new(place.re, place.im.abs());
+                    let known = |d: &Disc| (d.center - place).norm() <= d.radius;
+                    if cell.holds(place) && stalled.len() < 4 && !self.found.iter().any(known) {
+                        stalled.push(place);
+                    }
+                }
+                Outcome::Lost => {}
+            }
+        }
+        let most = 0.5 * cell.width().min(cell.height());
+        for place in stalled {
+            if self
+                .found
+                .iter()
+                .any(|d| (d.center - place).norm() <= d.radius)
+            {
+                continue;
+            }
+            if let Some(disc) = cluster(self.walker, place, most)? {
+                self.insert(disc);
+            }
+        }
+        Ok(self.located(cell) == cell.count)
+    }
+
+    /// Roots just below the cell, shifted into it.
+    fn shifted(&self, cell: &Cell) -> Vec<Complex64> {
+        if !self.spacing.is_finite() || cell.symmetric {
+            return Vec::new();
+        }
+        let bottom = cell.im.0;
+        let start = self
+            .found
+            .partition_point(|disc| disc.center.im < bottom - self.spacing);
+        let below = self
+            .found
+            .iter()
+            .skip(start)
+            .take_while(|disc| disc.center.im < bottom);
+        let rows = (cell.height() / self.spacing).min(PATIENCE as f64) as u32 + 1;
+        below
+            .take(4 * PATIENCE as usize)
+            .flat_map(|disc| {
+                let center = disc.center;
+                (1..=rows).map(move |k| center + Complex64::I * (f64::from(k) * self.spacing))
+            })
+            .filter(|s| cell.holds(*s))
+            .collect()
+    }
+
+    fn mismatch(&self, counted: u64, cell: &Cell) -> Error {
+        let found = self.found.iter().filter(|disc| cell.holds(disc.center));
+        Error::CountMismatch {
+            counted,
+            found: found.map(|disc| (disc.center, disc.multiplicity)).collect(),
+            advice: format!(
+                "near {} double precision does not tell the roots apart; another unit of time or \
+                 a less expanded form of the equation may help",
+                Complex64::new(0.5 * (cell.re.0 + cell.re.1), cell.im.1)
+            ),
+        }
+    }
+}
+
+/// The k-th of points that fill the cell evenly.
+fn even(cell: &Cell, k: usize) -> Complex64 {
+    let part = |share: f64| (0.5 + (k as f64 + 1.0) * share).fract();
+    Complex64::new(
+        cell.re.0 + part(EVEN.0) * cell.width(),
+        cell.im.0 + part(EVEN.1) * cell.height(),
+    )
+}

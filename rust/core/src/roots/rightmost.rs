@@ -1,0 +1,275 @@
+//! The roots that decide stability: the rightmost ones, with a proved count of the half plane
+//! that holds them.
+//!
+//! A line Re s = σ is sought with at least the wanted number of roots to its right, but not many
+//! more: to the left with growing steps, for a neutral equation by halving the distance to the
+//! chains, and back by bisection. Newton's iteration starts from the points where the walk along
+//! the line came closest to a root; if its discs add up to the count, all is known, else the half
+//! plane is searched cell by cell. Right of the chains there may be fewer roots than wanted, or
+//! none at all: the chains themselves then lead, and the set holds what there is.
+
+use num_complex::Complex64;
+
+use super::cell::Cell;
+use super::count::{close, half_plane, prepared};
+use super::isolate::Search;
+use super::neutral::chain_abscissa;
+use super::newton::Disc;
+use super::region::Region;
+use super::set::{RootSet, locate, with_mirror_image};
+use super::winding::Walker;
+use crate::quasipoly::{Kind, QuasiPolynomial};
+use crate::{Error, Task};
+
+/// Most roots that can be asked for.
+const MAX_WANTED: usize = 10_000;
+
+/// Lines tried before giving up.
+const MAX_LINES: usize = 400;
+
+/// A line this close to the chains, in units of one over the longest delay, is as good as on them.
+const CHAIN_MARGIN: f64 = 1e-4;
+
+/// Evaluations after which a line is given up: those that hug the chains cost without end.
+const EVALUATIONS_PER_LINE: u64 = 2_000_000;
+
+/// The `n` rightmost roots, not counting those with Im < 0, together with their mirror images.
+///
+/// More than `n` where the real parts of the next ones cannot be told apart, fewer where there are
+/// no more roots or no more right of the chains of a neutral equation. `region` is the half plane
+/// in which the roots listed are all there are.
+///
+/// # Errors
+/// [`Error::Argument`] for n = 0, the zero function or an advanced equation;
+/// [`Error::CountMismatch`] where double precision does not tell the roots apart;
+/// [`Error::TooMuch`]; [`Error::Interrupted`].
+///
+/// ```
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::rightmost};
+/// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![2.0, 0.3]], vec![0.0, 0.36])?;
+/// let set = rightmost(&h, 1, &Task::new())?;
+/// assert!((set.roots[0].re + 3.316_780_322_147_385).abs() <= set.radii[0]);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, Error> {
+    if n == 0 || n > MAX_WANTED {
+        return Err(Error::argument(format!(
+            "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots"
+        )));
+    }
+    if h.kind() == Kind::Advanced {
+        return Err(Error::argument(
+            "an advanced equation has roots arbitrarily far to the right: no root is the \
+             rightmost; the term with the highest power of s must not be delayed more than others",
+        ));
+    }
+    let h = prepared(h)?;
+    let chain = chain_abscissa(&h);
+    match h.kind() {
+        Kind::Polynomial => {
+            let everywhere = Region::right_of(f64::NEG_INFINITY);
+            let discs = half_plane_discs(&h, everywhere.re.0, task)?;
+            return Ok(first(discs, n, everywhere.re.0));
+        }
+        // Right of its chains a difference equation has no roots.
+        Kind::Difference => return Ok(RootSet::new(Vec::new(), Region::right_of(chain))),
+        Kind::Retarded | Kind::Neutral | Kind::Advanced => {}
+    }
+    let mut lines = Lines::new(&h, chain, task);
+    let mut wanted = n as u64;
+    loop {
+        let (line, last) = lines.find(wanted)?;
+        let discs = discs_right_of(&h, &line, task)?;
+        if discs.len() >= n || last {
+            return Ok(first(discs, n, line.sigma));
+        }
+        // A pair counts twice in the half plane but once in the list.
+        wanted = line.count + n as u64 - discs.len() as u64;
+    }
+}
+
+/// The largest real part of a root, or the abscissa of the chains if that is larger.
+///
+/// # Errors
+/// As [`rightmost`]; [`Error::Argument`] where there is no root.
+pub fn spectral_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<f64, Error> {
+    let set = rightmost(h, 1, task)?;
+    let isolated = set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re);
+    let abscissa = isolated.max(chain_abscissa(h));
+    if abscissa == f64::NEG_INFINITY {
+        return Err(Error::argument(
+            "a constant has no roots, hence no spectral abscissa",
+        ));
+    }
+    Ok(abscissa)
+}
+
+/// A line, and what is known of the half plane to its right.
+#[derive(Debug, Clone)]
+struct Line {
+    sigma: f64,
+    count: u64,
+    hints: Vec<Complex64>,
+}
+
+/// Lines for which the count is known.
+struct Lines<'a> {
+    h: &'a QuasiPolynomial,
+    task: &'a Task,
+    chain: f64,
+    /// Least distance to the chains.
+    margin: f64,
+    step: f64,
+    start: f64,
+    /// The leftmost line with too few roots.
+    few: Option<Line>,
+    /// The rightmost line with enough of them.
+    enough: Option<Line>,
+}
+
+impl<'a> Lines<'a> {
+    fn new(h: &'a QuasiPolynomial, chain: f64, task: &'a Task) -> Self {
+        let delays = h.delays();
+        let span = delays.last().copied().unwrap_or(1.0) - delays.first().copied().unwrap_or(0.0);
+        let step = 1.0 / span;
+        let start = if chain < 0.0 { 0.0 } else { chain + step };
+        Self {
+            h,
+            task,
+            chain,
+            margin: CHAIN_MARGIN * step,
+            step,
+            start,
+            few: None,
+            enough: None,
+        }
+    }
+
+    /// A line with at least `wanted` roots to its right, and not many more if that is cheap; with
+    /// fewer, and `true`, where no line further left can be counted.
+    fn find(&mut self, wanted: u64) -> Result<(Line, bool), Error> {
+        if let Some(line) = self.enough.take_if(|line| line.count < wanted) {
+            self.few = Some(line);
+        }
+        for _ in 0..MAX_LINES {
+            self.task.check()?;
+            let sigma = match (&self.few, &self.enough) {
+                (None, None) => self.start,
+                (Some(few), None) => {
+                    if few.sigma - self.chain <= self.margin {
+                        return Ok((few.clone(), true));
+                    }
+                    let ahead = few.sigma - self.step;
+                    self.step *= 1.5;
+                    // Never onto the chains, only half the way.
+                    ahead.max(0.5 * (few.sigma + self.chain))
+                }
+                (few, Some(enough)) => {
+                    let right = few.as_ref().map_or(f64::INFINITY, |few| few.sigma);
+                    let gap = right - enough.sigma;
+                    if enough.count <= 4 * wanted + 16 || gap <= 1e-3 * enough.sigma.abs() {
+                        return Ok((enough.clone(), false));
+                    }
+                    let step = self.step.min(0.5 * gap);
+                    self.step *= if gap.is_finite() { 1.0 } else { 2.0 };
+                    enough.sigma + step
+                }
+            };
+            match self.counted(sigma) {
+                Ok(line) if line.count < wanted => self.few = Some(line),
+                Ok(line) => self.enough = Some(line),
+                // Too close to the chains, or too far left for double precision.
+                Err(Error::TooMuch { .. } | Error::Argument(_)) if self.enough.is_none() => {
+                    let Some(few) = self.few.clone() else { break };
+                    return Ok((few, true));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Err(Error::TooMuch {
+            what: "the search for a line right of which the rightmost roots lie",
+            limit: MAX_LINES as u64,
+            unit: "lines",
+            advice: "ask for fewer roots, or for those in a region".into(),
+        })
+    }
+
+    /// Count right of `sigma`, or of a line nearby where a root is in the way.
+    fn counted(&self, sigma: f64) -> Result<Line, Error> {
+        let mut at = sigma;
+        let mut aside = 1.0;
+        loop {
+            let mut walker = Walker::with_limit(self.h, self.task, EVALUATIONS_PER_LINE);
+            match half_plane(&mut walker, at) {
+                Ok(count) => {
+                    return Ok(Line {
+                        sigma: at,
+                        count,
+                        hints: walker.hints,
+                    });
+                }
+                Err(Error::Contour { distance, .. }) if f64::abs(aside) < 1e9 => {
+                    let moved = sigma + aside * distance.max(1e-12 * sigma.abs());
+                    at = if moved > self.chain {
+                        moved
+                    } else {
+                        sigma + aside.abs() * distance
+                    };
+                    aside *= -3.0;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+/// Discs, Im ≥ 0, that hold all roots right of a line.
+fn discs_right_of(h: &QuasiPolynomial, line: &Line, task: &Task) -> Result<Vec<Disc>, Error> {
+    let mut walker = Walker::new(h, task);
+    let mut search = Search::new(&mut walker);
+    search.iterate_from(&line.hints, |s| s.is_finite())?;
+    let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
+    let discs: Vec<Disc> = search.found().iter().filter(right).copied().collect();
+    if discs.iter().map(Disc::weight).sum::<u64>() == line.count {
+        return Ok(discs);
+    }
+    half_plane_discs(h, line.sigma, task)
+}
+
+/// The same, cell by cell.
+fn half_plane_discs(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<Vec<Disc>, Error> {
+    let Some(closed) = close(h, &Region::right_of(sigma))? else {
+        return Ok(Vec::new());
+    };
+    let mut walker = Walker::new(h, task);
+    let height = closed.symmetric.unwrap_or(0.0);
+    let cell = Cell::new(&mut walker, closed.re, (0.0, height), true)?;
+    locate(&mut walker, cell)
+}
+
+/// The first `n` of all discs right of `sigma`, more where the next ones tie with them.
+fn first(mut discs: Vec<Disc>, n: usize, sigma: f64) -> RootSet {
+    discs.sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
+    let left = |disc: &Disc| disc.center.re - disc.radius;
+    let right = |disc: &Disc| disc.center.re + disc.radius;
+    let mut edge = f64::INFINITY;
+    let mut listed = 0;
+    for disc in &discs {
+        if listed >= n && right(disc) < edge {
+            break;
+        }
+        edge = edge.min(left(disc));
+        listed += 1;
+    }
+    let next = discs.iter().skip(listed).map(right).fold(sigma, f64::max);
+    let line = if listed < discs.len() {
+        0.5 * (edge + next)
+    } else {
+        sigma
+    };
+    discs.truncate(listed);
+    RootSet::new(
+        discs.into_iter().flat_map(with_mirror_image).collect(),
+        Region::right_of(line),
+    )
+}

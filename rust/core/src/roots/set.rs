@@ -1,0 +1,151 @@
+//! All roots of a region, with their evidence.
+
+use num_complex::Complex64;
+
+use super::cell::Cell;
+use super::count::{Closed, close, prepared};
+use super::isolate::Search;
+use super::newton::Disc;
+use super::region::Region;
+use super::winding::Walker;
+use crate::quasipoly::QuasiPolynomial;
+use crate::{Error, Task};
+
+/// More roots than anyone can have meant to list.
+const MAX_ROOTS: u64 = 1_000_000;
+
+/// Roots with discs proved to hold exactly their multiplicity.
+///
+/// Sorted by falling real part, then rising |Im|, then Im ≥ 0 first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RootSet {
+    /// Centres of the discs, 1/s.
+    pub roots: Vec<Complex64>,
+    /// Roots in each disc.
+    pub multiplicities: Vec<u32>,
+    /// Radii of the discs, 1/s.
+    pub radii: Vec<f64>,
+    /// Is the disc proved to hold a single point? `false` for a multiple root or a cluster that
+    /// double precision does not tell apart.
+    pub resolved: Vec<bool>,
+    /// Number of roots in `region`, with multiplicity, by the argument principle; equal to the
+    /// sum of the multiplicities.
+    pub counted: u64,
+    /// Where the roots were sought.
+    pub region: Region,
+}
+
+impl RootSet {
+    /// Sort the discs; `counted` is the sum of their multiplicities.
+    pub(super) fn new(mut discs: Vec<Disc>, region: Region) -> Self {
+        discs.sort_by(|a, b| {
+            rank(a)
+                .partial_cmp(&rank(b))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+        Self {
+            roots: discs.iter().map(|d| d.center).collect(),
+            multiplicities: discs.iter().map(|d| d.multiplicity).collect(),
+            radii: discs.iter().map(|d| d.radius).collect(),
+            resolved: discs.iter().map(|d| d.multiplicity == 1).collect(),
+            counted: discs.iter().map(|d| u64::from(d.multiplicity)).sum(),
+            region,
+        }
+    }
+}
+
+fn rank(disc: &Disc) -> (f64, f64, f64) {
+    let Complex64 { re, im } = disc.center;
+    (-re, im.abs(), -im)
+}
+
+/// A disc and, unless it lies on the real axis, its mirror image.
+pub(super) fn with_mirror_image(disc: Disc) -> impl Iterator<Item = Disc> {
+    let image = Disc {
+        center: disc.center.conj(),
+        ..disc
+    };
+    std::iter::once(disc).chain((!disc.is_on_axis()).then_some(image))
+}
+
+/// Every root in a region.
+///
+/// Open sides are closed by proved bounds. Roots on the real axis belong to a region whose lower
+/// (or upper) edge it is; a disc that meets that edge counts with all its roots.
+///
+/// # Errors
+/// As [`count`](super::count); [`Error::CountMismatch`] where double precision does not suffice
+/// to locate what was counted.
+///
+/// ```
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Region, roots}};
+/// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![1.0]], vec![0.0, 1.0])?;
+/// let set = roots(&h, &Region::new((-10.0, 2.0), (0.0, 30.0))?, &Task::new())?;
+/// assert_eq!(set.counted, 5);
+/// assert!((set.roots[0].re + 0.318_131_505_204_764_1).abs() <= set.radii[0]);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn roots(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSet, Error> {
+    let h = prepared(h)?;
+    let Some(closed) = close(&h, region)? else {
+        return Ok(RootSet::new(Vec::new(), *region));
+    };
+    let mut walker = Walker::new(&h, task);
+    let Closed { re, .. } = closed;
+    let lower = closed
+        .symmetric
+        .map(|height| Cell::new(&mut walker, re, (0.0, height), true));
+    let upper = closed.above.map(|im| Cell::new(&mut walker, re, im, false));
+    let (lower, upper) = (lower.transpose()?, upper.transpose()?);
+    let mut discs = Vec::new();
+    for cell in [lower, upper].into_iter().flatten() {
+        for disc in locate(&mut walker, cell)? {
+            if cell.symmetric && !closed.half {
+                discs.extend(with_mirror_image(disc));
+            } else {
+                discs.push(disc);
+            }
+        }
+    }
+    if closed.mirrored {
+        for disc in &mut discs {
+            disc.center = disc.center.conj();
+        }
+    }
+    Ok(RootSet::new(discs, *region))
+}
+
+/// Discs, Im ≥ 0, that hold the roots of a cell: disjoint, inside, and adding up to its count.
+pub(super) fn locate(walker: &mut Walker<'_>, cell: Cell) -> Result<Vec<Disc>, Error> {
+    if cell.count > MAX_ROOTS {
+        return Err(Error::TooMuch {
+            what: "the list of all roots",
+            limit: MAX_ROOTS,
+            unit: "roots",
+            advice: "take a smaller region".into(),
+        });
+    }
+    let mut search = Search::new(walker);
+    search.locate_all(cell)?;
+    let within: Vec<Disc> = search
+        .found()
+        .iter()
+        .filter(|disc| cell.holds(disc.center))
+        .copied()
+        .collect();
+    for disc in &within {
+        let Disc { center, radius, .. } = *disc;
+        let clear_below = cell.symmetric || center.im - radius > cell.im.0;
+        let inside = center.re - radius > cell.re.0
+            && center.re + radius < cell.re.1
+            && center.im + radius < cell.im.1
+            && clear_below;
+        if !inside {
+            return Err(Error::Contour {
+                place: center,
+                distance: 2.0 * radius,
+            });
+        }
+    }
+    Ok(within)
+}

@@ -1,0 +1,300 @@
+//! How far arg h turns along a straight line: proved.
+//!
+//! With c the term that dominates, arg h = arg g − τ_c Im s. From a point z with computed value v
+//! (error at most e) and slope w (error e′), Taylor's formula along the line gives for every point
+//! within r: |g − v| ≤ (|w| + e′) r + B r²/2 + e, with B a bound on |g″| there. As long as this is
+//! at most 0.95 |v|, g stays in a disc that does not hold 0 and arg g within 72° of arg v. Two
+//! neighbouring points whose reaches meet therefore differ in argument by less than 144°: their
+//! principal difference is the true one. Since each computed value serves both its neighbours,
+//! their errors cancel in the sum but at the two ends and where c changes; `slack` adds those up.
+//!
+//! Where |v| < 4e a root cannot be told from none: an error with the place, never a guess.
+
+use num_complex::Complex64;
+
+use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
+use crate::{Error, Task};
+
+/// Share of |v| that g may move by.
+const SHARE: f64 = 0.95;
+
+/// Evaluations between two looks at the task.
+const CHECK_EVERY: u64 = 1024;
+
+/// Evaluations after which a computation is given up.
+const MAX_EVALUATIONS: u64 = 20_000_000;
+
+/// Below this, underflow could matter and values prove nothing.
+const UNDERFLOW: f64 = 1e-250;
+
+/// Change of arg h along a line, in rad, and a bound on its error.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Turn {
+    pub(super) angle: f64,
+    pub(super) slack: f64,
+}
+
+impl Turn {
+    /// The line walked backwards.
+    pub(super) fn reversed(self) -> Self {
+        Self {
+            angle: -self.angle,
+            slack: self.slack,
+        }
+    }
+
+    /// Both lines, one after the other.
+    pub(super) fn then(self, next: Self) -> Self {
+        Self {
+            angle: self.angle + next.angle,
+            slack: self.slack + next.slack,
+        }
+    }
+
+    /// What is left of this line when `part` of it is taken away.
+    pub(super) fn without(self, part: Self) -> Self {
+        self.then(part.reversed())
+    }
+
+    /// The whole number of `unit`s in a closed path; `None` where the slack leaves room for
+    /// another.
+    pub(super) fn revolutions(self, unit: f64) -> Option<u64> {
+        let number = (self.angle / unit).round();
+        let off = (self.angle - number * unit).abs();
+        (self.slack < 0.25 * unit && off <= 0.25 * unit && number >= 0.0).then_some(number as u64)
+    }
+}
+
+/// Walks along lines; keeps the probe, the budget and the hints of roots nearby.
+pub(super) struct Walker<'a> {
+    pub(super) probe: Probe<'a>,
+    pub(super) task: &'a Task,
+    /// Where Newton's step from the points closest to a root leads to.
+    pub(super) hints: Vec<Complex64>,
+    checked: u64,
+    limit: u64,
+}
+
+impl<'a> Walker<'a> {
+    pub(super) fn new(h: &'a QuasiPolynomial, task: &'a Task) -> Self {
+        Self::with_limit(h, task, MAX_EVALUATIONS)
+    }
+
+    /// A walker that gives up after `limit` evaluations.
+    pub(super) fn with_limit(h: &'a QuasiPolynomial, task: &'a Task, limit: u64) -> Self {
+        Self {
+            probe: Probe::new(h),
+            task,
+            hints: Vec::new(),
+            checked: 0,
+            limit,
+        }
+    }
+
+    /// Look at the task and at the budget now and then.
+    pub(super) fn pause(&mut self) -> Result<(), Error> {
+        let spent = self.probe.evaluations();
+        if spent < self.checked + CHECK_EVERY {
+            return Ok(());
+        }
+        self.checked = spent;
+        self.task.check()?;
+        if spent > self.limit {
+            return Err(Error::TooMuch {
+                what: "the search for roots",
+                limit: self.limit,
+                unit: "evaluations",
+                advice: "take a smaller region, or keep its edges clear of chains of roots".into(),
+            });
+        }
+        Ok(())
+    }
+
+    /// The jet at `s`, its value proved to be at least four times its error.
+    fn clear_jet(&mut self, s: Complex64) -> Result<Jet, Error> {
+        let mut jet = self.probe.jet(s);
+        if !is_finite(&jet) {
+            self.probe.refer_to_dominant(s);
+            jet = self.probe.jet(s);
+        }
+        if !is_finite(&jet) {
+            return Err(overflow(s));
+        }
+        if is_clear(&jet) {
+            Ok(jet)
+        } else {
+            Err(self.blocked(s))
+        }
+    }
+
+    /// The error of a line that cannot be proved to be clear of roots at `place`.
+    fn blocked(&mut self, place: Complex64) -> Error {
+        let mut distance =
+            4.0 * f64::EPSILON * modulus(place).max(f64::MIN_POSITIVE / f64::EPSILON);
+        for _ in 0..200 {
+            let aside = [1.0, -1.0].map(|sign| Complex64::new(sign * distance, 0.0));
+            let up = aside.map(|step| step * Complex64::I);
+            if [aside, up]
+                .concat()
+                .iter()
+                .all(|step| is_clear(&self.probe.jet(place + step)))
+            {
+                break;
+            }
+            distance *= 2.0;
+        }
+        Error::Contour { place, distance }
+    }
+
+    /// How far from `s` along the line (unit vector `along`), up to `most`, g keeps its sense.
+    fn reach(&self, jet: &Jet, s: Complex64, along: Complex64, most: f64) -> f64 {
+        let room = SHARE * modulus(jet.value) - jet.value_error;
+        let slope = modulus(jet.slope) + jet.slope_error;
+        let size = modulus(s);
+        let mut span = most.min(room / slope);
+        let mut best = 0.0f64;
+        for _ in 0..6 {
+            let bend = self.probe.curvature(size + span, along.re * span);
+            let r = 2.0 * room / (slope + (slope * slope + 2.0 * bend * room).sqrt());
+            let r = r.min(span) * (1.0 - 1e-12);
+            best = if r.is_nan() { best } else { best.max(r) };
+            if best >= 0.25 * span {
+                break;
+            }
+            span = if best > 0.0 { 3.0 * best } else { span / 64.0 };
+        }
+        best
+    }
+
+    /// Change of arg h along the line parallel to an axis from `from` to `to`.
+    ///
+    /// # Errors
+    /// [`Error::Contour`] where a root lies on the line or too close to it, [`Error::TooMuch`],
+    /// [`Error::Interrupted`].
+    pub(super) fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error> {
+        let whole = (to - from).re.abs() + (to - from).im.abs();
+        if whole == 0.0 {
+            return Ok(Turn::default());
+        }
+        let along = (to - from) / whole;
+        self.probe.refer_to_dominant(from);
+        let mut here = from;
+        let mut jet = self.clear_jet(here)?;
+        let mut turn = Turn {
+            angle: 0.0,
+            slack: uncertainty(&jet),
+        };
+        let mut guess = f64::INFINITY;
+        // Newton's corrections at the last two points: a local minimum hints at a root.
+        let mut before = (f64::INFINITY, f64::INFINITY);
+        while here != to {
+            self.pause()?;
+            if let Some(larger) = jet.overtaken_by {
+                turn.slack += uncertainty(&jet);
+                self.probe.refer_to(larger);
+                jet = self.clear_jet(here)?;
+                turn.slack += uncertainty(&jet);
+            }
+            let rest = (to - here).re.abs() + (to - here).im.abs();
+            let reach = self.reach(&jet, here, along, rest.min(guess));
+            let (next, ahead) = self.step(here, to, along, (reach, rest))?;
+            let ratio = unit(jet.value).conj() * unit(ahead.value);
+            turn.angle += libm::atan2(ratio.im, ratio.re) - self.probe.delay() * (next - here).im;
+            turn.slack += 1e-15 + 1e-15 * (self.probe.delay() * (next - here).im).abs();
+            let correction = modulus(jet.value) / modulus(jet.slope);
+            if before.1 < before.0 && before.1 < correction && self.hints.len() < 1000 {
+                self.hints.push(here - newton_step(&jet));
+            }
+            before = (before.1, correction);
+            guess = 4.0 * ((next - here).re.abs() + (next - here).im.abs());
+            here = next;
+            jet = ahead;
+        }
+        turn.slack += uncertainty(&jet);
+        // Rounding of the places themselves, times the delay they are multiplied by.
+        turn.slack += 1e-15 * self.probe.delay() * (from.im.abs() + to.im.abs());
+        Ok(turn)
+    }
+
+    /// The next point and its jet: as far as both reaches cover, else as far as the own one.
+    fn step(
+        &mut self,
+        here: Complex64,
+        to: Complex64,
+        along: Complex64,
+        (reach, rest): (f64, f64),
+    ) -> Result<(Complex64, Jet), Error> {
+        let mut length = if reach >= rest {
+            rest
+        } else {
+            rest.min(1.9 * reach)
+        };
+        for attempt in 0..8 {
+            let next = if length >= rest {
+                to
+            } else {
+                here + along * length
+            };
+            if next == here {
+                break;
+            }
+            let ahead = self.probe.jet(next);
+            if !is_finite(&ahead) {
+                length *= 0.25;
+                continue;
+            }
+            let gone = (next - here).re.abs() + (next - here).im.abs();
+            let covered = if gone <= reach {
+                is_clear(&ahead)
+            } else {
+                is_clear(&ahead) && gone <= reach + self.reach(&ahead, next, -along, gone)
+            };
+            if covered {
+                return Ok((next, ahead));
+            }
+            if gone <= reach && attempt > 0 {
+                // The own reach covers the step, so only rounding is in the way.
+                return Err(self.blocked(next));
+            }
+            length = (0.999 * reach).min(length * 0.999);
+        }
+        Err(self.blocked(here))
+    }
+}
+
+fn is_finite(jet: &Jet) -> bool {
+    jet.value.is_finite()
+        && jet.slope.is_finite()
+        && jet.value_error.is_finite()
+        && jet.slope_error.is_finite()
+}
+
+/// Is the value known to within a quarter?
+pub(super) fn is_clear(jet: &Jet) -> bool {
+    let size = modulus(jet.value);
+    size >= 4.0 * jet.value_error && size > UNDERFLOW
+}
+
+/// Bound on the error of arg g.
+fn uncertainty(jet: &Jet) -> f64 {
+    // asin t ≤ (π/2) t
+    1.58 * jet.value_error / modulus(jet.value)
+}
+
+fn unit(value: Complex64) -> Complex64 {
+    value / modulus(value)
+}
+
+/// g/g′, in steps that do not overflow.
+pub(super) fn newton_step(jet: &Jet) -> Complex64 {
+    let size = modulus(jet.slope);
+    let direction = jet.slope.conj() / size;
+    (jet.value / size) * direction
+}
+
+pub(super) fn overflow(s: Complex64) -> Error {
+    Error::argument(format!(
+        "the function cannot be evaluated at {s}: a power of s exceeds double precision; choose \
+         another unit of time or a smaller region"
+    ))
+}
