@@ -1,1 +1,202 @@
 //! Bindings of `deadtime::dde`.
+
+use deadtime::dde::sampled::{self, LoopCells};
+use deadtime::dde::{Equations, LinearLoop, Reference, Start};
+use num_complex::Complex64;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use pyo3::prelude::*;
+
+use crate::arrays::in_order;
+use crate::errors::to_python;
+use crate::runtime::{run, run_here};
+
+type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
+
+/// A run with more steps than this is worth a thread that listens for Ctrl-C.
+const SHORT: f64 = 2000.0;
+
+/// The linear loop x' = A x + B w + E r, u = K x + L w + M r, y = C x + D w, w(t) = sat(u(t - Td)).
+#[pyclass(frozen, module = "deadtime._deadtime", name = "LinearLoop")]
+pub(crate) struct PyLinearLoop {
+    inner: LinearLoop,
+}
+
+#[pymethods]
+impl PyLinearLoop {
+    #[new]
+    #[pyo3(signature = (a, b, e, k, l, m, c, d, delay, sample_time=None, limit=None))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one argument a symbol of the equations"
+    )]
+    fn new(
+        py: Python<'_>,
+        a: Floats<'_>,
+        b: Floats<'_>,
+        e: Floats<'_>,
+        k: Floats<'_>,
+        l: f64,
+        m: f64,
+        c: Floats<'_>,
+        d: f64,
+        delay: f64,
+        sample_time: Option<f64>,
+        limit: Option<f64>,
+    ) -> PyResult<Self> {
+        let equations = Equations {
+            a: in_order(&a).into_owned(),
+            b: in_order(&b).into_owned(),
+            e: in_order(&e).into_owned(),
+            k: in_order(&k).into_owned(),
+            l,
+            m,
+            c: in_order(&c).into_owned(),
+            d,
+        };
+        LinearLoop::new(equations, delay, sample_time, limit)
+            .map(|inner| Self { inner })
+            .map_err(|error| to_python(py, error))
+    }
+
+    /// Outputs, inputs and the breaking points of both; times count from the start of the run.
+    #[pyo3(signature = (
+        output_times, input_times, state, command, reference_before, reference_times,
+        reference_values, command_history, sample_phase
+    ))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the start of a run and its reference"
+    )]
+    #[expect(clippy::type_complexity, reason = "four arrays")]
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        output_times: Floats<'py>,
+        input_times: Floats<'py>,
+        state: Floats<'py>,
+        command: f64,
+        reference_before: f64,
+        reference_times: Floats<'py>,
+        reference_values: Floats<'py>,
+        command_history: Floats<'py>,
+        sample_phase: f64,
+    ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, Vector<'py>)> {
+        let (output_times, input_times) = (in_order(&output_times), in_order(&input_times));
+        let reference = Reference::new(
+            reference_before,
+            in_order(&reference_times).into_owned(),
+            in_order(&reference_values).into_owned(),
+        )
+        .map_err(|error| to_python(py, error))?;
+        let start = Start {
+            state: in_order(&state).into_owned(),
+            command,
+            command_history: in_order(&command_history).into_owned(),
+            sample_phase,
+        };
+        let steps = self.steps(&output_times) + self.steps(&input_times);
+        let plant = &self.inner;
+        let found = if steps < SHORT {
+            run_here(py, |task| {
+                plant.simulate(&start, &reference, &output_times, &input_times, task)
+            })
+        } else {
+            run(py, None, None, |task| {
+                plant.simulate(&start, &reference, &output_times, &input_times, task)
+            })
+        }?;
+        Ok((
+            found.outputs.to_pyarray(py),
+            found.inputs.to_pyarray(py),
+            found.output_breaks.to_pyarray(py),
+            found.input_breaks.to_pyarray(py),
+        ))
+    }
+
+    /// The transition matrix of a sampled loop, limit left out.
+    fn transition_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (matrix, size) = run_here(py, |_| sampled::transition_matrix(&self.inner))?;
+        matrix.to_pyarray(py).reshape([size, size])
+    }
+
+    /// Poles s = ln(z)/Ts of a sampled loop, limit left out, rightmost first.
+    fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
+        Ok(run_here(py, |_| sampled::poles(&self.inner))?.to_pyarray(py))
+    }
+}
+
+impl PyLinearLoop {
+    /// A rough number of samples or elements up to the last of `times`.
+    fn steps(&self, times: &[f64]) -> f64 {
+        let last = times.last().copied().unwrap_or(0.0);
+        let step = match self.inner.sample_time() {
+            Some(sample_time) => sample_time,
+            None => {
+                let rate: f64 = self.inner.equations().a.iter().map(|a| a.abs()).sum();
+                let span = 1.0 / rate;
+                if self.inner.delay() > 0.0 {
+                    span.min(self.inner.delay())
+                } else {
+                    span
+                }
+            }
+        };
+        last / step + times.len() as f64
+    }
+}
+
+/// Abscissa, number of unstable poles and status of many sampled loops.
+///
+/// Every array holds one entry for all cells or one entry a cell.
+#[pyfunction]
+#[pyo3(signature = (cells, states, a, b, k, l, scale, delay, sample_time, threads=None,
+    progress=None))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one array a symbol of the equations"
+)]
+#[expect(clippy::type_complexity, reason = "three arrays")]
+pub(crate) fn sampled_abscissa_grid<'py>(
+    py: Python<'py>,
+    cells: usize,
+    states: usize,
+    a: Floats<'py>,
+    b: Floats<'py>,
+    k: Floats<'py>,
+    l: Floats<'py>,
+    scale: Floats<'py>,
+    delay: Floats<'py>,
+    sample_time: Floats<'py>,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(
+    Vector<'py>,
+    Bound<'py, PyArray1<i32>>,
+    Bound<'py, PyArray1<u8>>,
+)> {
+    let (a, b, k, l) = (in_order(&a), in_order(&b), in_order(&k), in_order(&l));
+    let (scale, delay, sample_time) = (in_order(&scale), in_order(&delay), in_order(&sample_time));
+    let models = LoopCells {
+        cells,
+        states,
+        a: &a,
+        b: &b,
+        k: &k,
+        l: &l,
+        scale: &scale,
+        delay: &delay,
+        sample_time: &sample_time,
+    };
+    let found = run(py, threads, progress.as_ref(), |task| {
+        sampled::abscissa_grid(&models, task)
+    })?;
+    let abscissa: Vec<f64> = found.iter().map(|cell| cell.abscissa).collect();
+    let unstable: Vec<i32> = found.iter().map(|cell| cell.unstable).collect();
+    let status: Vec<u8> = found.iter().map(|cell| cell.status as u8).collect();
+    Ok((
+        abscissa.to_pyarray(py),
+        unstable.to_pyarray(py),
+        status.to_pyarray(py),
+    ))
+}

@@ -14,5 +14,7 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _deadtime {
     #[pymodule_export]
+    use super::dde::{PyLinearLoop, sampled_abscissa_grid};
+    #[pymodule_export]
     use super::runtime::{spin, thread_count};
 }

@@ -1,0 +1,360 @@
+r"""Controllers: what turns the reference r and the measured output y into the command u.
+
+Each is linear in its gains and is known in two forms: as polynomials, u = R(s) r - F(s) y, for
+characteristic functions, and as equations
+
+    x' = A x + B y + E r,   u = C x + p y + q y' + M r,
+
+for simulation. The derivative is either ideal, H(s) = s, or filtered,
+H(s) = \ :math:`\omega^2 s / (s^2 + 2 \zeta \omega s + \omega^2)`. In a sampled loop the filter
+and the integrator stay continuous and are sampled with the rest: the discretisation is exact.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._validation import finite, positive
+
+__all__ = ["PD", "PI", "PID", "PV", "Controller", "DerivativeFilter", "P"]
+
+Vector = NDArray[np.float64]
+Polynomial = list[Any]
+
+
+class ControllerEquations(NamedTuple):
+    """x' = A x + B y + E r, u = C x + p y + q y' + M r, with the derivative of r left out."""
+
+    A: Vector
+    B: Vector
+    E: Vector
+    C: Vector
+    p: float
+    q: float
+    M: float
+
+
+@dataclass(frozen=True)
+class DerivativeFilter:
+    """H(s) = omega^2 s / (s^2 + 2 damping omega s + omega^2), a derivative that rolls off.
+
+    Parameters
+    ----------
+    omega : float
+        Corner in rad/s, above zero.
+    damping : float
+        Damping ratio, above zero.
+
+    Raises
+    ------
+    ValueError
+        If a number is not above zero or not finite.
+    """
+
+    omega: float
+    damping: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "omega", positive("omega", self.omega))
+        object.__setattr__(self, "damping", positive("damping", self.damping))
+
+
+@dataclass(frozen=True)
+class Controller(ABC):
+    """Base of all controllers: gains, and a filter where there is a derivative."""
+
+    def __post_init__(self) -> None:
+        for name in self._gains():
+            object.__setattr__(self, name, finite(name, getattr(self, name)))
+        if all(getattr(self, name) == 0.0 for name in self._gains()):
+            gains = ", ".join(f"{name}=0" for name in self._gains())
+            raise ValueError(f"{gains}: the loop is open, give a gain other than zero")
+        if self._filter is not None and not isinstance(self._filter, DerivativeFilter):
+            raise TypeError(f"filter={self._filter!r}: give a DerivativeFilter or None")
+
+    @classmethod
+    @abstractmethod
+    def _gains(cls) -> tuple[str, ...]:
+        """Names of the gains."""
+
+    @property
+    def _filter(self) -> DerivativeFilter | None:
+        return getattr(self, "filter", None)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The gains, and ``omega`` and ``damping`` of the filter where there is one."""
+        numbers = {name: float(getattr(self, name)) for name in self._gains()}
+        if self._filter is not None:
+            numbers |= {"omega": self._filter.omega, "damping": self._filter.damping}
+        return numbers
+
+    def _replace(self, numbers: Mapping[str, float]) -> Controller:
+        """Return the same controller with other numbers."""
+        fields: dict[str, Any] = {n: numbers.get(n, getattr(self, n)) for n in self._gains()}
+        if self._filter is not None:
+            fields["filter"] = DerivativeFilter(
+                omega=numbers.get("omega", self._filter.omega),
+                damping=numbers.get("damping", self._filter.damping),
+            )
+        return type(self)(**fields)
+
+    @property
+    def _differentiates_reference(self) -> bool:
+        """Whether a jump of the reference makes an impulse of the command."""
+        return False
+
+    @abstractmethod
+    def _terms(self, values: Mapping[str, Any]) -> _Terms:
+        """Gains on the proportional, integral and derivative terms."""
+
+    def _feedback(self, values: Mapping[str, Any]) -> tuple[Polynomial, Polynomial]:
+        """F = num/den, descending, in numbers or symbols of `values`."""
+        terms = self._terms(values)
+        return self._rational(values, terms.proportional, terms.integral, terms.derivative)
+
+    def _reference(self, values: Mapping[str, Any]) -> tuple[Polynomial, Polynomial]:
+        """R = num/den over the denominator of F."""
+        terms = self._terms(values)
+        derivative = terms.derivative if terms.derivative_of_error else 0.0
+        return self._rational(values, terms.proportional, terms.integral, derivative)
+
+    def _rational(
+        self, values: Mapping[str, Any], p: Any, i: Any, d: Any
+    ) -> tuple[Polynomial, Polynomial]:
+        """Sum of p, i/s and d H(s) over one denominator."""
+        terms = self._terms(values)
+        integral = [1.0, 0.0] if terms.integrates else [1.0]
+        if self._filter is None or not terms.differentiates:
+            rolled_off, slope = [1.0], [d, 0.0]
+        else:
+            omega, damping = values["omega"], values["damping"]
+            rolled_off = [1.0, 2.0 * (damping * omega), omega * omega]
+            slope = [omega * omega * d, 0.0]
+        num = _scaled(p, _product(integral, rolled_off))
+        if terms.differentiates:
+            num = _sum(num, _product(integral, slope))
+        if terms.integrates:
+            num = _sum(num, _scaled(i, rolled_off))
+        return num, _product(integral, rolled_off)
+
+    def _equations(self, values: Mapping[str, float]) -> ControllerEquations:
+        """Equations of the states: integral of the error first, filter after it."""
+        terms = self._terms(values)
+        on_error = 1.0 if terms.derivative_of_error else 0.0
+        blocks: list[tuple[Vector, Vector, Vector, Vector]] = []
+        p, q = -terms.proportional, 0.0
+        if terms.integrates:
+            blocks.append(
+                (np.zeros((1, 1)), np.array([-1.0]), np.array([1.0]), np.array([terms.integral]))
+            )
+        if terms.differentiates and self._filter is None:
+            q = -terms.derivative
+        elif terms.differentiates:
+            omega, damping = values["omega"], values["damping"]
+            # The second state is the derivative over omega, so that both are of one size.
+            both = np.array([[0.0, omega], [-omega, -2.0 * damping * omega]])
+            into = np.array([0.0, omega])
+            out = np.array([0.0, -terms.derivative * omega])
+            # The filter sees y, or y - r for a derivative of the error.
+            blocks.append((both, into, -on_error * into, out))
+        size = sum(len(block[1]) for block in blocks)
+        matrix = np.zeros((size, size))
+        at = 0
+        for block in blocks:
+            n = len(block[1])
+            matrix[at : at + n, at : at + n] = block[0]
+            at += n
+        drive, along, row = (
+            np.concatenate([np.zeros(0), *(block[part] for block in blocks)]) for part in (1, 2, 3)
+        )
+        return ControllerEquations(matrix, drive, along, row, p, q, terms.proportional)
+
+    def _rest(
+        self, values: Mapping[str, float], output: float, reference: float, command: float
+    ) -> Vector:
+        """States after a long time at constant `output` and `reference`, giving `command`.
+
+        The integral takes the value at which the controller takes over without a bump.
+        """
+        terms = self._terms(values)
+        states: list[float] = []
+        if terms.integrates:
+            missing = command - terms.proportional * (reference - output)
+            states.append(missing / terms.integral if terms.integral != 0.0 else 0.0)
+        if terms.differentiates and self._filter is not None:
+            seen = output - reference if terms.derivative_of_error else output
+            states += [seen, 0.0]
+        return np.array(states)
+
+
+class _Terms(NamedTuple):
+    """u = p (r - y) + i ∫(r - y) - d H y, or + d H (r - y)."""
+
+    proportional: Any
+    integral: Any = 0.0
+    derivative: Any = 0.0
+    integrates: bool = False
+    differentiates: bool = False
+    derivative_of_error: bool = False
+
+
+@dataclass(frozen=True)
+class P(Controller):
+    """Proportional controller, u = Kp (r - y).
+
+    Parameters
+    ----------
+    Kp : float
+        Gain, not zero.
+    """
+
+    Kp: float
+
+    @classmethod
+    def _gains(cls) -> tuple[str, ...]:
+        return ("Kp",)
+
+    def _terms(self, values: Mapping[str, Any]) -> _Terms:
+        return _Terms(values["Kp"])
+
+
+@dataclass(frozen=True)
+class PV(Controller):
+    """Proportional and velocity controller, u = Kp (r - y) - Kv H y.
+
+    The derivative is that of the measurement alone, so steps of the reference do not kick.
+
+    Parameters
+    ----------
+    Kp, Kv : float
+        Gains, not both zero.
+    filter : DerivativeFilter, optional
+        H(s); without it the derivative is ideal and the loop is neutral where the plant's
+        relative degree is one.
+    """
+
+    Kp: float
+    Kv: float
+    filter: DerivativeFilter | None = field(default=None)
+
+    @classmethod
+    def _gains(cls) -> tuple[str, ...]:
+        return ("Kp", "Kv")
+
+    def _terms(self, values: Mapping[str, Any]) -> _Terms:
+        return _Terms(values["Kp"], derivative=values["Kv"], differentiates=True)
+
+
+@dataclass(frozen=True)
+class PD(Controller):
+    """Proportional and derivative controller, u = Kp e + Kd H e with e = r - y.
+
+    Parameters
+    ----------
+    Kp, Kd : float
+        Gains, not both zero.
+    filter : DerivativeFilter, optional
+        H(s); without it the derivative is ideal, and a step of the reference is an impulse of the
+        command, which a limited or sampled loop does not see.
+    """
+
+    Kp: float
+    Kd: float
+    filter: DerivativeFilter | None = field(default=None)
+
+    @classmethod
+    def _gains(cls) -> tuple[str, ...]:
+        return ("Kp", "Kd")
+
+    @property
+    def _differentiates_reference(self) -> bool:
+        return self.filter is None and self.Kd != 0.0
+
+    def _terms(self, values: Mapping[str, Any]) -> _Terms:
+        return _Terms(
+            values["Kp"], derivative=values["Kd"], differentiates=True, derivative_of_error=True
+        )
+
+
+@dataclass(frozen=True)
+class PI(Controller):
+    """Proportional and integral controller, u = Kp e + Ki ∫ e dt with e = r - y.
+
+    Parameters
+    ----------
+    Kp, Ki : float
+        Gains, not both zero. The integral does not stop while the command is limited.
+    """
+
+    Kp: float
+    Ki: float
+
+    @classmethod
+    def _gains(cls) -> tuple[str, ...]:
+        return ("Kp", "Ki")
+
+    def _terms(self, values: Mapping[str, Any]) -> _Terms:
+        return _Terms(values["Kp"], integral=values["Ki"], integrates=True)
+
+
+@dataclass(frozen=True)
+class PID(Controller):
+    """Proportional, integral and derivative controller, u = Kp e + Ki ∫ e dt + Kd H e, e = r - y.
+
+    Parameters
+    ----------
+    Kp, Ki, Kd : float
+        Gains, not all zero. The integral does not stop while the command is limited.
+    filter : DerivativeFilter, optional
+        H(s); without it the derivative is ideal, and a step of the reference is an impulse of the
+        command, which a limited or sampled loop does not see.
+    """
+
+    Kp: float
+    Ki: float
+    Kd: float
+    filter: DerivativeFilter | None = field(default=None)
+
+    @classmethod
+    def _gains(cls) -> tuple[str, ...]:
+        return ("Kp", "Ki", "Kd")
+
+    @property
+    def _differentiates_reference(self) -> bool:
+        return self.filter is None and self.Kd != 0.0
+
+    def _terms(self, values: Mapping[str, Any]) -> _Terms:
+        return _Terms(
+            values["Kp"],
+            integral=values["Ki"],
+            derivative=values["Kd"],
+            integrates=True,
+            differentiates=True,
+            derivative_of_error=True,
+        )
+
+
+def _product(p: Polynomial, q: Polynomial) -> Polynomial:
+    out: Polynomial = [0.0] * (len(p) + len(q) - 1)
+    for i, a in enumerate(p):
+        for j, b in enumerate(q):
+            out[i + j] = out[i + j] + a * b
+    return out
+
+
+def _sum(p: Polynomial, q: Polynomial) -> Polynomial:
+    if len(p) < len(q):
+        p, q = q, p
+    head = len(p) - len(q)
+    return p[:head] + [a + b for a, b in zip(p[head:], q, strict=True)]
+
+
+def _scaled(factor: Any, p: Polynomial) -> Polynomial:
+    return [factor * a for a in p]

@@ -1,0 +1,228 @@
+"""A feedback loop with a delay: plant, controller, delay, and the hold and limit around them."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+from numpy.typing import ArrayLike
+
+from deadtime._controllers import Controller
+from deadtime._loop_model import LoopModel
+from deadtime._loop_run import simulate_loop
+from deadtime._plants import Plant
+from deadtime._response import Response
+from deadtime._validation import non_negative, positive
+
+if TYPE_CHECKING:
+    from deadtime._deadtime import LinearLoop
+
+__all__ = ["ControlLoop"]
+
+_FIELDS = ("plant", "controller", "delay", "sample_time", "limit", "delay_path")
+_PATHS = ("command", "measurement")
+
+
+@dataclass(frozen=True)
+class ControlLoop:
+    """A plant under feedback with one delay in the loop.
+
+    The command u of the controller is limited, delayed by `delay` and reaches the plant as w.
+    With `sample_time` the controller computes u only every `sample_time` seconds and holds it;
+    such a loop is not a continuous one, and everything here treats it exactly.
+
+    Parameters
+    ----------
+    plant : Plant
+        `Integrator`, `FirstOrder` or `RationalPlant`.
+    controller : Controller
+        `P`, `PV`, `PD`, `PI` or `PID`.
+    delay : float, optional
+        Delay in s, zero or more; None where it is not known yet.
+    sample_time : float, optional
+        Sample time in s; None for continuous time.
+    limit : float, optional
+        Bound of the command, abs(u) <= limit; None for no bound.
+    delay_path : {"command", "measurement"}
+        Where the delay sits. Between command and plant, the output starts to move `delay` after a
+        step; in the measurement, the output itself is the same function `delay` earlier.
+
+    Raises
+    ------
+    ValueError
+        If a number is negative, not finite or zero where it must not be; the message names it.
+    """
+
+    plant: Plant
+    controller: Controller
+    _: KW_ONLY
+    delay: float | None = None
+    sample_time: float | None = None
+    limit: float | None = None
+    delay_path: Literal["command", "measurement"] = "command"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.plant, Plant):
+            raise TypeError(f"plant={self.plant!r}: give a plant, for example Integrator()")
+        if not isinstance(self.controller, Controller):
+            raise TypeError(f"controller={self.controller!r}: give a controller, such as P(Kp=1)")
+        if self.delay is not None:
+            object.__setattr__(self, "delay", non_negative("delay", self.delay))
+        if self.sample_time is not None:
+            object.__setattr__(self, "sample_time", positive("sample_time", self.sample_time))
+        if self.limit is not None:
+            object.__setattr__(self, "limit", positive("limit", self.limit))
+        if self.delay_path not in _PATHS:
+            raise ValueError(
+                f"delay_path={self.delay_path!r}: give one of {', '.join(map(repr, _PATHS))}"
+            )
+        LoopModel.build(self.plant, self.controller, self.parameters)
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the command is held between samples."""
+        return self.sample_time is not None
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The named numbers of the loop: those of plant and controller, then its own.
+
+        Returns
+        -------
+        dict of str to float
+            ``delay``, ``sample_time`` and ``limit`` are there where they are not None.
+        """
+        own = {name: getattr(self, name) for name in ("delay", "sample_time", "limit")}
+        known = {name: value for name, value in own.items() if value is not None}
+        return self.plant.parameters | self.controller.parameters | known
+
+    def replace(self, **changes: Any) -> ControlLoop:
+        """Return the loop with other numbers or other parts.
+
+        Parameters
+        ----------
+        **changes
+            Names of `parameters`, or the arguments of `ControlLoop`.
+
+        Returns
+        -------
+        ControlLoop
+
+        Raises
+        ------
+        ValueError
+            If the loop has no such name.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=2.4))
+        >>> loop.replace(delay=0.36, Kp=3.0).parameters
+        {'gain': 1.0, 'lag': 0.0, 'Kp': 3.0, 'delay': 0.36}
+        """
+        parts = {name: changes.pop(name, getattr(self, name)) for name in _FIELDS}
+        for part in ("plant", "controller"):
+            if isinstance(parts[part], (Plant, Controller)):
+                mine = parts[part].parameters
+                numbers = {name: changes.pop(name) for name in mine if name in changes}
+                if numbers:
+                    parts[part] = parts[part]._replace(numbers)
+        if changes:
+            raise ValueError(
+                f"{', '.join(changes)}: no such number in this loop, which has "
+                f"{', '.join(self.parameters)}"
+            )
+        return ControlLoop(**parts)
+
+    def continuous(self) -> ControlLoop:
+        """Return the same loop without the hold, as if the controller computed all the time."""
+        return self.replace(sample_time=None)
+
+    def simulate(
+        self,
+        time: ArrayLike,
+        reference: ArrayLike = 1.0,
+        *,
+        initial_output: float = 0.0,
+        reference_before: float | None = None,
+        reference_time: ArrayLike | None = None,
+        command_history: ArrayLike = (),
+        sample_phase: float = 0.0,
+    ) -> Response:
+        """Response to a reference that is constant between jumps, exact to rounding.
+
+        The run starts at ``time[0]`` with the plant at rest at `initial_output`, under the command
+        that keeps it there.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            Output times in s, increasing.
+        reference : float or array_like, shape (m,)
+            A number: a step to it at the start. An array: values that hold from the times in
+            `reference_time` on.
+        initial_output : float
+            Output at the start.
+        reference_before : float, optional
+            Reference before the first jump; `initial_output` by default.
+        reference_time : array_like, shape (m,), optional
+            Times of the values of an array `reference`, increasing, in the same clock as `time`;
+            `time` itself where the lengths agree.
+        command_history : array_like, optional
+            Sampled loops: the commands issued at the samples before the start, the latest last.
+            Those still under way arrive as they did; before them the plant was at rest.
+        sample_phase : float
+            Sampled loops: time in s from the start to the first sample, in [0, sample_time).
+
+        Returns
+        -------
+        Response
+
+        Raises
+        ------
+        ValueError
+            If the delay is None, an argument is out of its range, or the response grows beyond
+            1e150; the message says when.
+
+        Notes
+        -----
+        Continuous loops are integrated by the method of steps in Taylor elements that end at
+        every breaking point, sampled ones by matrix exponentials between events; see the
+        description of the delay differential equations in the manual. A sampled controller reads
+        output and reference at the sample; one that lies on a jump reads the reference after it.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.31), delay=0.36, limit=1.0)
+        >>> response = loop.simulate([0.0, 1.0, 2.0, 10.0], reference=2.0)
+        >>> print(response.outputs)
+        [0.         0.64       1.60825592 2.00000012]
+        """
+        return simulate_loop(
+            self,
+            time,
+            reference,
+            initial_output=initial_output,
+            reference_before=reference_before,
+            reference_time=reference_time,
+            command_history=command_history,
+            sample_phase=sample_phase,
+        )
+
+    @cached_property
+    def _model(self) -> LoopModel:
+        return LoopModel.build(self.plant, self.controller, self.parameters)
+
+    @cached_property
+    def _native(self) -> LinearLoop:
+        return self._model.native(self._known_delay(), self.sample_time, self.limit)
+
+    def _known_delay(self) -> float:
+        if self.delay is None:
+            raise ValueError(
+                "the delay of this loop is None: set it with loop.replace(delay=...) or estimate "
+                "it from a recording first"
+            )
+        return self.delay

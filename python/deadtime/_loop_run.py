@@ -1,0 +1,153 @@
+"""One simulation of a control loop: arguments to the stepper's, its arrays to a `Response`.
+
+With the delay in the measurement the true output runs ahead of what the stepper calls y by the
+delay, so outputs are asked for that much later and their breaks are moved back.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._loop_model import state_at_rest
+from deadtime._response import Response
+from deadtime._validation import finite
+
+if TYPE_CHECKING:
+    from deadtime._loop import ControlLoop
+
+__all__ = ["simulate_loop"]
+
+Vector = NDArray[np.float64]
+
+
+class _Jumps(NamedTuple):
+    """A reference that holds `values` from `times` on, and `before` until the first of them."""
+
+    times: Vector
+    values: Vector
+    before: float
+
+    def at(self, times: Vector) -> Vector:
+        place = np.searchsorted(self.times, times, side="right")
+        return np.concatenate([[self.before], self.values])[place]
+
+
+def simulate_loop(
+    loop: ControlLoop,
+    time: ArrayLike,
+    reference: ArrayLike,
+    *,
+    initial_output: float,
+    reference_before: float | None,
+    reference_time: ArrayLike | None,
+    command_history: ArrayLike,
+    sample_phase: float,
+) -> Response:
+    """Check the arguments of `ControlLoop.simulate` and run it."""
+    times = _increasing("time", time)
+    if times.size == 0:
+        raise ValueError("time is empty: give at least one output time")
+    start = float(times[0])
+    initial = finite("initial_output", initial_output)
+    before = initial if reference_before is None else finite("reference_before", reference_before)
+    jumps = _jumps(times, reference, reference_time, before)
+    if loop.controller._differentiates_reference and not loop.is_sampled and loop.limit is None:
+        _refuse_impulses(jumps, start)
+
+    past = jumps.at(np.array([np.nextafter(start, -np.inf)]))[0]
+    state, command = state_at_rest(
+        loop.plant, loop.controller, loop.parameters, initial, float(past)
+    )
+    native = loop._native
+    delay = loop._known_delay()
+    ahead = delay if loop.delay_path == "measurement" else 0.0
+    arguments = (
+        state,
+        command,
+        jumps.before,
+        jumps.times - start,
+        jumps.values,
+        np.ravel(np.asarray(command_history, dtype=np.float64)),
+        finite("sample_phase", sample_phase),
+    )
+    since = times - start
+    outputs, inputs, output_breaks, input_breaks = native.simulate(since + ahead, since, *arguments)
+
+    def dense(at: Vector) -> Vector:
+        return native.simulate(at - start + ahead, np.empty(0), *arguments)[0]
+
+    breaks = np.concatenate([output_breaks - ahead, input_breaks])
+    return Response(
+        time=times,
+        outputs=outputs,
+        inputs=inputs,
+        breaks=_distinct(breaks[breaks >= 0.0], delay) + start,
+        reference=jumps.at(times),
+        steady_state=_steady_state(loop, float(jumps.values[-1])),
+        _dense=dense,
+    )
+
+
+def _steady_state(loop: ControlLoop, reference: float) -> float | None:
+    rest = loop._model.equilibrium(reference)
+    if rest is None or (loop.limit is not None and abs(rest[1]) > loop.limit):
+        return None
+    return rest[0]
+
+
+def _jumps(
+    times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
+) -> _Jumps:
+    values = np.asarray(reference, dtype=np.float64)
+    if values.ndim == 0:
+        if reference_time is not None:
+            raise ValueError(
+                f"reference={values} is one number, so reference_time has no meaning: give an "
+                "array of as many values as there are times"
+            )
+        return _Jumps(times[:1], values.reshape(1), before)
+    where = times if reference_time is None else _increasing("reference_time", reference_time)
+    if values.shape != where.shape or values.size == 0:
+        raise ValueError(
+            f"reference has shape {values.shape} and its times {where.shape}: give one value for "
+            "each element of reference_time (or of time, without reference_time), at least one"
+        )
+    return _Jumps(where, values, before)
+
+
+def _refuse_impulses(jumps: _Jumps, start: float) -> None:
+    levels = np.concatenate([[jumps.before], jumps.values])
+    moments = jumps.times[np.diff(levels) != 0.0]
+    moments = moments[moments >= start]
+    if moments.size:
+        raise ValueError(
+            f"the reference jumps at t = {moments[0]} s, and the ideal derivative of a jump is an "
+            "impulse: give the controller a DerivativeFilter or the loop a limit, or use PV, which "
+            "differentiates the output alone"
+        )
+
+
+def _increasing(name: str, given: ArrayLike) -> Vector:
+    times = np.atleast_1d(np.asarray(given, dtype=np.float64))
+    if times.ndim != 1:
+        raise ValueError(f"{name} has shape {times.shape}: give a one-dimensional array")
+    if not np.isfinite(times).all():
+        raise ValueError(f"{name} holds {times[~np.isfinite(times)][0]}: give finite times")
+    steps = np.diff(times)
+    if (steps <= 0.0).any():
+        at = int(np.argmax(steps <= 0.0))
+        raise ValueError(
+            f"{name}[{at + 1}]={times[at + 1]} does not come after {name}[{at}]={times[at]}: give "
+            "increasing times"
+        )
+    return times
+
+
+def _distinct(times: Vector, delay: float) -> Vector:
+    """Sorted times, those within rounding of one another as one."""
+    times = np.unique(times)
+    apart = np.diff(times) > 64 * np.finfo(float).eps * (times[1:] + delay)
+    return np.asarray(times[np.append(True, apart)[: times.size]])

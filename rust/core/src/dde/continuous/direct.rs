@@ -1,0 +1,177 @@
+//! The loop without a delay: w = sat(K x + L w + M r) holds at one and the same instant.
+//!
+//! For L < 1, or for any L ≠ 1 without a limit, w = sat(v) with v = (K x + M r)/(1 − L) is its one
+//! solution. The loop is then linear where |v| ≤ limit and has a constant command elsewhere; an
+//! element ends where v crosses the limit. The two fields agree there, so the state passes
+//! through and never slides.
+
+use crate::dde::linear::{
+    LinearLoop, Reference, Start, Trajectory, Wanted, check_growth, dot, saturate, slack,
+};
+use crate::{Error, Task};
+
+use super::crossing::{Mode, Stretch, stretches};
+use super::series::{Expansion, Series};
+use super::watch;
+
+/// Changes of mode without progress in time after which the mode is kept: rounding at the limit.
+const MOST_CHANGES: u32 = 2;
+
+/// Room left when an element is shortened.
+const MARGIN: f64 = 0.95;
+
+pub(super) fn run(
+    plant: &LinearLoop,
+    start: &Start,
+    reference: &Reference,
+    mut wanted: Wanted<'_>,
+    task: &Task,
+) -> Result<Trajectory, Error> {
+    let closed = Closed::new(plant)?;
+    let equations = plant.equations();
+    let limit = plant.limit();
+    let horizon = 1.0 + 2.0 * wanted.last();
+    let nothing = Series::constant(0.0);
+    let n = equations.states();
+    let mut free = Expansion::new(&closed.a, n);
+    let mut driven = Expansion::new(&equations.a, n);
+    let mut cursor = reference.cursor();
+    let mut modes: Vec<Stretch> = Vec::new();
+    let mut x = start.state.clone();
+    let mut forcing = vec![0.0; n];
+    let mut mode = Mode::Free;
+    let mut changes = 0;
+    let mut t = 0.0;
+    let mut elements = 0;
+    while !wanted.is_done() {
+        watch(elements, task)?;
+        elements += 1;
+        let tolerance = slack(t, 0.0);
+        let jumps = elements == 1 || cursor.next_jump() <= t + tolerance;
+        let r = cursor.advance(t, tolerance);
+        if jumps {
+            wanted.input_break(t);
+            let v = dot(&closed.k, &x) + closed.m * r;
+            mode = match limit {
+                Some(limit) if v > limit => Mode::High,
+                Some(limit) if v < -limit => Mode::Low,
+                _ => Mode::Free,
+            };
+        }
+        let held = match mode {
+            Mode::Free => None,
+            Mode::High => limit,
+            Mode::Low => limit.map(|limit| -limit),
+        };
+        let (a, expansion) = match held {
+            None => (&closed.a, &mut free),
+            Some(_) => (&equations.a, &mut driven),
+        };
+        for (i, forcing) in forcing.iter_mut().enumerate() {
+            *forcing = match held {
+                None => closed.e[i] * r,
+                Some(w) => equations.e[i] * r + equations.b[i] * w,
+            };
+        }
+        let mut h = (cursor.next_jump().min(horizon) - t).max(tolerance);
+        let mut next = t + h;
+        if h > expansion.trial {
+            h = expansion.trial;
+            next = t + h;
+        }
+        let part = MARGIN * expansion.expand(a, &equations.b, &forcing, &x, &nothing, h);
+        if part < MARGIN {
+            expansion.shorten(part);
+            h *= part;
+            next = t + h;
+        }
+        let v = expansion.combine(&closed.k, 0.0, &nothing, closed.m * r);
+        let mut end = 1.0;
+        if let Some(limit) = limit {
+            stretches(&v, limit, &mut modes);
+            if let Some(other) = modes.iter().find(|stretch| stretch.mode != mode) {
+                if other.start > 0.0 || changes < MOST_CHANGES {
+                    end = other.start;
+                    next = t + end * h;
+                    mode = other.mode;
+                }
+            }
+        }
+        if next <= t {
+            changes += 1;
+            continue;
+        }
+        changes = 0;
+        let y = match held {
+            None => expansion.combine(&closed.c, 0.0, &nothing, closed.d * r),
+            Some(w) => expansion.combine(&equations.c, 0.0, &nothing, equations.d * w),
+        };
+        wanted.outputs_before(next - tolerance, |time| y.at((time - t) / h));
+        wanted.inputs_before(next - tolerance, |time| {
+            held.unwrap_or_else(|| saturate(v.at((time - t) / h), limit))
+        });
+        if end < 1.0 {
+            wanted.input_break(next);
+            wanted.output_break(next);
+        }
+        expansion.end(end, &mut x);
+        check_growth(&x, 0.0, next)?;
+        t = next;
+    }
+    Ok(wanted.trajectory)
+}
+
+/// The loop with w = v substituted.
+struct Closed {
+    a: Vec<f64>,
+    /// Gain of r in x′.
+    e: Vec<f64>,
+    k: Vec<f64>,
+    m: f64,
+    c: Vec<f64>,
+    d: f64,
+}
+
+impl Closed {
+    fn new(plant: &LinearLoop) -> Result<Self, Error> {
+        let equations = plant.equations();
+        let denominator = 1.0 - equations.l;
+        if denominator == 0.0 || (denominator < 0.0 && plant.limit().is_some()) {
+            return Err(Error::argument(format!(
+                "without a delay the command depends on itself with gain L = {}, which {}: give \
+                 the loop a delay or filter the derivative",
+                equations.l,
+                if denominator == 0.0 {
+                    "no command satisfies"
+                } else {
+                    "several limited commands satisfy"
+                }
+            )));
+        }
+        let k: Vec<f64> = equations.k.iter().map(|k| k / denominator).collect();
+        let m = equations.m / denominator;
+        let n = equations.states();
+        let mut a = equations.a.clone();
+        for i in 0..n {
+            for j in 0..n {
+                a[i * n + j] += equations.b[i] * k[j];
+            }
+        }
+        let along = |base: &[f64], gain: f64| -> Vec<f64> {
+            base.iter().zip(&k).map(|(c, k)| c + gain * k).collect()
+        };
+        Ok(Self {
+            a,
+            e: equations
+                .e
+                .iter()
+                .zip(&equations.b)
+                .map(|(e, b)| e + b * m)
+                .collect(),
+            c: along(&equations.c, equations.d),
+            d: equations.d * m,
+            k,
+            m,
+        })
+    }
+}

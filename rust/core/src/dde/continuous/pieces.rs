@@ -1,0 +1,128 @@
+//! The delayed command as a queue of pieces, and the order of the breaks between them.
+
+use std::collections::VecDeque;
+
+use crate::Error;
+use crate::dde::linear::slack;
+
+use super::series::Series;
+
+/// Pieces in the queue beyond which the run is given up.
+const MOST_PIECES: usize = 1_000_000;
+
+/// The lowest derivative that jumps at a breaking point; [`SMOOTH`] where none does.
+pub(super) type Order = u8;
+
+/// No break at all.
+pub(super) const SMOOTH: Order = u8::MAX;
+
+/// Breaks up to this order are reported; later ones are below what a plot or a fit can see.
+pub(super) const REPORTED: Order = 10;
+
+/// w(t) = series((t − origin)/scale) up to `end`; the piece before it says where it starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub(super) end: f64,
+    pub(super) origin: f64,
+    pub(super) scale: f64,
+    pub(super) series: Series,
+    /// Order of the break at the start of the piece.
+    pub(super) order: Order,
+}
+
+impl Piece {
+    pub(super) fn constant(value: f64, end: f64) -> Self {
+        Self {
+            end,
+            origin: 0.0,
+            scale: 1.0,
+            series: Series::constant(value),
+            order: SMOOTH,
+        }
+    }
+
+    /// w over [t, t + h] in σ ∈ [0, 1].
+    pub(super) fn local(&self, t: f64, h: f64) -> Series {
+        if self.series.degree == 0 {
+            return self.series;
+        }
+        let offset = (t - self.origin) / self.scale;
+        let offset = if offset.abs() <= f64::EPSILON {
+            0.0
+        } else {
+            offset
+        };
+        self.series.shifted(offset, h / self.scale)
+    }
+}
+
+/// The pieces not yet used up, first one first; never empty.
+#[derive(Debug)]
+pub(super) struct Pieces {
+    front: Piece,
+    rest: VecDeque<Piece>,
+    end: f64,
+    delay: f64,
+    /// Order of a break lost in a piece too short to keep.
+    dropped: Order,
+}
+
+impl Pieces {
+    /// Constant `command` until the first command of the run arrives.
+    pub(super) fn new(command: f64, delay: f64) -> Self {
+        Self {
+            front: Piece::constant(command, delay),
+            rest: VecDeque::new(),
+            end: delay,
+            delay,
+            dropped: SMOOTH,
+        }
+    }
+
+    pub(super) fn front(&self) -> &Piece {
+        &self.front
+    }
+
+    /// Leave behind what ends at `t`; the order of the break passed.
+    pub(super) fn reach(&mut self, t: f64) -> Order {
+        let mut order = SMOOTH;
+        while self.front.end <= t + slack(t, self.delay) {
+            let Some(next) = self.rest.pop_front() else {
+                break;
+            };
+            self.front = next;
+            order = order.min(next.order);
+        }
+        order
+    }
+
+    /// Append a piece; one shorter than rounding is left to its neighbour, and equal constants
+    /// become one piece.
+    pub(super) fn push(&mut self, mut piece: Piece) -> Result<(), Error> {
+        piece.order = piece.order.min(self.dropped);
+        let is_dust = piece.end - self.end <= slack(piece.end, self.delay);
+        let last = self.rest.back_mut().unwrap_or(&mut self.front);
+        let is_same = last.series.degree == 0 && last.series == piece.series;
+        self.end = piece.end;
+        if is_dust {
+            self.dropped = piece.order;
+            last.end = piece.end;
+            return Ok(());
+        }
+        self.dropped = SMOOTH;
+        if is_same {
+            last.end = piece.end;
+            return Ok(());
+        }
+        if self.rest.len() >= MOST_PIECES {
+            return Err(Error::TooMuch {
+                what: "the continuous response",
+                limit: MOST_PIECES as u64,
+                unit: "pieces of the command in one delay",
+                advice: "shorten the time simulated or the list of reference jumps".to_owned(),
+            });
+        }
+        self.rest.push_back(piece);
+        Ok(())
+    }
+}

@@ -1,0 +1,49 @@
+//! The loop with a hold: u_k is computed at t_k = t_0 + k Ts and reaches the plant Td later.
+//!
+//! With m = ⌊Td/Ts⌋ and δ = Td − m Ts the plant sees u_{k−m−1} on [t_k, t_k + δ) and u_{k−m} on
+//! [t_k + δ, t_{k+1}), so between events its response is a matrix exponential and the loop as a
+//! whole is one linear map of (x, u_{k−1}, …, u_{k−m−1}): finite-dimensional, with poles
+//! s = ln(z)/Ts. Everything here is exact to rounding. A delay within rounding of a whole number
+//! of samples is taken as that number.
+
+mod grid;
+mod run;
+mod transition;
+
+pub use grid::{CellPoles, LoopCells, abscissa_grid};
+pub(crate) use run::run;
+pub use transition::{poles, transition_matrix};
+
+/// How a delay lies on the sample grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// m, the whole samples in the delay.
+    pub samples: usize,
+    /// δ, what remains of the delay, in [0, Ts).
+    pub early: f64,
+    /// Ts − δ.
+    pub late: f64,
+}
+
+impl Timing {
+    /// Of `delay` seconds at `sample_time` seconds.
+    pub fn new(delay: f64, sample_time: f64) -> Self {
+        let ratio = delay / sample_time;
+        let nearest = ratio.round();
+        if (ratio - nearest).abs() <= 8.0 * f64::EPSILON * nearest.max(1.0) {
+            return Self {
+                samples: nearest as usize,
+                early: 0.0,
+                late: sample_time,
+            };
+        }
+        let whole = ratio.floor();
+        // One rounding: the product of whole and Ts is not rounded on its own.
+        let early = (-whole).mul_add(sample_time, delay).clamp(0.0, sample_time);
+        Self {
+            samples: whole as usize,
+            early,
+            late: sample_time - early,
+        }
+    }
+}

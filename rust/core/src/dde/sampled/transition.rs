@@ -1,0 +1,148 @@
+//! Transition matrix of the sampled loop without its limit, and its poles.
+//!
+//!   x_{k+1} = Φ x_k + Γ₁ u_{k−m−1} + Γ₀ u_{k−m},   u_k = K x_k + L u_{k−m−1},
+//!
+//! Γ₀ = Γ(Ts − δ), Γ₁ = Φ(Ts − δ) Γ(δ); the state is (x_k, u_{k−1}, …, u_{k−m−1}), m + 1 commands
+//! behind x. Reference: Åström & Wittenmark, Computer-Controlled Systems (3rd ed. 1997), section
+//! 2.3, with the feedback closed. Eigenvalues by the QR algorithm (backward stable).
+
+use faer::MatRef;
+use num_complex::Complex64;
+
+use crate::Error;
+use crate::dde::linear::LinearLoop;
+use crate::dde::propagator::{Propagator, multiply_add};
+
+use super::Timing;
+
+/// A dense eigenvalue problem beyond this size is refused.
+const MOST_STATES: usize = 2000;
+
+/// The open-loop pieces Φ, Γ₀, Γ₁ of one sample.
+pub(super) struct Sample {
+    phi: Vec<f64>,
+    now: Vec<f64>,
+    past: Vec<f64>,
+    lag: usize,
+}
+
+impl Sample {
+    pub(super) fn new(a: &[f64], b: &[f64], delay: f64, sample_time: f64) -> Self {
+        let timing = Timing::new(delay, sample_time);
+        let late = Propagator::new(a, &[b], timing.late);
+        let early = Propagator::new(a, &[b], timing.early);
+        let mut past = vec![0.0; b.len()];
+        late.apply(early.gamma(0), &[0.0], &mut past);
+        let mut phi = vec![0.0; a.len()];
+        product(&late.phi(), &early.phi(), b.len(), &mut phi);
+        Self {
+            phi,
+            now: late.gamma(0).to_vec(),
+            past,
+            lag: timing.samples,
+        }
+    }
+
+    /// Side of the transition matrix.
+    pub(super) fn size(&self) -> usize {
+        self.now.len() + self.lag + 1
+    }
+
+    /// The loop closed with u = K x + L w and the command scaled by `gain` on its way to the
+    /// plant; row-major.
+    pub(super) fn close(&self, k: &[f64], l: f64, gain: f64) -> Vec<f64> {
+        let (n, size) = (self.now.len(), self.size());
+        let oldest = size - 1;
+        let mut matrix = vec![0.0; size * size];
+        for row in 0..n {
+            let line = &mut matrix[row * size..(row + 1) * size];
+            line[..n].copy_from_slice(&self.phi[row * n..(row + 1) * n]);
+            line[oldest] += gain * self.past[row];
+            if self.lag == 0 {
+                // u_{k−m} is the command of this very sample.
+                for (entry, k) in line.iter_mut().zip(k) {
+                    *entry += gain * self.now[row] * k;
+                }
+                line[oldest] += gain * self.now[row] * l;
+            } else {
+                line[oldest - 1] += gain * self.now[row];
+            }
+        }
+        let newest = &mut matrix[n * size..(n + 1) * size];
+        newest[..n].copy_from_slice(k);
+        newest[oldest] += l;
+        for row in n + 1..size {
+            matrix[row * size + row - 1] = 1.0;
+        }
+        matrix
+    }
+}
+
+/// The transition matrix, row-major, and its side.
+pub fn transition_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error> {
+    let Some(sample_time) = plant.sample_time() else {
+        return Err(Error::argument(
+            "a continuous loop has no transition matrix: give it a sample_time",
+        ));
+    };
+    let equations = plant.equations();
+    check_size(equations.states(), plant.delay(), sample_time)?;
+    let sample = Sample::new(&equations.a, &equations.b, plant.delay(), sample_time);
+    Ok((sample.close(&equations.k, equations.l, 1.0), sample.size()))
+}
+
+/// Poles s = ln(z)/Ts of the sampled loop, rightmost first; z = 0 gives re s = −∞.
+pub fn poles(plant: &LinearLoop) -> Result<Vec<Complex64>, Error> {
+    let (matrix, size) = transition_matrix(plant)?;
+    let sample_time = plant.sample_time().unwrap_or(f64::NAN);
+    let mut poles: Vec<_> = eigenvalues(&matrix, size)?
+        .into_iter()
+        .map(|z| Complex64::new(z.norm().ln() / sample_time, z.arg() / sample_time))
+        .collect();
+    poles.sort_by(|p, q| q.re.total_cmp(&p.re).then(q.im.total_cmp(&p.im)));
+    Ok(poles)
+}
+
+/// Refuse what a dense eigenvalue problem is no tool for.
+pub(super) fn check_size(n: usize, delay: f64, sample_time: f64) -> Result<(), Error> {
+    if delay / sample_time + n as f64 > MOST_STATES as f64 {
+        return Err(Error::TooMuch {
+            what: "the transition matrix",
+            limit: MOST_STATES as u64,
+            unit: "states",
+            advice: format!(
+                "the delay of {delay} s holds too many samples of {sample_time} s: lengthen the \
+                 sample time or treat the loop as continuous"
+            ),
+        });
+    }
+    Ok(())
+}
+
+/// Eigenvalues of a row-major matrix.
+pub(super) fn eigenvalues(matrix: &[f64], size: usize) -> Result<Vec<Complex64>, Error> {
+    MatRef::from_row_major_slice(matrix, size, size)
+        .eigenvalues()
+        .map_err(|_| Error::Convergence {
+            what: "the eigenvalues of the transition matrix",
+            best: Complex64::new(f64::NAN, f64::NAN),
+            advice: "the loop is scaled too badly: choose units in which its gains are moderate"
+                .to_owned(),
+        })
+}
+
+/// `out` += A B for square matrices of side n.
+fn product(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
+    let mut column = vec![0.0; n];
+    let mut result = vec![0.0; n];
+    for j in 0..n {
+        for i in 0..n {
+            column[i] = b[i * n + j];
+        }
+        result.fill(0.0);
+        multiply_add(a, &column, &mut result);
+        for i in 0..n {
+            out[i * n + j] = result[i];
+        }
+    }
+}
