@@ -51,6 +51,8 @@ impl Cell {
 /// * `Undecided`: the zero function, or more work or precision than there is. If only the
 ///   abscissa is missing, the count holds all the same.
 ///
+/// The abscissa is also NaN where it is beyond reach in a cell that is no longer `Ok`.
+///
 /// # Errors
 /// [`Error::Interrupted`] alone.
 ///
@@ -88,7 +90,10 @@ pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, E
             return Ok(Cell {
                 unstable,
                 abscissa: f64::NAN,
-                status: CellStatus::Undecided,
+                status: match status {
+                    CellStatus::Ok => CellStatus::Undecided,
+                    known => known,
+                },
             });
         }
     };
@@ -110,6 +115,10 @@ fn count(h: &QuasiPolynomial, chain: f64, task: &Task) -> Result<(i32, CellStatu
     }
     if chain > 0.0 {
         return Ok((ENDLESS, CellStatus::Infinite));
+    }
+    if h.coefficients().iter().all(|row| row.first() == Some(&0.0)) {
+        // s itself is a factor.
+        return Ok((UNKNOWN, CellStatus::Boundary));
     }
     match count_right_of(h, 0.0, task) {
         Ok(number) => Ok(match i32::try_from(number) {
