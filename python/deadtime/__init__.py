@@ -3,7 +3,9 @@
 from deadtime._controllers import PD, PI, PID, PV, DerivativeFilter, P
 from deadtime._loop import ControlLoop
 from deadtime._plants import FirstOrder, Integrator, RationalPlant, kit_plant
+from deadtime._quasipolynomial import QuasiPolynomial, delay, s
 from deadtime._response import Response
+from deadtime._rootset import RootSet
 
 __all__ = [
     "PD",
@@ -15,7 +17,11 @@ __all__ = [
     "FirstOrder",
     "Integrator",
     "P",
+    "QuasiPolynomial",
     "RationalPlant",
     "Response",
+    "RootSet",
+    "delay",
     "kit_plant",
+    "s",
 ]

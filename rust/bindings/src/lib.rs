@@ -16,5 +16,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::dde::{PyLinearLoop, sampled_abscissa_grid};
     #[pymodule_export]
+    use super::quasipoly::QuasiPolynomial;
+    #[pymodule_export]
     use super::runtime::{spin, thread_count};
 }

@@ -1,1 +1,172 @@
-//! Bindings of `deadtime::quasipoly`.
+//! Bindings of `deadtime::quasipoly` and `deadtime::roots`.
+
+use deadtime::quasipoly::QuasiPolynomial as Core;
+use deadtime::roots::{self, Region};
+use deadtime::{Error, Task};
+use num_complex::Complex64;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+
+use crate::arrays::in_order;
+use crate::errors::to_python;
+use crate::runtime::{run, run_here};
+
+/// Fewer values than this are computed on the calling thread.
+const FEW_VALUES: usize = 2048;
+
+/// Roots, multiplicities, radii, resolved, counted, re, im.
+type Listed<'py> = (
+    Bound<'py, PyArray1<Complex64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<bool>>,
+    u64,
+    (f64, f64),
+    (f64, f64),
+);
+
+/// A quasi-polynomial of the core.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct QuasiPolynomial {
+    core: Core,
+}
+
+fn wrapped(py: Python<'_>, result: Result<Core, Error>) -> PyResult<QuasiPolynomial> {
+    result
+        .map(|core| QuasiPolynomial { core })
+        .map_err(|error| to_python(py, error))
+}
+
+#[pymethods]
+impl QuasiPolynomial {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        coefficients: PyReadonlyArray2<'_, f64>,
+        delays: PyReadonlyArrayDyn<'_, f64>,
+    ) -> PyResult<Self> {
+        let rows = coefficients.as_array();
+        let rows = rows.rows().into_iter().map(|row| row.to_vec()).collect();
+        wrapped(py, Core::new(rows, in_order(&delays).into_owned()))
+    }
+
+    /// Ascending coefficients, one row for each delay.
+    fn coefficients<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let width = self.core.degree() + 1;
+        let rows: Vec<Vec<f64>> = self
+            .core
+            .coefficients()
+            .iter()
+            .map(|row| {
+                let mut row = row.clone();
+                row.resize(width, 0.0);
+                row
+            })
+            .collect();
+        PyArray2::from_vec2(py, &rows)
+            .map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))
+    }
+
+    /// Delays in seconds.
+    fn delays<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.core.delays())
+    }
+
+    fn kind(&self) -> &'static str {
+        self.core.kind().name()
+    }
+
+    fn degree(&self) -> usize {
+        self.core.degree()
+    }
+
+    fn add(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
+        wrapped(py, self.core.add(&other.core))
+    }
+
+    fn sub(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
+        wrapped(py, self.core.sub(&other.core))
+    }
+
+    fn mul(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
+        wrapped(py, self.core.mul(&other.core))
+    }
+
+    fn scale(&self, py: Python<'_>, factor: f64) -> PyResult<Self> {
+        wrapped(py, self.core.scale(factor))
+    }
+
+    fn pow(&self, py: Python<'_>, exponent: u32) -> PyResult<Self> {
+        wrapped(py, self.core.pow(exponent))
+    }
+
+    fn derivative(&self, py: Python<'_>, order: u32) -> PyResult<Self> {
+        wrapped(py, self.core.derivative(order))
+    }
+
+    /// Values at all points, in C order.
+    fn values<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArrayDyn<'py, Complex64>,
+    ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
+        let points = in_order(&points);
+        let work = |task: &Task| self.core.values(&points, task);
+        let values = if points.len() < FEW_VALUES {
+            run_here(py, work)?
+        } else {
+            run(py, None, None, work)?
+        };
+        Ok(values.into_pyarray(py))
+    }
+
+    fn count(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<u64> {
+        run(py, None, None, |task| {
+            roots::count(&self.core, &Region { re, im }, task)
+        })
+    }
+
+    fn count_right_of(&self, py: Python<'_>, sigma: f64) -> PyResult<u64> {
+        run(py, None, None, |task| {
+            roots::count_right_of(&self.core, sigma, task)
+        })
+    }
+
+    fn roots<'py>(&self, py: Python<'py>, re: (f64, f64), im: (f64, f64)) -> PyResult<Listed<'py>> {
+        let set = run(py, None, None, |task| {
+            roots::roots(&self.core, &Region { re, im }, task)
+        })?;
+        Ok(listed(py, set))
+    }
+
+    fn rightmost<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Listed<'py>> {
+        let set = run(py, None, None, |task| roots::rightmost(&self.core, n, task))?;
+        Ok(listed(py, set))
+    }
+
+    fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {
+        run(py, None, None, |task| {
+            roots::spectral_abscissa(&self.core, task)
+        })
+    }
+
+    fn chain_abscissa(&self) -> f64 {
+        roots::chain_abscissa(&self.core)
+    }
+}
+
+fn listed(py: Python<'_>, set: roots::RootSet) -> Listed<'_> {
+    (
+        set.roots.into_pyarray(py),
+        set.multiplicities
+            .into_iter()
+            .map(i64::from)
+            .collect::<Vec<_>>()
+            .into_pyarray(py),
+        set.radii.into_pyarray(py),
+        set.resolved.into_pyarray(py),
+        set.counted,
+        set.region.re,
+        set.region.im,
+    )
+}

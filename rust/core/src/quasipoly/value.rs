@@ -1,8 +1,13 @@
 //! Values of a quasi-polynomial at single points.
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 use super::{Probe, QuasiPolynomial};
+use crate::{Error, Task};
+
+/// Points that one thread takes at a time.
+const CHUNK: usize = 1024;
 
 /// A value of h without its largest exponential: h(s) = `value` · e^(−s `delay`).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,5 +61,22 @@ impl QuasiPolynomial {
             }
         };
         Complex64::new(grow(turned.re), grow(turned.im))
+    }
+
+    /// h at every point.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub fn values(&self, points: &[Complex64], task: &Task) -> Result<Vec<Complex64>, Error> {
+        let chunks: Result<Vec<Vec<Complex64>>, Error> = points
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                task.check()?;
+                let values = chunk.iter().map(|s| self.value(*s)).collect();
+                task.advance(chunk.len() as u64);
+                Ok(values)
+            })
+            .collect();
+        Ok(chunks?.concat())
     }
 }

@@ -193,14 +193,11 @@ pub(super) fn cluster(
         disc.center
     };
     let second = smallest_square(walker, side, most)?;
-    Ok(Some(match second {
-        Some(second)
-            if second.multiplicity == first.multiplicity && second.radius <= first.radius =>
-        {
-            second
-        }
-        _ => first,
-    }))
+    // The better centre is worth a disc that is one step of the search for its size larger.
+    let as_good = |second: &Disc| {
+        second.multiplicity == first.multiplicity && second.radius <= 1.6 * first.radius
+    };
+    Ok(Some(second.filter(as_good).unwrap_or(first)))
 }
 
 fn smallest_square(

@@ -153,7 +153,7 @@ impl<'a> Walker<'a> {
         let size = modulus(s);
         let mut span = most.min(room / slope);
         let mut best = 0.0f64;
-        for _ in 0..6 {
+        for _ in 0..40 {
             let bend = self.probe.curvature(size + span, along.re * span);
             let r = 2.0 * room / (slope + (slope * slope + 2.0 * bend * room).sqrt());
             let r = r.min(span) * (1.0 - 1e-12);
@@ -161,7 +161,8 @@ impl<'a> Walker<'a> {
             if best >= 0.25 * span {
                 break;
             }
-            span = if best > 0.0 { 3.0 * best } else { span / 64.0 };
+            // The bound grows exponentially with the span: come down in steps, not at once.
+            span = (3.0 * best).max(0.125 * span);
         }
         best
     }

@@ -1,0 +1,98 @@
+"""Characteristic roots with the evidence that they are right and that none is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["RootSet"]
+
+_SHOWN = 12
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RootSet:
+    """Roots of a quasi-polynomial, each the centre of a disc proved to hold it.
+
+    Behaves like the array of its roots: it has a length, can be indexed and iterated over, and
+    NumPy takes it for an array. Sorted by falling real part, then rising modulus of the imaginary
+    part, then the upper one of a pair first.
+
+    Attributes
+    ----------
+    roots : ndarray of complex, shape (n,)
+        Centres of the discs, in 1/s.
+    multiplicities : ndarray of int, shape (n,)
+        How many roots the disc holds.
+    radii : ndarray of float, shape (n,)
+        Radii of the discs, in 1/s: every root is within the radius of its centre.
+    resolved : ndarray of bool, shape (n,)
+        Is the disc proved to hold one single point? Not so for a multiple root, nor for a cluster
+        that double precision cannot tell from one.
+    counted : int
+        Number of roots in `region` by the argument principle; equal to the sum of the
+        multiplicities.
+    region : tuple of (float, float)
+        The ranges of the real and of the imaginary part, `((a, b), (c, d))`, in which the roots
+        listed are all there are.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> found = (dtm.s + dtm.delay(1.0)).roots(re=(-3, 2), im=(0, 20))
+    >>> found.counted
+    3
+    >>> abs(found[0] - (-0.318131505204764 + 1.337235701430689j)) < 1e-14
+    True
+    """
+
+    roots: NDArray[np.complex128]
+    multiplicities: NDArray[np.int64]
+    radii: NDArray[np.float64]
+    resolved: NDArray[np.bool_]
+    counted: int
+    region: tuple[tuple[float, float], tuple[float, float]]
+
+    def __post_init__(self) -> None:
+        for array in (self.roots, self.multiplicities, self.radii, self.resolved):
+            array.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.roots)
+
+    def __iter__(self) -> Iterator[complex]:
+        return iter(self.roots.tolist())
+
+    @overload
+    def __getitem__(self, index: int) -> complex: ...
+    @overload
+    def __getitem__(self, index: slice) -> NDArray[np.complex128]: ...
+    def __getitem__(self, index: Any) -> Any:
+        """One root as a number, several as an array; any index that NumPy takes."""
+        return self.roots[index]
+
+    def __array__(
+        self, dtype: np.dtype[Any] | None = None, copy: bool | None = None
+    ) -> NDArray[Any]:
+        """Give the roots to NumPy."""
+        # asarray knows `copy` since NumPy 2 only.
+        array = np.asarray(self.roots, dtype=dtype)
+        return array.copy() if copy else array
+
+    def __repr__(self) -> str:
+        (a, b), (c, d) = self.region
+        lines = [f"RootSet: {self.counted} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g})"]
+        for index in range(min(len(self), _SHOWN)):
+            root = complex(self.roots[index])
+            line = f"  {root.real:.15g} {'-' if root.imag < 0 else '+'} {abs(root.imag):.15g}i"
+            line += f"  within {self.radii[index]:.1e}"
+            if self.multiplicities[index] > 1:
+                line += f", {self.multiplicities[index]} roots not told apart"
+            lines.append(line)
+        if len(self) > _SHOWN:
+            lines.append(f"  and {len(self) - _SHOWN} more")
+        return "\n".join(lines)
