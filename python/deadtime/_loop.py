@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from deadtime._controllers import Controller
 from deadtime._loop_model import LoopModel
-from deadtime._loop_run import simulate_loop
+from deadtime._loop_run import settled_step, simulate_loop
+from deadtime._loop_stability import (
+    characteristic,
+    sampled_abscissa,
+    sampled_roots,
+    stable_range,
+)
 from deadtime._plants import Plant
 from deadtime._response import Response
-from deadtime._validation import non_negative, positive
+from deadtime._validation import finite, non_negative, positive
 
 if TYPE_CHECKING:
+    from deadtime import QuasiPolynomial, RootSet
     from deadtime._deadtime import LinearLoop
 
 __all__ = ["ControlLoop"]
 
 _FIELDS = ("plant", "controller", "delay", "sample_time", "limit", "delay_path")
 _PATHS = ("command", "measurement")
+
+# Samples in the delay at which the search for its stable range ends: the transition matrix grows
+# with them.
+_MOST_SAMPLES = 200
 
 
 @dataclass(frozen=True)
@@ -198,7 +212,7 @@ class ControlLoop:
         >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.31), delay=0.36, limit=1.0)
         >>> response = loop.simulate([0.0, 1.0, 2.0, 10.0], reference=2.0)
         >>> print(response.outputs)
-        [0.         0.64       1.60825592 2.00000012]
+        [0.         0.64       1.63876861 2.        ]
         """
         return simulate_loop(
             self,
@@ -210,6 +224,216 @@ class ControlLoop:
             command_history=command_history,
             sample_phase=sample_phase,
         )
+
+    def step_response(self, time: ArrayLike | None = None, amplitude: float = 1.0) -> Response:
+        """Response to a step of the reference from rest at zero.
+
+        Parameters
+        ----------
+        time : array_like, optional
+            Output times in s; by default 501 from the step until the response has settled, or
+            has visibly failed to.
+        amplitude : float
+            Height of the step.
+
+        Returns
+        -------
+        Response
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=2.0), delay=0.36)
+        >>> round(loop.step_response().info()["overshoot"], 3)
+        23.128
+        """
+        if time is not None:
+            return self.simulate(time, amplitude)
+        return settled_step(self, finite("amplitude", amplitude))
+
+    def characteristic(self) -> QuasiPolynomial:
+        """Return the characteristic function of the continuous loop, its limit left out.
+
+        Returns
+        -------
+        QuasiPolynomial
+            a g + b f exp(-s delay) for the plant b/a and the feedback f/g.
+
+        Raises
+        ------
+        ValueError
+            If the loop is sampled or its delay is None.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> h = dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).characteristic()
+        >>> h.kind
+        'neutral'
+        """
+        if self.is_sampled:
+            raise ValueError(
+                f"a loop with sample_time={self.sample_time} has finitely many poles and no "
+                "characteristic quasi-polynomial: use transition_matrix() or rightmost(), or "
+                "continuous().characteristic() for the loop without its hold"
+            )
+        self._known_delay()
+        return cast("QuasiPolynomial", self._characteristic(self.parameters))
+
+    def _characteristic(self, values: Mapping[str, Any]) -> Any:
+        """Characteristic function with numbers or symbols from `values`, which name them all."""
+        return characteristic(self.plant, self.controller, values)
+
+    def transition_matrix(self) -> NDArray[np.float64]:
+        """Return the matrix that takes a sampled loop, limit left out, from sample to sample.
+
+        Returns
+        -------
+        ndarray, shape (n + m + 1, n + m + 1)
+            For the state (x, u_{k-1}, ..., u_{k-m-1}): the n states of plant and controller, and
+            as many past commands as reach into the present sample interval, m = floor(delay /
+            sample_time).
+
+        Raises
+        ------
+        ValueError
+            If the loop is continuous, its delay is None or holds too many samples.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.1, sample_time=0.1)
+        >>> loop.transition_matrix()
+        array([[ 1. ,  0.1,  0. ],
+               [-2. ,  0. ,  0. ],
+               [ 0. ,  1. ,  0. ]])
+        """
+        if not self.is_sampled:
+            raise ValueError(
+                "a continuous loop has no transition matrix: use characteristic(), or give the "
+                "loop a sample_time"
+            )
+        return self._native.transition_matrix()
+
+    def rightmost(self, n: int = 1) -> RootSet:
+        """Return the `n` rightmost poles, limit left out.
+
+        Parameters
+        ----------
+        n : int
+            How many.
+
+        Returns
+        -------
+        RootSet
+            Of a continuous loop: roots of `characteristic`, with proved discs. Of a sampled loop:
+            s = ln(z)/sample_time for the eigenvalues z of `transition_matrix`, with radii that
+            estimate the rounding error to first order.
+
+        Raises
+        ------
+        ValueError
+            If the delay is None or `n` is less than one.
+        """
+        if n < 1:
+            raise ValueError(f"n={n}: ask for one pole at least")
+        if self.sample_time is None:
+            return self.characteristic().rightmost(n)
+        return sampled_roots(self.transition_matrix(), self.sample_time, n)
+
+    def spectral_abscissa(self) -> float:
+        """Return the largest real part of the poles in 1/s, limit left out.
+
+        Small deviations from rest grow or decay like exp(abscissa t).
+
+        Returns
+        -------
+        float
+            ln(rho)/sample_time for a sampled loop, rho the spectral radius of its transition
+            matrix.
+
+        Raises
+        ------
+        ValueError
+            If the delay is None.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
+        >>> round(loop.spectral_abscissa(), 6), round(loop.continuous().spectral_abscissa(), 6)
+        (-1.187697, -1.423398)
+        """
+        return self._abscissa(self.parameters)
+
+    def is_stable(self) -> bool:
+        """Whether every pole lies left of the imaginary axis, limit left out.
+
+        For a neutral loop it must stay so under small changes of the delay (strong stability).
+
+        Raises
+        ------
+        ValueError
+            If the delay is None.
+        """
+        if self.is_sampled:
+            return self.spectral_abscissa() < 0.0
+        return bool(self.characteristic().is_stable())
+
+    def stable_range(self, name: str) -> tuple[float, float]:
+        """Interval of one named number, around its present value, on which the loop is stable.
+
+        Walks outwards from the present value in growing steps to the first loss of stability on
+        either side and refines each by Brent's method to twelve digits. A loss that is regained
+        within one step (1/64 of the value at first) can be passed over.
+
+        Parameters
+        ----------
+        name : str
+            One of `parameters`, but not ``limit``.
+
+        Returns
+        -------
+        (low, high) : tuple of float
+            An end is infinite where stability is not lost within a million times the value (for
+            the delay of a sampled loop: within 200 samples), and 0 for numbers that cannot be
+            negative.
+
+        Raises
+        ------
+        ValueError
+            If the loop is unstable as it is, its delay is None or it has no such number.
+
+        Examples
+        --------
+        The hold costs stability:
+
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
+        >>> low, high = loop.stable_range("Kp")
+        >>> round(high, 3), round(loop.continuous().stable_range("Kp")[1], 3)
+        (4.024, 4.363)
+        """
+        values = self.parameters
+        if name not in values or name == "limit":
+            raise ValueError(
+                f"{name!r} is not a number whose range can be sought: choose one of "
+                f"{', '.join(known for known in values if known != 'limit')}"
+            )
+        farthest = math.inf
+        if self.sample_time is not None and name == "delay":
+            farthest = _MOST_SAMPLES * self.sample_time
+        return stable_range(
+            lambda value: self._abscissa(values | {name: value}), name, values[name], farthest
+        )
+
+    def _abscissa(self, values: Mapping[str, float]) -> float:
+        """Spectral abscissa with numbers from `values`, which may lie outside the usual range."""
+        self._known_delay()
+        if self.is_sampled:
+            model = LoopModel.build(self.plant, self.controller, values)
+            return sampled_abscissa(model, values["delay"], values["sample_time"])
+        return float(self._characteristic(values).spectral_abscissa())
 
     @cached_property
     def _model(self) -> LoopModel:

@@ -23,6 +23,16 @@ __all__ = ["simulate_loop"]
 Vector = NDArray[np.float64]
 
 
+# The default time of a step response: at first so many times the slowest constant of the loop (at
+# least so many seconds), doubled until the last quarter is settled or the response has run away.
+_POINTS = 501
+_SHORTEST = 10.0
+_LEAST = 0.01
+_DOUBLINGS = 10
+_SETTLED = 0.005
+_LOST = 20.0
+
+
 class _Jumps(NamedTuple):
     """A reference that holds `values` from `times` on, and `before` until the first of them."""
 
@@ -68,12 +78,12 @@ def simulate_loop(
         state,
         command,
         jumps.before,
-        jumps.times - start,
+        _on_samples(jumps.times - start, start, loop.sample_time, sample_phase),
         jumps.values,
         np.ravel(np.asarray(command_history, dtype=np.float64)),
         finite("sample_phase", sample_phase),
     )
-    since = times - start
+    since = _on_samples(times - start, start, loop.sample_time, sample_phase)
     outputs, inputs, output_breaks, input_breaks = native.simulate(since + ahead, since, *arguments)
 
     def dense(at: Vector) -> Vector:
@@ -89,6 +99,21 @@ def simulate_loop(
         steady_state=_steady_state(loop, float(jumps.values[-1])),
         _dense=dense,
     )
+
+
+def settled_step(loop: ControlLoop, amplitude: float) -> Response:
+    """Step response up to where it has settled, found by doubling the time."""
+    delay = loop._known_delay()
+    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
+    span = _SHORTEST * max([delay + (loop.sample_time or 0.0), *slowest, _LEAST])
+    for _ in range(_DOUBLINGS):
+        response = loop.simulate(np.linspace(0.0, span, _POINTS), amplitude)
+        goal = response.outputs[-1] if response.steady_state is None else response.steady_state
+        away = np.abs(response.outputs - goal)
+        if away[-_POINTS // 4 :].max() <= _SETTLED * abs(goal) or away.max() > _LOST * abs(goal):
+            break
+        span *= 2.0
+    return response
 
 
 def _steady_state(loop: ControlLoop, reference: float) -> float | None:
@@ -144,6 +169,15 @@ def _increasing(name: str, given: ArrayLike) -> Vector:
             "increasing times"
         )
     return times
+
+
+def _on_samples(since: Vector, start: float, sample_time: float | None, phase: float) -> Vector:
+    """Move times that miss a sample only by the rounding of the clock onto it."""
+    if sample_time is None:
+        return since
+    samples = phase + np.rint((since - phase) / sample_time) * sample_time
+    rounding = 4.0 * np.finfo(float).eps * (abs(start) + np.abs(since))
+    return np.where(np.abs(since - samples) <= rounding, samples, since)
 
 
 def _distinct(times: Vector, delay: float) -> Vector:

@@ -52,7 +52,7 @@ class Response:
     >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.31), delay=0.36)
     >>> time, outputs = loop.simulate([0.0, 0.5, 1.0])
     >>> print(outputs)
-    [0.         0.63818222 0.96676774]
+    [0.         0.1834     0.77112888]
     """
 
     time: Vector

@@ -160,3 +160,109 @@ pub(crate) fn norm(a: &[f64], n: usize) -> f64 {
 fn side(a: &[f64]) -> usize {
     (0..).find(|n| n * n >= a.len()).unwrap_or(0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn close(found: &[f64], truth: &[f64], relative: f64) {
+        let scale = truth.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for (found, truth) in found.iter().zip(truth) {
+            assert!(
+                (found - truth).abs() <= relative * scale,
+                "{found} is not {truth}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_rotation_turns() {
+        let h = 2.0;
+        let found = Propagator::new(&[0.0, 1.0, -1.0, 0.0], &[&[0.0, 1.0]], h);
+        close(
+            &found.phi(),
+            &[h.cos(), h.sin(), -h.sin(), h.cos()],
+            4.0 * f64::EPSILON,
+        );
+        close(
+            found.gamma(0),
+            &[1.0 - h.cos(), h.sin()],
+            4.0 * f64::EPSILON,
+        );
+    }
+
+    #[test]
+    fn an_integrator_is_exact() {
+        let found = Propagator::new(&[0.0], &[&[1.0]], 0.065);
+        assert_eq!(found.phi(), [1.0]);
+        assert_eq!(found.gamma(0), [0.065]);
+    }
+
+    #[test]
+    fn a_non_normal_matrix_with_a_large_input_agrees_with_forty_digits() {
+        let a = [-3.0, 2000.0, 0.5, 0.0, -0.25, -7.0, 1.0, 0.0, -40.0];
+        let found = Propagator::new(&a, &[&[1e6, 2.0, -3.0]], 0.375);
+        let phi = [
+            1.726_542_984_080_490_2,
+            43.851_079_621_243_18,
+            5.257_939_972_085_656,
+            0.002_619_769_464_083_126,
+            1.787_025_344_949_991_2,
+            -0.250_410_248_845_426_8,
+            0.036_802_087_838_807_91,
+            -0.748_505_561_166_607_5,
+            0.364_865_734_044_597_43,
+        ];
+        // Eight doublings each lose about one unit of the largest entry.
+        close(&found.phi(), &phi, 1e-14);
+        close(
+            found.gamma(0),
+            &[
+                21_254.403_061_251_527,
+                395.286_236_384_093_2,
+                -388.702_329_230_797_95,
+            ],
+            1e-14,
+        );
+    }
+
+    #[test]
+    fn no_states_and_no_time_are_fine() {
+        let empty = Propagator::new(&[], &[&[]], 1.0);
+        assert!(empty.phi().is_empty() && empty.gamma(0).is_empty());
+        let still = Propagator::new(&[5.0], &[&[3.0]], 0.0);
+        assert_eq!((still.phi(), still.gamma(0)), (vec![1.0], &[0.0][..]));
+    }
+
+    proptest! {
+        /// Two steps are one step of the sum, and A Γ = (Φ − I) g.
+        #[test]
+        fn steps_compose(
+            a in prop::collection::vec(-4.0..4.0, 9),
+            g in prop::collection::vec(-2.0..2.0, 3),
+            x in prop::collection::vec(-1.0..1.0, 3),
+            (first, second) in (0.0..1.5, 0.0..1.5),
+        ) {
+            let step = |h: f64, x: &[f64]| {
+                let mut out = vec![0.0; 3];
+                Propagator::new(&a, &[&g], h).apply(x, &[0.7], &mut out);
+                out
+            };
+            let whole = step(first + second, &x);
+            let parts = step(second, &step(first, &x));
+            let size = (norm(&a, 3) * (first + second)).exp();
+            for (whole, part) in whole.iter().zip(&parts) {
+                prop_assert!((whole - part).abs() <= 1e-14 * size);
+            }
+            let one = Propagator::new(&a, &[&g], first);
+            let mut left = vec![0.0; 3];
+            multiply_add(&a, one.gamma(0), &mut left);
+            let mut right = vec![0.0; 3];
+            multiply_add(&one.growth, &g, &mut right);
+            for (left, right) in left.iter().zip(&right) {
+                prop_assert!((left - right).abs() <= 1e-14 * size);
+            }
+        }
+    }
+}

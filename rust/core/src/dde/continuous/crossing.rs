@@ -206,3 +206,118 @@ fn bisect(u: &Series, level: f64, interval: &Bernstein, degree: usize) -> f64 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn series(coefficients: &[f64]) -> Series {
+        let mut out = Series::constant(0.0);
+        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
+        out.degree = coefficients.len() - 1;
+        out
+    }
+
+    /// Π (σ − root).
+    fn with_roots(roots: &[f64]) -> Series {
+        let mut out = vec![1.0];
+        for root in roots {
+            out.push(0.0);
+            for i in (0..out.len()).rev() {
+                out[i] = if i > 0 { out[i - 1] } else { 0.0 } - root * out[i];
+            }
+        }
+        series(&out)
+    }
+
+    fn found(u: &Series, limit: f64) -> Vec<Stretch> {
+        let mut out = Vec::new();
+        stretches(u, limit, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_line_through_both_limits_is_cut_at_both() {
+        let modes = found(&series(&[-4.0, 8.0]), 1.0);
+        let expected = [
+            (Mode::Low, 0.0, 0.375),
+            (Mode::Free, 0.375, 0.625),
+            (Mode::High, 0.625, 1.0),
+        ];
+        assert_eq!(modes.len(), 3);
+        for (stretch, (mode, start, end)) in modes.iter().zip(expected) {
+            assert_eq!(stretch.mode, mode);
+            assert!((stretch.start - start).abs() < 1e-16 && (stretch.end - end).abs() < 1e-16);
+        }
+    }
+
+    #[test]
+    fn touching_the_limit_is_no_crossing() {
+        // 1 − (σ − 1/3)², up to rounding.
+        let modes = found(&series(&[1.0 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        assert!(
+            modes
+                .iter()
+                .all(|stretch| stretch.mode == Mode::Free || stretch.end - stretch.start < 1e-7)
+        );
+    }
+
+    #[test]
+    fn a_peak_just_over_the_limit_is_found() {
+        // 1 + 1e-12 − (σ − 1/3)² is over the limit for 2e-6 around 1/3.
+        let modes = found(&series(&[1.0 + 1e-12 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        assert_eq!(modes.len(), 3);
+        assert!((modes[1].end - modes[1].start - 2e-6).abs() < 1e-9);
+    }
+
+    #[test]
+    fn standing_on_the_limit_is_free() {
+        assert_eq!(found(&series(&[1.0]), 1.0).len(), 1);
+        assert_eq!(found(&series(&[1.0, 1e-17, -1e-17]), 1.0).len(), 1);
+        assert_eq!(found(&series(&[1.0, -0.5]), 1.0)[0].mode, Mode::Free);
+    }
+
+    proptest! {
+        /// Every root apart from its neighbours is a cut, to its conditioning.
+        #[test]
+        fn all_roots_are_cuts(mut roots in prop::collection::vec(0.0_f64..1.0, 1..9)) {
+            roots.sort_by(f64::total_cmp);
+            prop_assume!(roots.windows(2).all(|pair| pair[1] - pair[0] > 0.02));
+            prop_assume!(roots[0] > 1e-3 && roots[roots.len() - 1] < 0.999);
+            let u = with_roots(&roots);
+            let mut shifted = u;
+            shifted.coefficients[0] += 1e3;
+            let modes = found(&shifted, 1e3);
+            prop_assert_eq!(modes.len(), roots.len() + 1);
+            for (stretch, root) in modes[1..].iter().zip(&roots) {
+                let slope: f64 = roots
+                    .iter()
+                    .filter(|other| *other != root)
+                    .map(|other| (root - other).abs())
+                    .product();
+                // Rounding of the shift by 1000 over the slope at the root.
+                prop_assert!((stretch.start - root).abs() < 1e-11 / slope);
+            }
+        }
+
+        /// On either side of every cut the mode is that of the polynomial.
+        #[test]
+        fn modes_are_those_of_the_values(
+            coefficients in prop::collection::vec(-3.0..3.0, 1..12),
+            sigmas in prop::collection::vec(0.0_f64..1.0, 40),
+        ) {
+            let u = series(&coefficients);
+            let modes = found(&u, 1.0);
+            prop_assert_eq!(modes[0].start, 0.0);
+            prop_assert_eq!(modes[modes.len() - 1].end, 1.0);
+            prop_assert!(modes.windows(2).all(|p| p[0].end == p[1].start && p[0].mode != p[1].mode));
+            for sigma in sigmas {
+                let value = u.at(sigma);
+                prop_assume!((value.abs() - 1.0).abs() > 1e-9);
+                let here = modes.iter().find(|m| sigma <= m.end).map(|m| m.mode);
+                prop_assert_eq!(here, Some(Mode::of(value, 1.0)));
+            }
+        }
+    }
+}

@@ -140,19 +140,32 @@ impl Expansion {
                 break;
             }
         }
+        self.sound_part()
+    }
+
+    /// Largest part of the element on which the last coefficients are negligible beside the
+    /// largest one; both shrink with the element, so the bound is approached in a few rounds.
+    fn sound_part(&self) -> f64 {
         let mut part = 1.0_f64;
-        for i in 0..n {
-            let mut largest = 0.0_f64;
-            for j in 0..=self.degree {
-                largest = largest.max(self.terms[j * n + i].abs());
-            }
-            for j in [DEGREE - 1, DEGREE] {
-                if j <= self.degree {
-                    let last = self.terms[j * n + i].abs();
-                    if last > NEGLIGIBLE * largest {
-                        part = part.min((NEGLIGIBLE * largest / last).powf(1.0 / j as f64));
+        if self.degree < DEGREE - 1 {
+            return part;
+        }
+        for i in 0..self.n {
+            loop {
+                let (mut largest, mut power, mut ratio) = (0.0_f64, 1.0_f64, 1.0_f64);
+                for j in 0..=self.degree {
+                    let size = self.terms[j * self.n + i].abs() * power;
+                    if j >= DEGREE - 1 && largest > 0.0 && size > NEGLIGIBLE * largest {
+                        ratio = ratio.min((NEGLIGIBLE * largest / size).powf(1.0 / j as f64));
                     }
+                    largest = largest.max(size);
+                    power *= part;
                 }
+                // A step of a thousandth ends the approach from above.
+                if ratio >= 1.0 || part < 1e-9 {
+                    break;
+                }
+                part *= ratio.min(0.999);
             }
         }
         part
@@ -207,5 +220,44 @@ impl Expansion {
     /// y on the element.
     pub(super) fn output(&self, equations: &Equations, w: &Series) -> Series {
         self.combine(&equations.c, equations.d, w, 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_shifted_series_is_the_same_function(
+            scaled in prop::collection::vec(-1.0..1.0, 1..=DEGREE + 1),
+            (offset, part, sigma) in (0.0..1.0, 0.0..1.0, 0.0..1.0),
+        ) {
+            // Coefficients that decay as those of an element do.
+            let mut series = Series::constant(0.0);
+            series.degree = scaled.len() - 1;
+            let mut size = 1.0;
+            for (j, c) in scaled.iter().enumerate() {
+                series.coefficients[j] = c * size;
+                size *= 2.0 / (j + 1) as f64;
+            }
+            let ratio = part * (1.0 - offset);
+            let shifted = series.shifted(offset, ratio);
+            let truth = series.at(offset + ratio * sigma);
+            prop_assert!((shifted.at(sigma) - truth).abs() < 2e-14);
+        }
+    }
+
+    #[test]
+    fn an_exponential_is_summed_to_rounding_on_the_part_that_is_offered() {
+        let a = [-40.0];
+        let mut expansion = Expansion::new(&a, 1);
+        let part = expansion.expand(&a, &[0.0], &[0.0], &[1.0], &Series::constant(0.0), 0.3);
+        assert!(part < 0.25, "e^-12 is not summed in one element: {part}");
+        let mut x = [0.0];
+        expansion.end(part, &mut x);
+        let truth = (-12.0 * part).exp();
+        assert!((x[0] - truth).abs() < 4.0 * f64::EPSILON * truth.max(1.0));
     }
 }

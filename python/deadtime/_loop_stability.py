@@ -1,0 +1,117 @@
+"""Characteristic function, poles and stable ranges of a control loop, its limit left out.
+
+A continuous loop with plant b/a and feedback f/g has the characteristic function
+a g + b f e^(-s Td); a sampled one the eigenvalues z of its transition matrix, poles s = ln(z)/Ts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import eig
+from scipy.optimize import brentq
+
+from deadtime._controllers import Controller
+from deadtime._loop_model import LoopModel
+from deadtime._plants import Plant
+
+if TYPE_CHECKING:
+    from deadtime import RootSet
+
+__all__ = ["characteristic", "sampled_abscissa", "sampled_roots", "stable_range"]
+
+# Numbers of a loop that cannot be negative, those of them that may be zero, and those that keep
+# their sign because the loop has no meaning at zero.
+_NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"})
+_MAY_BE_ZERO = frozenset({"delay", "lag"})
+_KEEPS_SIGN = frozenset({"time_constant"})
+
+# The walk away from the present value: first step, growth from step to step, how far it goes and
+# what counts as zero on the way down; lengths as parts of the value.
+_FIRST_STEP = 1.0 / 64.0
+_GROWTH = 1.2
+_FARTHEST = 1e6
+_NEARLY_ZERO = 1e-6
+
+
+def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
+    """Build a g + b f e^(-s delay) from numbers or symbols in `values`."""
+    from deadtime import delay
+
+    b, a = plant._polynomials(values)
+    f, g = controller._feedback(values)
+    return _in_s(a) * _in_s(g) + _in_s(b) * _in_s(f) * delay(values["delay"])
+
+
+def _in_s(coefficients: Sequence[Any]) -> Any:
+    """Polynomial in s from descending coefficients, numbers or symbols."""
+    from deadtime import s
+
+    total: Any = 0.0 * s
+    for power, c in enumerate(reversed(coefficients)):
+        if not (isinstance(c, float) and c == 0.0):
+            total = total + c * s**power
+    return total
+
+
+def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> float:
+    """Return ln(rho)/Ts with rho the largest modulus of the loop's eigenvalues."""
+    return float(model.native(delay, sample_time).poles()[0].real)
+
+
+def sampled_roots(matrix: np.ndarray[Any, Any], sample_time: float, n: int) -> RootSet:
+    """Return the `n` rightmost poles s = ln(z)/Ts, with first-order bounds of their error."""
+    from deadtime import RootSet
+
+    z, left, right = eig(matrix, left=True, right=True)
+    order = np.lexsort((z.imag, -np.abs(z)))[:n]
+    z = z[order]
+    # |dz| <= ||error|| / |y* x|, with the backward error of the QR algorithm.
+    overlap = np.abs(np.sum(left[:, order].conj() * right[:, order], axis=0))
+    error = len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radii = error / (overlap * np.abs(z) * sample_time)
+        roots = np.log(z) / sample_time
+    return RootSet(roots, np.ones(len(roots), dtype=np.int64), radii)
+
+
+def stable_range(
+    abscissa: Callable[[float], float], name: str, value: float, farthest: float
+) -> tuple[float, float]:
+    """Walk from `value` both ways to the first sign change of `abscissa`, up to `farthest`."""
+    if not abscissa(value) < 0.0:
+        raise ValueError(
+            f"the loop is not stable at {name}={value}: start from a stable one, for example with "
+            "lower gains"
+        )
+    size = abs(value) if value != 0.0 else 1.0
+    stops_at_zero = name in _NON_NEGATIVE or (name in _KEEPS_SIGN and value > 0.0)
+
+    def edge(direction: float) -> float:
+        inside, step = value, _FIRST_STEP * size
+        while abs(inside - value) < _FARTHEST * size:
+            outside = inside + direction * step
+            if stops_at_zero and direction < 0.0:
+                outside = max(outside, 0.5 * inside)
+                if outside < _NEARLY_ZERO * size:
+                    if name not in _MAY_BE_ZERO or abscissa(0.0) < 0.0:
+                        return 0.0
+                    return _refine(abscissa, inside, 0.0)
+            if outside > farthest:
+                break
+            if not abscissa(outside) < 0.0:
+                return _refine(abscissa, inside, outside)
+            inside, step = outside, step * _GROWTH
+        return direction * np.inf
+
+    return edge(-1.0), edge(1.0)
+
+
+def _refine(abscissa: Callable[[float], float], inside: float, outside: float) -> float:
+    """Zero of `abscissa` between a stable and an unstable value."""
+    if abscissa(outside) == 0.0:
+        return outside
+    size = max(abs(inside), abs(outside))
+    return float(brentq(abscissa, inside, outside, xtol=1e-13 * size, rtol=1e-14, maxiter=200))
