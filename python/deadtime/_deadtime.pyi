@@ -45,6 +45,23 @@ def spin(
 ) -> int: ...
 
 @final
+class Family:
+    def __new__(
+        cls, names: list[str], terms: list[tuple[float, list[int], int, float, list[float]]]
+    ) -> Family: ...
+    def at(self, values: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def map(
+        self,
+        values: list[float],
+        parameters: tuple[int, int],
+        first: NDArray[np.float64],
+        second: NDArray[np.float64],
+        abscissa: bool,
+        threads: int | None = None,
+        progress: Callable[[int], object] | None = None,
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]: ...
+
+@final
 class LinearLoop:
     def __new__(
         cls,

@@ -16,7 +16,7 @@ import math
 import numbers
 from collections.abc import Mapping
 from functools import cached_property
-from typing import NoReturn, SupportsFloat, TypeAlias
+from typing import SupportsFloat, TypeAlias
 
 from deadtime._deadtime import Family
 from deadtime._quasipolynomial import QuasiPolynomial
@@ -56,7 +56,7 @@ class ParametricQuasiPolynomial:
     >>> Kp, Kv, T = dtm.parameters("Kp Kv T")
     >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(T)
     >>> h
-    s + (Kv*s + Kp)*delay(T)
+    s + (Kp + Kv s) exp(-T s)
     >>> h.names
     ('Kp', 'Kv', 'T')
     >>> round(h.at(Kp=2.0, Kv=0.3, T=0.36).spectral_abscissa(), 6)
@@ -75,9 +75,9 @@ class ParametricQuasiPolynomial:
         )
 
     @classmethod
-    def _of(cls, names: tuple[str, ...], terms: Mapping[_Monomial, float]) -> (
-        ParametricQuasiPolynomial
-    ):
+    def _of(
+        cls, names: tuple[str, ...], terms: Mapping[_Monomial, float]
+    ) -> ParametricQuasiPolynomial:
         for coefficient in terms.values():
             if not math.isfinite(coefficient):
                 raise ValueError(
@@ -233,13 +233,13 @@ class ParametricQuasiPolynomial:
                 self._names, {key: value / divisor for key, value in self._terms.items()}
             )
         if isinstance(other, ParametricQuasiPolynomial | QuasiPolynomial):
-            _refuse_division(other)
+            raise TypeError(_no_quotient(other))
         return NotImplemented
 
     def __rtruediv__(self, other: object) -> ParametricQuasiPolynomial:
         if _coerced(other) is None:
             return NotImplemented
-        _refuse_division(self)
+        raise TypeError(_no_quotient(self))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ParametricQuasiPolynomial):
@@ -298,7 +298,7 @@ def parameters(names: str) -> tuple[Parameter, ...]:
     >>> import deadtime as dtm
     >>> Kp, T = dtm.parameters("Kp T")
     >>> dtm.s**2 + 0.5 * dtm.s + Kp * dtm.delay(2 * T + 0.1)
-    s**2 + 0.5*s + Kp*delay(2*T + 0.1)
+    0.5 s + s^2 + Kp exp(-(2 T + 0.1) s)
     """
     if not isinstance(names, str):
         raise TypeError(f"names={names!r}: give the names in one string, such as 'Kp Kv T'")
@@ -331,10 +331,10 @@ def _coerced(other: object) -> tuple[tuple[str, ...], _Terms] | None:
     return None
 
 
-def _refuse_division(divisor: object) -> NoReturn:
-    raise TypeError(
-        f"division by {divisor!r}: quotients of parameters and quasi-polynomials are none. "
-        "Multiply the equation through by it: the characteristic equation a + b/T = 0 is T*a + b = 0"
+def _no_quotient(divisor: object) -> str:
+    return (
+        f"division by {divisor!r}: the result would be no quasi-polynomial. Multiply the equation "
+        "through by it: a + b/T = 0 becomes T*a + b = 0"
     )
 
 
@@ -355,7 +355,7 @@ def _times(a: _Monomial, b: _Monomial) -> _Monomial:
 
 
 def _text(terms: _Terms, names: tuple[str, ...]) -> str:
-    """Terms as one would write them, gathered by delay."""
+    """Write the terms down in the manner of `QuasiPolynomial`, gathered by delay."""
     by_delay: dict[_Delay, list[tuple[_Monomial, float]]] = {}
     for key, value in terms.items():
         by_delay.setdefault(key[2], []).append((key, value))
@@ -365,17 +365,19 @@ def _text(terms: _Terms, names: tuple[str, ...]) -> str:
         inner = [_product(value, key[0], key[1]) for key, value in row]
         if delay == _NO_DELAY:
             summands += inner
-        elif len(inner) == 1:
-            summands.append(_factored(inner[0], f"delay({_affine(delay)})"))
+            continue
+        factor = f"exp(-{_affine(delay)} s)"
+        if len(inner) > 1:
+            summands.append(f"({_joined(inner)}) {factor}")
         else:
-            summands.append(f"({_joined(inner)})*delay({_affine(delay)})")
+            summands.append(_factored(inner[0], factor))
     return _joined(summands) if summands else "0"
 
 
 def _rank(key: _Monomial, names: tuple[str, ...]) -> tuple[float, ...]:
-    """High powers of s first, then high powers of the parameters in their order."""
+    """Order by the power of s, then high powers of the parameters first."""
     exponents = dict(key[0])
-    return (-key[1], *(-exponents.get(name, 0) for name in names))
+    return (key[1], *(-exponents.get(name, 0) for name in names))
 
 
 def _affine(delay: _Delay) -> str:
@@ -383,22 +385,19 @@ def _affine(delay: _Delay) -> str:
     summands = [_product(slope, ((name, 1),), 0) for name, slope in slopes]
     if constant or not summands:
         summands.append(_number(constant))
-    return _joined(summands)
+    single = len(summands) == 1 and not summands[0].startswith("-")
+    return summands[0] if single else f"({_joined(summands)})"
 
 
 def _product(coefficient: float, powers: _Powers, power: int) -> str:
     factors = [*powers, ("s", power)] if power else list(powers)
-    text = "*".join(name if n == 1 else f"{name}**{n}" for name, n in factors)
-    if not text:
-        return _number(coefficient)
-    return _factored(_number(coefficient), text)
+    text = " ".join(name if n == 1 else f"{name}^{n}" for name, n in factors)
+    return _factored(_number(coefficient), text) if text else _number(coefficient)
 
 
 def _factored(left: str, right: str) -> str:
-    """The product of two factors, a leading 1 left out."""
-    if left in ("1", "-1"):
-        return left[:-1] + right
-    return f"{left}*{right}"
+    """Write two factors, a leading 1 left out."""
+    return left[:-1] + right if left in ("1", "-1") else f"{left} {right}"
 
 
 def _joined(summands: list[str]) -> str:
@@ -406,4 +405,4 @@ def _joined(summands: list[str]) -> str:
 
 
 def _number(value: float) -> str:
-    return repr(value).removesuffix(".0")
+    return f"{value:.12g}"

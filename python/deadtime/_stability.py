@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
 import math
-import numbers
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,6 @@ from deadtime._parametric import Parameter, ParametricQuasiPolynomial
 from deadtime._validation import finite
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
 
 __all__ = ["MapStatus", "StabilityMap", "stability_map"]
@@ -112,7 +111,7 @@ class StabilityMap:
         ... )
         >>> values, abscissa = chart.best()
         >>> {name: round(value, 3) for name, value in values.items()}
-        {'Kp': 0.7, 'T': 0.5}
+        {'Kp': 0.8, 'T': 0.5}
         """
         candidates = np.where(self.stable, self.abscissa, np.nan)
         if not np.isfinite(candidates).any():
@@ -149,7 +148,7 @@ class StabilityMap:
         plot_stability_map(ax, self, chosen)
         return ax
 
-    def to_xarray(self) -> xarray.Dataset:
+    def to_xarray(self) -> Any:
         """Return the arrays as an `xarray.Dataset` with the parameters as coordinates.
 
         Returns
@@ -163,10 +162,12 @@ class StabilityMap:
             If xarray is not installed.
         """
         try:
-            import xarray
+            xarray = importlib.import_module("xarray")
         except ImportError as error:
             raise ImportError("to_xarray() needs xarray: pip install xarray") from error
-        arrays = {name: getattr(self, name) for name in ("unstable", "abscissa", "status", "stable")}
+        arrays = {
+            name: getattr(self, name) for name in ("unstable", "abscissa", "status", "stable")
+        }
         data = xarray.Dataset(
             {name: (self.names, array) for name, array in arrays.items()}, coords=self.axes
         )
@@ -245,7 +246,7 @@ def stability_map(
     >>> Kp, Kv = dtm.parameters("Kp Kv")
     >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(0.36)
     >>> dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}, shape=(60, 37))
-    <StabilityMap Kp 0.1 to 6 (60), Kv -0.9 to 0.9 (37): 1163 of 2220 stable>
+    <StabilityMap Kp 0.1 to 6 (60), Kv -0.9 to 0.9 (37): 1321 of 2220 stable>
     """
     names, axes = _axes(ranges, shape)
     cells = len(axes[names[0]]) * len(axes[names[1]])
@@ -260,7 +261,8 @@ def stability_map(
         )
     if progress is not None:
         progress(cells)
-    for array in (*axes.values(), *found):
+    arrays: list[NDArray[Any]] = [*axes.values(), *found]
+    for array in arrays:
         array.flags.writeable = False
     return StabilityMap(names, axes, *found)
 
@@ -276,7 +278,7 @@ def _map_family(
     threads: int | None,
     progress: _Progress | None,
 ) -> _Found:
-    """Counts, abscissas and statuses of a family's members."""
+    """Judge the members of a family."""
     unknown = [name for name in names if name not in family.names]
     if unknown:
         raise ValueError(
@@ -304,7 +306,7 @@ def _map_loop(
     threads: int | None,
     progress: _Progress | None,
 ) -> _Found:
-    """The same of a loop whose named numbers vary."""
+    """Judge a loop whose named numbers vary."""
     values: dict[str, Any] = {**loop.parameters}
     values.pop("limit", None)
     unknown = [name for name in names if name not in values and name != "delay"]
@@ -367,7 +369,7 @@ def _map_sampled(
 def _models(
     loop: ControlLoop, values: dict[str, Any], names: tuple[str, str], axes: dict[str, _Floats]
 ) -> tuple[_Floats, _Floats, _Floats, _Floats]:
-    """A, B, K and L of every cell; of one cell where they are the same in all.
+    """Return A, B, K and L of every cell, or of one cell where they are the same in all.
 
     A model is affine in each of the loop's gains, so along an axis with a gain two models say all;
     along any other axis one is built at each point.
@@ -410,7 +412,7 @@ def _models(
 
 
 def _along(part: _Floats, points: _Floats, axis: int) -> _Floats:
-    """An affine function along an axis from its values at 0 and 1."""
+    """Extend an affine function along an axis from its values at 0 and 1."""
     start, end = np.take(part, [0], axis), np.take(part, [1], axis)
     scale = points.reshape([-1 if i == axis else 1 for i in range(part.ndim)])
     return np.asarray(start + scale * (end - start))

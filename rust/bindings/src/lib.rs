@@ -19,4 +19,6 @@ mod _deadtime {
     use super::quasipoly::QuasiPolynomial;
     #[pymodule_export]
     use super::runtime::{spin, thread_count};
+    #[pymodule_export]
+    use super::stability::PyFamily;
 }
