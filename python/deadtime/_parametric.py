@@ -84,9 +84,15 @@ class ParametricQuasiPolynomial:
                     f"coefficient {coefficient}: coefficients must be finite, scale the equation"
                 )
         self = object.__new__(ParametricQuasiPolynomial)
-        self._names = names
-        self._terms = {key: value for key, value in terms.items() if value != 0.0}
+        self._adopt(names, {key: value for key, value in terms.items() if value != 0.0})
         return self
+
+    def _adopt(self, names: tuple[str, ...], terms: _Terms) -> None:
+        object.__setattr__(self, "_names", names)
+        object.__setattr__(self, "_terms", terms)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a {type(self).__name__} does not change: cannot set {name!r}")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -260,8 +266,7 @@ class Parameter(ParametricQuasiPolynomial):
     """A named number that has no value yet; made by `parameters`."""
 
     def __init__(self, name: str) -> None:
-        self._names = (name,)
-        self._terms = {(((name, 1),), 0, _NO_DELAY): 1.0}
+        self._adopt((name,), {(((name, 1),), 0, _NO_DELAY): 1.0})
 
     @property
     def name(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Sequence
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, cast, overload
 
@@ -11,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
-from deadtime._errors import ContourError
 from deadtime._rootset import RootSet
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class QuasiPolynomial:
     @property
     def degree(self) -> int:
         """Highest power of s."""
-        return self._coefficients.shape[1] - 1
+        return self._native.degree()
 
     @property
     def kind(self) -> Kind:
@@ -178,9 +178,7 @@ class QuasiPolynomial:
             divisor = float(cast(float, other))
             if divisor == 0.0:
                 raise ZeroDivisionError("division of a quasi-polynomial by zero")
-            return self._wrap(
-                _deadtime.QuasiPolynomial(self._coefficients / divisor, self._delays)
-            )
+            return self._wrap(_deadtime.QuasiPolynomial(self._coefficients / divisor, self._delays))
         if isinstance(other, QuasiPolynomial):
             raise TypeError(_NO_QUOTIENT)
         return NotImplemented
@@ -206,7 +204,7 @@ class QuasiPolynomial:
     @overload
     def __call__(self, s: complex) -> complex: ...
     @overload
-    def __call__(self, s: ArrayLike) -> NDArray[np.complex128]: ...
+    def __call__(self, s: NDArray[Any] | Sequence[Any]) -> NDArray[np.complex128]: ...
     def __call__(self, s: Any) -> Any:
         """Value at `s` (1/s): a complex number, or an array of the shape of `s`.
 
@@ -219,7 +217,7 @@ class QuasiPolynomial:
         return values.reshape(points.shape) if points.ndim else complex(values[0])
 
     def derivative(self, n: int = 1) -> QuasiPolynomial:
-        """Derivative of order `n` by s.
+        """Differentiate `n` times by s.
 
         Parameters
         ----------
@@ -244,7 +242,7 @@ class QuasiPolynomial:
     # Roots
 
     def count(self, re: Range | None = None, im: Range | None = None) -> int:
-        """Number of roots in a region, counted with multiplicity: proved.
+        """Count the roots in a region, with multiplicity, and prove the number.
 
         Parameters
         ----------
@@ -282,7 +280,7 @@ class QuasiPolynomial:
         return self._native.count(_range("re", re), _range("im", im))
 
     def roots(self, re: Range | None = None, im: Range | None = None) -> RootSet:
-        """Every root in a region, each with a disc proved to hold it.
+        """Locate every root in a region, each with a disc proved to hold it.
 
         Parameters
         ----------
@@ -315,7 +313,7 @@ class QuasiPolynomial:
         return _root_set(self._native.roots(_range("re", re), _range("im", im)))
 
     def rightmost(self, n: int = 1) -> RootSet:
-        """The rightmost roots, with the proof that nothing else lies that far right.
+        """Locate the rightmost roots and prove that nothing else lies that far right.
 
         Parameters
         ----------
@@ -349,7 +347,7 @@ class QuasiPolynomial:
         return _root_set(self._native.rightmost(number))
 
     def spectral_abscissa(self) -> float:
-        """Largest real part of a root, or `chain_abscissa` if that is larger.
+        """Give the largest real part of a root, or `chain_abscissa` if that is larger.
 
         For a neutral equation, roots that exceed the chains by less than 1e-4 of one over the
         longest delay are not told from them.
@@ -364,7 +362,7 @@ class QuasiPolynomial:
         return self._native.spectral_abscissa()
 
     def chain_abscissa(self) -> float:
-        r"""Real part that the chains of roots of a neutral equation can come to.
+        r"""Give the real part that the chains of roots of a neutral equation can come to.
 
         The solution c of :math:`\sum_j |b_j| e^{-c d_j} = |a|` with a the coefficient of the
         highest power of s without delay, b_j those with the delays d_j [1]_: the supremum over
@@ -390,18 +388,30 @@ class QuasiPolynomial:
         return self._native.chain_abscissa()
 
     def is_stable(self, strong: bool = True) -> bool:
-        """Is every root proved to lie left of the imaginary axis?
+        """Tell whether every root is proved to lie left of the imaginary axis.
 
         Parameters
         ----------
         strong : bool, default True
-            Ask for strong stability: also under arbitrarily small changes of the delays, which
-            matters for neutral equations. With False, the delays are taken as exact.
+            Ask for strong stability [1]_: also under arbitrarily small changes of the delays,
+            which matters for neutral equations. With False, delays that are whole multiples of a
+            common one (to rounding) are taken as exactly that.
 
         Returns
         -------
         bool
-            False also where a root lies on the axis or too close to it to tell.
+            False also where a root lies on the axis or too close to it to tell, and for an
+            advanced equation.
+
+        Raises
+        ------
+        ValueError
+            For the zero function.
+
+        References
+        ----------
+        .. [1] J. K. Hale and S. M. Verduyn Lunel, "Strong stabilization of neutral functional
+           differential equations", IMA Journal of Mathematical Control and Information 19 (2002).
 
         Examples
         --------
@@ -409,12 +419,7 @@ class QuasiPolynomial:
         >>> (s + 4.0 * delay(0.36)).is_stable(), (s + 5.0 * delay(0.36)).is_stable()
         (True, False)
         """
-        if strong and not self.chain_abscissa() < 0.0:
-            return False
-        try:
-            return self._native.count_right_of(0.0) == 0
-        except ContourError:
-            return False
+        return self._native.is_stable(bool(strong))
 
 
 _NO_QUOTIENT: Final = (
@@ -464,7 +469,7 @@ def delay(
 
 
 def _operand(value: object) -> QuasiPolynomial | None:
-    """A quasi-polynomial or a real number as the former; None for anything else."""
+    """Turn a real number into a quasi-polynomial; None for foreign types."""
     if isinstance(value, QuasiPolynomial):
         return value
     if _is_number(value):
@@ -504,13 +509,15 @@ def _range(name: str, ends: Range | None) -> tuple[float, float]:
             math.inf if high is None else float(high),
         )
     except (TypeError, ValueError) as error:
-        raise TypeError(f"{name}={ends!r}: give a pair (low, high), None for an open end") from error
+        raise TypeError(
+            f"{name}={ends!r}: give a pair (low, high), None for an open end"
+        ) from error
     return pair
 
 
-def _root_set(listed: _deadtime.Listed) -> RootSet:
-    *columns, counted, re, im = listed
-    return RootSet(*columns, counted=counted, region=(re, im))
+def _root_set(listed: _deadtime._Listed) -> RootSet:
+    roots, multiplicities, radii, resolved, counted, re, im = listed
+    return RootSet(roots, multiplicities, radii, resolved, counted, (re, im))
 
 
 def _term(row: NDArray[np.float64], tau: float) -> str:

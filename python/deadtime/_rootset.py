@@ -73,7 +73,8 @@ class RootSet:
     def __getitem__(self, index: slice) -> NDArray[np.complex128]: ...
     def __getitem__(self, index: Any) -> Any:
         """One root as a number, several as an array; any index that NumPy takes."""
-        return self.roots[index]
+        picked = self.roots[index]
+        return picked if isinstance(picked, np.ndarray) else complex(picked)
 
     def __array__(
         self, dtype: np.dtype[Any] | None = None, copy: bool | None = None

@@ -3,15 +3,16 @@
 use std::borrow::Cow;
 
 use numpy::ndarray::ArrayViewD;
-use numpy::{Element, PyReadonlyArrayDyn};
+use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 
 /// The elements in C order: a borrow when they lie so in memory, a gathered copy otherwise.
 pub(crate) fn in_order<'a, T: Element + Copy>(
     array: &'a PyReadonlyArrayDyn<'_, T>,
 ) -> Cow<'a, [T]> {
+    // `as_slice` also serves Fortran order, where memory order is not C order.
     match array.as_slice() {
-        Ok(slice) => Cow::Borrowed(slice),
-        Err(_) => Cow::Owned(view(array).iter().copied().collect()),
+        Ok(slice) if array.is_c_contiguous() => Cow::Borrowed(slice),
+        _ => Cow::Owned(view(array).iter().copied().collect()),
     }
 }
 

@@ -126,9 +126,9 @@ impl QuasiPolynomial {
         })
     }
 
-    fn count_right_of(&self, py: Python<'_>, sigma: f64) -> PyResult<u64> {
+    fn is_stable(&self, py: Python<'_>, strong: bool) -> PyResult<bool> {
         run(py, None, None, |task| {
-            roots::count_right_of(&self.core, sigma, task)
+            roots::is_stable(&self.core, strong, task)
         })
     }
 

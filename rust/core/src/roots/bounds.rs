@@ -61,7 +61,7 @@ pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance
 }
 
 /// A radius beyond which `top` rⁿ > Σ `lower`_k rᵏ, within a percent of the least one.
-fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
+pub(super) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
     let degree = lower.len() as f64;
     // Fujiwara 1916: twice the largest of the n-th roots is a bound.
     let outer = lower

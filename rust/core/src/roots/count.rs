@@ -202,6 +202,8 @@ pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     if sigma.abs() > radius {
         return Ok(if sigma > 0.0 { 0 } else { degree as u64 });
     }
+    // All roots are at 0: any radius will do.
+    let radius = if radius == 0.0 { 1.0 } else { radius };
     // Just beyond the circle.
     let top = ((radius - sigma) * (radius + sigma)).sqrt() * (1.0 + 1e-9) + f64::MIN_POSITIVE;
     let end = Complex64::new(sigma, top);

@@ -2,7 +2,8 @@
 //!
 //! `winding` proves how arg h turns along a line; `cell` builds rectangles with counts from it,
 //! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
-//! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains;
+//! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
+//! decides;
 //! `bounds` says where roots cannot be. All proofs take exp, sin and cos of the `libm` crate to
 //! be right within 2 ulp.
 
@@ -16,13 +17,15 @@ mod real;
 mod region;
 mod rightmost;
 mod set;
+mod stable;
 mod winding;
 
 pub use count::{count, count_right_of};
-pub use neutral::{chain_abscissa, is_chain_strongly_stable};
+pub use neutral::chain_abscissa;
 pub use region::Region;
 pub use rightmost::{rightmost, spectral_abscissa};
 pub use set::{RootSet, roots};
+pub use stable::is_stable;
 
 #[cfg(test)]
 mod tests;

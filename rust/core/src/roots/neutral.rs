@@ -6,7 +6,8 @@
 //! (Avellar and Hale 1980). C_D is attained or approached if the delays are rationally
 //! independent, and is in any case the supremum over arbitrarily small changes of the delays:
 //! C_D < 0 is what strong stability asks for (Hale and Verduyn Lunel 2002). For commensurate
-//! delays taken as exact, the chains may end further left; `chain_abscissa` does not use that.
+//! delays taken as exact, as for every difference equation with one base, the chains may end
+//! further left; `chain_abscissa` does not use that, `is_stable` does where asked to.
 
 use crate::quasipoly::{Kind, QuasiPolynomial};
 
@@ -74,11 +75,6 @@ pub fn chain_abscissa(h: &QuasiPolynomial) -> f64 {
         c = next;
     }
     c
-}
-
-/// Does every chain stay left of the imaginary axis under small changes of the delays?
-pub fn is_chain_strongly_stable(h: &QuasiPolynomial) -> bool {
-    chain_abscissa(h) < 0.0
 }
 
 #[cfg(test)]

@@ -295,7 +295,7 @@ pub(super) fn newton_step(jet: &Jet) -> Complex64 {
 
 pub(super) fn overflow(s: Complex64) -> Error {
     Error::argument(format!(
-        "the function cannot be evaluated at {s}: a power of s exceeds double precision; choose \
-         another unit of time or a smaller region"
+        "the function cannot be evaluated at {s:e}: a power of s leaves the range of double \
+         precision; choose another unit of time or another region"
     ))
 }

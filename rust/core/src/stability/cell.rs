@@ -116,10 +116,6 @@ fn count(h: &QuasiPolynomial, chain: f64, task: &Task) -> Result<(i32, CellStatu
     if chain > 0.0 {
         return Ok((ENDLESS, CellStatus::Infinite));
     }
-    if h.coefficients().iter().all(|row| row.first() == Some(&0.0)) {
-        // s itself is a factor.
-        return Ok((UNKNOWN, CellStatus::Boundary));
-    }
     match count_right_of(h, 0.0, task) {
         Ok(number) => Ok(match i32::try_from(number) {
             Ok(number) => (number, CellStatus::Ok),

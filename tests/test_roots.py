@@ -1,0 +1,438 @@
+"""Characteristic roots: counts, discs, rightmost ones, against certified answers."""
+
+import json
+import math
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import pytest
+from deadtime import QuasiPolynomial, RootSet, delay, s
+from deadtime._errors import ContourError
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+CASES = {
+    case["name"]: case
+    for case in json.loads(
+        (Path(__file__).parent / "reference" / "root_cases.json").read_text(encoding="utf-8")
+    )["cases"]
+}
+
+# The region has the real axis for an edge, and a multiple root or a cluster lies on it: in double
+# precision two real roots cannot be told from a pair off the axis.
+CLUSTER_ON_THE_AXIS = {"double_at_0", "near_double", "mazanti_mult6", "mid_mult4_exact0"}
+
+# A root lies exactly on an edge.
+ROOT_ON_AN_EDGE = {"on_contour"}
+
+# Simple roots closer together than double precision can tell: one disc, all its roots, whether
+# above the real axis or below it.
+NOT_TOLD_APART = {"near_double": [2], "mazanti_mult6": [6]}
+
+# No rightmost root: chains lie as far right or further.
+CHAINS_LEAD = {"tdscontrol_2.6_tau2=2", "tdscontrol_2.6_tau2=2.05", "diff_26"}
+
+# The reference knows the rightmost root of the region only.
+REGION_ONLY = {"high_freq"}
+
+# Slack for the centre's own last bit where a radius is that small.
+ULP = 2.3e-16
+
+
+def make(case):
+    return QuasiPolynomial(case["coefs"], case["delays"])
+
+
+def region(case):
+    a, b, c, d = case["region"]
+    return {"re": (a, b), "im": (c, d)}
+
+
+def symmetric(case):
+    a, b, c, d = case["region"]
+    return {"re": (a, b), "im": (-d, d) if c == 0 else (c, d)}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_kind(name):
+    assert make(CASES[name]).kind == CASES[name]["type"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_count_of_the_certified_region(name):
+    case = CASES[name]
+    if name in ROOT_ON_AN_EDGE:
+        with pytest.raises(ContourError) as error:
+            make(case).count(**symmetric(case))
+        assert min(abs(error.value.place - z) for z in (2j, -2j)) < 1e-6
+        assert 0 < error.value.distance < 1e-3
+    else:
+        assert make(case).count(**symmetric(case)) == case["certified_winding_count"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_count_of_the_upper_half(name):
+    case = CASES[name]
+    if name in CLUSTER_ON_THE_AXIS | ROOT_ON_AN_EDGE:
+        with pytest.raises(ContourError):
+            make(case).count(**region(case))
+    else:
+        assert make(case).count(**region(case)) == case["count_region_upper_closed"]
+
+
+@pytest.mark.parametrize("name", sorted(set(CASES) - ROOT_ON_AN_EDGE))
+def test_all_roots_within_their_radii(name):
+    case = CASES[name]
+    found = make(case).roots(**region(case))
+    assert found.counted == found.multiplicities.sum()
+    held = np.zeros(len(found), dtype=int)
+    with mp.workdps(30):
+        for re, im, multiplicity in case["roots_25digits"]:
+            root = mp.mpc(re, im)
+            outside = [
+                abs(mp.mpc(z) - root) - mp.mpf(r) - ULP * abs(z)
+                for z, r in zip(found, found.radii.tolist(), strict=True)
+            ]
+            nearest = int(np.argmin([float(x) for x in outside]))
+            assert outside[nearest] <= 0
+            # A disc about the real axis holds the mirror image as well.
+            on_axis = abs(found[nearest].imag) <= found.radii[nearest] and root.imag != 0
+            held[nearest] += multiplicity * (2 if on_axis else 1)
+    assert held.tolist() == found.multiplicities.tolist()
+    clusters = found.multiplicities[found.multiplicities > 1].tolist()
+    multiple = [m for *_, m in case["roots"] if m > 1]
+    assert clusters == multiple + NOT_TOLD_APART.get(name, [])
+    assert found.resolved.tolist() == (found.multiplicities == 1).tolist()
+
+
+@pytest.mark.parametrize("name", sorted(set(CASES) - ROOT_ON_AN_EDGE))
+def test_radii_are_no_excuse(name):
+    """No larger than 300 times what rounding the coefficients' values must cost."""
+    case = CASES[name]
+    found = make(case).roots(**region(case))
+    errors = [e for e in case["double_precision_error_estimate"] if e is not None]
+    if errors and name not in CLUSTER_ON_THE_AXIS:
+        size = max(1.0, float(np.abs(found.roots).max()))
+        assert found.radii.max() <= 1000 * max(errors) * size
+
+
+@pytest.mark.parametrize("name", sorted(set(CASES) - CHAINS_LEAD - REGION_ONLY))
+def test_rightmost_is_the_certified_one(name):
+    case = CASES[name]
+    found = make(case).rightmost()
+    wanted = complex(case["rightmost"]["re"], case["rightmost"]["im"])
+    assert abs(found[0] - wanted) <= found.radii[0] + ULP * max(abs(wanted), 1)
+    (line, end), im = found.region
+    assert line < found[0].real < end == math.inf
+    assert im == (-math.inf, math.inf)
+
+
+@pytest.mark.parametrize("name", sorted(CHAINS_LEAD))
+def test_where_chains_lead_no_root_is_rightmost(name):
+    h = make(CASES[name])
+    assert len(h.rightmost()) == 0
+    assert h.spectral_abscissa() == h.chain_abscissa()
+
+
+@pytest.mark.parametrize(
+    "name", ["qpmr_ex1", "humphries_k3", "neutral_unstable_chain", "lambertw_yi"]
+)
+def test_several_rightmost_roots(name):
+    case = CASES[name]
+    for n in (2, 3, 5):
+        found = make(case).rightmost(n)
+        upper = [z for z in found if z.imag >= 0]
+        wanted = [complex(re, im) for re, im, _ in case["roots"][:n]]
+        assert np.allclose(upper, wanted, rtol=0, atol=1e-12)
+        assert make(case).count(re=(found.region[0][0], None)) == found.counted
+
+
+# Closed forms
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(-8, 8), st.floats(0.05, 4))
+def test_scalar_equation_by_lambert_w(a, T):
+    assume(abs(a) > 1e-3)
+    assume(abs(a * T - math.exp(-1)) > 1e-6)
+    h = s + a * delay(T)
+    with mp.workdps(30):
+        branches = [mp.lambertw(-mp.mpf(a) * mp.mpf(T), k) / mp.mpf(T) for k in range(-8, 9)]
+    try:
+        found = h.roots(re=(-6 / T, 9), im=(-30 / T, 30 / T))
+    except ContourError:
+        assume(False)
+    inside = [w for w in branches if -6 / T < w.real < 9 and abs(w.imag) < 30 / T]
+    assert len(found) == len(inside) == found.counted
+    for root, radius in zip(found, found.radii, strict=True):
+        assert min(abs(mp.mpc(root) - w) for w in inside) <= radius + ULP * abs(root)
+    first = h.rightmost()
+    assert abs(first[0].real - max(w.real for w in branches)) <= first.radii[0] + 1e-15
+
+
+def test_critical_damping_is_one_double_point():
+    found = (s + math.exp(-1) * delay(1.0)).rightmost()
+    assert found.multiplicities.tolist() == [2]
+    assert not found.resolved[0]
+    assert abs(found[0] + 1) <= found.radii[0] < 1e-5
+
+
+def test_a_polynomial_has_all_its_roots():
+    h = (s - 1) * (s + 2) * (s**2 + 4 * s + 13) * delay(0.7)
+    everywhere = h.roots()
+    assert np.allclose(everywhere, [1, -2, -2 + 3j, -2 - 3j], rtol=0, atol=1e-13)
+    assert h.count() == 4
+    assert np.allclose(h.rightmost(), [1], rtol=0, atol=1e-14)
+    assert len(h.rightmost(9)) == 4
+    # Equal real parts cannot be told apart: all of them, or none.
+    assert len(h.rightmost(2)) == 4
+
+
+# The paper's loops: s + (Kp + Kv s) e^(−s Td)
+
+
+def test_pv_loop_of_the_paper():
+    def loop(Kv):
+        return s + (2.0 + Kv * s) * delay(0.36)
+
+    first = loop(0.3).rightmost()
+    assert abs(first[0] + 3.3168) < 5e-5
+    assert len(first) == 1
+    assert abs(loop(0.3).chain_abscissa() - math.log(0.3) / 0.36) < 1e-14
+    pair = loop(0.7).rightmost()
+    assert np.allclose(pair, [-0.926 + 7.713j, -0.926 - 7.713j], rtol=0, atol=5e-4)
+    # With Kv = cos(ω Td) and Kp = ω sin(ω Td) a pair sits at ±iω.
+    with mp.workdps(20):
+        omega = mp.findroot(lambda w: w * mp.sin(w * mp.mpf("0.36")) - 2, 8)
+        limit = float(-mp.cos(omega * mp.mpf("0.36")))
+    assert abs(limit - 0.9685) < 5e-5
+    assert loop(limit - 1e-6).is_stable()
+    assert not loop(limit + 1e-6).is_stable()
+    assert not loop(1.1).is_stable()
+
+
+def test_p_loop_of_the_paper():
+    limit = math.pi / (2 * 0.36)
+    assert abs(limit - 4.363) < 5e-4
+    assert (s + (limit - 1e-9) * delay(0.36)).is_stable()
+    assert not (s + limit * delay(0.36)).is_stable()
+    assert not (s + (limit + 1e-9) * delay(0.36)).is_stable()
+    assert (s + (limit + 1e-9) * delay(0.36)).count(re=(0, None)) == 2
+
+
+# Properties
+
+gains = st.floats(-3, 3)
+
+
+@st.composite
+def loops(draw):
+    """First or second order, retarded or neutral with its chain to the left of −0.05/τ."""
+    tau = draw(st.floats(0.1, 3))
+    b = draw(st.sampled_from([0.0, 0.3, -0.7]))
+    h = s + draw(gains) + (draw(gains) + b * s) * delay(tau)
+    if draw(st.booleans()):
+        h = h * s + draw(gains) * delay(draw(st.floats(0.1, 3))) + draw(gains)
+    assume(h.kind in ("retarded", "neutral"))
+    return h
+
+
+@settings(deadline=None, max_examples=50)
+@given(loops(), st.floats(-2, 1), st.floats(-15, 15))
+def test_the_whole_is_the_sum_of_its_parts(h, x, y):
+    # Real roots belong to either side of an edge on the real axis.
+    assume(y != 0)
+    try:
+        whole = h.count(re=(-3, 4), im=(-21, 23))
+        parts = [h.count(re=re, im=im) for re in ((-3, x), (x, 4)) for im in ((-21, y), (y, 23))]
+    except ContourError:
+        assume(False)
+    assert whole == sum(parts)
+
+
+@settings(deadline=None, max_examples=50)
+@given(loops())
+def test_roots_are_conjugate_and_add_up(h):
+    try:
+        number = h.count(re=(-3, 4), im=(-21, 21))
+        found = h.roots(re=(-3, 4), im=(-21, 21))
+        upper = h.roots(re=(-3, 4), im=(0, 21))
+        lower = h.roots(re=(-3, 4), im=(-21, 0))
+    except ContourError:
+        assume(False)
+    assert found.counted == number
+    assert set(found) == {z.conjugate() for z in found}
+    assert [z for z in found if z.imag >= 0] == list(upper)
+    assert [z.conjugate() for z in upper] == list(lower)
+
+
+@settings(deadline=None, max_examples=50)
+@given(loops(), st.integers(-6, 6))
+def test_scaling_of_time(h, power):
+    """With s = c z and τ = t / c the roots are divided by c, exactly for a power of two."""
+    c = 2.0**power
+    scaled = QuasiPolynomial(h.coefficients * c ** np.arange(h.degree + 1), h.delays * c)
+    first, second = h.rightmost(2), scaled.rightmost(2)
+    assert len(first) == len(second)
+    assert np.allclose(np.asarray(second) * c, first, rtol=1e-9, atol=1e-6)
+    assert h.is_stable() == scaled.is_stable()
+
+
+@settings(deadline=None, max_examples=50)
+@given(loops())
+def test_nothing_lies_right_of_the_rightmost(h):
+    found = h.rightmost()
+    assume(len(found))
+    try:
+        beyond = h.count(re=(found[0].real + 2 * found.radii[0] + 1e-6, None))
+        all_of_them = h.count(re=(found.region[0][0], None))
+    except ContourError:
+        assume(False)
+    assert beyond == 0
+    assert all_of_them == found.counted
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.lists(st.floats(-4, 2), min_size=1, max_size=4), st.floats(0, 2))
+def test_given_real_roots_are_found(roots, tau):
+    assume(min([abs(a - b) for i, a in enumerate(roots) for b in roots[:i]] or [1]) > 1e-2)
+    h = delay(tau)
+    for root in roots:
+        h = h * (s - root)
+    found = h.roots(re=(-5, 3), im=(0, 1))
+    assert np.allclose(np.sort(found.roots.real), np.sort(roots), rtol=0, atol=1e-7)
+    assert found.roots.imag.tolist() == [0.0] * len(roots)
+
+
+# Regions
+
+
+def test_open_ends():
+    h = s + delay(1.0)
+    assert h.count(re=(-0.5, None)) == 2
+    assert h.count(im=(0, 30)) == 5
+    assert h.count(re=(0, None), im=(0, None)) == 0
+    assert (1 + s**2 * delay(1.0)).count(im=(-20, 20)) > 0
+    assert h.roots(re=(-0.5, None)).region == ((-0.5, math.inf), (-math.inf, math.inf))
+    neutral = s + (1 + 0.5 * s) * delay(1.0)
+    # Left of its chain the delayed term leads: finitely many roots there, too.
+    assert neutral.count(re=(None, -3.0)) == 0
+    assert neutral.count(re=(-0.6, None)) == len(neutral.roots(re=(-0.6, None)))
+
+
+@pytest.mark.parametrize(
+    ("h", "where", "message"),
+    [
+        (s + delay(1.0), {}, "infinitely many"),
+        (s + delay(1.0), {"re": (None, 0)}, "infinitely many"),
+        (s + (1 + 0.5 * s) * delay(1.0), {"re": (-1, None)}, "chain"),
+        (1 + s * delay(1.0), {"re": (0, None)}, "advanced"),
+        (s - s, {"re": (0, 1), "im": (0, 1)}, "zero function"),
+        (s, {"re": (1, 0)}, "below its upper end"),
+        (s, {"re": (1, 1)}, "below its upper end"),
+        (s, {"im": (math.nan, 1)}, "below its upper end"),
+        (s, {"re": (math.inf, None)}, "below its upper end"),
+    ],
+)
+def test_regions_that_cannot_be(h, where, message):
+    for method in (h.count, h.roots):
+        with pytest.raises(ValueError, match=message):
+            method(**where)
+
+
+@pytest.mark.parametrize("bad", [1.0, (1.0,), ("a", 1.0), (1, 2, 3), "ab"])
+def test_ranges_are_pairs(bad):
+    with pytest.raises(TypeError, match="pair"):
+        s.count(re=bad)
+
+
+def test_an_edge_through_a_root_is_never_moved():
+    h = s * (s + 1 + delay(1.0))
+    with pytest.raises(ContourError) as error:
+        h.count(re=(0, 5))
+    away = 2 * error.value.distance
+    assert h.count(re=(-away, 5)) == 1
+    assert h.count(re=(away, 5)) == 0
+
+
+def test_far_to_the_left_nothing_overflows():
+    h = s + delay(1.0)
+    assert h.count(re=(-1e4, 2), im=(-30, 30)) == 10
+    assert len(h.roots(re=(-1e4, 2), im=(-30, 30))) == 10
+
+
+def test_tiny_and_huge_scales():
+    tiny = s + 1e8 * delay(1e-8)
+    assert tiny.count(re=(-1e9, 2e8), im=(0, 3e9)) == 5
+    assert len(tiny.roots(re=(-1e9, 2e8), im=(0, 3e9))) == 5
+    slow = QuasiPolynomial([[0, 1e290], [1e286, 0]], [0.0, 1e4])
+    reference = (s + delay(1.0)).rightmost()
+    assert np.allclose(slow.rightmost() * np.array(1e4), reference, rtol=1e-12)
+
+
+# Chains
+
+
+def test_chain_abscissa_in_closed_form():
+    assert (s + delay(1.0)).chain_abscissa() == -math.inf
+    assert (1 + s * delay(1.0)).chain_abscissa() == math.inf
+    assert (s**2).chain_abscissa() == -math.inf
+    golden = s * (1 - delay(1.0) - delay(2.0)) + 1
+    assert abs(golden.chain_abscissa() - math.log((1 + math.sqrt(5)) / 2)) < 1e-15
+
+
+def test_a_neutral_loop_right_of_its_chain():
+    h = s + (1 + 1.2 * s) * delay(1.0)
+    assert not h.is_stable()
+    assert abs(h.chain_abscissa() - math.log(1.2)) < 1e-15
+    assert h.spectral_abscissa() > h.chain_abscissa()
+
+
+def test_exact_delays_can_be_stable_where_perturbed_ones_are_not():
+    """Example 2.6 of the TDS-CONTROL manual: stable for delays 1 and 2 only as long as exact."""
+    h = make(CASES["tdscontrol_2.6_tau2=2"])
+    assert h.is_stable(strong=False)
+    assert not h.is_stable()
+    moved = make(CASES["tdscontrol_2.6_tau2=2.05"])
+    assert not moved.is_stable(strong=False)
+    assert not moved.is_stable()
+
+
+def test_silly_questions():
+    for bad in (0, -1):
+        with pytest.raises(ValueError, match="n="):
+            s.rightmost(bad)
+    with pytest.raises(TypeError):
+        s.rightmost(1.5)
+    with pytest.raises(ValueError, match="advanced"):
+        (1 + s * delay(1.0)).rightmost()
+    assert (1 + s * delay(1.0)).spectral_abscissa() == math.inf
+    assert not (1 + s * delay(1.0)).is_stable()
+    with pytest.raises(ValueError, match="zero function"):
+        (s - s).rightmost()
+    with pytest.raises(ValueError, match="no roots"):
+        (s - s + 3).spectral_abscissa()
+    assert len((s - s + 3).rightmost()) == 0
+    assert not s.is_stable()
+    assert (s + 1).is_stable()
+
+
+# The set
+
+
+def test_root_set_is_like_an_array():
+    found = (s + delay(1.0)).roots(re=(-3, 2), im=(-20, 20))
+    assert isinstance(found, RootSet)
+    assert len(found) == 6 == found.counted
+    assert [type(z) for z in found] == [complex] * 6
+    assert np.array_equal(np.asarray(found), found.roots)
+    assert np.asarray(found, dtype=np.complex64).dtype == np.complex64
+    assert np.array_equal(found[:2], found.roots[:2])
+    assert np.array_equal(found[found.resolved], found.roots)
+    assert found[0] in found
+    assert np.all(np.diff(found.roots.real) <= 0)
+    assert found[0].imag > 0 > found[1].imag
+    assert "6 roots" in repr(found)
+    with pytest.raises(ValueError, match="read-only"):
+        found.roots[0] = 0
