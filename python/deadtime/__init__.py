@@ -6,6 +6,7 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 
+from deadtime._design import Design, design
 from deadtime._errors import (
     ContourError,
     ConvergenceError,
@@ -22,6 +23,7 @@ from deadtime._estimation import (
     estimate_delay,
 )
 from deadtime._loop import ControlLoop
+from deadtime._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s
 from deadtime._readers import read_recording
@@ -29,6 +31,7 @@ from deadtime._recording import Recording, Step
 from deadtime._response import Response
 from deadtime._rootset import RootSet
 from deadtime._special import dde_roots, lambertw
+from deadtime._stability import MapStatus, StabilityMap, stability_map
 
 __all__ = [
     "PD",
@@ -44,11 +47,15 @@ __all__ = [
     "DeadtimeError",
     "DelayEstimate",
     "DerivativeFilter",
+    "Design",
     #    "Design",
     "FirstOrder",
     "Integrator",
+    "MapStatus",
     "NotIdentifiableError",
     "P",
+    "Parameter",
+    "ParametricQuasiPolynomial",
     "Plant",
     "QuasiPolynomial",
     "RationalPlant",
@@ -56,14 +63,18 @@ __all__ = [
     "RecordingError",
     "Response",
     "RootSet",
+    "StabilityMap",
     "Step",
     "Whiteness",
     "damping_ratio",
     "dde_roots",
     #    "delay",
+    "design",
     "estimate_delay",
     "kit_plant",
     "lambertw",
+    "parameters",
     "read_recording",
     "s",
+    "stability_map",
 ]

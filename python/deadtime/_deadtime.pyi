@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "Family",
     "LinearLoop",
     "QuasiPolynomial",
     "dde_roots",
@@ -63,6 +64,24 @@ def dde_roots(
     k: NDArray[np.int64],
     threads: int | None = None,
 ) -> NDArray[np.complex128]: ...
+
+
+@final
+class Family:
+    def __new__(
+        cls, names: list[str], terms: list[tuple[float, list[int], int, float, list[float]]]
+    ) -> Family: ...
+    def at(self, values: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def map(
+        self,
+        values: list[float],
+        parameters: tuple[int, int],
+        first: NDArray[np.float64],
+        second: NDArray[np.float64],
+        abscissa: bool,
+        threads: int | None = None,
+        progress: Callable[[int], object] | None = None,
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]: ...
 
 @final
 class LinearLoop:

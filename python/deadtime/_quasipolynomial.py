@@ -6,13 +6,16 @@ import math
 import operator
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any, Final, Literal, TypeAlias, cast, overload
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._rootset import RootSet
+
+if TYPE_CHECKING:
+    from deadtime._parametric import ParametricQuasiPolynomial
 
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
@@ -425,17 +428,25 @@ _NO_QUOTIENT: Final = (
 )
 
 
-def delay(T: float) -> QuasiPolynomial:
+@overload
+def delay(T: float) -> QuasiPolynomial: ...
+@overload
+def delay(T: ParametricQuasiPolynomial) -> ParametricQuasiPolynomial: ...
+def delay(
+    T: float | ParametricQuasiPolynomial,
+) -> QuasiPolynomial | ParametricQuasiPolynomial:
     """Transfer function of a pure delay, exp(-s T).
 
     Parameters
     ----------
-    T : float
-        Delay in s, finite and not negative.
+    T : float or ParametricQuasiPolynomial
+        Delay in s, finite and not negative; or a parameter, or a sum of multiples of parameters
+        and a number.
 
     Returns
     -------
-    QuasiPolynomial
+    QuasiPolynomial or ParametricQuasiPolynomial
+        The latter for a delay with parameters in it.
 
     Raises
     ------
@@ -450,6 +461,8 @@ def delay(T: float) -> QuasiPolynomial:
     >>> dtm.s + 2.0 * dtm.delay(0.36)
     s + 2 exp(-0.36 s)
     """
+    if hasattr(T, "_exponential"):
+        return T._exponential()
     if not _is_number(T):
         raise TypeError(f"T={T!r}: a delay is a real number of seconds")
     return QuasiPolynomial([[1.0]], [float(T)])

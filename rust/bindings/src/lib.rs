@@ -21,4 +21,6 @@ mod _deadtime {
     use super::runtime::{spin, thread_count};
     #[pymodule_export]
     use super::special::{dde_roots, lambertw};
+    #[pymodule_export]
+    use super::stability::PyFamily;
 }
