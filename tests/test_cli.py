@@ -42,7 +42,7 @@ def demo(tmp_path_factory):
 def test_the_demo_shows_the_truth_beside_the_estimates(demo):
     _, printed = demo
     assert "the truth" in printed
-    for method in ("dominant", "exact", "hold and limit", "waveform"):
+    for method in ("paper", "exact", "as flown", "waveform with lag"):
         assert method in printed
     assert "The loop is 0.4" in printed
     assert "unsafe" in printed

@@ -5,7 +5,6 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
-
 from deadtime._design import Design, design
 from deadtime._errors import (
     ContourError,
@@ -48,7 +47,6 @@ __all__ = [
     "DelayEstimate",
     "DerivativeFilter",
     "Design",
-    #    "Design",
     "FirstOrder",
     "Integrator",
     "MapStatus",
@@ -68,7 +66,7 @@ __all__ = [
     "Whiteness",
     "damping_ratio",
     "dde_roots",
-    #    "delay",
+    "delay",
     "design",
     "estimate_delay",
     "kit_plant",

@@ -65,7 +65,6 @@ def dde_roots(
     threads: int | None = None,
 ) -> NDArray[np.complex128]: ...
 
-
 @final
 class Family:
     def __new__(

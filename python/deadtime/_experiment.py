@@ -41,7 +41,8 @@ class DemoFlight:
     truth : ControlLoop
         The loop that was flown.
     numbers : dict of str to float
-        The truth in the terms of the estimators: ``delay``, ``gain``, ``lag``, ``delay+lag``.
+        The truth in the terms of the estimators: ``delay`` (less the lead of the plant's zero),
+        ``gain``, ``lag``, ``delay+lag``.
     window : (float, float)
         The part around the step to estimate from, s.
     """
@@ -78,10 +79,11 @@ def demo_flight(seed: int = 1, noise: float = 0.002) -> DemoFlight:
     recording = Recording(
         time, reference, flown.outputs + error, units={"output": "m"}, source="simulated flight"
     )
-    # (b1 s + b0) / (s (s + a)): gain b0/a, lag 1/a, and a zero that leads by b1/b0.
+    # (b1 s + b0) / (s (s + a)): gain b0/a, lag 1/a, and a zero that leads by b1/b0. A model of
+    # delay and lag alone sees the lead as so much less delay.
     (b1, b0), (_, a, _) = plant.num, plant.den
     numbers = {
-        "delay": 0.26,
+        "delay": 0.26 - b1 / b0,
         "gain": b0 / a,
         "lag": 1.0 / a,
         "delay+lag": 0.26 + 1.0 / a - b1 / b0,
@@ -110,6 +112,10 @@ class Study:
         Gains made for the delay and its uncertainty.
     naive : Design
         Gains made in the same way for the same vehicle as if there were no delay.
+    gain_margin : float
+        Factor by which the gain of the designed loop may grow until it is unstable.
+    largest_delay : float
+        Delay up to which the designed loop is stable, s.
     responses : dict of str to Response
         Unit steps of the loop (the true one where it is known, else the fitted one) under both.
     flown_on : str
@@ -126,6 +132,8 @@ class Study:
     continuous_limit: float
     designed: Design
     naive: Design
+    gain_margin: float
+    largest_delay: float
     responses: dict[str, Response]
     flown_on: str
     truth: DemoFlight | None = None
@@ -148,8 +156,8 @@ class Study:
         parts = " (delay and lag together)" if "lag" in fit.free else ""
         gains = ", ".join(f"{key} = {value:.3g}" for key, value in self.designed.gains.items())
         said = [
-            f"The loop is {late:.2f} s late{parts}, between {low:.2f} and {high:.2f} s with 95 % "
-            f"confidence.",
+            f"The loop is {late:.2f} s late{parts}, between {low:.3f} and {high:.3f} s with 95 % "
+            "confidence.",
             f"Under proportional control Kp above {self.safe_gain():.2f} is unsafe (less than a "
             f"factor of 2 from instability at {self.held_limit:.2f}"
             + (
@@ -158,9 +166,10 @@ class Study:
                 if self.known.is_sampled
                 else ")."
             ),
-            f"Try {gains}: {_settles(self.responses['designed for the delay'])}; gains made as if "
-            f"there were no delay would leave a loop that "
-            f"{_settles(self.responses['designed without the delay'], settle='settle')}.",
+            f"Try {gains}: a step {_settles(self.responses['designed for the delay'])}, and the "
+            f"loop stays stable until its gain is {self.gain_margin:.1f} times what it was found "
+            f"to be, or its delay {self.largest_delay:.2f} s. After gains made as if there were no "
+            f"delay a step {_settles(self.responses['designed without the delay'])}.",
         ]
         return " ".join(said)
 
@@ -197,9 +206,9 @@ def study(
     progress("mapping the gains")
     template = PV(Kp=1.0, Kv=0.1, filter=PAPER_FILTER)
     interval = comparison.best.ci(0.95, "delay")
-    designed = design(fitted, controller=template, delay=interval, objective="settling_time")
+    designed = design(fitted, controller=template, delay=interval)
     progress("designing without the delay, for contrast")
-    naive = design(fitted, controller=template, delay=0.0, objective="settling_time")
+    naive = design(fitted, controller=template, delay=0.0)
     progress("flying both designs")
     flown = fitted if truth is None else truth.truth
     responses = {
@@ -215,6 +224,8 @@ def study(
         continuous_limit=continuous,
         designed=designed,
         naive=naive,
+        gain_margin=designed.loop.stable_range("gain")[1] / designed.loop.parameters["gain"],
+        largest_delay=designed.loop.stable_range("delay")[1],
         responses=responses,
         flown_on="the fitted loop" if truth is None else "the true loop",
         truth=truth,
@@ -230,11 +241,13 @@ def _fly(loop: ControlLoop, controller: Controller) -> Response:
     return loop.replace(controller=controller).simulate(time)
 
 
-def _settles(response: Response, settle: str = "it settles") -> str:
-    """In words, whether and when a response settles."""
-    settled = response.info()["settling_time"]
-    if np.isfinite(settled):
-        return f"{settle} to 2 % in {settled:.1f} s"
+def _settles(response: Response) -> str:
+    """Whether and when a response settles, in words that follow "a step"."""
+    info = response.info()
+    if np.isfinite(info["settling_time"]):
+        return (
+            f"settles to 2 % in {info['settling_time']:.1f} s with {info['overshoot']:.0f} % "
+            "overshoot"
+        )
     swing = float(np.ptp(response.outputs[response.time > 0.5 * response.time[-1]]))
-    never = "never settles" if settle == "settle" else "it does not settle"
-    return f"{never} (it still swings by {swing:.2g} after {0.5 * WATCHED:g} s)"
+    return f"has not settled after {response.time[-1]:g} s (it still swings by {swing:.2g})"

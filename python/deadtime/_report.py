@@ -95,7 +95,8 @@ def _estimates(study: Study) -> str:
         body.append(row.replace("<tr>", '<tr class="truth">'))
     return (
         f"<table>{_row(COLUMNS, 'th', width)}{''.join(body)}</table>"
-        "<p>In brackets: taken as given, not fitted.</p>"
+        "<p>In brackets: taken as given, not fitted. Sum: delay and lag, which one step determines "
+        "better than either. “As flown”: with the hold and the limit.</p>"
     )
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import typer
+from rich import box
 from rich.table import Table
 
 from deadtime._cli import options as opt
@@ -126,7 +127,7 @@ def _estimate_all(
         )
         return
     console.print(estimates_table(comparison))
-    console.print("(in brackets: taken as given, not fitted)", style="dim")
+    console.print("in brackets: taken as given; sum: delay and lag", style="dim")
     for sentence in comparison.explanation():
         console.print(f"• {sentence}", highlight=False, markup=False)
 
@@ -182,7 +183,7 @@ def roots(
 
 
 def _roots_table(found: RootSet) -> Table:
-    table = Table(header_style="bold")
+    table = Table(box=box.SIMPLE_HEAD)
     for head in ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius"):
         table.add_column(head, justify="right")
     for root, multiplicity, radius in zip(

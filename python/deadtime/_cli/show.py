@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from rich.console import Console
@@ -57,9 +57,10 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = None) -> Table:
     """The delay by every method, with the truth beside it where it is known."""
-    table = Table(title="Delay of the loop", title_justify="left", header_style="bold")
+    table = Table(title="Delay of the loop", title_justify="left", box=None, padding=(0, 1, 0, 0))
     for index, head in enumerate(COLUMNS):
-        table.add_column(head, justify="right" if 0 < index < len(COLUMNS) - 1 else "left")
+        justify: Literal["left", "right"] = "right" if 0 < index < len(COLUMNS) - 1 else "left"
+        table.add_column(head, justify=justify, no_wrap=True)
     for row in comparison.rows():
         # A reason does not fit into a cell; it is said in full below the table.
         table.add_row(*(row if len(row) > 2 else [row[0], "refused"]))

@@ -17,25 +17,17 @@ from deadtime._recording import Recording
 __all__ = ["Comparison", "compare_methods"]
 
 #: Heads of the columns that `Comparison.rows` fills.
-COLUMNS = (
-    "method",
-    "delay / s",
-    "95 % interval",
-    "gain",
-    "lag / s",
-    "delay + lag / s",
-    "adequate",
-)
+COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
 
 #: Two delays closer than this share of their mean are called the same.
 AGREE = 0.03
 
 LABELS = {
-    "dominant": "overshoot, dominant root (the paper's)",
-    "exact": "overshoot, exact response",
-    "saturated": "overshoot, with hold and limit",
-    "waveform": "waveform, delay and gain",
-    "waveform with lag": "waveform, delay, gain and lag",
+    "dominant": "paper's overshoot",
+    "exact": "exact overshoot",
+    "saturated": "overshoot as flown",
+    "waveform": "waveform",
+    "waveform with lag": "waveform with lag",
 }
 
 
@@ -81,8 +73,8 @@ class Comparison:
         for name, fit in self.estimates.items():
             interval, total = "–", "–"
             if fit.calibrated:
-                interval = "{:.3f} to {:.3f}".format(*fit.ci(0.95))
-                total = f"{fit.delay_plus_lag:.3f} ± {fit.stderr['delay+lag']:.3f}"
+                interval = "{:.3f} – {:.3f}".format(*fit.ci(0.95))
+                total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
             rows.append(
                 [
                     LABELS[name],
