@@ -196,7 +196,7 @@ def test_responses_decay_with_the_rightmost_pole(kp, delay):
             delay=0.36,
             sample_time=0.065,
         ),
-        dtm.ControlLoop(dtm.FirstOrder(1.0, 0.5), dtm.PI(1.0, 2.0), delay=0.3, sample_time=0.1),
+        dtm.ControlLoop(dtm.FirstOrder(1.0, 0.5), dtm.PI(1.0, 3.0), delay=0.3, sample_time=0.1),
     ],
     ids=["p", "kit", "filtered pv", "pi"],
 )
@@ -259,7 +259,12 @@ def test_sampled_poles_carry_their_rounding_error():
     z = np.roots([1.0, -1.0, 0.2])
     truth = np.sort(np.log(z) / 0.1)[::-1]
     assert (np.abs(np.asarray(found) - truth) <= found.radii).all()
-    assert found.radii.max() < 1e-12
+    assert found.radii.max() < 1e-11
+    assert found.resolved.all()
+    pair = loop.replace(Kp=5.0).rightmost()
+    assert len(pair) == pair.counted == 2
+    assert pair[0] == pair[1].conjugate()
+    assert pair[0].imag > 0.0
 
 
 # Arguments
@@ -472,3 +477,85 @@ def test_plot_draws_output_reference_and_command():
     axes = response.plot(command=True)
     assert len(axes.lines) == 3
     matplotlib.pyplot.close(axes.figure)
+
+
+# Continuous loops through their characteristic function
+
+
+def test_characteristic_functions():
+    s, delay = dtm.s, dtm.delay
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.36)
+    assert loop.characteristic() == s + 2.0 * delay(0.36)
+    neutral = loop.replace(controller=dtm.PV(2.0, 0.3))
+    assert neutral.characteristic() == s + (2.0 + 0.3 * s) * delay(0.36)
+    lagged = dtm.ControlLoop(dtm.Integrator(0.9, 0.2), dtm.PI(1.0, 0.5), delay=0.1)
+    assert lagged.characteristic() == 0.2 * s**3 + s**2 + (0.9 * s + 0.45) * delay(0.1)
+
+
+@given(plants, controllers, st.sampled_from([0.1, 0.36]))
+@settings(deadline=None, max_examples=30)
+def test_characteristic_function_is_the_determinant(plant, controller, delay):
+    """Up to the factor that the plant's and the controller's denominators leave."""
+    loop = dtm.ControlLoop(plant, controller, delay=delay)
+    model, h = loop._model, loop.characteristic()
+
+    def determinant(s):
+        n = len(model.B)
+        matrix = np.zeros((n + 1, n + 1), dtype=complex)
+        matrix[:n, :n] = s * np.eye(n) - model.A
+        matrix[:n, n] = -model.B
+        matrix[n, :n] = -model.K * np.exp(-s * delay)
+        matrix[n, n] = 1.0 - model.L * np.exp(-s * delay)
+        return np.linalg.det(matrix)
+
+    points = [0.7 + 1.9j, -0.4 + 3.0j, 2.0 - 1.0j]
+    ratios = [h(s) / determinant(s) for s in points]
+    np.testing.assert_allclose(ratios, ratios[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("loop", "name", "high"),
+    [
+        (dtm.ControlLoop(INTEGRATOR, dtm.P(1.0), delay=0.36), "Kp", math.pi / 0.72),
+        (dtm.ControlLoop(INTEGRATOR, dtm.P(1.0), delay=0.10), "Kp", math.pi / 0.20),
+        (dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.1), "delay", math.pi / 4.0),
+        (dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.1), "gain", math.pi / 0.4),
+    ],
+)
+def test_ranges_of_continuous_loops(loop, name, high):
+    found = loop.stable_range(name)
+    assert found[0] == 0.0
+    assert found[1] == pytest.approx(high, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("derivative_filter", "high"), [(None, 0.9685), (dtm.DerivativeFilter(38.0), 0.890)]
+)
+def test_velocity_gain_of_the_paper(derivative_filter, high):
+    """Armah & Yi: the largest Kv at Kp = 2, and what their filter costs."""
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.PV(2.0, 0.3, derivative_filter), delay=0.36)
+    assert loop.stable_range("Kv")[1] == pytest.approx(high, abs=5e-4)
+    abscissa = {None: -3.3168, dtm.DerivativeFilter(38.0): -2.197}[derivative_filter]
+    assert loop.spectral_abscissa() == pytest.approx(abscissa, abs=5e-4)
+
+
+def test_a_neutral_loop_needs_strong_stability():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 1.05), delay=0.36)
+    assert not loop.is_stable()
+    assert loop.replace(Kv=0.5).is_stable()
+
+
+def test_stability_of_loops_without_a_delay():
+    loop = dtm.ControlLoop(dtm.Integrator(1.0, 0.5), dtm.PI(1.0, 0.5), delay=0.0)
+    # 0.5 s^3 + s^2 + s + Ki is stable for Ki < 2.
+    assert loop.is_stable()
+    assert loop.stable_range("Ki")[1] == pytest.approx(2.0, rel=1e-12)
+
+
+@given(st.floats(0.5, 3.5), st.sampled_from([None, 0.1]))
+@settings(deadline=None, max_examples=20)
+def test_fast_sampling_has_the_poles_of_continuous_time(kp, lag):
+    loop = dtm.ControlLoop(dtm.Integrator(lag=lag or 0.0), dtm.P(kp), delay=0.2)
+    sampled = loop.replace(sample_time=1e-3).spectral_abscissa()
+    # Half a sample more delay moves the poles by about |s|^2 Ts / 2.
+    assert sampled == pytest.approx(loop.spectral_abscissa(), abs=0.1)

@@ -7,9 +7,10 @@ a g + b f e^(-s Td); a sampled one the eigenvalues z of its transition matrix, p
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.optimize import brentq
 
@@ -61,20 +62,32 @@ def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> floa
     return float(model.native(delay, sample_time).poles()[0].real)
 
 
-def sampled_roots(matrix: np.ndarray[Any, Any], sample_time: float, n: int) -> RootSet:
-    """Return the `n` rightmost poles s = ln(z)/Ts, with first-order bounds of their error."""
+def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> RootSet:
+    """Return the `n` rightmost poles and their mirror images, with first-order error bounds."""
     from deadtime import RootSet
 
-    z, left, right = eig(matrix, left=True, right=True)
-    order = np.lexsort((z.imag, -np.abs(z)))[:n]
-    z = z[order]
-    # |dz| <= ||error|| / |y* x|, with the backward error of the QR algorithm.
-    overlap = np.abs(np.sum(left[:, order].conj() * right[:, order], axis=0))
+    z, left, right = cast(Any, eig)(matrix, left=True, right=True)
+    # |dz| <= ||error|| / |y* x| with the backward error of the QR algorithm.
+    overlap = np.abs(np.sum(left.conj() * right, axis=0))
     error = len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix)
     with np.errstate(divide="ignore", invalid="ignore"):
+        poles = np.log(z.astype(np.complex128)) / sample_time
         radii = error / (overlap * np.abs(z) * sample_time)
-        roots = np.log(z) / sample_time
-    return RootSet(roots, np.ones(len(roots), dtype=np.int64), radii)
+    order = np.lexsort((-z.imag, np.abs(poles.imag), -poles.real))
+    # A pole and its mirror image are neighbours, the upper one first: keep n uppers.
+    order = order[np.cumsum(z[order].imag >= 0.0) <= n]
+    roots, radii = poles[order], radii[order]
+    gaps = np.abs(roots[:, None] - poles[None, :])
+    gaps[np.arange(len(order)), order] = np.inf
+    furthest = float(roots.real.min())
+    return RootSet(
+        roots,
+        np.ones(len(roots), dtype=np.int64),
+        radii,
+        radii < 0.5 * gaps.min(axis=1),
+        len(roots),
+        ((furthest, np.inf), (-np.pi / sample_time, np.pi / sample_time)),
+    )
 
 
 def stable_range(
@@ -114,4 +127,5 @@ def _refine(abscissa: Callable[[float], float], inside: float, outside: float) -
     if abscissa(outside) == 0.0:
         return outside
     size = max(abs(inside), abs(outside))
-    return float(brentq(abscissa, inside, outside, xtol=1e-13 * size, rtol=1e-14, maxiter=200))
+    zero = float(brentq(abscissa, inside, outside, xtol=1e-13 * size, rtol=1e-14, maxiter=200))
+    return 0.0 if abs(zero) < 1e-12 * size else zero

@@ -1,4 +1,9 @@
 //! The delayed command as a queue of pieces, and the order of the breaks between them.
+//!
+//! Every break comes back one delay later, one order smoother (or, in a neutral loop, no smoother
+//! at all), so the pieces of one delay grow in number with every jump there has been. Two
+//! neighbours whose polynomials are the same function to rounding become one piece again: a break
+//! that has faded below rounding costs nothing any more.
 
 use std::collections::VecDeque;
 
@@ -19,9 +24,17 @@ pub(super) const SMOOTH: Order = u8::MAX;
 /// Breaks up to this order are reported; later ones are below what a plot or a fit can see.
 pub(super) const REPORTED: Order = 10;
 
-/// w(t) = series((t − origin)/scale) up to `end`; the piece before it says where it starts.
+/// Two polynomials whose coefficients differ by less than this part of the largest one, in the
+/// sum, are one.
+const SAME: f64 = 4.0 * f64::EPSILON;
+
+/// What is left, one piece later, of the length of the longest.
+const FORGET: f64 = 0.998;
+
+/// w(t) = series((t − origin)/scale) from `start` to `end`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
+    pub(super) start: f64,
     pub(super) end: f64,
     pub(super) origin: f64,
     pub(super) scale: f64,
@@ -33,6 +46,7 @@ pub(super) struct Piece {
 impl Piece {
     pub(super) fn constant(value: f64, end: f64) -> Self {
         Self {
+            start: 0.0,
             end,
             origin: 0.0,
             scale: 1.0,
@@ -54,6 +68,19 @@ impl Piece {
         };
         self.series.shifted(offset, h / self.scale)
     }
+
+    /// Is this piece, continued, the other one?
+    fn continues_as(&self, other: &Self) -> bool {
+        let length = other.end - other.start;
+        let mine = self.local(other.start, length);
+        let theirs = other.local(other.start, length);
+        let (mut difference, mut largest) = (0.0, 0.0_f64);
+        for (mine, theirs) in mine.coefficients.iter().zip(&theirs.coefficients) {
+            difference += (mine - theirs).abs();
+            largest = largest.max(theirs.abs());
+        }
+        difference <= SAME * largest
+    }
 }
 
 /// The pieces not yet used up, first one first; never empty.
@@ -63,6 +90,9 @@ pub(super) struct Pieces {
     rest: VecDeque<Piece>,
     end: f64,
     delay: f64,
+    /// Length of the longest of the latest pieces: two that are longer together would only be
+    /// cut again.
+    longest: f64,
     /// Order of a break lost in a piece too short to keep.
     dropped: Order,
 }
@@ -75,6 +105,7 @@ impl Pieces {
             rest: VecDeque::new(),
             end: delay,
             delay,
+            longest: 0.0,
             dropped: SMOOTH,
         }
     }
@@ -99,6 +130,7 @@ impl Pieces {
     /// Append a piece; one shorter than rounding is left to its neighbour, and equal constants
     /// become one piece.
     pub(super) fn push(&mut self, mut piece: Piece) -> Result<(), Error> {
+        self.longest = (FORGET * self.longest).max(piece.end - piece.start);
         piece.order = piece.order.min(self.dropped);
         let is_dust = piece.end - self.end <= slack(piece.end, self.delay);
         let last = self.rest.back_mut().unwrap_or(&mut self.front);
@@ -110,8 +142,17 @@ impl Pieces {
             return Ok(());
         }
         self.dropped = SMOOTH;
-        if is_same {
+        let is_faded = piece.order > REPORTED && piece.end - last.start <= self.longest;
+        if is_same || (is_faded && last.continues_as(&piece)) {
             last.end = piece.end;
+            return Ok(());
+        }
+        if is_faded && piece.continues_as(last) {
+            *last = Piece {
+                start: last.start,
+                order: last.order,
+                ..piece
+            };
             return Ok(());
         }
         if self.rest.len() >= MOST_PIECES {

@@ -88,6 +88,7 @@ pub(super) fn run(
             }
             let last = stretch.end >= 1.0;
             pieces.push(Piece {
+                start: delay + t + stretch.start * h,
                 end: delay + if last { next } else { t + stretch.end * h },
                 origin: t + delay,
                 scale: h,

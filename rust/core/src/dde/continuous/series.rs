@@ -10,6 +10,10 @@ pub(super) const DEGREE: usize = 24;
 /// of the series behind it.
 const NEGLIGIBLE: f64 = 1e-17;
 
+/// A state this small throughout its element is as good as zero; it keeps subnormal numbers, which
+/// have no relative precision, from shortening the element.
+const NOTHING: f64 = 1e-280;
+
 /// An element is tried no longer than this over ‖A‖₁, which keeps coefficients from overflowing.
 const TRIAL: f64 = 16.0;
 
@@ -155,7 +159,7 @@ impl Expansion {
                 let (mut largest, mut power, mut ratio) = (0.0_f64, 1.0_f64, 1.0_f64);
                 for j in 0..=self.degree {
                     let size = self.terms[j * self.n + i].abs() * power;
-                    if j >= DEGREE - 1 && largest > 0.0 && size > NEGLIGIBLE * largest {
+                    if j >= DEGREE - 1 && largest > NOTHING && size > NEGLIGIBLE * largest {
                         ratio = ratio.min((NEGLIGIBLE * largest / size).powf(1.0 / j as f64));
                     }
                     largest = largest.max(size);
