@@ -207,7 +207,7 @@ def _ranges(loop: ControlLoop, names: tuple[str, ...]) -> dict[str, tuple[float,
         second = (0.0, 0.5 * critical / max(late, 1e-9))
     else:
         second = (-0.1 * critical * late, critical * late)
-    return {names[0]: (0.02 * critical, 1.1 * critical), names[1]: second}
+    return {names[0]: (0.02 * critical, 1.25 * critical), names[1]: second}
 
 
 def _small_gain(loop: ControlLoop) -> float:

@@ -71,7 +71,7 @@ def plot_fits(
     ax: Axes, recording: Recording, fits: Mapping[str, DelayEstimate], unit: str = "m"
 ) -> None:
     """Recorded output with the fitted ones over it."""
-    ax.plot(recording.time, recording.reference, label="reference", **REFERENCE)
+    ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
     ax.plot(recording.time, recording.output, label="recorded", **DATA)
     for colour, (label, fit) in zip(COLOURS, fits.items(), strict=False):
         window = fit.recording
@@ -122,9 +122,12 @@ def plot_stability_map(ax: Axes, chart: StabilityMap, chosen: Mapping[str, float
     if np.any(np.isfinite(shading)):
         drawn = ax.pcolormesh(x, y, shading, cmap="viridis_r", shading="auto", rasterized=True)
         ax.figure.colorbar(drawn, ax=ax, label="spectral abscissa / (1/s)")
-    stable = chart.stable.T.astype(float)
-    if 0.0 < stable.mean() < 1.0:
-        ax.contour(x, y, stable, levels=[0.5], colors="k", linewidths=1.2)
+    if 0.0 < chart.stable.mean() < 1.0:
+        # The abscissa is continuous, so its zero line lies between the cells it separates. Where
+        # it is missing or infinite, the boundary goes by the cells themselves.
+        whole = np.all(np.isfinite(chart.abscissa))
+        level = chart.abscissa if whole else 0.5 - chart.stable.astype(float)
+        ax.contour(x, y, level.T, levels=[0.0], colors="k", linewidths=1.2)
     if chosen:
         ax.plot(chosen[across], chosen[up], "*", color=COLOURS[1], ms=14, mec="w")
     ax.set(xlabel=across, ylabel=up, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))

@@ -108,8 +108,8 @@ class Comparison:
             )
         if not plain.adequate:
             said.append(
-                "The residuals of the fit are coloured, so the model is an equivalent of the "
-                "vehicle rather than the vehicle; its interval is the robust one."
+                "The residuals of the fit without lag are coloured: that model is an equivalent of "
+                "the vehicle rather than the vehicle, and its interval is the robust one."
             )
         return said
 

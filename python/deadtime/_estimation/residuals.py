@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 __all__ = ["Whiteness", "robust_covariance", "white_covariance", "whiteness_of"]
 
@@ -64,7 +64,7 @@ def whiteness_of(residuals: Array, parameters: int = 0) -> Whiteness:
     rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
     statistic = float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
     freedom = max(1, lags - parameters)
-    return Whiteness(statistic, float(stats.chi2.sf(statistic, freedom)), lags, float(rho[0]))
+    return Whiteness(statistic, float(special.chdtrc(freedom, statistic)), lags, float(rho[0]))
 
 
 def white_covariance(jacobian: Array, residuals: Array) -> Array:

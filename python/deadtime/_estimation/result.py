@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from deadtime._estimation.residuals import Whiteness
 from deadtime._loop import ControlLoop
@@ -152,7 +152,7 @@ class DelayEstimate:
                 f"{name!r} was not fitted, there are intervals for {', '.join(self.stderr)}"
             )
         freedom = max(1, self.residuals.size - len(self.free))
-        reach = float(stats.t.ppf(0.5 + level / 2, freedom)) * self.stderr[name]
+        reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
         value = self.delay_plus_lag if name == "delay+lag" else self.loop.parameters[name]
         low = value - reach
         if name != "gain":
