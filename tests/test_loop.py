@@ -559,3 +559,66 @@ def test_fast_sampling_has_the_poles_of_continuous_time(kp, lag):
     sampled = loop.replace(sample_time=1e-3).spectral_abscissa()
     # Half a sample more delay moves the poles by about |s|^2 Ts / 2.
     assert sampled == pytest.approx(loop.spectral_abscissa(), abs=0.1)
+
+
+@given(plants, controllers)
+@settings(deadline=None, max_examples=30)
+def test_numbers_may_be_symbols(plant, controller):
+    """Constant quasi-polynomials stand in for symbols: algebra is all they have."""
+    loop = dtm.ControlLoop(plant, controller, delay=0.3)
+    symbols = {
+        name: value if name == "delay" else dtm.QuasiPolynomial([[value]], [0.0])
+        for name, value in loop.parameters.items()
+    }
+    h, symbolic = loop.characteristic(), loop._characteristic(symbols)
+    points = np.array([0.7 + 1.9j, -0.4 + 3.0j, 2.0 - 1.0j])
+    np.testing.assert_allclose(symbolic(points), h(points), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("plant", "controller"),
+    [
+        (dtm.Integrator(), dtm.PV(1.0, 0.2)),
+        (dtm.Integrator(lag=0.1), dtm.PV(1.0, 0.2, dtm.DerivativeFilter(20.0))),
+        (dtm.kit_plant(), dtm.PID(1.0, 0.2, 0.1, dtm.DerivativeFilter(20.0))),
+        (dtm.RationalPlant([0.2, 1.0], [1.0, 1.0]), dtm.PI(0.5, 0.5)),
+    ],
+)
+def test_grids_of_sampled_loops_are_their_single_loops(plant, controller):
+    from deadtime._loop_stability import sampled_grid
+
+    rng = np.random.default_rng(7)
+    cells = 40
+    loop = dtm.ControlLoop(plant, controller, delay=0.3, sample_time=0.065)
+    values = {name: value * rng.uniform(0.3, 2.5, cells) for name, value in loop.parameters.items()}
+    if "omega" in values:
+        values["omega"] = rng.choice([15.0, 30.0], cells)
+    values["damping"] = 1.0
+    seen = []
+    abscissa, unstable, status = sampled_grid(plant, controller, values, progress=seen.append)
+    for i in range(cells):
+        numbers = {n: np.atleast_1d(v)[i % np.size(v)] for n, v in values.items()}
+        single = loop.replace(**{n: v for n, v in numbers.items() if n in loop.parameters})
+        # Gains enter in another order here than there: a last place or two of the matrix.
+        assert abscissa[i] == pytest.approx(single.spectral_abscissa(), rel=1e-9, abs=1e-9)
+        assert unstable[i] == (np.abs(np.linalg.eigvals(single.transition_matrix())) > 1).sum()
+        assert status[i] == 0
+    shared = sampled_grid(plant, controller, values, threads=1)
+    np.testing.assert_array_equal(shared[0], abscissa)
+
+
+def test_many_jumps_are_the_sum_of_their_steps():
+    """Breaks that have faded are forgotten, without a trace in the response."""
+    rng = np.random.default_rng(1)
+    loop = dtm.ControlLoop(dtm.Integrator(lag=0.05), dtm.P(1.5), delay=0.36)
+    jumps = np.sort(rng.uniform(0.0, 40.0, 150))
+    levels = rng.choice([-1.0, 0.0, 1.0], 150)
+    times = np.linspace(0.0, 40.0, 201)
+    found = loop.simulate(times, levels, reference_time=jumps, reference_before=0.0)
+    total = np.zeros(len(times))
+    for jump, height in zip(jumps, np.diff(levels, prepend=0.0), strict=True):
+        if height != 0.0:
+            later = times[times > jump] - jump
+            one = loop.simulate(np.concatenate([[0.0], later]), height)
+            total[times > jump] += one.outputs[1:]
+    assert np.abs(found.outputs - total).max() < 1e-12

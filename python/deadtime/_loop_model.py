@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,8 +79,9 @@ class LoopModel:
             limit,
         )
 
-    def equilibrium(self, reference: float) -> tuple[float, float] | None:
-        """Output and command at rest under `reference`, or None where there is no such rest."""
+    @cached_property
+    def rest_gains(self) -> tuple[float, float] | None:
+        """Output and command at rest under a unit reference, None where there is no such rest."""
         n = len(self.B)
         matrix = np.zeros((n + 1, n + 1))
         matrix[:n, :n] = self.A
@@ -90,7 +92,7 @@ class LoopModel:
         if not scale.all():
             return None
         matrix /= scale[:, None]
-        right = -reference * np.append(self.E, self.M) / scale
+        right = -np.append(self.E, self.M) / scale
         if np.linalg.cond(matrix) > 1e13:
             return None
         x = np.linalg.solve(matrix, right)

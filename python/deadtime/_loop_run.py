@@ -117,10 +117,13 @@ def settled_step(loop: ControlLoop, amplitude: float) -> Response:
 
 
 def _steady_state(loop: ControlLoop, reference: float) -> float | None:
-    rest = loop._model.equilibrium(reference)
-    if rest is None or (loop.limit is not None and abs(rest[1]) > loop.limit):
+    gains = loop._model.rest_gains
+    if gains is None:
         return None
-    return rest[0]
+    output, command = gains
+    if loop.limit is not None and abs(command * reference) > loop.limit:
+        return None
+    return output * reference
 
 
 def _jumps(
