@@ -4,13 +4,12 @@ import copy
 import pickle
 from fractions import Fraction
 
+import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime import delay, s
 from hypothesis import given
 from hypothesis import strategies as st
-
-import deadtime as dtm
-from deadtime import delay, s
 
 Kp, Kv, T = dtm.parameters("Kp Kv T")
 NAMES = ("Kp", "Kv", "T")
@@ -27,7 +26,7 @@ def test_parameters_are_split_at_spaces_and_commas():
 
 @pytest.mark.parametrize("names", ["", " , ", "2x", "a-b", "lambda", "s", "Kp T Kp"])
 def test_bad_names_are_refused(names):
-    with pytest.raises(ValueError, match="name|variable|twice"):
+    with pytest.raises(ValueError, match=r"name|variable|twice"):
         dtm.parameters(names)
 
 

@@ -7,12 +7,11 @@ import signal
 import sys
 import threading
 
+import deadtime as dtm
 import numpy as np
 import pytest
-from scipy.special import lambertw
-
-import deadtime as dtm
 from deadtime import MapStatus, delay, s
+from scipy.special import lambertw
 
 Kp, Kv, Td = dtm.parameters("Kp Kv Td")
 INTEGRATOR = s + Kp * delay(Td)
@@ -29,7 +28,8 @@ def integrator_by_hand(gain, time):
     """Unstable roots of s + K exp(-s T).
 
     s = jw: w = K and w T = pi/2 + 2 pi k for K > 0, so pairs cross at K T = pi/2 + 2 pi k, to the
-    right. For K < 0 there is one real root on the right, and pairs cross at |K| T = 3 pi/2 + 2 pi k.
+    right. For K < 0 there is one real root on the right, and pairs cross at
+    |K| T = 3 pi/2 + 2 pi k.
     """
     size = np.abs(gain) * time
     return np.where(gain > 0, 2 * pairs(size, np.pi / 2), 1 + 2 * pairs(size, 1.5 * np.pi))
@@ -139,7 +139,7 @@ def test_zero_function_and_overflow_are_undecided():
 
 @pytest.mark.parametrize("family", [VELOCITY, INTEGRATOR * (1 + 0.25 * s), VELOCITY + 0.02 * s**2])
 def test_cell_is_the_pointwise_call(family):
-    ranges = {name: (0.07, 0.93) for name in family.names}
+    ranges = dict.fromkeys(family.names, (0.07, 0.93))
     chart = dtm.stability_map(family, ranges, shape=(7, 6))
     for (i, j), unstable in np.ndenumerate(chart.unstable):
         cell = zip(chart.names, (i, j), strict=True)
@@ -179,7 +179,8 @@ def test_continuous_loop_over_plant_and_delay():
 
 
 @pytest.mark.parametrize(
-    ("time", "sample_time", "limit"), [(0.36, 0.065, 4.024), (0.10, 0.065, 12.46), (0.36, None, 4.363)]
+    ("time", "sample_time", "limit"),
+    [(0.36, 0.065, 4.024), (0.10, 0.065, 12.46), (0.36, None, 4.363)],
 )
 def test_hold_lowers_the_largest_gain(time, sample_time, limit):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1), delay=time, sample_time=sample_time)

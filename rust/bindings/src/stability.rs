@@ -58,7 +58,6 @@ impl PyFamily {
     /// Counts, abscissas and statuses over two parameters; `values` holds the others.
     #[pyo3(signature = (values, parameters, first, second, abscissa, threads=None, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "two axes and how to run")]
-    #[expect(clippy::type_complexity, reason = "three arrays")]
     fn map<'py>(
         &self,
         py: Python<'py>,
