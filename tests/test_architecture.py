@@ -23,7 +23,7 @@ CORE_ARROWS = {
 
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
 FLOORS = [
-    {"_errors", "_deadtime"},
+    {"_errors", "_validation", "_deadtime"},
     {
         "_special",
         "_rootset",
@@ -33,8 +33,10 @@ FLOORS = [
         "_controllers",
         "_response",
         "_loop",
+        "_loop_model",
+        "_loop_run",
+        "_loop_stability",
         "_stability",
-        "_simulation",
     },
     {"_recording"},
     {"_readers", "_estimation", "_design"},

@@ -11,7 +11,6 @@ import numpy as np
 from scipy.optimize import minimize
 
 from deadtime._controllers import PV, Controller, P
-from deadtime._errors import DeadtimeError
 from deadtime._loop import ControlLoop
 from deadtime._stability import StabilityMap, stability_map
 
@@ -24,6 +23,13 @@ SIMULATED_CELLS = 150
 
 #: A step response that has not settled by then has not settled at all, in units of 1/|abscissa|.
 HORIZON = 12.0
+
+#: Output times of a simulation that looks for the settling time.
+SETTLING_POINTS = 800
+
+#: The band the search keeps to. It is narrower than the 2 % that are promised, because the best
+#: settling time is had by a peak that just touches the band, which the next rounding would break.
+SEARCH_BAND = 0.018
 
 #: What a loop costs that does not settle, so that the search turns away from it, s.
 NEVER = 1e6
@@ -154,7 +160,10 @@ def design(
         return max(one.spectral_abscissa() for one in loops(gains))
 
     def settling(gains: np.ndarray) -> float:
-        return max(_settling_time(one) for one in loops(gains))
+        return max(_settling_time(one, SEARCH_BAND) for one in loops(gains))
+
+    def promised(gains: np.ndarray) -> float:
+        return max(_settling_time(one, 0.02) for one in loops(gains))
 
     cost = abscissa if objective == "abscissa" else settling
     start = _start(worst, axes, cost if objective == "settling_time" else None)
@@ -166,7 +175,7 @@ def design(
         abscissa=abscissa(gains),
         delays=delays,
         objective=objective,
-        value=cost(gains),
+        value=abscissa(gains) if objective == "abscissa" else promised(gains),
         charts=charts,
     )
 
@@ -220,20 +229,20 @@ def _small_gain(loop: ControlLoop) -> float:
     raise ValueError("no proportional gain stabilises this loop: give ranges= and a controller")
 
 
-def _settling_time(loop: ControlLoop) -> float:
+def _settling_time(loop: ControlLoop, band: float) -> float:
+    """Time from which the response to a unit step stays within `band` of 1."""
     abscissa = loop.spectral_abscissa()
     if not abscissa < 0.0:
         return NEVER
     end = (loop.delay or 0.0) + HORIZON / -abscissa
     if end > 1e4 * max(loop.delay or 0.0, 1e-3):
         return NEVER
-    # A sampled loop's output is nearly straight between samples; 800 points resolve 2 %.
-    time = np.linspace(0.0, end, 800)
-    try:
-        settled = loop.simulate(time).info()["settling_time"]
-    except DeadtimeError:
+    time = np.linspace(0.0, end, SETTLING_POINTS)
+    outputs = loop.simulate(time).outputs
+    outside = np.flatnonzero(np.abs(outputs - 1.0) > band)
+    if outside.size and outside[-1] == time.size - 1:
         return NEVER
-    return settled if np.isfinite(settled) else NEVER
+    return float(time[outside[-1] + 1]) if outside.size else 0.0
 
 
 def _start(

@@ -59,8 +59,8 @@ def read_recording(
     >>> rows = [f"{k / 10},{int(k > 4)},{max(0, k - 6) / 10}" for k in range(20)]
     >>> _ = file.write_text("t_s,ref_m,height_m\n" + "\n".join(rows))
     >>> flight = dtm.read_recording(file, time="t_s", reference="ref_m", output="height_m")
-    >>> len(flight), flight.sample_time
-    (20, 0.1)
+    >>> len(flight), flight.steps()[0].time
+    (20, 0.5)
     """
     path = Path(path)
     names = {"time": time, "reference": reference, "output": output}
