@@ -20,7 +20,7 @@ fn drone(kp: f64, kv: f64) -> Equations {
         l: -kv,
         m: kp,
         c: vec![1.0],
-        d: 0.0,
+        ..Equations::default()
     }
 }
 
@@ -35,7 +35,7 @@ fn filtered(kp: f64, kv: f64) -> Equations {
         l: 0.0,
         m: kp,
         c: vec![1.0, 0.0, 0.0],
-        d: 0.0,
+        ..Equations::default()
     }
 }
 

@@ -350,7 +350,6 @@ def test_wrong_types_are_refused():
             lambda loop: loop.replace(sample_time=0.1).simulate([0.0], sample_phase=0.1),
             r"sample_phase=0\.1",
         ),
-        (lambda loop: loop.replace(controller=dtm.PD(1.0, 0.1)).simulate([0.0]), "impulse"),
     ],
 )
 def test_bad_calls_say_what_to_do(call, message):
@@ -412,8 +411,7 @@ def test_equations_are_the_polynomials(plant, controller):
     f, g = (np.polyval(p, s) for p in controller._feedback(controller.parameters))
     r, _ = (np.polyval(p, s) for p in controller._reference(controller.parameters))
     assert from_command == pytest.approx(-b / a * f / g, rel=1e-10)
-    # The ideal derivative of the reference is left out of the equations: an impulse at jumps.
-    assert from_reference == pytest.approx(r / g, rel=1e-10)
+    assert from_reference + s * model.impulse == pytest.approx(r / g, rel=1e-10)
 
 
 # Figures of a response
@@ -622,3 +620,49 @@ def test_many_jumps_are_the_sum_of_their_steps():
             one = loop.simulate(np.concatenate([[0.0], later]), height)
             total[times > jump] += one.outputs[1:]
     assert np.abs(found.outputs - total).max() < 1e-12
+
+
+# The ideal derivative of the error: an impulse where the reference jumps
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.36])
+@pytest.mark.parametrize("plant", [INTEGRATOR, dtm.Integrator(lag=0.1)])
+def test_an_ideal_derivative_of_a_step_is_an_impulse(plant, delay):
+    """R(s) = Kp + Kd s: the response is that of PV and Kd/Kp times its derivative."""
+    kp, kd = 1.6, 0.2
+    times = np.concatenate([[0.0], np.linspace(0.007, 4.007, 81)])
+    width = 1e-5
+    pv = dtm.ControlLoop(plant, dtm.PV(kp, kd), delay=delay)
+    around = times[1:, None] + width * np.array([-2, -1, 1, 2])
+    near = pv.simulate(np.concatenate([[0.0], around.ravel()])).outputs[1:].reshape(-1, 4).T
+    slope = (8 * (near[2] - near[1]) - (near[3] - near[0])) / (12 * width)
+    found = pv.replace(controller=dtm.PD(kp, kd)).simulate(times).outputs[1:]
+    # Differences of step 1e-5 round to 1e-10.
+    assert found == pytest.approx(pv.simulate(times).outputs[1:] + kd / kp * slope, abs=1e-9)
+
+
+def test_a_fast_filter_tends_to_the_impulse():
+    ideal = dtm.ControlLoop(dtm.Integrator(lag=0.1), dtm.PID(1.2, 0.3, 0.1), delay=0.3)
+    filtered = ideal.replace(controller=dtm.PID(1.2, 0.3, 0.1, dtm.DerivativeFilter(2000.0)))
+    levels, jumps = [1.0, -0.5], [0.2, 1.7]
+    sharp = ideal.simulate(TIMES, levels, reference_time=jumps).outputs
+    smooth = filtered.simulate(TIMES, levels, reference_time=jumps).outputs
+    assert np.abs(sharp - smooth).max() < 5e-3
+
+
+def test_a_jump_before_the_start_is_no_impulse():
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.PD(1.6, 0.2), delay=0.36)
+    found = loop.simulate(TIMES, [1.0], reference_time=[-1.0])
+    pv = loop.replace(controller=dtm.PV(1.6, 0.2)).simulate(TIMES)
+    np.testing.assert_array_equal(found.outputs, pv.outputs)
+
+
+def test_limit_and_hold_do_not_see_the_impulse():
+    pd = dtm.ControlLoop(INTEGRATOR, dtm.PD(1.6, 0.2), delay=0.36)
+    pv = pd.replace(controller=dtm.PV(1.6, 0.2))
+    for fields in ({"limit": 1.0}, {"sample_time": 0.065}):
+        np.testing.assert_array_equal(
+            pd.replace(**fields).simulate(TIMES).outputs,
+            pv.replace(**fields).simulate(TIMES).outputs,
+        )
+    assert np.abs(pd.simulate(TIMES).outputs - pv.simulate(TIMES).outputs).max() > 0.1

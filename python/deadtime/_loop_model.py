@@ -34,6 +34,7 @@ class LoopModel:
     M: float
     C: Vector
     D: float
+    impulse: float
 
     @classmethod
     def build(cls, plant: Plant, controller: Controller, values: Mapping[str, float]) -> LoopModel:
@@ -59,6 +60,7 @@ class LoopModel:
             M=float(c.M),
             C=np.concatenate([p.C, np.zeros(m)]),
             D=p.D,
+            impulse=float(c.impulse),
         )
 
     def native(
@@ -77,6 +79,7 @@ class LoopModel:
             delay,
             sample_time,
             limit,
+            self.impulse,
         )
 
     @cached_property
