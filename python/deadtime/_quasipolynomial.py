@@ -1,4 +1,7 @@
-"""Quasi-polynomials: characteristic functions of linear systems with delays."""
+"""Quasi-polynomials: characteristic functions of linear systems with delays.
+
+One class, kept whole: most of the file is its documentation.
+"""
 
 from __future__ import annotations
 
@@ -349,8 +352,9 @@ class QuasiPolynomial:
     def spectral_abscissa(self) -> float:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.
 
-        For a neutral equation, roots that exceed the chains by less than 1e-4 of one over the
-        longest delay are not told from them.
+        For a neutral equation, roots closer to the chains than the search comes to them are not
+        told from them: ``rightmost().region`` shows how close, usually within 1e-4 of one over
+        the longest delay.
 
         Returns
         -------

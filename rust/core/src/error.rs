@@ -26,8 +26,9 @@ pub enum Error {
 
     /// A zero lies on the contour, or too close to it for double precision to tell.
     #[error(
-        "a root lies on the contour near {place}, or closer to it than double precision can tell: \
-         move the edge of the region by more than {distance:.1e}"
+        "a root lies on the contour near {:?}{:+?}i, or closer to it than double precision can \
+         tell: move the edge of the region by more than {distance:.1e}",
+        place.re, place.im
     )]
     Contour {
         /// Where the contour meets the root.

@@ -21,32 +21,75 @@ use crate::{Error, Task};
 /// Coefficients are not scaled down to less than two to this power.
 const LOWEST_EXPONENT: i32 = -1000;
 
-/// The function with its coefficients scaled by a power of two, to a largest one between 1 and 2
-/// unless that would make the smallest one underflow: roots stay exactly what they are.
+/// A function made ready: h(s) = factor · sᵏ · `rest`(s) with k = `zeros`.
 ///
-/// # Errors
-/// [`Error::Argument`] for the zero function.
-pub(super) fn prepared(h: &QuasiPolynomial) -> Result<QuasiPolynomial, Error> {
-    let sizes = || {
-        h.coefficients()
+/// Common powers of s are exact roots at 0 and are taken out. Coefficients are scaled by a power
+/// of two, to a largest one between 1 and 2 unless that would make the smallest one underflow.
+/// Neither changes a root.
+#[derive(Debug, Clone)]
+pub(super) struct Prepared {
+    pub(super) rest: QuasiPolynomial,
+    pub(super) zeros: u32,
+}
+
+impl Prepared {
+    /// # Errors
+    /// [`Error::Argument`] for the zero function.
+    pub(super) fn new(h: &QuasiPolynomial) -> Result<Self, Error> {
+        let sizes = || {
+            h.coefficients()
+                .iter()
+                .flatten()
+                .map(|c| c.abs())
+                .filter(|c| *c > 0.0)
+        };
+        let (smallest, largest) = sizes().fold((f64::INFINITY, 0.0f64), |(low, high), c| {
+            (low.min(c), high.max(c))
+        });
+        if largest == 0.0 {
+            return Err(Error::argument(
+                "the zero function: every s is a root, there is nothing to count",
+            ));
+        }
+        let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
+        // In two steps: 2^1074 itself overflows.
+        let half = shift / 2;
+        let (first, second) = (libm::ldexp(1.0, half), libm::ldexp(1.0, shift - half));
+        let lowest = |row: &Vec<f64>| row.iter().take_while(|c| **c == 0.0).count();
+        let common = h.coefficients().iter().map(lowest).min().unwrap_or(0);
+        let rows = h
+            .coefficients()
             .iter()
-            .flatten()
-            .map(|c| c.abs())
-            .filter(|c| *c > 0.0)
-    };
-    let (smallest, largest) = sizes().fold((f64::INFINITY, 0.0f64), |(low, high), c| {
-        (low.min(c), high.max(c))
-    });
-    if largest == 0.0 {
-        return Err(Error::argument(
-            "the zero function: every s is a root, there is nothing to count",
-        ));
+            .map(|row| {
+                row.iter()
+                    .skip(common)
+                    .map(|c| c * first * second)
+                    .collect()
+            })
+            .collect();
+        Ok(Self {
+            rest: QuasiPolynomial::new(rows, h.delays().to_vec())?,
+            zeros: u32::try_from(common).unwrap_or(u32::MAX),
+        })
     }
-    let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
-    // In two steps: 2^1074 itself overflows.
-    let half = shift / 2;
-    h.scale(libm::ldexp(1.0, half))?
-        .scale(libm::ldexp(1.0, shift - half))
+
+    /// Exact roots at 0 in the region.
+    ///
+    /// # Errors
+    /// [`Error::Contour`] where 0 lies on an edge other than one on the real axis.
+    pub(super) fn zeros_in(&self, region: &Region) -> Result<u32, Error> {
+        let Region { re, im } = *region;
+        if self.zeros == 0 || re.0 > 0.0 || re.1 < 0.0 || im.0 > 0.0 || im.1 < 0.0 {
+            return Ok(0);
+        }
+        if re.0 == 0.0 || re.1 == 0.0 {
+            return Err(Error::Contour {
+                place: Complex64::ZERO,
+                distance: f64::MIN_POSITIVE,
+            });
+        }
+        Ok(self.zeros)
+    }
 }
 
 /// A region with its open sides closed by proved bounds, in the upper half plane as far as
@@ -67,9 +110,8 @@ pub(super) struct Closed {
 /// Close the open sides of `region`; `None` when it is empty of roots for sure.
 ///
 /// # Errors
-/// [`Error::Argument`] for a bad region, or one that cannot be shown to hold finitely many roots.
+/// [`Error::Argument`] for a region that cannot be shown to hold finitely many roots.
 pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Closed>, Error> {
-    region.check()?;
     let mirrored = region.im.1 + region.im.0 < 0.0;
     let Region { mut re, mut im } = if mirrored { region.mirrored() } else { *region };
     if im.0.is_infinite() || im.1.is_infinite() {
@@ -151,12 +193,14 @@ fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, Error> {
-    let h = prepared(h)?;
-    let Some(closed) = close(&h, region)? else {
-        return Ok(0);
+    let prepared = Prepared::new(h)?;
+    let h = &prepared.rest;
+    region.check()?;
+    let mut total = u64::from(prepared.zeros_in(region)?);
+    let Some(closed) = close(h, region)? else {
+        return Ok(total);
     };
-    let mut walker = Walker::new(&h, task);
-    let mut total = 0;
+    let mut walker = Walker::new(h, task);
     if let Some(height) = closed.symmetric {
         let cell = Cell::new(&mut walker, closed.re, (0.0, height), true)?;
         total += if closed.half {
@@ -186,9 +230,11 @@ pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, E
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn count_right_of(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<u64, Error> {
-    Region::right_of(sigma).check()?;
-    let h = prepared(h)?;
-    half_plane(&mut Walker::new(&h, task), sigma)
+    let region = Region::right_of(sigma);
+    region.check()?;
+    let prepared = Prepared::new(h)?;
+    let zeros = u64::from(prepared.zeros_in(&region)?);
+    Ok(zeros + half_plane(&mut Walker::new(&prepared.rest, task), sigma)?)
 }
 
 /// [`count_right_of`] for a finite `sigma` with a walker that is already there; its hints are

@@ -228,9 +228,10 @@ impl<'a, 'w> Search<'a, 'w> {
             counted,
             found: found.map(|disc| (disc.center, disc.multiplicity)).collect(),
             advice: format!(
-                "near {} double precision does not tell the roots apart; another unit of time or \
-                 a less expanded form of the equation may help",
-                Complex64::new(0.5 * (cell.re.0 + cell.re.1), cell.im.1)
+                "near {:e}{:+e}i double precision does not tell the roots apart; another unit of \
+                 time or a less expanded form of the equation may help",
+                0.5 * (cell.re.0 + cell.re.1),
+                cell.im.1
             ),
         }
     }

@@ -17,7 +17,7 @@ use super::winding::{Walker, is_clear, newton_step};
 use crate::Error;
 use crate::quasipoly::{Probe, modulus};
 
-const MAX_STEPS: u32 = 40;
+const MAX_STEPS: u32 = 60;
 
 /// A disc in which the number of roots is proved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,33 +73,22 @@ pub(super) fn newton(
             jet = probe.jet(z);
         }
         let step = newton_step(&jet);
-        if !step.is_finite() {
-            return if modulus(jet.value) <= jet.value_error {
-                Outcome::Stalled(z)
-            } else {
-                Outcome::Lost
-            };
-        }
         let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
         let small = modulus(step) <= 2.0 * f64::EPSILON * modulus(z);
-        z -= step;
-        if !window(z) {
+        let next = z - step;
+        let ahead = next.is_finite() && window(next);
+        if small || lost_in_rounding {
+            // Next to a multiple root the slope is lost as well, and the step may lead anywhere.
+            let end = if ahead { next } else { z };
+            let disc = simple_disc(probe, end).and_then(|disc| real_if_mirrored(probe, disc));
+            return disc.map_or(Outcome::Stalled(z), Outcome::Simple);
+        }
+        if !ahead {
             return Outcome::Lost;
         }
-        if small || lost_in_rounding {
-            return match simple_disc(probe, z) {
-                Some(disc) => {
-                    real_if_mirrored(probe, disc).map_or(Outcome::Stalled(z), Outcome::Simple)
-                }
-                None => Outcome::Stalled(z),
-            };
-        }
+        z = next;
     }
-    match simple_disc(probe, z) {
-        Some(disc) => real_if_mirrored(probe, disc).map_or(Outcome::Lost, Outcome::Simple),
-        None if probe.jet(z).value_error * 1e3 > modulus(probe.jet(z).value) => Outcome::Stalled(z),
-        None => Outcome::Lost,
-    }
+    Outcome::Lost
 }
 
 /// The disc of a simple root next to `z`, if there is one that can be proved.

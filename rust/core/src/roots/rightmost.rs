@@ -11,12 +11,12 @@
 use num_complex::Complex64;
 
 use super::cell::Cell;
-use super::count::{close, half_plane, prepared};
+use super::count::{Prepared, close, half_plane};
 use super::isolate::Search;
 use super::neutral::chain_abscissa;
 use super::newton::Disc;
 use super::region::Region;
-use super::set::{RootSet, locate, with_mirror_image};
+use super::set::{RootSet, add_zeros, locate, with_mirror_image};
 use super::winding::Walker;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::{Error, Task};
@@ -27,11 +27,14 @@ const MAX_WANTED: usize = 10_000;
 /// Lines tried before giving up.
 const MAX_LINES: usize = 400;
 
+/// Lines given up because a cluster reaches across them.
+const MAX_EVASIONS: u32 = 20;
+
 /// A line this close to the chains, in units of one over the longest delay, is as good as on them.
 const CHAIN_MARGIN: f64 = 1e-4;
 
 /// Evaluations after which a line is given up: those that hug the chains cost without end.
-const EVALUATIONS_PER_LINE: u64 = 2_000_000;
+const EVALUATIONS_PER_LINE: u64 = 300_000;
 
 /// The `n` rightmost roots, not counting those with Im < 0, together with their mirror images.
 ///
@@ -63,23 +66,36 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
              rightmost; the term with the highest power of s must not be delayed more than others",
         ));
     }
-    let h = prepared(h)?;
+    let Prepared { rest: h, zeros } = Prepared::new(h)?;
     let chain = chain_abscissa(&h);
+    let listed = |mut discs: Vec<Disc>, sigma: f64| {
+        add_zeros(&mut discs, if sigma < 0.0 { zeros } else { 0 });
+        discs
+    };
     match h.kind() {
         Kind::Polynomial => {
-            let everywhere = Region::right_of(f64::NEG_INFINITY);
-            let discs = half_plane_discs(&h, everywhere.re.0, task)?;
-            return Ok(first(discs, n, everywhere.re.0));
+            let everywhere = f64::NEG_INFINITY;
+            let discs = half_plane_discs(&h, everywhere, task)?;
+            return Ok(first(listed(discs, everywhere), n, everywhere));
         }
         // Right of its chains a difference equation has no roots.
-        Kind::Difference => return Ok(RootSet::new(Vec::new(), Region::right_of(chain))),
+        Kind::Difference => return Ok(first(listed(Vec::new(), chain), n, chain)),
         Kind::Retarded | Kind::Neutral | Kind::Advanced => {}
     }
     let mut lines = Lines::new(&h, chain, task);
     let mut wanted = n as u64;
+    let mut known: Vec<Complex64> = Vec::new();
     loop {
-        let (line, last) = lines.find(wanted)?;
-        let discs = discs_right_of(&h, &line, task)?;
+        let (mut line, last) = lines.find(wanted)?;
+        line.hints.append(&mut known);
+        let discs = match discs_right_of(&h, &line, task) {
+            Ok(discs) => discs,
+            // A cluster reaches across the line.
+            Err(Error::Contour { distance, .. }) if lines.evade(&line, distance) => continue,
+            Err(error) => return Err(error),
+        };
+        known.extend(discs.iter().map(|disc| disc.center));
+        let discs = listed(discs, line.sigma);
         if discs.len() >= n || last {
             return Ok(first(discs, n, line.sigma));
         }
@@ -89,6 +105,9 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
 }
 
 /// The largest real part of a root, or the abscissa of the chains if that is larger.
+///
+/// Roots between the chains and the last line that could be counted (the `region` of
+/// [`rightmost`]) are not told from the chains.
 ///
 /// # Errors
 /// As [`rightmost`]; [`Error::Argument`] where there is no root.
@@ -121,6 +140,7 @@ struct Lines<'a> {
     margin: f64,
     step: f64,
     start: f64,
+    evasions: u32,
     /// The leftmost line with too few roots.
     few: Option<Line>,
     /// The rightmost line with enough of them.
@@ -140,9 +160,20 @@ impl<'a> Lines<'a> {
             margin: CHAIN_MARGIN * step,
             step,
             start,
+            evasions: 0,
             few: None,
             enough: None,
         }
+    }
+
+    /// Forget `line` and take up one further left; `false` when that has been done too often or
+    /// leads onto the chains.
+    fn evade(&mut self, line: &Line, distance: f64) -> bool {
+        self.evasions += 1;
+        self.start = line.sigma - 2.0 * distance * f64::from(self.evasions);
+        self.few = None;
+        self.enough = None;
+        self.start > self.chain && self.evasions < MAX_EVASIONS
     }
 
     /// A line with at least `wanted` roots to its right, and not many more if that is cheap; with

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::cell::Cell;
-use super::count::{Closed, close, prepared};
+use super::count::{Closed, Prepared, close};
 use super::isolate::Search;
 use super::newton::Disc;
 use super::region::Region;
@@ -25,8 +25,8 @@ pub struct RootSet {
     pub multiplicities: Vec<u32>,
     /// Radii of the discs, 1/s.
     pub radii: Vec<f64>,
-    /// Is the disc proved to hold a single point? `false` for a multiple root or a cluster that
-    /// double precision does not tell apart.
+    /// Is the disc proved to hold a single point? `false` for a multiple root (other than an exact
+    /// one at 0) or a cluster that double precision does not tell apart.
     pub resolved: Vec<bool>,
     /// Number of roots in `region`, with multiplicity, by the argument principle; equal to the
     /// sum of the multiplicities.
@@ -47,7 +47,10 @@ impl RootSet {
             roots: discs.iter().map(|d| d.center).collect(),
             multiplicities: discs.iter().map(|d| d.multiplicity).collect(),
             radii: discs.iter().map(|d| d.radius).collect(),
-            resolved: discs.iter().map(|d| d.multiplicity == 1).collect(),
+            resolved: discs
+                .iter()
+                .map(|d| d.multiplicity == 1 || d.radius == 0.0)
+                .collect(),
             counted: discs.iter().map(|d| u64::from(d.multiplicity)).sum(),
             region,
         }
@@ -57,6 +60,26 @@ impl RootSet {
 fn rank(disc: &Disc) -> (f64, f64, f64) {
     let Complex64 { re, im } = disc.center;
     (-re, im.abs(), -im)
+}
+
+/// Exact roots at 0, as a disc of their own or in the one that reaches there.
+pub(super) fn add_zeros(discs: &mut Vec<Disc>, zeros: u32) {
+    if zeros == 0 {
+        return;
+    }
+    if let Some(disc) = discs
+        .iter_mut()
+        .find(|disc| disc.center.norm() <= disc.radius)
+    {
+        disc.multiplicity = disc.multiplicity.saturating_add(zeros);
+        return;
+    }
+    discs.push(Disc {
+        center: Complex64::ZERO,
+        radius: 0.0,
+        isolation: 0.0,
+        multiplicity: zeros,
+    });
 }
 
 /// A disc and, unless it lies on the real axis, its mirror image.
@@ -86,18 +109,22 @@ pub(super) fn with_mirror_image(disc: Disc) -> impl Iterator<Item = Disc> {
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn roots(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSet, Error> {
-    let h = prepared(h)?;
-    let Some(closed) = close(&h, region)? else {
-        return Ok(RootSet::new(Vec::new(), *region));
+    let prepared = Prepared::new(h)?;
+    let h = &prepared.rest;
+    region.check()?;
+    let zeros = prepared.zeros_in(region)?;
+    let mut discs = Vec::new();
+    let Some(closed) = close(h, region)? else {
+        add_zeros(&mut discs, zeros);
+        return Ok(RootSet::new(discs, *region));
     };
-    let mut walker = Walker::new(&h, task);
+    let mut walker = Walker::new(h, task);
     let Closed { re, .. } = closed;
     let lower = closed
         .symmetric
         .map(|height| Cell::new(&mut walker, re, (0.0, height), true));
     let upper = closed.above.map(|im| Cell::new(&mut walker, re, im, false));
     let (lower, upper) = (lower.transpose()?, upper.transpose()?);
-    let mut discs = Vec::new();
     for cell in [lower, upper].into_iter().flatten() {
         for disc in locate(&mut walker, cell)? {
             if cell.symmetric && !closed.half {
@@ -112,6 +139,7 @@ pub fn roots(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSe
             disc.center = disc.center.conj();
         }
     }
+    add_zeros(&mut discs, zeros);
     Ok(RootSet::new(discs, *region))
 }
 

@@ -14,7 +14,7 @@ use num_complex::Complex64;
 
 use super::bounds::{cauchy_radius, dominance, right_edge};
 use super::cell::Cell;
-use super::count::{half_plane, prepared};
+use super::count::{Prepared, half_plane};
 use super::neutral::chain_abscissa;
 use super::winding::Walker;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
@@ -42,8 +42,8 @@ const MAX_SAMPLES: u32 = 1 << 20;
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn is_stable(h: &QuasiPolynomial, strong: bool, task: &Task) -> Result<bool, Error> {
-    let h = prepared(h)?;
-    if h.kind() == Kind::Advanced || strong && chain_abscissa(&h) >= 0.0 {
+    let Prepared { rest: h, zeros } = Prepared::new(h)?;
+    if zeros > 0 || h.kind() == Kind::Advanced || strong && chain_abscissa(&h) >= 0.0 {
         return Ok(false);
     }
     let mut walker = Walker::new(&h, task);
