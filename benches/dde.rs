@@ -1,1 +1,113 @@
-fn main() {}
+//! The linear stepper: one simulation of ten seconds each, and the poles of a sampled loop.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use deadtime::Task;
+use deadtime::dde::sampled::{self, LoopCells};
+use deadtime::dde::{Equations, LinearLoop, Reference, Start};
+
+const DELAY: f64 = 0.36;
+const SAMPLE_TIME: f64 = 0.065;
+
+/// y′ = w, u = kp (r − y) − kv y′.
+fn drone(kp: f64, kv: f64) -> Equations {
+    Equations {
+        a: vec![0.0],
+        b: vec![1.0],
+        e: vec![0.0],
+        k: vec![-kp],
+        l: -kv,
+        m: kp,
+        c: vec![1.0],
+        ..Equations::default()
+    }
+}
+
+/// The derivative filtered at 38 rad/s, damping 1.
+fn filtered(kp: f64, kv: f64) -> Equations {
+    let omega = 38.0;
+    Equations {
+        a: vec![0.0, 0.0, 0.0, 0.0, 0.0, omega, omega, -omega, -2.0 * omega],
+        b: vec![1.0, 0.0, 0.0],
+        e: vec![0.0; 3],
+        k: vec![-kp, 0.0, -kv * omega],
+        l: 0.0,
+        m: kp,
+        c: vec![1.0, 0.0, 0.0],
+        ..Equations::default()
+    }
+}
+
+fn simulations(criterion: &mut Criterion) {
+    let cases = [
+        ("p step", drone(1.31, 0.0), None, None),
+        ("p step, limited", drone(1.31, 0.0), None, Some(1.0)),
+        ("pv neutral", drone(2.0, 0.3), None, None),
+        ("pv filtered, limited", filtered(2.0, 0.3), None, Some(1.0)),
+        (
+            "sampled p, limited",
+            drone(1.31, 0.0),
+            Some(SAMPLE_TIME),
+            Some(1.0),
+        ),
+        (
+            "sampled pv filtered, limited",
+            filtered(2.0, 0.3),
+            Some(SAMPLE_TIME),
+            Some(1.0),
+        ),
+    ];
+    let mut group = criterion.benchmark_group("simulate 10 s, 100 outputs");
+    let times: Vec<f64> = (1..=100).map(|i| 0.1 * f64::from(i)).collect();
+    for (name, equations, sample_time, limit) in cases {
+        let start = Start {
+            state: vec![0.0; equations.states()],
+            ..Start::default()
+        };
+        let plant = LinearLoop::new(equations, DELAY, sample_time, limit);
+        let (Ok(plant), Ok(reference)) = (plant, Reference::step(0.0, 1.0)) else {
+            continue;
+        };
+        group.bench_function(name, |bencher| {
+            let task = Task::new();
+            bencher.iter(|| {
+                plant.simulate(black_box(&start), black_box(&reference), &times, &[], &task)
+            });
+        });
+    }
+    group.finish();
+}
+
+fn poles(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("sampled poles");
+    for (name, equations) in [("p", drone(2.0, 0.0)), ("pv filtered", filtered(2.0, 0.3))] {
+        if let Ok(plant) = LinearLoop::new(equations, DELAY, Some(SAMPLE_TIME), None) {
+            group.bench_function(name, |bencher| {
+                bencher.iter(|| sampled::poles(black_box(&plant)));
+            });
+        }
+    }
+    let k: Vec<f64> = (1..=10_000).map(|i| -6e-4 * f64::from(i)).collect();
+    let cells = LoopCells {
+        cells: k.len(),
+        states: 1,
+        a: &[0.0],
+        b: &[1.0],
+        k: &k,
+        l: &[0.0],
+        scale: &[1.0],
+        delay: &[DELAY],
+        sample_time: &[SAMPLE_TIME],
+    };
+    group.throughput(Throughput::Elements(k.len() as u64));
+    group.sample_size(10);
+    group.bench_function("grid over kp", |bencher| {
+        let task = Task::new();
+        bencher.iter(|| sampled::abscissa_grid(black_box(&cells), &task));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, simulations, poles);
+criterion_main!(benches);

@@ -29,7 +29,7 @@ Polynomial = list[Any]
 
 
 class ControllerEquations(NamedTuple):
-    """x' = A x + B y + E r, u = C x + p y + q y' + M r, with the derivative of r left out."""
+    """x' = A x + B y + E r, u = C x + p y + q y' + M r, and an impulse where r jumps."""
 
     A: Vector
     B: Vector
@@ -38,6 +38,7 @@ class ControllerEquations(NamedTuple):
     p: float
     q: float
     M: float
+    impulse: float
 
 
 @dataclass(frozen=True)
@@ -105,11 +106,6 @@ class Controller(ABC):
             )
         return type(self)(**fields)
 
-    @property
-    def _differentiates_reference(self) -> bool:
-        """Whether a jump of the reference makes an impulse of the command."""
-        return False
-
     @abstractmethod
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         """Gains on the proportional, integral and derivative terms."""
@@ -174,7 +170,9 @@ class Controller(ABC):
         drive, along, row = (
             np.concatenate([np.zeros(0), *(block[part] for block in blocks)]) for part in (1, 2, 3)
         )
-        return ControllerEquations(matrix, drive, along, row, p, q, terms.proportional)
+        return ControllerEquations(
+            matrix, drive, along, row, p, q, terms.proportional, -on_error * q
+        )
 
     def _rest(
         self, values: Mapping[str, float], output: float, reference: float, command: float
@@ -273,10 +271,6 @@ class PD(Controller):
     def _gains(cls) -> tuple[str, ...]:
         return ("Kp", "Kd")
 
-    @property
-    def _differentiates_reference(self) -> bool:
-        return self.filter is None and self.Kd != 0.0
-
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         return _Terms(
             values["Kp"], derivative=values["Kd"], differentiates=True, derivative_of_error=True
@@ -325,10 +319,6 @@ class PID(Controller):
     @classmethod
     def _gains(cls) -> tuple[str, ...]:
         return ("Kp", "Ki", "Kd")
-
-    @property
-    def _differentiates_reference(self) -> bool:
-        return self.filter is None and self.Kd != 0.0
 
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         return _Terms(

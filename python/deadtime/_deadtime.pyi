@@ -76,6 +76,7 @@ class LinearLoop:
         delay: float,
         sample_time: float | None = None,
         limit: float | None = None,
+        impulse: float = 0.0,
     ) -> LinearLoop: ...
     def simulate(
         self,

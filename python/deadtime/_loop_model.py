@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ class LoopModel:
     M: float
     C: Vector
     D: float
+    impulse: float
 
     @classmethod
     def build(cls, plant: Plant, controller: Controller, values: Mapping[str, float]) -> LoopModel:
@@ -58,6 +60,7 @@ class LoopModel:
             M=float(c.M),
             C=np.concatenate([p.C, np.zeros(m)]),
             D=p.D,
+            impulse=float(c.impulse),
         )
 
     def native(
@@ -76,10 +79,12 @@ class LoopModel:
             delay,
             sample_time,
             limit,
+            self.impulse,
         )
 
-    def equilibrium(self, reference: float) -> tuple[float, float] | None:
-        """Output and command at rest under `reference`, or None where there is no such rest."""
+    @cached_property
+    def rest_gains(self) -> tuple[float, float] | None:
+        """Output and command at rest under a unit reference, None where there is no such rest."""
         n = len(self.B)
         matrix = np.zeros((n + 1, n + 1))
         matrix[:n, :n] = self.A
@@ -90,7 +95,7 @@ class LoopModel:
         if not scale.all():
             return None
         matrix /= scale[:, None]
-        right = -reference * np.append(self.E, self.M) / scale
+        right = -np.append(self.E, self.M) / scale
         if np.linalg.cond(matrix) > 1e13:
             return None
         x = np.linalg.solve(matrix, right)

@@ -64,9 +64,6 @@ def simulate_loop(
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
     jumps = _jumps(times, reference, reference_time, before)
-    if loop.controller._differentiates_reference and not loop.is_sampled and loop.limit is None:
-        _refuse_impulses(jumps, start)
-
     past = jumps.at(np.array([np.nextafter(start, -np.inf)]))[0]
     state, command = state_at_rest(
         loop.plant, loop.controller, loop.parameters, initial, float(past)
@@ -117,10 +114,13 @@ def settled_step(loop: ControlLoop, amplitude: float) -> Response:
 
 
 def _steady_state(loop: ControlLoop, reference: float) -> float | None:
-    rest = loop._model.equilibrium(reference)
-    if rest is None or (loop.limit is not None and abs(rest[1]) > loop.limit):
+    gains = loop._model.rest_gains
+    if gains is None:
         return None
-    return rest[0]
+    output, command = gains
+    if loop.limit is not None and abs(command * reference) > loop.limit:
+        return None
+    return output * reference
 
 
 def _jumps(
@@ -141,18 +141,6 @@ def _jumps(
             "each element of reference_time (or of time, without reference_time), at least one"
         )
     return _Jumps(where, values, before)
-
-
-def _refuse_impulses(jumps: _Jumps, start: float) -> None:
-    levels = np.concatenate([[jumps.before], jumps.values])
-    moments = jumps.times[np.diff(levels) != 0.0]
-    moments = moments[moments >= start]
-    if moments.size:
-        raise ValueError(
-            f"the reference jumps at t = {moments[0]} s, and the ideal derivative of a jump is an "
-            "impulse: give the controller a DerivativeFilter or the loop a limit, or use PV, which "
-            "differentiates the output alone"
-        )
 
 
 def _increasing(name: str, given: ArrayLike) -> Vector:

@@ -10,18 +10,25 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig
 from scipy.optimize import brentq
 
 from deadtime._controllers import Controller
+from deadtime._deadtime import sampled_abscissa_grid
 from deadtime._loop_model import LoopModel
 from deadtime._plants import Plant
 
 if TYPE_CHECKING:
     from deadtime import RootSet
 
-__all__ = ["characteristic", "sampled_abscissa", "sampled_roots", "stable_range"]
+__all__ = [
+    "characteristic",
+    "sampled_abscissa",
+    "sampled_grid",
+    "sampled_roots",
+    "stable_range",
+]
 
 # Numbers of a loop that cannot be negative, those of them that may be zero, and those that keep
 # their sign because the loop has no meaning at zero.
@@ -129,3 +136,77 @@ def _refine(abscissa: Callable[[float], float], inside: float, outside: float) -
     size = max(abs(inside), abs(outside))
     zero = float(brentq(abscissa, inside, outside, xtol=1e-13 * size, rtol=1e-14, maxiter=200))
     return 0.0 if abs(zero) < 1e-12 * size else zero
+
+
+def sampled_grid(
+    plant: Plant,
+    controller: Controller,
+    values: Mapping[str, ArrayLike],
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+    """Abscissa, number of unstable poles and status of many sampled loops of one structure.
+
+    `values` names every number of the loop; each is one for all cells or an array with one entry
+    a cell. The feedback is linear in the controller's gains and the plant's input in its gain, so
+    these, the delay and the sample time vary inside one native call; every distinct combination
+    of the other numbers makes a call of its own.
+    """
+    arrays = {name: np.atleast_1d(np.asarray(v, dtype=np.float64)) for name, v in values.items()}
+    cells = max(len(array) for array in arrays.values())
+    inside = (*controller._gains(), "gain", "delay", "sample_time")
+    outside = [name for name, array in arrays.items() if name not in inside and len(array) > 1]
+    groups: list[Any] = [slice(None)]
+    if outside:
+        columns = np.column_stack([np.broadcast_to(arrays[name], cells) for name in outside])
+        _, place = np.unique(columns, axis=0, return_inverse=True)
+        order = np.argsort(place.ravel(), kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(place.ravel()[order])) + 1)
+
+    abscissa = np.empty(cells)
+    unstable = np.empty(cells, dtype=np.int32)
+    status = np.empty(cells, dtype=np.uint8)
+    done = 0
+    for group in groups:
+        part = {name: a if len(a) == 1 else a[group] for name, a in arrays.items()}
+        size = cells if isinstance(group, slice) else len(group)
+        report = None if progress is None else lambda n, done=done: progress(done + n)
+        abscissa[group], unstable[group], status[group] = _grid_of_gains(
+            plant, controller, part, size, threads, report
+        )
+        done += size
+    return abscissa, unstable, status
+
+
+def _grid_of_gains(
+    plant: Plant,
+    controller: Controller,
+    arrays: Mapping[str, NDArray[np.float64]],
+    cells: int,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+    """Like `sampled_grid`, where only gains, delay and sample time vary."""
+    fixed = {name: float(array[0]) for name, array in arrays.items()} | {"gain": 1.0}
+    gains = controller._gains()
+    feedback: Any = 0.0
+    direct: Any = 0.0
+    for name in gains:
+        alone = fixed | dict.fromkeys(gains, 0.0) | {name: 1.0}
+        model = LoopModel.build(plant, controller, alone)
+        feedback = feedback + arrays[name][:, None] * model.K
+        direct = direct + arrays[name] * model.L
+    scale = arrays["gain"] if "gain" in arrays else np.ones(1)
+    return sampled_abscissa_grid(
+        cells,
+        len(model.B),
+        np.ascontiguousarray(model.A),
+        model.B,
+        feedback,
+        direct * scale,
+        scale,
+        arrays["delay"],
+        arrays["sample_time"],
+        threads,
+        progress,
+    )

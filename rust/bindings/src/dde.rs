@@ -25,7 +25,7 @@ pub(crate) struct PyLinearLoop {
 #[pymethods]
 impl PyLinearLoop {
     #[new]
-    #[pyo3(signature = (a, b, e, k, l, m, c, d, delay, sample_time=None, limit=None))]
+    #[pyo3(signature = (a, b, e, k, l, m, c, d, delay, sample_time=None, limit=None, impulse=0.0))]
     #[expect(
         clippy::too_many_arguments,
         reason = "one argument a symbol of the equations"
@@ -43,6 +43,7 @@ impl PyLinearLoop {
         delay: f64,
         sample_time: Option<f64>,
         limit: Option<f64>,
+        impulse: f64,
     ) -> PyResult<Self> {
         let equations = Equations {
             a: in_order(&a).into_owned(),
@@ -53,6 +54,7 @@ impl PyLinearLoop {
             m,
             c: in_order(&c).into_owned(),
             d,
+            impulse,
         };
         LinearLoop::new(equations, delay, sample_time, limit)
             .map(|inner| Self { inner })
@@ -68,7 +70,6 @@ impl PyLinearLoop {
         clippy::too_many_arguments,
         reason = "the start of a run and its reference"
     )]
-    #[expect(clippy::type_complexity, reason = "four arrays")]
     fn simulate<'py>(
         &self,
         py: Python<'py>,

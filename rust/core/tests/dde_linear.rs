@@ -16,7 +16,7 @@ fn drone(kp: f64, kv: f64) -> Equations {
         l: -kv,
         m: kp,
         c: vec![1.0],
-        d: 0.0,
+        ..Equations::default()
     }
 }
 
@@ -30,7 +30,7 @@ fn lagged(kp: f64, lag: f64) -> Equations {
         l: 0.0,
         m: kp,
         c: vec![1.0, 0.0],
-        d: 0.0,
+        ..Equations::default()
     }
 }
 

@@ -7,6 +7,8 @@
 //! of y, or direct feedthrough) the neutral one, whose jumps travel on for ever. With a sample
 //! time Ts the command is u_k = sat(K x(t_k) + L w(t_k−) + M r(t_k)) and w = u_k on
 //! [t_k + Td, t_{k+1} + Td); controller states see the reference held in the same way.
+//! An ideal derivative of r is zero but for an impulse at each jump of r, which arrives at the
+//! plant like the rest of the command and, where L ≠ 0, comes back with weight L.
 //! Time counts from the start of the run; every signal is scalar, x has any length.
 
 use crate::{Error, Task};
@@ -35,6 +37,9 @@ pub struct Equations {
     pub c: Vec<f64>,
     /// Feedthrough D.
     pub d: f64,
+    /// Weight of the impulse in u per unit jump of the reference: the gain of an ideal derivative
+    /// of r. A limited or sampled command does not see it.
+    pub impulse: f64,
 }
 
 impl Equations {
@@ -212,26 +217,28 @@ impl LinearLoop {
         finite("E", &equations.e)?;
         finite("K", &equations.k)?;
         finite("C", &equations.c)?;
-        finite("L, M, D", &[equations.l, equations.m, equations.d])?;
+        finite(
+            "L, M, D, impulse",
+            &[equations.l, equations.m, equations.d, equations.impulse],
+        )?;
         if !(delay.is_finite() && delay >= 0.0) {
             return Err(Error::argument(format!(
                 "delay={delay}: give a finite number of seconds, zero or more"
             )));
         }
-        if let Some(ts) = sample_time {
-            if !(ts.is_finite() && ts > 0.0) {
-                return Err(Error::argument(format!(
-                    "sample_time={ts}: give a positive number of seconds, or none for continuous \
-                     time"
-                )));
-            }
+        if let Some(ts) = sample_time
+            && !(ts.is_finite() && ts > 0.0)
+        {
+            return Err(Error::argument(format!(
+                "sample_time={ts}: give a positive number of seconds, or none for continuous time"
+            )));
         }
-        if let Some(limit) = limit {
-            if limit.is_nan() || limit <= 0.0 {
-                return Err(Error::argument(format!(
-                    "limit={limit}: give a positive bound of the command, or none for no limit"
-                )));
-            }
+        if let Some(limit) = limit
+            && (limit.is_nan() || limit <= 0.0)
+        {
+            return Err(Error::argument(format!(
+                "limit={limit}: give a positive bound of the command, or none for no limit"
+            )));
         }
         Ok(Self {
             equations,
@@ -273,12 +280,12 @@ impl LinearLoop {
         self.check_start(start)?;
         for times in [output_times, input_times] {
             finite("time", times)?;
-            if let Some(&first) = times.first() {
-                if first < 0.0 {
-                    return Err(Error::argument(format!(
-                        "time {first} lies before the start of the run: leave it out"
-                    )));
-                }
+            if let Some(&first) = times.first()
+                && first < 0.0
+            {
+                return Err(Error::argument(format!(
+                    "time {first} lies before the start of the run: leave it out"
+                )));
             }
             if let Some(pair) = times.windows(2).find(|pair| pair[1] < pair[0]) {
                 return Err(Error::argument(format!(

@@ -36,6 +36,7 @@ pub(super) fn run(
     let mut free = Expansion::new(&closed.a, n);
     let mut driven = Expansion::new(&equations.a, n);
     let mut cursor = reference.cursor();
+    cursor.advance(0.0, -f64::MIN_POSITIVE);
     let mut modes: Vec<Stretch> = Vec::new();
     let mut x = start.state.clone();
     let mut forcing = vec![0.0; n];
@@ -48,9 +49,17 @@ pub(super) fn run(
         elements += 1;
         let tolerance = slack(t, 0.0);
         let jumps = elements == 1 || cursor.next_jump() <= t + tolerance;
+        let before = cursor.value();
         let r = cursor.advance(t, tolerance);
         if jumps {
             wanted.input_break(t);
+            let struck = closed.impulse * (r - before);
+            if struck != 0.0 {
+                wanted.output_break(t);
+                for (x, b) in x.iter_mut().zip(&equations.b) {
+                    *x += b * struck;
+                }
+            }
             let v = dot(&closed.k, &x) + closed.m * r;
             mode = match limit {
                 Some(limit) if v > limit => Mode::High,
@@ -89,12 +98,13 @@ pub(super) fn run(
         let mut end = 1.0;
         if let Some(limit) = limit {
             stretches(&v, limit, &mut modes);
-            if let Some(other) = modes.iter().find(|stretch| stretch.mode != mode) {
-                if other.start > 0.0 || changes < MOST_CHANGES {
-                    end = other.start;
-                    next = t + end * h;
-                    mode = other.mode;
-                }
+            let leaves = |stretch: &&Stretch| {
+                stretch.mode != mode && (stretch.start > 0.0 || changes < MOST_CHANGES)
+            };
+            if let Some(other) = modes.iter().find(leaves).copied() {
+                end = other.start;
+                next = t + end * h;
+                mode = other.mode;
             }
         }
         if next <= t {
@@ -130,6 +140,8 @@ struct Closed {
     m: f64,
     c: Vec<f64>,
     d: f64,
+    /// Weight of the impulse in w per unit jump of r.
+    impulse: f64,
 }
 
 impl Closed {
@@ -170,6 +182,11 @@ impl Closed {
                 .collect(),
             c: along(&equations.c, equations.d),
             d: equations.d * m,
+            impulse: if plant.limit().is_none() {
+                equations.impulse / denominator
+            } else {
+                0.0
+            },
             k,
             m,
         })

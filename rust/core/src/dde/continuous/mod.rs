@@ -13,6 +13,7 @@
 
 mod crossing;
 mod direct;
+mod impulses;
 mod pieces;
 mod run;
 mod series;

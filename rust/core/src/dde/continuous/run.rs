@@ -6,6 +6,7 @@ use crate::dde::linear::{
 use crate::{Error, Task};
 
 use super::crossing::{Mode, Stretch, stretches};
+use super::impulses::Impulses;
 use super::pieces::{Order, Piece, Pieces, REPORTED, SMOOTH};
 use super::series::{DEGREE, Expansion, Series};
 use super::watch;
@@ -24,7 +25,9 @@ pub(super) fn run(
     let (delay, limit) = (plant.delay(), plant.limit());
     let orders = Orders::new(plant);
     let mut pieces = Pieces::new(start.command, delay);
+    let mut impulses = Impulses::default();
     let mut cursor = reference.cursor();
+    cursor.advance(0.0, -slack(0.0, delay));
     let mut x = start.state.clone();
     let mut forcing = vec![0.0; x.len()];
     let mut expansion = Expansion::new(&equations.a, x.len());
@@ -37,12 +40,24 @@ pub(super) fn run(
         let tolerance = slack(t, delay);
         let arriving = pieces.reach(t);
         let jumps = elements == 0 || cursor.next_jump() <= t + tolerance;
+        let before = cursor.value();
         let r = cursor.advance(t, tolerance);
+        let struck = impulses.arrived(t + tolerance);
+        for (x, b) in x.iter_mut().zip(&equations.b) {
+            *x += b * struck;
+        }
+        let made = if limit.is_none() {
+            equations.impulse * (r - before)
+        } else {
+            0.0
+        };
+        impulses.push(t + delay, made + equations.l * struck);
+        let state_jumps = struck != 0.0;
         for (forcing, e) in forcing.iter_mut().zip(&equations.e) {
             *forcing = e * r;
         }
         let piece = pieces.front();
-        let stop = piece.end.min(cursor.next_jump());
+        let stop = piece.end.min(cursor.next_jump()).min(impulses.next());
         let mut h = stop - t;
         let mut next = stop;
         if h > expansion.trial {
@@ -60,7 +75,7 @@ pub(super) fn run(
         let u = expansion.command(equations, &w, r);
         let y = expansion.output(equations, &w);
 
-        if orders.of_output(arriving, jumps) <= REPORTED {
+        if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
             wanted.output_break(t);
         }
         wanted.outputs_before(next - tolerance, |time| y.at((time - t) / h));
@@ -77,7 +92,11 @@ pub(super) fn run(
                 end: 1.0,
             }),
         }
-        let mut order = orders.of_command(arriving, jumps);
+        let mut order = if state_jumps {
+            0
+        } else {
+            orders.of_command(arriving, jumps)
+        };
         for stretch in &modes {
             if stretch.mode != mode {
                 order = order.min(1);

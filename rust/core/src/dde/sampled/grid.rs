@@ -162,9 +162,8 @@ impl AllRows<'_> {
                 e: vec![0.0; b.len()],
                 k: self.k.at(cell).to_vec(),
                 l: self.l.number(cell),
-                m: 0.0,
                 c: vec![0.0; b.len()],
-                d: 0.0,
+                ..Equations::default()
             },
             delay,
             Some(sample_time),
