@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._deadtime import sampled_abscissa_grid
 from deadtime._loop import ControlLoop
-from deadtime._loop_model import LoopModel
+from deadtime._loop_stability import sampled_grid
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial
 from deadtime._validation import finite
 
@@ -336,86 +335,18 @@ def _map_sampled(
     progress: _Progress | None,
 ) -> _Found:
     """Eigenvalues of the transition matrix in every cell."""
-    first, second = (axes[name] for name in names)
-    shape = (len(first), len(second))
-    grids = dict(zip(names, np.meshgrid(first, second, indexing="ij"), strict=True))
+    first, second = np.meshgrid(*(axes[name] for name in names), indexing="ij")
+    grids = dict(zip(names, (first, second), strict=True))
     for name in ("delay", "sample_time"):
         low = float(np.min(grids.get(name, values.get(name, 0.0))))
         if low < 0.0 or (name == "sample_time" and low == 0.0):
             raise ValueError(f"{name}={low}: delays are zero or more, sample times above zero")
-    A, B, K, L = _models(loop, values, names, axes)
-    time = {
-        name: np.ravel(grids[name]) if name in names else np.array([values[name]])
-        for name in ("delay", "sample_time")
-    }
-    abscissa, unstable, status = sampled_abscissa_grid(
-        shape[0] * shape[1],
-        B.shape[-1],
-        np.ravel(A),
-        np.ravel(B),
-        np.ravel(K),
-        np.ravel(L),
-        np.ones(1),
-        time["delay"],
-        time["sample_time"],
-        threads,
-        progress,
-    )
+    cells = values | {name: np.ravel(grid) for name, grid in grids.items()}
+    abscissa, unstable, status = sampled_grid(loop.plant, loop.controller, cells, threads, progress)
     unsure = (status == MapStatus.BOUNDARY) | (status == MapStatus.UNDECIDED)
     unstable = np.where(unsure, np.int32(-2), unstable)
+    shape = first.shape
     return unstable.reshape(shape), abscissa.reshape(shape), status.reshape(shape)
-
-
-def _models(
-    loop: ControlLoop, values: dict[str, Any], names: tuple[str, str], axes: dict[str, _Floats]
-) -> tuple[_Floats, _Floats, _Floats, _Floats]:
-    """Return A, B, K and L of every cell, or of one cell where they are the same in all.
-
-    A model is affine in each of the loop's gains, so along an axis with a gain two models say all;
-    along any other axis one is built at each point.
-    """
-    gains = {"gain", *type(loop.controller)._gains()}
-    timing = {"delay", "sample_time"}
-    points: list[_Floats] = []
-    for name in names:
-        if name in timing:
-            points.append(np.zeros(1))
-        elif name in gains:
-            points.append(np.array([0.0, 1.0]))
-        else:
-            points.append(axes[name])
-    if all(name in timing for name in names):
-        points = [np.zeros(1), np.zeros(1)]
-    sizes = tuple(len(p) for p in points)
-    built = []
-    for x in points[0]:
-        for y in points[1]:
-            numbers_of = dict(zip(names, (float(x), float(y)), strict=True))
-            cell = {**values, **{n: v for n, v in numbers_of.items() if n not in timing}}
-            built.append(LoopModel.build(loop.plant, loop.controller, cell))
-    parts = []
-    for letter in ("A", "B", "K", "L"):
-        part = np.array([getattr(model, letter) for model in built], dtype=np.float64)
-        part = part.reshape(*sizes, *part.shape[1:])
-        constant = bool(np.all(part == part[:1, :1]))
-        if constant:
-            parts.append(part[0, 0])
-            continue
-        for i, name in enumerate(names):
-            if name in gains:
-                part = _along(part, axes[name], i)
-            elif name in timing:
-                part = np.repeat(part, len(axes[name]), axis=i)
-        parts.append(np.ascontiguousarray(part))
-    A, B, K, L = parts
-    return A, B, K, L
-
-
-def _along(part: _Floats, points: _Floats, axis: int) -> _Floats:
-    """Extend an affine function along an axis from its values at 0 and 1."""
-    start, end = np.take(part, [0], axis), np.take(part, [1], axis)
-    scale = points.reshape([-1 if i == axis else 1 for i in range(part.ndim)])
-    return np.asarray(start + scale * (end - start))
 
 
 def _axes(
