@@ -85,13 +85,18 @@ class Controller(ABC):
         """Names of the gains."""
 
     @property
+    def gains(self) -> dict[str, float]:
+        """The gains by name."""
+        return {name: float(getattr(self, name)) for name in self._gains()}
+
+    @property
     def _filter(self) -> DerivativeFilter | None:
         return getattr(self, "filter", None)
 
     @property
     def parameters(self) -> dict[str, float]:
         """The gains, and ``omega`` and ``damping`` of the filter where there is one."""
-        numbers = {name: float(getattr(self, name)) for name in self._gains()}
+        numbers = self.gains
         if self._filter is not None:
             numbers |= {"omega": self._filter.omega, "damping": self._filter.damping}
         return numbers

@@ -6,6 +6,17 @@ from typing import TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Family",
+    "LinearLoop",
+    "QuasiPolynomial",
+    "dde_roots",
+    "lambertw",
+    "sampled_abscissa_grid",
+    "spin",
+    "thread_count",
+]
+
 _Listed: TypeAlias = tuple[
     NDArray[np.complex128],
     NDArray[np.int64],
@@ -43,6 +54,33 @@ def thread_count(threads: int | None = None) -> int: ...
 def spin(
     seconds: float, threads: int | None = None, progress: Callable[[int], object] | None = None
 ) -> int: ...
+def lambertw(
+    z: NDArray[np.complex128], k: NDArray[np.int64], threads: int | None = None
+) -> NDArray[np.complex128]: ...
+def dde_roots(
+    a0: NDArray[np.float64],
+    a1: NDArray[np.float64],
+    delay: NDArray[np.float64],
+    k: NDArray[np.int64],
+    threads: int | None = None,
+) -> NDArray[np.complex128]: ...
+
+@final
+class Family:
+    def __new__(
+        cls, names: list[str], terms: list[tuple[float, list[int], int, float, list[float]]]
+    ) -> Family: ...
+    def at(self, values: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def map(
+        self,
+        values: list[float],
+        parameters: tuple[int, int],
+        first: NDArray[np.float64],
+        second: NDArray[np.float64],
+        abscissa: bool,
+        threads: int | None = None,
+        progress: Callable[[int], object] | None = None,
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]: ...
 
 @final
 class LinearLoop:

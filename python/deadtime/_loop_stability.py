@@ -7,7 +7,7 @@ a g + b f e^(-s Td); a sampled one the eigenvalues z of its transition matrix, p
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,8 @@ from deadtime._controllers import Controller
 from deadtime._deadtime import sampled_abscissa_grid
 from deadtime._loop_model import LoopModel
 from deadtime._plants import Plant
-
-if TYPE_CHECKING:
-    from deadtime import RootSet
+from deadtime._quasipolynomial import delay, s
+from deadtime._rootset import RootSet
 
 __all__ = [
     "characteristic",
@@ -46,8 +45,6 @@ _NEARLY_ZERO = 1e-6
 
 def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
     """Build a g + b f e^(-s delay) from numbers or symbols in `values`."""
-    from deadtime import delay
-
     b, a = plant._polynomials(values)
     f, g = controller._feedback(values)
     return _in_s(a) * _in_s(g) + _in_s(b) * _in_s(f) * delay(values["delay"])
@@ -55,8 +52,6 @@ def characteristic(plant: Plant, controller: Controller, values: Mapping[str, An
 
 def _in_s(coefficients: Sequence[Any]) -> Any:
     """Polynomial in s from descending coefficients, numbers or symbols."""
-    from deadtime import s
-
     total: Any = 0.0 * s
     for power, c in enumerate(reversed(coefficients)):
         if not (isinstance(c, float) and c == 0.0):
@@ -71,8 +66,6 @@ def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> floa
 
 def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> RootSet:
     """Return the `n` rightmost poles and their mirror images, with first-order error bounds."""
-    from deadtime import RootSet
-
     z, left, right = cast(Any, eig)(matrix, left=True, right=True)
     # |dz| <= ||error|| / |y* x| with the backward error of the QR algorithm.
     overlap = np.abs(np.sum(left.conj() * right, axis=0))

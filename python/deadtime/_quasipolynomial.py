@@ -1,4 +1,7 @@
-"""Quasi-polynomials: characteristic functions of linear systems with delays."""
+"""Quasi-polynomials: characteristic functions of linear systems with delays.
+
+One class, kept whole: most of the file is its documentation.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,16 @@ import math
 import operator
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any, Final, Literal, TypeAlias, cast, overload
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._rootset import RootSet
+
+if TYPE_CHECKING:
+    from deadtime._parametric import ParametricQuasiPolynomial
 
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
@@ -346,8 +352,9 @@ class QuasiPolynomial:
     def spectral_abscissa(self) -> float:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.
 
-        For a neutral equation, roots that exceed the chains by less than 1e-4 of one over the
-        longest delay are not told from them.
+        For a neutral equation, roots closer to the chains than the search comes to them are not
+        told from them: ``rightmost().region`` shows how close, usually within 1e-4 of one over
+        the longest delay.
 
         Returns
         -------
@@ -425,17 +432,25 @@ _NO_QUOTIENT: Final = (
 )
 
 
-def delay(T: float) -> QuasiPolynomial:
+@overload
+def delay(T: float) -> QuasiPolynomial: ...
+@overload
+def delay(T: ParametricQuasiPolynomial) -> ParametricQuasiPolynomial: ...
+def delay(
+    T: float | ParametricQuasiPolynomial,
+) -> QuasiPolynomial | ParametricQuasiPolynomial:
     """Transfer function of a pure delay, exp(-s T).
 
     Parameters
     ----------
-    T : float
-        Delay in s, finite and not negative.
+    T : float or ParametricQuasiPolynomial
+        Delay in s, finite and not negative; or a parameter, or a sum of multiples of parameters
+        and a number.
 
     Returns
     -------
-    QuasiPolynomial
+    QuasiPolynomial or ParametricQuasiPolynomial
+        The latter for a delay with parameters in it.
 
     Raises
     ------
@@ -450,6 +465,8 @@ def delay(T: float) -> QuasiPolynomial:
     >>> dtm.s + 2.0 * dtm.delay(0.36)
     s + 2 exp(-0.36 s)
     """
+    if hasattr(T, "_exponential"):
+        return T._exponential()
     if not _is_number(T):
         raise TypeError(f"T={T!r}: a delay is a real number of seconds")
     return QuasiPolynomial([[1.0]], [float(T)])

@@ -19,4 +19,8 @@ mod _deadtime {
     use super::quasipoly::QuasiPolynomial;
     #[pymodule_export]
     use super::runtime::{spin, thread_count};
+    #[pymodule_export]
+    use super::special::{dde_roots, lambertw};
+    #[pymodule_export]
+    use super::stability::PyFamily;
 }

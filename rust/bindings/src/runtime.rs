@@ -50,12 +50,12 @@ where
     let pool = pool(threads)?;
     let task = Task::new();
     let outcome = py.detach(|| {
-        std::thread::scope(|scope| {
+        pool.pool.in_place_scope(|scope| {
             let (tell, hear) = channel();
-            let (task, pool) = (&task, &pool.pool);
-            scope.spawn(move || {
-                let result = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(task))));
-                // The receiver outlives this thread: it waits below until it has the result.
+            let task = &task;
+            scope.spawn(move |_| {
+                let result = catch_unwind(AssertUnwindSafe(|| work(task)));
+                // The receiver outlives this job: the caller waits below until it has the result.
                 let _ = tell.send(result);
             });
             let mut refused = None;
@@ -120,10 +120,11 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
     let threads = wanted(threads)?;
     let process = std::process::id();
     let current = POOL.load_full();
-    if let Some(pool) = &current {
-        if pool.process == process && pool.threads == threads {
-            return Ok(Arc::clone(pool));
-        }
+    if let Some(pool) = &current
+        && pool.process == process
+        && pool.threads == threads
+    {
+        return Ok(Arc::clone(pool));
     }
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads)

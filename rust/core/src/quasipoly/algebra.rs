@@ -11,6 +11,9 @@ use crate::Error;
 /// A product with more coefficients than this is a slip of the pen.
 const MAX_COEFFICIENTS: usize = 1_000_000;
 
+/// A derivative of higher order, of anything but a polynomial, is a slip of the pen as well.
+const MAX_ORDER: u32 = 10_000;
+
 /// Delays of a product closer than this (relative) are the same sum in another order.
 const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
 
@@ -164,10 +167,18 @@ impl QuasiPolynomial {
     /// The `order`-th derivative by s: row p becomes p′ − τp, `order` times.
     ///
     /// # Errors
-    /// [`Error::Argument`] when a coefficient overflows.
+    /// [`Error::Argument`] when a coefficient overflows, [`Error::TooMuch`] for an absurd order.
     pub fn derivative(&self, order: u32) -> Result<Self, Error> {
         let mut rows = self.rows();
-        for _ in 0..order {
+        for taken in 0..order {
+            if taken >= MAX_ORDER {
+                return Err(Error::TooMuch {
+                    what: "the derivative",
+                    limit: MAX_ORDER.into(),
+                    unit: "orders",
+                    advice: "take a lower one".into(),
+                });
+            }
             for (row, delay) in &mut rows {
                 let mut power = 0.0;
                 for k in 0..row.len() {

@@ -67,6 +67,11 @@ fn bad_arguments_are_refused() {
     let huge = make(&[&[1e200]], &[1e308]);
     assert!(huge.mul(&huge).is_err());
     assert!(make(&[&[1.0, 1.0]], &[0.0]).pow(4_000_000).is_err());
+    assert!(make(&[&[1.0]], &[1.0]).derivative(u32::MAX).is_err());
+    assert_eq!(
+        make(&[&[1.0, 1.0]], &[0.0]).derivative(u32::MAX),
+        Ok(QuasiPolynomial::zero())
+    );
 }
 
 #[test]

@@ -106,6 +106,9 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
 
 /// The largest real part of a root, or the abscissa of the chains if that is larger.
 ///
+/// Roots between the chains and the last line that could be counted (the `region` of
+/// [`rightmost`]) are not told from the chains.
+///
 /// # Errors
 /// As [`rightmost`]; [`Error::Argument`] where there is no root.
 pub fn spectral_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<f64, Error> {

@@ -1,0 +1,33 @@
+"""The ``deadtime`` command."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+
+__all__ = ["main"]
+
+EXTRAS = ("matplotlib", "rich", "typer")
+
+
+def _installed(name: str) -> bool:
+    """Whether a package is there, without the cost of importing it."""
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ValueError:  # a placeholder in sys.modules
+        return False
+
+
+def main() -> None:
+    """Run the command; without its extras, say how to get them."""
+    missing = [name for name in EXTRAS if not _installed(name)]
+    if missing:
+        print(
+            f"the deadtime command needs {', '.join(missing)}, not installed; this line installs "
+            "everything it needs:\n    pip install 'deadtime[all]'",
+            file=sys.stderr,
+        )
+        raise SystemExit(1)
+    from deadtime._cli.app import run
+
+    run()

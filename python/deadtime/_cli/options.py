@@ -1,0 +1,83 @@
+"""Options that several commands share, and the loop they describe."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from deadtime._controllers import PV, Controller, DerivativeFilter, P
+from deadtime._loop import ControlLoop
+from deadtime._plants import Integrator
+
+__all__ = [
+    "As_json",
+    "Command",
+    "Delay",
+    "File",
+    "Filter",
+    "Gain",
+    "Kp",
+    "Kv",
+    "Lag",
+    "Limit",
+    "Output",
+    "Plot",
+    "Reference",
+    "Sample_time",
+    "Time",
+    "Window",
+    "described_loop",
+]
+
+File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
+Time = Annotated[str, typer.Option(help="Column of the time stamps, s.")]
+Reference = Annotated[str, typer.Option(help="Column of the reference.")]
+Output = Annotated[str, typer.Option(help="Column of the measured output.")]
+Command = Annotated[str | None, typer.Option(help="Column of the command, if it was logged.")]
+Window = Annotated[
+    tuple[float, float] | None, typer.Option(help="Use the samples between these times, s.")
+]
+Kp = Annotated[float, typer.Option(help="Proportional gain.", show_default=False)]
+Kv = Annotated[float, typer.Option(help="Velocity gain.")]
+Delay = Annotated[float, typer.Option(help="Delay of the loop, s.", show_default=False)]
+Gain = Annotated[float, typer.Option(help="Gain of the integrating plant.")]
+Lag = Annotated[float, typer.Option(help="Lag of the plant, s.")]
+Sample_time = Annotated[
+    float | None, typer.Option(help="Time between commands, s; each is held. Without: continuous.")
+]
+Limit = Annotated[float | None, typer.Option(help="Largest size of the command.")]
+Filter = Annotated[
+    float | None,
+    typer.Option(help="Corner of the derivative's filter, rad/s. Without: ideal derivative."),
+]
+Plot = Annotated[Path | None, typer.Option(help="Write a picture to this .png, .svg or .pdf.")]
+As_json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def described_loop(
+    kp: float,
+    kv: float = 0.0,
+    *,
+    delay: float | None = None,
+    gain: float = 1.0,
+    lag: float = 0.0,
+    sample_time: float | None = None,
+    limit: float | None = None,
+    corner: float | None = None,
+) -> ControlLoop:
+    """The loop that the options describe: an integrator under P or PV control."""
+    for name, value in {"kp": kp, "kv": kv, "gain": gain, "lag": lag}.items():
+        if not math.isfinite(value):
+            raise ValueError(f"--{name} is {value}: give a finite number")
+    smoothing = None if corner is None else DerivativeFilter(omega=corner)
+    controller: Controller = P(Kp=kp) if kv == 0.0 else PV(Kp=kp, Kv=kv, filter=smoothing)
+    return ControlLoop(
+        Integrator(gain=gain, lag=lag),
+        controller,
+        delay=delay,
+        sample_time=sample_time,
+        limit=limit,
+    )

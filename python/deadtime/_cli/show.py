@@ -1,0 +1,95 @@
+"""How results look in a terminal."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from deadtime._estimation.compare import COLUMNS, Comparison, truth_row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["estimates_table", "print_json", "save_figure", "stages"]
+
+console = Console()
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def print_json(found: Mapping[str, Any]) -> None:
+    """Print plain values as JSON; what is not finite becomes null."""
+    print(json.dumps(_plain(found), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if isinstance(value, complex):
+        return {"re": _plain(value.real), "im": _plain(value.imag)}
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Path):
+        return str(value)
+    return value
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure to a file whose suffix says the format."""
+    if path.suffix.lower() not in PICTURES:
+        raise ValueError(f"{path} is no picture: end it in {', '.join(PICTURES)}")
+    figure.savefig(path, dpi=150)
+
+
+def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = None) -> Table:
+    """The delay by every method, with the truth beside it where it is known."""
+    table = Table(title="Delay of the loop", title_justify="left", box=None, padding=(0, 1, 0, 0))
+    for index, head in enumerate(COLUMNS):
+        justify: Literal["left", "right"] = "right" if 0 < index < len(COLUMNS) - 1 else "left"
+        table.add_column(head, justify=justify, no_wrap=True)
+    for row in comparison.rows():
+        # A reason does not fit into a cell; it is said in full below the table.
+        table.add_row(*(row if len(row) > 2 else [row[0], "refused"]))
+    if truth is not None:
+        table.add_section()
+        table.add_row(*truth_row(truth), style="bold")
+    return table
+
+
+@contextmanager
+def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """A progress bar over named stages, on standard error; call it as each stage begins."""
+    if quiet:
+        yield lambda stage: None
+        return
+    with Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as progress:
+        task = progress.add_task("", total=count)
+        begun = 0
+
+        def begin(stage: str) -> None:
+            nonlocal begun
+            progress.update(task, description=stage, completed=begun)
+            begun += 1
+
+        yield begin

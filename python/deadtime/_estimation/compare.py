@@ -1,0 +1,200 @@
+"""Several methods on one recording, and in words why they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.overshoot import estimate_by_overshoot
+from deadtime._estimation.result import DelayEstimate
+from deadtime._estimation.waveform import estimate_by_waveform
+from deadtime._loop import ControlLoop
+from deadtime._recording import Recording
+
+__all__ = ["Comparison", "compare_methods"]
+
+#: Heads of the columns that `Comparison.rows` fills.
+COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
+
+#: Two delays closer than this share of their mean are called the same.
+AGREE = 0.03
+
+LABELS = {
+    "dominant": "paper's overshoot",
+    "exact": "exact overshoot",
+    "saturated": "overshoot as flown",
+    "waveform": "waveform",
+    "waveform with lag": "waveform with lag",
+}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Estimates of one delay by several methods.
+
+    Attributes
+    ----------
+    estimates : dict of str to DelayEstimate
+        By name: ``dominant``, ``exact``, ``saturated``, ``waveform``, ``waveform with lag``.
+    refusals : dict of str to str
+        The methods that could not answer, and why.
+    """
+
+    estimates: Mapping[str, DelayEstimate]
+    refusals: Mapping[str, str]
+
+    @property
+    def best(self) -> DelayEstimate:
+        """The estimate to go on with.
+
+        The fit with a lag if the lag is above zero and the Bayesian information criterion
+        pays for it, on as many independent samples as the residuals' colour leaves; else the
+        fit of delay and gain.
+        """
+        plain = self.estimates["waveform"]
+        lagged = self.estimates.get("waveform with lag")
+        if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
+            return plain
+        rho = min(0.99, max(0.0, lagged.whiteness.autocorrelation))
+        effective = lagged.residuals.size * (1.0 - rho) / (1.0 + rho)
+        gain = 2.0 * effective * np.log(plain.rms / lagged.rms) if lagged.rms > 0 else np.inf
+        return lagged if gain > np.log(max(effective, 2.0)) else plain
+
+    def rows(self) -> list[list[str]]:
+        """The estimates as cells of a table with the heads `COLUMNS`.
+
+        What was not fitted but taken as given stands in brackets. A method that refused has one
+        cell with its reason.
+        """
+        rows = []
+        for name, fit in self.estimates.items():
+            interval, total = "–", "–"
+            if fit.calibrated:
+                interval = "{:.3f} – {:.3f}".format(*fit.ci(0.95))
+                total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
+            rows.append(
+                [
+                    LABELS[name],
+                    f"{fit.delay:.3f}",
+                    interval,
+                    _number(fit.gain, "gain" in fit.free),
+                    _number(fit.lag, "lag" in fit.free),
+                    total,
+                    "yes" if fit.adequate else "no",
+                ]
+            )
+        rows += [[LABELS[name], f"refused: {why}"] for name, why in self.refusals.items()]
+        return rows
+
+    def explanation(self) -> list[str]:
+        """Why the methods differ, a sentence or two each."""
+        plain = self.estimates["waveform"]
+        dominant = self.estimates.get("dominant")
+        said = []
+        if dominant is None:
+            said.append(f"The overshoot method does not answer: {self.refusals['dominant']}.")
+        else:
+            said += _overshoot_against_waveform(dominant, plain)
+        lagged = self.estimates.get("waveform with lag")
+        if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
+            said.append(
+                f"The vehicle lags: with a lag fitted too the misfit falls from {plain.rms:.3g} to "
+                f"{lagged.rms:.3g} rms, at {lagged.delay:.3f} s of delay and {lagged.lag:.3f} s of "
+                f"lag. Part of what looks like dead time is the vehicle's own response; the sum, "
+                f"{lagged.delay_plus_lag:.3f} s, is what the recording determines well."
+            )
+        if not plain.adequate:
+            said.append(
+                "The residuals of the fit without lag are coloured: that model is an equivalent of "
+                "the vehicle rather than the vehicle, and its interval is the robust one."
+            )
+        return said
+
+
+def truth_row(numbers: Mapping[str, float]) -> list[str]:
+    """The true numbers of a simulated flight, as a row under those of `Comparison.rows`."""
+    return [
+        "the truth",
+        f"{numbers['delay']:.3f}",
+        "",
+        f"{numbers['gain']:.3f}",
+        f"{numbers['lag']:.3f}",
+        f"{numbers['delay+lag']:.3f}",
+        "",
+    ]
+
+
+def _number(value: float | None, fitted: bool) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.3f}" if fitted else f"({value:g})"
+
+
+def _overshoot_against_waveform(dominant: DelayEstimate, plain: DelayEstimate) -> list[str]:
+    difference = plain.delay - dominant.delay
+    if abs(difference) <= AGREE * plain.delay:
+        return [
+            f"The paper's overshoot method ({dominant.delay:.3f} s) and the fit of the whole "
+            f"waveform ({plain.delay:.3f} s) agree."
+        ]
+    said = [
+        f"The paper's overshoot method says {dominant.delay:.3f} s, the fit of the whole waveform "
+        f"{plain.delay:.3f} s: they differ by {abs(difference):.3f} s."
+    ]
+    assumed, gain = dominant.gain, plain.gain
+    if assumed is None or gain is None or "gain" not in plain.stderr:
+        return said
+    low, high = plain.ci(0.95, "gain")
+    if not low <= assumed <= high:
+        weaker = "weaker" if gain < assumed else "stronger"
+        less = "less" if gain < assumed else "more"
+        short = "too short" if gain < assumed else "too long"
+        said.append(
+            f"The gain is not {assumed:g}, as the overshoot method takes it to be, but {gain:.3f} "
+            f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the delay is read "
+            f"{short}. With this gain the same overshoot would mean "
+            f"{dominant.delay * assumed / gain:.3f} s."
+        )
+    return said
+
+
+def compare_methods(
+    recording: Recording,
+    loop: ControlLoop,
+    window: tuple[float | None, float | None] | None = None,
+) -> Comparison:
+    """Estimate the delay by every method that applies.
+
+    Parameters
+    ----------
+    recording, loop, window
+        As for `estimate_delay`.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    NotIdentifiableError
+        When not even the fit of delay and gain has an answer.
+    """
+    estimates: dict[str, DelayEstimate] = {}
+    refusals: dict[str, str] = {}
+    named = [name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")]
+    plain = [name for name in named if name != "lag"]
+    for name in ("dominant", "exact", "saturated"):
+        try:
+            estimates[name] = estimate_by_overshoot(recording, loop, window, name)
+        except (NotIdentifiableError, ValueError) as error:
+            refusals[name] = str(error).rstrip(".")
+    estimates["waveform"] = estimate_by_waveform(recording, loop, window, plain)
+    if "lag" in named:
+        try:
+            estimates["waveform with lag"] = estimate_by_waveform(recording, loop, window, named)
+        except NotIdentifiableError as error:
+            refusals["waveform with lag"] = str(error).rstrip(".")
+    return Comparison(estimates, refusals)

@@ -1,0 +1,96 @@
+"""The door to the estimators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from deadtime._estimation.overshoot import estimate_by_overshoot
+from deadtime._estimation.result import DelayEstimate
+from deadtime._estimation.waveform import estimate_by_waveform
+from deadtime._loop import ControlLoop
+from deadtime._recording import Recording
+
+__all__ = ["estimate_delay"]
+
+
+def estimate_delay(
+    recording: Recording,
+    loop: ControlLoop,
+    *,
+    method: Literal["auto", "overshoot", "waveform"] = "auto",
+    free: Sequence[str] = ("delay", "gain"),
+    window: tuple[float | None, float | None] | None = None,
+    **options: Any,
+) -> DelayEstimate:
+    """Estimate the delay of a closed loop from a recording of its step response.
+
+    Parameters
+    ----------
+    recording : Recording
+        Reference and output over time, as logged where the controller runs.
+    loop : ControlLoop
+        What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
+    method : {"auto", "overshoot", "waveform"}
+        ``"waveform"`` fits the simulated loop to the whole window and is what ``"auto"`` takes.
+        ``"overshoot"`` reads one number, as Armah & Yi did.
+    free : sequence of str
+        What ``"waveform"`` fits: any of ``"delay"``, ``"gain"`` and ``"lag"``. The overshoot
+        method fits the delay alone.
+    window : (float or None, float or None), optional
+        The part of the recording to use, s. It should begin at rest and hold one step.
+    **options
+        For ``"overshoot"``: ``map="dominant"`` (the paper's), ``"exact"`` (the exact step
+        response) or ``"saturated"`` (the loop simulated with its hold and limit).
+
+    Returns
+    -------
+    DelayEstimate
+
+    Raises
+    ------
+    NotIdentifiableError
+        When the recording does not determine what was asked for: no step, no overshoot
+        (Kp·Td below 1/e), numbers that cannot be told apart.
+    RecordingError
+        When the window holds too few samples.
+    ValueError
+        For a method, option or free quantity that does not exist.
+
+    Notes
+    -----
+    A ground station sees the sum of all delays on the way round the loop; from its own log,
+    which part is in the command and which in the measurement cannot be told. A model that does
+    not explain the recording is returned with ``adequate=False``, not refused.
+
+    References
+    ----------
+    S. Armah and S. Yi, "Analysis of Time Delays in Quadrotor Systems and Design of Control".
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> truth = dtm.ControlLoop(dtm.Integrator(0.8), dtm.P(2.4), delay=0.4, sample_time=0.065)
+    >>> time = np.arange(150) * 0.065
+    >>> step = np.where(time < 1.0, 0.0, 1.0)
+    >>> flown = truth.simulate(time, step, reference_time=time)
+    >>> flight = dtm.Recording(time, step, flown.outputs)
+    >>> known = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.4), sample_time=0.065)
+    >>> fit = dtm.estimate_delay(flight, known, free=("delay", "gain"))
+    >>> round(fit.delay, 6), round(fit.gain, 6), fit.adequate
+    (0.4, 0.8, True)
+    """
+    if not isinstance(recording, Recording):
+        raise TypeError(f"recording is a {type(recording).__name__}, not a Recording")
+    if not isinstance(loop, ControlLoop):
+        raise TypeError(f"loop is a {type(loop).__name__}, not a ControlLoop")
+    if method in ("auto", "waveform"):
+        if options:
+            raise ValueError(f"the waveform method has no option {next(iter(options))!r}")
+        return estimate_by_waveform(recording, loop, window, free)
+    if method == "overshoot":
+        if set(options) - {"map"}:
+            raise ValueError(f"the overshoot method has the option 'map', not {set(options)!r}")
+        return estimate_by_overshoot(recording, loop, window, **options)
+    raise ValueError(f"method={method!r} is not one of 'auto', 'overshoot', 'waveform'")

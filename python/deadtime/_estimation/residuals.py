@@ -1,0 +1,107 @@
+"""What the residuals of a fit say: whether they are white, and how uncertain the fit is if not.
+
+Least squares gives the covariance ``σ² (JᵀJ)⁻¹`` only for residuals that are white. Coloured
+ones (a model that is not quite the vehicle, sensor noise that circulates in the loop) carry
+less information than their number suggests; the sandwich ``(JᵀJ)⁻¹ S (JᵀJ)⁻¹`` with Newey and
+West's (1987) long-run covariance S of the scores ``J_t e_t`` stays valid for them. Its
+bandwidth is Andrews' (1991, eq. 6.2 and 6.4) plug-in for the Bartlett kernel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+__all__ = ["Whiteness", "robust_covariance", "white_covariance", "whiteness_of"]
+
+#: Residuals are called coloured when white ones would look so only this seldom.
+SIGNIFICANCE = 0.01
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Ljung and Box's (1978) portmanteau test of residuals.
+
+    Attributes
+    ----------
+    statistic : float
+        Q, chi-squared with `lags` degrees of freedom for white residuals.
+    p_value : float
+        How often white residuals come out at least as coloured.
+    lags : int
+        Number of autocorrelations in Q.
+    autocorrelation : float
+        The autocorrelation at lag one.
+    """
+
+    statistic: float
+    p_value: float
+    lags: int
+    autocorrelation: float
+
+    @property
+    def white(self) -> bool:
+        """Whether the residuals pass for white at the 1 % level."""
+        return self.p_value > SIGNIFICANCE
+
+
+def whiteness_of(residuals: Array, parameters: int = 0) -> Whiteness:
+    """Test residuals of a fit with so many `parameters` for whiteness.
+
+    Residuals that vanish to rounding pass: there is nothing left in them.
+    """
+    n = residuals.size
+    centred = residuals - residuals.mean()
+    power = float(centred @ centred)
+    lags = max(1, min(20, n // 4))
+    if power == 0.0:
+        return Whiteness(0.0, 1.0, lags, 0.0)
+    rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
+    statistic = float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
+    freedom = max(1, lags - parameters)
+    return Whiteness(statistic, float(special.chdtrc(freedom, statistic)), lags, float(rho[0]))
+
+
+def white_covariance(jacobian: Array, residuals: Array) -> Array:
+    """Covariance of the parameters for white residuals, ``σ² (JᵀJ)⁻¹``."""
+    n, k = jacobian.shape
+    variance = float(residuals @ residuals) / (n - k)
+    return np.asarray(variance * _inverse_information(jacobian))
+
+
+def robust_covariance(jacobian: Array, residuals: Array) -> Array:
+    """Covariance of the parameters that holds for autocorrelated residuals too."""
+    n, k = jacobian.shape
+    scores = jacobian * residuals[:, None]
+    spread = scores.T @ scores
+    bandwidth = _bandwidth(residuals)
+    for lag in range(1, bandwidth + 1):
+        product = scores[lag:].T @ scores[:-lag]
+        spread += (1.0 - lag / (bandwidth + 1)) * (product + product.T)
+    bread = _inverse_information(jacobian)
+    # n/(n-k): the small-sample factor that makes the white case agree with the usual estimate
+    return np.asarray(bread @ spread @ bread * (n / (n - k)))
+
+
+def _bandwidth(residuals: Array) -> int:
+    """Andrews' bandwidth for the Bartlett kernel, residuals taken as an AR(1) process."""
+    n = residuals.size
+    power = float(residuals @ residuals)
+    rho = float(residuals[1:] @ residuals[:-1]) / power if power > 0 else 0.0
+    rho = float(np.clip(rho, -0.97, 0.97))
+    alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
+    return int(min(n // 4, np.ceil(1.1447 * (alpha * n) ** (1 / 3))))
+
+
+def _inverse_information(jacobian: Array) -> Array:
+    """``(JᵀJ)⁻¹`` through a QR decomposition of the scaled columns."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    r = np.linalg.qr(jacobian / scale, mode="r")
+    inverse = np.linalg.inv(r)
+    return np.asarray((inverse @ inverse.T) / np.outer(scale, scale))

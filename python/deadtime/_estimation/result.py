@@ -1,0 +1,223 @@
+"""What an estimator found, and how far to believe it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from deadtime._estimation.residuals import Whiteness
+from deadtime._loop import ControlLoop
+from deadtime._recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["CramerRaoBound", "DelayEstimate"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CramerRaoBound:
+    """Smallest standard deviations an unbiased estimator can have on this recording.
+
+    Attributes
+    ----------
+    free : tuple of str
+        What is taken as unknown; a bound without this says nothing.
+    noise : float
+        Standard deviation of the white measurement noise it is for, in the output's unit.
+    stderr : dict of str to float
+        The bound for each free quantity, and for ``delay+lag`` where both are free.
+    """
+
+    free: tuple[str, ...]
+    noise: float
+    stderr: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DelayEstimate:
+    """A loop with its delay, and the uncertainty of every number that was fitted.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method.
+    loop : ControlLoop
+        The loop with the fitted numbers put in.
+    free : tuple of str
+        What was fitted.
+    stderr : dict of str to float
+        Standard errors of the free quantities, s or the unit of the gain; ``delay+lag`` is there
+        whenever the delay is. They are robust ones when the residuals are not white.
+    cov : ndarray, shape (len(free), len(free))
+        Their covariance.
+    crb : CramerRaoBound or None
+        The Cramér-Rao bound, naming what it takes as free.
+    recording : Recording
+        The window the fit was made on.
+    residuals : ndarray
+        Recorded minus simulated output.
+    whiteness : Whiteness
+        Test of the residuals.
+    adequate : bool
+        Whether the model explains the recording up to white noise. If not, the intervals are
+        the robust ones, and the model is an equivalent of the vehicle, not the vehicle.
+    message : str
+        What the method has to say, in words.
+    uncalibrated : str
+        Why there is no interval; empty where there is one.
+    details : dict
+        Quantities of the method alone, such as the overshoot.
+    """
+
+    method: str
+    loop: ControlLoop
+    free: tuple[str, ...]
+    stderr: dict[str, float]
+    cov: Array
+    crb: CramerRaoBound | None
+    recording: Recording
+    residuals: Array
+    whiteness: Whiteness
+    adequate: bool
+    message: str
+    uncalibrated: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def delay(self) -> float:
+        """The delay of the loop, s."""
+        return float(self.loop.parameters["delay"])
+
+    @property
+    def gain(self) -> float | None:
+        """Gain of the plant: fitted, or as it was given; None if the plant has none to name."""
+        return self.loop.parameters.get("gain")
+
+    @property
+    def lag(self) -> float | None:
+        """Lag of the plant, s: fitted, or as it was given; None if the plant has none to name."""
+        return self.loop.parameters.get("lag")
+
+    @property
+    def delay_plus_lag(self) -> float:
+        """The sum of delay and lag, s: well determined also when its parts are not."""
+        return self.delay + (self.lag or 0.0)
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the method can give an interval that covers what it says."""
+        return not self.uncalibrated
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals, in the unit of the output."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
+    def ci(self, level: float = 0.95, name: str = "delay") -> tuple[float, float]:
+        """Confidence interval of a fitted quantity.
+
+        Parameters
+        ----------
+        level : float
+            Between 0 and 1.
+        name : str
+            One of `free`, or ``"delay+lag"``.
+
+        Returns
+        -------
+        (float, float)
+            In seconds for a delay or lag; cut off at zero, below which none of them can be.
+
+        Raises
+        ------
+        ValueError
+            When the method cannot give an interval (the message says why), the level is not
+            between 0 and 1, or the quantity was not fitted.
+        """
+        if not 0.0 < level < 1.0:
+            raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+        if not self.calibrated:
+            raise ValueError(f"no interval: {self.uncalibrated}")
+        if name not in self.stderr:
+            raise ValueError(
+                f"{name!r} was not fitted, there are intervals for {', '.join(self.stderr)}"
+            )
+        freedom = max(1, self.residuals.size - len(self.free))
+        reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
+        value = self.delay_plus_lag if name == "delay+lag" else self.loop.parameters[name]
+        low = value - reach
+        if name != "gain":
+            low = max(0.0, low)
+        return (low, value + reach)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the arrays, as plain values for JSON."""
+        found: dict[str, Any] = {
+            "method": self.method,
+            "delay": self.delay,
+            "gain": self.gain,
+            "lag": self.lag,
+            "delay_plus_lag": self.delay_plus_lag,
+            "free": list(self.free),
+            "stderr": {name: _plain(value) for name, value in self.stderr.items()},
+            "interval_95": (
+                {name: list(self.ci(0.95, name)) for name in self.stderr}
+                if self.calibrated
+                else None
+            ),
+            "rms": self.rms,
+            "white": self.whiteness.white,
+            "residual_autocorrelation": self.whiteness.autocorrelation,
+            "adequate": self.adequate,
+            "message": self.message,
+        }
+        if self.uncalibrated:
+            found["no_interval_because"] = self.uncalibrated
+        return found | dict(self.details)
+
+    def summary(self) -> str:
+        """The result as a few lines of text."""
+        lines = [f"{self.method}: {self.message}"]
+        units = {"delay": "s", "lag": "s", "delay+lag": "s", "gain": ""}
+        values = dict(self.loop.parameters) | {"delay+lag": self.delay_plus_lag}
+        for name, stderr in self.stderr.items():
+            line = f"  {name:<10}{values[name]:9.4f} {units.get(name, ''):<2}"
+            if self.calibrated:
+                low, high = self.ci(0.95, name)
+                line += f" ± {stderr:.4f}   95 % interval {low:.4f} to {high:.4f}"
+            lines.append(line.rstrip())
+        if not self.calibrated:
+            lines.append(f"  no interval: {self.uncalibrated}")
+        kind = "white" if self.whiteness.white else "coloured"
+        lines.append(
+            f"  residuals {self.rms:.4g} rms, {kind} (lag-1 autocorrelation "
+            f"{self.whiteness.autocorrelation:.2f}); model adequate: "
+            f"{'yes' if self.adequate else 'no'}"
+        )
+        return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Fit over data, and the residuals; needs matplotlib."""
+        from deadtime._plots import plot_estimate
+
+        return plot_estimate(self)
+
+    def __repr__(self) -> str:
+        spread = f" ± {self.stderr['delay']:.3g}" if self.calibrated else ""
+        return (
+            f"<DelayEstimate {self.method}: delay {self.delay:.4g}{spread} s, "
+            f"adequate: {self.adequate}>"
+        )
+
+
+def _plain(value: float) -> float | None:
+    return value if math.isfinite(value) else None

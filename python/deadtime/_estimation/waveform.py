@@ -1,0 +1,279 @@
+"""Least squares of the simulated loop on the whole recording.
+
+The output of the loop, simulated with its hold and its limit at the recording's time stamps, is
+fitted to the recorded one over any of delay, gain and lag; the output at the start of the window
+is fitted along, because one noisy sample is a poor initial condition. The cost has several
+valleys over the delay (a whole period of the loop's oscillation too much fits almost as well),
+so a grid over delay and gain comes first and the best few points of it are refined.
+
+The residuals are white only if the model is the vehicle and the noise enters at the measurement
+but does not circulate through the controller; where they are not, the standard errors are robust
+ones and the result says that the model is not adequate.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime._estimation.result import CramerRaoBound, DelayEstimate
+from deadtime._estimation.simulated import SimulatedRecording
+from deadtime._loop import ControlLoop
+from deadtime._recording import Recording
+
+__all__ = ["FREE_NAMES", "estimate_by_waveform"]
+
+#: What the fit can determine, in the order it reports.
+FREE_NAMES = ("delay", "gain", "lag")
+
+#: Points of the first grid over the delay, and factors of the first grid over the gain.
+DELAY_POINTS = 24
+GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
+
+#: Grid points that are refined; the best of them wins.
+REFINED = 3
+
+#: Ratio of singular values of the scaled Jacobian below which data do not tell two numbers apart:
+#: rounding in difference quotients is at about 1e-8.
+INDISTINGUISHABLE = 1e-6
+
+#: A lag that changes the cost by less than this share is none: least squares itself stops there.
+VANISHING = 1e-6
+
+#: A residual for simulations that leave all bounds, in units of the step.
+HOPELESS = 1e3
+
+Array = NDArray[np.float64]
+
+
+def estimate_by_waveform(
+    recording: Recording,
+    loop: ControlLoop,
+    window: tuple[float | None, float | None] | None,
+    free: Sequence[str],
+) -> DelayEstimate:
+    """Fit `free` of the loop to the window of the recording."""
+    names = _checked(free, loop)
+    simulated = SimulatedRecording(recording, loop, window)
+    data = simulated.recording
+    _check_excitation(data, len(names))
+    problem = _Problem(simulated, names)
+    solution = problem.solve()
+    jacobian, residuals = solution.jacobian, -solution.misfit
+    values = dict(zip(names, (float(value) for value in solution.parameters), strict=False))
+
+    held = [name for name in names if name != "gain" and values[name] <= 1e-9]
+    loose = [i for i, name in enumerate((*names, "start")) if name not in held]
+    _check_distinguishable(jacobian[:, loose], [(*names, "initial output")[i] for i in loose])
+    whiteness = whiteness_of(residuals, len(names))
+    exact = float(np.max(np.abs(residuals))) <= 1e-9 * float(np.ptp(data.output))
+    adequate = (whiteness.white or exact) and not held
+    white = _embed(white_covariance(jacobian[:, loose], residuals), loose, jacobian.shape[1])
+    spread = white
+    if not whiteness.white:
+        robust = robust_covariance(jacobian[:, loose], residuals)
+        spread = _embed(robust, loose, jacobian.shape[1])
+    count = len(names)
+    noise = float(np.sqrt(residuals @ residuals / (residuals.size - solution.parameters.size)))
+    return DelayEstimate(
+        method="waveform",
+        loop=loop.replace(**values),
+        free=names,
+        stderr=_stderr(names, spread),
+        cov=spread[:count, :count],
+        crb=CramerRaoBound((*names, "initial output"), noise, _stderr(names, white)),
+        recording=data,
+        residuals=residuals,
+        whiteness=whiteness,
+        adequate=adequate,
+        message=_message(names, held, adequate),
+        details={"initial_output": float(solution.parameters[count])},
+    )
+
+
+@dataclass(frozen=True)
+class _Minimum:
+    """Where a search ended: parameters, misfit (simulated minus recorded), its derivatives."""
+
+    parameters: Array
+    misfit: Array
+    jacobian: Array
+
+    @property
+    def cost(self) -> float:
+        return float(self.misfit @ self.misfit)
+
+
+class _Problem:
+    """The least-squares problem: parameters are `names`, then the output at the start."""
+
+    def __init__(self, simulated: SimulatedRecording, names: tuple[str, ...]) -> None:
+        self.simulated = simulated
+        self.names = names
+        data = simulated.recording
+        step = data.steps()[0]
+        self.span = float(data.time[-1] - step.time)
+        self.start = float(np.mean(data.output[: max(1, step.index)]))
+        self.size = max(float(np.ptp(data.output)), float(np.ptp(data.reference)))
+
+    def residuals(self, parameters: Array) -> Array:
+        """Simulated minus recorded output; bounded where the loop with these numbers is not."""
+        values = dict(zip(self.names, (float(value) for value in parameters), strict=False))
+        bound = HOPELESS * self.size
+        try:
+            output = self.simulated.output(values, float(parameters[-1]))
+        except ValueError:  # the response with these numbers grows without bound
+            return np.full(len(self.simulated.recording), bound)
+        return np.clip(output - self.simulated.recording.output, -bound, bound)
+
+    def solve(self) -> _Minimum:
+        """The best minimum reached from the best points of a grid."""
+        points = [np.array([*point, self.start]) for point in itertools.product(*self._grid())]
+        costs = [float(np.sum(self.residuals(point) ** 2)) for point in points]
+        best: _Minimum | None = None
+        for index in np.argsort(costs)[:REFINED]:
+            solution = self._refine(points[int(index)])
+            if best is None or solution.cost < best.cost:
+                best = solution
+        assert best is not None
+        return self._without_vanishing_lag(best)
+
+    def _without_vanishing_lag(self, found: _Minimum) -> _Minimum:
+        """Put a lag at zero that is there for rounding's sake only.
+
+        A small lag delays like a delay, to first order exactly so; next to zero the two cannot
+        be told apart, and the search stops wherever it entered that valley.
+        """
+        if "lag" not in self.names or found.parameters[self.names.index("lag")] == 0.0:
+            return found
+        delay, lag = self.names.index("delay"), self.names.index("lag")
+        moved = found.parameters.copy()
+        moved[delay] += moved[lag]
+        moved[lag] = 0.0
+        shifted = replace(found, parameters=moved, misfit=self.residuals(moved))
+        return shifted if shifted.cost <= found.cost * (1.0 + VANISHING) else found
+
+    def _grid(self) -> list[Array]:
+        plant = self.simulated.loop.parameters
+        grids = {
+            "delay": np.geomspace(0.003, 0.6, DELAY_POINTS) * self.span,
+            "gain": np.array(GAIN_FACTORS) * plant.get("gain", 1.0),
+            "lag": np.array([0.02]) * self.span,
+        }
+        return [grids[name] for name in self.names]
+
+    def _refine(self, start: Array) -> _Minimum:
+        gain = self.simulated.loop.parameters.get("gain", 1.0)
+        ends = {
+            "delay": (0.0, self.span),
+            "gain": tuple(sorted((1e-3 * gain, 1e3 * gain))),
+            "lag": (0.0, self.span),
+        }
+        low = [ends[name][0] for name in self.names] + [-np.inf]
+        high = [ends[name][1] for name in self.names] + [np.inf]
+        scale = {"delay": 0.1 * self.span, "gain": abs(gain), "lag": 0.1 * self.span}
+        found = least_squares(
+            self.residuals,
+            start,
+            bounds=(low, high),
+            jac="3-point",
+            x_scale=[scale[name] for name in self.names] + [self.size],
+            xtol=1e-14,
+            ftol=1e-14,
+            gtol=1e-14,
+            max_nfev=200,
+        )
+        return _Minimum(found.x, found.fun, np.asarray(found.jac))
+
+
+def _checked(free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
+    if isinstance(free, str):
+        free = (free,)
+    unknown = [name for name in free if name not in FREE_NAMES]
+    if unknown or not free:
+        raise ValueError(f"free={tuple(free)!r}: choose from {FREE_NAMES}, at least one")
+    missing = [name for name in free if name != "delay" and name not in loop.parameters]
+    if missing:
+        raise ValueError(
+            f"the plant {loop.plant!r} has no {missing[0]} to fit: use an Integrator or a "
+            "FirstOrder, or leave it out of `free`"
+        )
+    if "delay" not in free and loop.delay is None:
+        raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
+    return tuple(name for name in FREE_NAMES if name in free)
+
+
+def _check_excitation(data: Recording, parameters: int) -> None:
+    if not data.steps():
+        raise NotIdentifiableError(
+            f"the reference is {data.reference[0]:g} throughout the window: nothing excites the "
+            "loop; choose a window with a step"
+        )
+    first = data.steps()[0].index
+    if len(data) - first < 2 * (parameters + 1):
+        raise NotIdentifiableError(
+            f"{len(data) - first} samples after the step are too few for {parameters} numbers and "
+            "an initial output: widen the window"
+        )
+    if float(np.ptp(data.output)) == 0.0:
+        raise NotIdentifiableError(
+            f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
+        )
+
+
+def _check_distinguishable(jacobian: Array, names: list[str]) -> None:
+    norms = np.linalg.norm(jacobian, axis=0)
+    if not np.all(np.isfinite(norms)) or np.any(norms == 0.0):
+        blind = [name for name, norm in zip(names, norms, strict=True) if not norm > 0.0]
+        raise NotIdentifiableError(
+            f"the recording does not depend on the {' or '.join(blind) or 'parameters'}: the "
+            "window holds no response to a step, or the command is at its limit throughout"
+        )
+    _, singular, directions = np.linalg.svd(jacobian / norms)
+    if singular[-1] < INDISTINGUISHABLE * singular[0]:
+        weights = np.abs(directions[-1])
+        mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]
+        raise NotIdentifiableError(
+            f"{' and '.join(mixed)} cannot be told apart by this recording: fix one of them, or "
+            "record a step that is not at the limit throughout"
+        )
+
+
+def _embed(cov: Array, loose: list[int], size: int) -> Array:
+    """Covariance of all parameters: what stands at its bound has none of its own."""
+    full = np.zeros((size, size))
+    full[np.ix_(loose, loose)] = cov
+    return full
+
+
+def _stderr(names: tuple[str, ...], cov: Array) -> dict[str, float]:
+    errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
+    if "delay" in names:
+        total = np.array([1.0 if name in ("delay", "lag") else 0.0 for name in names])
+        count = len(names)
+        errors["delay+lag"] = float(np.sqrt(total @ cov[:count, :count] @ total))
+    return errors
+
+
+def _message(names: tuple[str, ...], held: list[str], adequate: bool) -> str:
+    text = f"least squares over {', '.join(names)}"
+    if held:
+        text += (
+            f"; the {' and '.join(held)} came out at zero, its bound, so its standard error of 0 "
+            "says nothing"
+        )
+    if not adequate:
+        text += (
+            "; the residuals are not white, so the loop is only an equivalent of the vehicle and "
+            "the standard errors are robust ones"
+        )
+        if "lag" not in names:
+            text += " (try free=('delay', 'gain', 'lag'))"
+    return text

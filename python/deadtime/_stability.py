@@ -1,0 +1,412 @@
+"""Maps of stability over two parameters."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._loop import ControlLoop
+from deadtime._loop_stability import sampled_grid
+from deadtime._parametric import Parameter, ParametricQuasiPolynomial
+from deadtime._validation import finite
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["MapStatus", "StabilityMap", "stability_map"]
+
+_Floats: TypeAlias = NDArray[np.float64]
+_Progress: TypeAlias = Callable[[int], object]
+
+#: More cells than a picture holds.
+_MAX_CELLS = 50_000_000
+
+
+class MapStatus(IntEnum):
+    """What is known of a cell of a `StabilityMap`."""
+
+    OK = 0
+    """Count and abscissa hold."""
+    BOUNDARY = 1
+    """A root, or a chain of them, lies on the boundary to working precision."""
+    CHAIN = 2
+    """The chains of roots of a neutral equation lead; told only where the abscissa is computed."""
+    INFINITE = 3
+    """Infinitely many unstable roots."""
+    UNDECIDED = 4
+    """Double precision or the limit of work did not suffice."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityMap:
+    """Stability over two parameters; made by `stability_map`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The two parameters: first and second axis of the arrays.
+    axes : dict of str to ndarray
+        Their values, increasing.
+    unstable : ndarray of int32, shape (n0, n1)
+        Number of unstable roots, counted with multiplicity; -1 for infinitely many, -2 where it
+        is not known: a root on the boundary, or undecided.
+    abscissa : ndarray of float64, shape (n0, n1)
+        Spectral abscissa in 1/s; NaN where it was not computed or is beyond reach.
+    status : ndarray of uint8, shape (n0, n1)
+        A `MapStatus`.
+
+    Notes
+    -----
+    All arrays are read-only.
+    """
+
+    names: tuple[str, str]
+    axes: dict[str, _Floats]
+    unstable: NDArray[np.int32]
+    abscissa: _Floats
+    status: NDArray[np.uint8]
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where no root and no chain of roots is unstable or on the boundary, shape (n0, n1)."""
+        known = (self.status == MapStatus.OK) | (self.status == MapStatus.CHAIN)
+        stable: NDArray[np.bool_] = known & (self.unstable == 0)
+        stable &= (self.status != MapStatus.CHAIN) | (self.abscissa < 0.0)
+        stable.flags.writeable = False
+        return stable
+
+    def best(self) -> tuple[dict[str, float], float]:
+        """Return the stable cell with the smallest spectral abscissa.
+
+        Returns
+        -------
+        values : dict of str to float
+            The two parameters there.
+        abscissa : float
+            In 1/s.
+
+        Raises
+        ------
+        ValueError
+            If no cell is stable, or the abscissa was not computed.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import deadtime as dtm
+        >>> Kp, = dtm.parameters("Kp")
+        >>> T, = dtm.parameters("T")
+        >>> chart = dtm.stability_map(
+        ...     dtm.s + Kp * dtm.delay(T), {"Kp": (0.1, 2.0), "T": [0.5, 1.0]}, shape=(20, 2)
+        ... )
+        >>> values, abscissa = chart.best()
+        >>> {name: round(value, 3) for name, value in values.items()}
+        {'Kp': 0.8, 'T': 0.5}
+        """
+        candidates = np.where(self.stable, self.abscissa, np.nan)
+        if not np.isfinite(candidates).any():
+            if self.stable.any():
+                raise ValueError(
+                    "the map has no abscissa to choose by: compute it with abscissa=True"
+                )
+            raise ValueError(
+                f"no cell of the map is stable: try other ranges of {' and '.join(self.names)}"
+            )
+        place = np.unravel_index(int(np.nanargmin(candidates)), candidates.shape)
+        values = {
+            name: float(self.axes[name][i]) for name, i in zip(self.names, place, strict=True)
+        }
+        return values, float(candidates[place])
+
+    def plot(self, ax: Axes | None = None, chosen: Mapping[str, float] | None = None) -> Axes:
+        """Draw the abscissa of the stable cells and their boundary.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure by default.
+        chosen : mapping of str to float, optional
+            Values of the two parameters to mark.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from deadtime._plots import plot_stability_map, shown_axes
+
+        ax = shown_axes(ax)
+        plot_stability_map(ax, self, chosen)
+        return ax
+
+    def to_xarray(self) -> Any:
+        """Return the arrays as an `xarray.Dataset` with the parameters as coordinates.
+
+        Returns
+        -------
+        xarray.Dataset
+            Variables ``unstable``, ``abscissa``, ``status`` and ``stable``.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        try:
+            xarray = importlib.import_module("xarray")
+        except ImportError as error:
+            raise ImportError("to_xarray() needs xarray: pip install xarray") from error
+        arrays = {
+            name: getattr(self, name) for name in ("unstable", "abscissa", "status", "stable")
+        }
+        data = xarray.Dataset(
+            {name: (self.names, array) for name, array in arrays.items()}, coords=self.axes
+        )
+        data["abscissa"].attrs["units"] = "1/s"
+        return data
+
+    def __repr__(self) -> str:
+        sides = ", ".join(
+            f"{name} {axis[0]:.6g} to {axis[-1]:.6g} ({len(axis)})"
+            for name, axis in self.axes.items()
+        )
+        return f"<StabilityMap {sides}: {int(self.stable.sum())} of {self.stable.size} stable>"
+
+
+def stability_map(
+    family: ParametricQuasiPolynomial | ControlLoop,
+    ranges: Mapping[str, tuple[float, float] | ArrayLike],
+    shape: tuple[int, int] = (101, 101),
+    *,
+    abscissa: bool = True,
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> StabilityMap:
+    """Stability over two parameters: number of unstable roots and spectral abscissa in each cell.
+
+    Parameters
+    ----------
+    family : ParametricQuasiPolynomial or ControlLoop
+        What to judge. The other named numbers of a loop keep their values; its limit plays no
+        part in stability.
+    ranges : mapping of str to (low, high) or array_like
+        Exactly two names. A tuple of two numbers is a range, sampled at as many points as `shape`
+        says, both ends included; a list or an array holds the points themselves, increasing. The
+        first name is the first axis of the results.
+    shape : tuple of int
+        Points along each range.
+    abscissa : bool
+        Compute the spectral abscissa too, at several times the cost of the counts. (For a sampled
+        loop it comes with the counts and is always given.)
+    threads : int, optional
+        Number of threads; all cores by default. Results have the same bits for any number.
+    progress : callable, optional
+        Called now and then with the number of finished cells, and at the end with all.
+
+    Returns
+    -------
+    StabilityMap
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown or another parameter has no value, a range is empty, not increasing or
+        not finite, a delay would be negative, or there are more than 50 million cells.
+    TypeError
+        If `family` is something else, or a range is not made of numbers.
+
+    Notes
+    -----
+    Continuous: a root is unstable right of the imaginary axis; their number is proved by the
+    argument principle, and equals the pointwise ``family.at(...).count(re=(0, None))``. Chains of
+    roots of neutral equations are judged robustly, as under arbitrarily small changes of the
+    delays [1]_.
+
+    Sampled: the poles are the eigenvalues of the transition matrix of the loop, hold and delay
+    included; unstable is outside the unit circle, and the abscissa is ln(rho)/Ts with rho the
+    spectral radius.
+
+    References
+    ----------
+    .. [1] J. K. Hale and S. M. Verduyn Lunel, "Strong stabilization of neutral functional
+       differential equations", IMA Journal of Mathematical Control and Information 19 (2002).
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> Kp, Kv = dtm.parameters("Kp Kv")
+    >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(0.36)
+    >>> dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}, shape=(60, 37))
+    <StabilityMap Kp 0.1 to 6 (60), Kv -0.9 to 0.9 (37): 1321 of 2220 stable>
+    """
+    names, axes = _axes(ranges, shape)
+    cells = len(axes[names[0]]) * len(axes[names[1]])
+    if isinstance(family, ControlLoop):
+        found = _map_loop(family, names, axes, abscissa, threads, progress)
+    elif isinstance(family, ParametricQuasiPolynomial):
+        found = _map_family(family, names, axes, abscissa, threads, progress)
+    else:
+        raise TypeError(
+            f"family of type {type(family).__name__}: give a ControlLoop, or an expression with "
+            "the parameters of dtm.parameters('...')"
+        )
+    if progress is not None:
+        progress(cells)
+    arrays: list[NDArray[Any]] = [*axes.values(), *found]
+    for array in arrays:
+        array.flags.writeable = False
+    return StabilityMap(names, axes, *found)
+
+
+_Found: TypeAlias = tuple[NDArray[np.int32], _Floats, NDArray[np.uint8]]
+
+
+def _map_family(
+    family: ParametricQuasiPolynomial,
+    names: tuple[str, str],
+    axes: dict[str, _Floats],
+    abscissa: bool,
+    threads: int | None,
+    progress: _Progress | None,
+) -> _Found:
+    """Judge the members of a family."""
+    unknown = [name for name in names if name not in family.names]
+    if unknown:
+        raise ValueError(
+            f"ranges for {', '.join(unknown)}: no such parameter, there "
+            + (f"is {', '.join(family.names)}" if family.names else "is none")
+        )
+    missing = [name for name in family.names if name not in names]
+    if missing:
+        raise ValueError(
+            f"no value for {', '.join(missing)}: put a number in its place where the family is "
+            "written, or give it one of the two ranges"
+        )
+    places = (family.names.index(names[0]), family.names.index(names[1]))
+    first, second = axes[names[0]], axes[names[1]]
+    return family._family.map(
+        [0.0] * len(family.names), places, first, second, abscissa, threads, progress
+    )
+
+
+def _map_loop(
+    loop: ControlLoop,
+    names: tuple[str, str],
+    axes: dict[str, _Floats],
+    abscissa: bool,
+    threads: int | None,
+    progress: _Progress | None,
+) -> _Found:
+    """Judge a loop whose named numbers vary."""
+    values: dict[str, Any] = {**loop.parameters}
+    values.pop("limit", None)
+    unknown = [name for name in names if name not in values and name != "delay"]
+    if unknown:
+        raise ValueError(
+            f"ranges for {', '.join(unknown)}: stability depends on no such number of this loop, "
+            f"but on {', '.join(dict.fromkeys([*values, 'delay']))}"
+        )
+    if "delay" not in values and "delay" not in names:
+        raise ValueError(
+            "the delay of this loop is None: give it a range, or set it with "
+            "loop.replace(delay=...)"
+        )
+    if loop.is_sampled:
+        return _map_sampled(loop, values, names, axes, threads, progress)
+    values |= {name: Parameter(name) for name in names}
+    family = loop._characteristic(values)
+    return _map_family(family, names, axes, abscissa, threads, progress)
+
+
+def _map_sampled(
+    loop: ControlLoop,
+    values: dict[str, Any],
+    names: tuple[str, str],
+    axes: dict[str, _Floats],
+    threads: int | None,
+    progress: _Progress | None,
+) -> _Found:
+    """Eigenvalues of the transition matrix in every cell."""
+    first, second = np.meshgrid(*(axes[name] for name in names), indexing="ij")
+    grids = dict(zip(names, (first, second), strict=True))
+    for name in ("delay", "sample_time"):
+        low = float(np.min(grids.get(name, values.get(name, 0.0))))
+        if low < 0.0 or (name == "sample_time" and low == 0.0):
+            raise ValueError(f"{name}={low}: delays are zero or more, sample times above zero")
+    cells = values | {name: np.ravel(grid) for name, grid in grids.items()}
+    abscissa, unstable, status = sampled_grid(loop.plant, loop.controller, cells, threads, progress)
+    unsure = (status == MapStatus.BOUNDARY) | (status == MapStatus.UNDECIDED)
+    unstable = np.where(unsure, np.int32(-2), unstable)
+    shape = first.shape
+    return unstable.reshape(shape), abscissa.reshape(shape), status.reshape(shape)
+
+
+def _axes(
+    ranges: Mapping[str, Any], shape: tuple[int, int]
+) -> tuple[tuple[str, str], dict[str, _Floats]]:
+    """Names and points of the two axes."""
+    if not isinstance(ranges, Mapping):
+        raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
+    if len(ranges) != 2:
+        raise ValueError(
+            f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}): a map has two"
+        )
+    first, second = ranges
+    sizes = _shape(shape)
+    axes = {
+        name: _points(name, ranges[name], size)
+        for name, size in zip((first, second), sizes, strict=True)
+    }
+    cells = math.prod(len(points) for points in axes.values())
+    if cells > _MAX_CELLS:
+        raise ValueError(
+            f"{cells} cells: more than {_MAX_CELLS} are more than a picture holds; take a smaller "
+            "shape, or several maps of smaller ranges"
+        )
+    return (first, second), axes
+
+
+def _shape(shape: Sequence[int]) -> tuple[int, int]:
+    try:
+        first, second = (operator.index(size) for size in shape)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"shape={shape!r}: give two whole numbers") from error
+    if min(first, second) < 2:
+        raise ValueError(f"shape={shape!r}: give at least 2 points a range")
+    if first * second > _MAX_CELLS:
+        raise ValueError(
+            f"shape={shape!r}: more than {_MAX_CELLS} cells are more than a picture holds; take "
+            "fewer, or several maps of smaller ranges"
+        )
+    return first, second
+
+
+def _points(name: str, given: Any, size: int) -> _Floats:
+    if isinstance(given, tuple):
+        if len(given) != 2:
+            raise ValueError(
+                f"{name}={given!r}: a tuple is a range (low, high); give points as a list or array"
+            )
+        low, high = (finite(name, end) for end in given)
+        if low >= high:
+            raise ValueError(f"{name}={given!r}: the low end of a range is below its high end")
+        return np.linspace(low, high, size)
+    array = np.asarray(given)
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"{name}={given!r}: give a range (low, high) or an array of real numbers")
+    points = np.array(array, dtype=np.float64)
+    if points.ndim != 1 or points.size == 0:
+        raise ValueError(f"{name} of shape {points.shape}: give points in one dimension, not none")
+    if not np.isfinite(points).all():
+        raise ValueError(f"{name}: not all points are finite")
+    if not (np.diff(points) > 0.0).all():
+        raise ValueError(f"{name}: points must increase; sort them and drop repeated ones")
+    return points

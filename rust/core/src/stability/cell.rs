@@ -1,0 +1,134 @@
+//! One cell of a stability map: is this quasi-polynomial stable, and by how much?
+//!
+//! The number of roots with Re s > 0 is proved by [`count_right_of`]. Chains of a neutral equation
+//! decide first: right of the axis they make infinitely many roots unstable. "Right of the axis"
+//! is meant as in [`chain_abscissa`], hence robustly: under arbitrarily small changes of the
+//! delays. The abscissa is the larger of the rightmost root's real part and the abscissa of the
+//! chains. What double precision cannot tell is named, not guessed.
+
+use crate::quasipoly::{Kind, QuasiPolynomial};
+use crate::roots::{chain_abscissa, count_right_of, rightmost};
+use crate::status::CellStatus;
+use crate::{Error, Task};
+
+/// The count of a cell with infinitely many unstable roots.
+pub const ENDLESS: i32 = -1;
+
+/// The count of a cell where it is not known: a root on the axis, or undecided.
+pub const UNKNOWN: i32 = -2;
+
+/// Chains closer to the axis than this, in e-folds over the longest delay, lie on it: rounding of
+/// the coefficients alone moves them as far.
+const ON_THE_AXIS: f64 = 16.0 * f64::EPSILON;
+
+/// What is known of one cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Number of roots with Re s > 0, [`ENDLESS`] or [`UNKNOWN`].
+    pub unstable: i32,
+    /// Spectral abscissa, 1/s; NaN where it was not asked for or could not be computed.
+    pub abscissa: f64,
+    /// How far count and abscissa hold.
+    pub status: CellStatus,
+}
+
+impl Cell {
+    /// Nothing is known.
+    pub(super) const UNDECIDED: Self = Self {
+        unstable: UNKNOWN,
+        abscissa: f64::NAN,
+        status: CellStatus::Undecided,
+    };
+}
+
+/// Judge the stability of h; with `abscissa`, also how far its roots are from the axis.
+///
+/// * `Ok`: count (and abscissa) hold.
+/// * `Boundary`: a root, or a chain of them, lies on the axis to working precision.
+/// * `Chain`: the chains lie further right than every root right of them, so the abscissa is
+///   theirs; told only with `abscissa`.
+/// * `Infinite`: infinitely many unstable roots, or an advanced equation.
+/// * `Undecided`: the zero function, or more work or precision than there is. If only the
+///   abscissa is missing, the count holds all the same.
+///
+/// The abscissa is also NaN where it is beyond reach in a cell that is no longer `Ok`.
+///
+/// # Errors
+/// [`Error::Interrupted`] alone.
+///
+/// ```
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::judge, status::CellStatus};
+/// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![5.0]], vec![0.0, 0.36])?;
+/// let cell = judge(&h, true, &Task::new())?;
+/// assert_eq!((cell.unstable, cell.status), (2, CellStatus::Ok));
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, Error> {
+    if h.is_zero() {
+        return Ok(Cell::UNDECIDED);
+    }
+    if h.kind() == Kind::Advanced {
+        return Ok(Cell {
+            unstable: ENDLESS,
+            abscissa: if abscissa { f64::INFINITY } else { f64::NAN },
+            status: CellStatus::Infinite,
+        });
+    }
+    let chain = chain_abscissa(h);
+    let (unstable, status) = count(h, chain, task)?;
+    if !abscissa {
+        return Ok(Cell {
+            unstable,
+            abscissa: f64::NAN,
+            status,
+        });
+    }
+    let (abscissa, isolated) = match isolated_abscissa(h, task) {
+        Ok(isolated) => (isolated.max(chain), isolated),
+        Err(Error::Interrupted) => return Err(Error::Interrupted),
+        Err(_) => {
+            return Ok(Cell {
+                unstable,
+                abscissa: f64::NAN,
+                status: match status {
+                    CellStatus::Ok => CellStatus::Undecided,
+                    known => known,
+                },
+            });
+        }
+    };
+    Ok(Cell {
+        unstable,
+        abscissa,
+        status: match status {
+            CellStatus::Ok if chain > isolated => CellStatus::Chain,
+            known => known,
+        },
+    })
+}
+
+fn count(h: &QuasiPolynomial, chain: f64, task: &Task) -> Result<(i32, CellStatus), Error> {
+    let longest = h.delays().last().zip(h.delays().first());
+    let longest = longest.map_or(0.0, |(last, first)| last - first);
+    if (chain * longest).abs() <= ON_THE_AXIS {
+        return Ok((UNKNOWN, CellStatus::Boundary));
+    }
+    if chain > 0.0 {
+        return Ok((ENDLESS, CellStatus::Infinite));
+    }
+    match count_right_of(h, 0.0, task) {
+        Ok(number) => Ok(match i32::try_from(number) {
+            Ok(number) => (number, CellStatus::Ok),
+            Err(_) => (UNKNOWN, CellStatus::Undecided),
+        }),
+        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(Error::Contour { .. }) => Ok((UNKNOWN, CellStatus::Boundary)),
+        Err(_) => Ok((UNKNOWN, CellStatus::Undecided)),
+    }
+}
+
+/// Real part of the rightmost root; −∞ where no root lies right of the chains.
+fn isolated_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<f64, Error> {
+    let set = rightmost(h, 1, task)?;
+    Ok(set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re))
+}

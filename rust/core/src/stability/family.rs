@@ -1,0 +1,282 @@
+//! Quasi-polynomials whose coefficients and delays depend on named parameters.
+//!
+//! A family is a sum of terms c · Π p_i^e_i · s^k · e^(−s τ(p)) with whole e_i and k and delays
+//! τ(p) = τ_0 + Σ σ_i p_i affine in the parameters p. It is what sums, differences and products of
+//! gains, s and e^(−s T) lead to. [`Family::at`] puts numbers in. Its coefficients and delays
+//! carry the rounding of that evaluation and no more; delays that agree to 4 ulp are the same
+//! sum in another order and are merged, as in products of quasi-polynomials, and a delay that is
+//! negative by no more than rounding is zero.
+
+use crate::Error;
+use crate::quasipoly::QuasiPolynomial;
+
+/// Delays closer than this (relative) are the same.
+const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
+
+/// A power of s or of a parameter beyond this is a slip of the pen.
+const MAX_POWER: u32 = 1000;
+
+/// More terms than this are a slip of the pen, too.
+const MAX_TERMS: usize = 100_000;
+
+/// constant + Σ `slopes`[i] · p_i.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Affine {
+    /// Value where all parameters are zero.
+    pub constant: f64,
+    /// One slope for each parameter.
+    pub slopes: Vec<f64>,
+}
+
+impl Affine {
+    /// The value at `values` and the sum of the moduli of its summands.
+    fn evaluate(&self, values: &[f64]) -> (f64, f64) {
+        let mut sum = (self.constant, self.constant.abs());
+        for (slope, value) in self.slopes.iter().zip(values) {
+            if *slope != 0.0 {
+                sum.0 += slope * value;
+                sum.1 += (slope * value).abs();
+            }
+        }
+        sum
+    }
+}
+
+/// One summand of a family.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// The number in front.
+    pub coefficient: f64,
+    /// The power of each parameter.
+    pub exponents: Vec<u32>,
+    /// The power of s.
+    pub power: u32,
+    /// The delay in seconds.
+    pub delay: Affine,
+}
+
+/// A quasi-polynomial with named parameters.
+///
+/// ```
+/// use deadtime::stability::{Affine, Family, Term};
+/// // s + Kp e^(−s T)
+/// let term = |exponents: [u32; 2], power, slope| Term {
+///     coefficient: 1.0,
+///     exponents: exponents.to_vec(),
+///     power,
+///     delay: Affine { constant: 0.0, slopes: vec![0.0, slope] },
+/// };
+/// let names = vec!["Kp".into(), "T".into()];
+/// let family = Family::new(names, vec![term([0, 0], 1, 0.0), term([1, 0], 0, 1.0)])?;
+/// let h = family.at(&[2.0, 0.36])?;
+/// assert_eq!(h.delays(), [0.0, 0.36]);
+/// assert_eq!(h.coefficients(), [vec![0.0, 1.0], vec![2.0]]);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Family {
+    names: Vec<String>,
+    /// Distinct delays.
+    delays: Vec<Affine>,
+    /// Terms that share a delay, by its index.
+    terms: Vec<Vec<Term>>,
+}
+
+impl Family {
+    /// Check the terms and gather them by delay.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where a name occurs twice, a term has not one exponent and one slope a
+    /// parameter, a number is not finite, or a power is absurdly large; [`Error::TooMuch`] for
+    /// absurdly many terms.
+    pub fn new(names: Vec<String>, terms: Vec<Term>) -> Result<Self, Error> {
+        if let Some(name) = repeated(&names) {
+            return Err(Error::argument(format!(
+                "parameter {name} is given twice: give every parameter its own name"
+            )));
+        }
+        if terms.len() > MAX_TERMS {
+            return Err(Error::TooMuch {
+                what: "the family",
+                limit: MAX_TERMS as u64,
+                unit: "terms",
+                advice: "keep it factored: the roots of a product are those of its factors".into(),
+            });
+        }
+        let mut family = Self {
+            names,
+            delays: Vec::new(),
+            terms: Vec::new(),
+        };
+        for term in terms {
+            family.check(&term)?;
+            let known = family.delays.iter().position(|delay| *delay == term.delay);
+            match known.and_then(|index| family.terms.get_mut(index)) {
+                Some(row) => row.push(term),
+                None => {
+                    family.delays.push(term.delay.clone());
+                    family.terms.push(vec![term]);
+                }
+            }
+        }
+        Ok(family)
+    }
+
+    fn check(&self, term: &Term) -> Result<(), Error> {
+        let count = self.names.len();
+        if term.exponents.len() != count || term.delay.slopes.len() != count {
+            return Err(Error::argument(format!(
+                "a term has {} exponents and {} slopes of its delay for {count} parameters: give \
+                 one of each a parameter",
+                term.exponents.len(),
+                term.delay.slopes.len()
+            )));
+        }
+        let mut numbers = std::iter::once(&term.coefficient)
+            .chain([&term.delay.constant])
+            .chain(&term.delay.slopes);
+        if let Some(number) = numbers.find(|number| !number.is_finite()) {
+            return Err(Error::argument(format!(
+                "{number} in a term: coefficients and delays must be finite"
+            )));
+        }
+        let highest = term.exponents.iter().fold(term.power, |a, b| a.max(*b));
+        if highest > MAX_POWER {
+            return Err(Error::argument(format!(
+                "a power of {highest}: powers up to {MAX_POWER} are taken"
+            )));
+        }
+        Ok(())
+    }
+
+    /// The names of the parameters, in the order of the values.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The member of the family at `values`, one for each parameter.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a wrong number of values, values that are not finite, a delay that
+    /// is negative there, or a coefficient that overflows.
+    pub fn at(&self, values: &[f64]) -> Result<QuasiPolynomial, Error> {
+        self.check_values(values)?;
+        let mut rows = Vec::with_capacity(self.terms.len());
+        for (delay, terms) in self.delays.iter().zip(&self.terms) {
+            let mut row = Vec::new();
+            for term in terms {
+                let place = term.power as usize;
+                if row.len() <= place {
+                    row.resize(place + 1, 0.0);
+                }
+                if let Some(total) = row.get_mut(place) {
+                    *total += value_of(term, values);
+                }
+            }
+            rows.push((row, self.delay_at(delay, values)?));
+        }
+        if rows.is_empty() {
+            return Ok(QuasiPolynomial::zero());
+        }
+        rows.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut last = f64::NEG_INFINITY;
+        for (_, delay) in &mut rows {
+            if *delay - last <= SAME_DELAY * *delay {
+                *delay = last;
+            } else {
+                last = *delay;
+            }
+        }
+        let (coefficients, delays) = rows.into_iter().unzip();
+        QuasiPolynomial::new(coefficients, delays)
+    }
+
+    /// Check that no delay becomes negative where each parameter lies in its range.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with a corner of the ranges where one does.
+    pub fn check_delays(&self, ranges: &[(f64, f64)]) -> Result<(), Error> {
+        let lows: Vec<f64> = ranges.iter().map(|range| range.0).collect();
+        self.check_values(&lows)?;
+        for delay in &self.delays {
+            // An affine function is least at a corner.
+            let corner: Vec<f64> = delay
+                .slopes
+                .iter()
+                .zip(ranges)
+                .map(|(slope, (low, high))| if *slope > 0.0 { *low } else { *high })
+                .collect();
+            self.check_values(&corner)?;
+            self.delay_at(delay, &corner)?;
+        }
+        Ok(())
+    }
+
+    fn check_values(&self, values: &[f64]) -> Result<(), Error> {
+        if values.len() != self.names.len() {
+            return Err(Error::argument(format!(
+                "{} values for {} parameters ({}): give one value a parameter",
+                values.len(),
+                self.names.len(),
+                self.names.join(", ")
+            )));
+        }
+        match self.names.iter().zip(values).find(|(_, v)| !v.is_finite()) {
+            Some((name, value)) => Err(Error::argument(format!(
+                "{name}={value}: parameters must be finite"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn delay_at(&self, delay: &Affine, values: &[f64]) -> Result<f64, Error> {
+        let (value, size) = delay.evaluate(values);
+        let rounding = f64::EPSILON * (delay.slopes.len() + 1) as f64 * size;
+        if value >= 0.0 {
+            // Infinite values are refused with the quasi-polynomial.
+            return Ok(value);
+        }
+        if value >= -rounding {
+            return Ok(0.0);
+        }
+        let place: Vec<String> = self
+            .names
+            .iter()
+            .zip(values)
+            .zip(&delay.slopes)
+            .filter(|(_, slope)| **slope != 0.0)
+            .map(|((name, value), _)| format!("{name}={value}"))
+            .collect();
+        let place = if place.is_empty() {
+            String::new()
+        } else {
+            format!(" at {}", place.join(", "))
+        };
+        Err(Error::argument(format!(
+            "a delay is {value} s{place}: delays must not be negative"
+        )))
+    }
+}
+
+fn repeated(names: &[String]) -> Option<&String> {
+    let mut rest = names;
+    while let Some((name, others)) = rest.split_first() {
+        if others.contains(name) {
+            return Some(name);
+        }
+        rest = others;
+    }
+    None
+}
+
+/// The term's coefficient with numbers put in.
+fn value_of(term: &Term, values: &[f64]) -> f64 {
+    let mut product = term.coefficient;
+    for (value, exponent) in values.iter().zip(&term.exponents) {
+        // Repeated products, not powi: its bits differ from machine to machine.
+        for _ in 0..*exponent {
+            product *= value;
+        }
+    }
+    product
+}

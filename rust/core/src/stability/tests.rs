@@ -1,0 +1,354 @@
+use std::f64::consts::PI;
+
+use proptest::prelude::*;
+
+use super::{Affine, Axis, ENDLESS, Family, Term, UNKNOWN, judge, map};
+use crate::quasipoly::QuasiPolynomial;
+use crate::roots::{count_right_of, spectral_abscissa};
+use crate::status::CellStatus;
+use crate::{Error, Task};
+
+fn term(coefficient: f64, exponents: &[u32], power: u32, constant: f64, slopes: &[f64]) -> Term {
+    Term {
+        coefficient,
+        exponents: exponents.to_vec(),
+        power,
+        delay: Affine {
+            constant,
+            slopes: slopes.to_vec(),
+        },
+    }
+}
+
+fn names(text: &str) -> Vec<String> {
+    text.split(' ').map(str::to_owned).collect()
+}
+
+/// s + Kp e^(−s T).
+fn integrator() -> Family {
+    Family::new(
+        names("Kp T"),
+        vec![
+            term(1.0, &[0, 0], 1, 0.0, &[0.0, 0.0]),
+            term(1.0, &[1, 0], 0, 0.0, &[0.0, 1.0]),
+        ],
+    )
+    .unwrap()
+}
+
+/// s + (Kp + Kv s) e^(−0.36 s).
+fn velocity() -> Family {
+    Family::new(
+        names("Kp Kv"),
+        vec![
+            term(1.0, &[0, 0], 1, 0.0, &[0.0, 0.0]),
+            term(1.0, &[1, 0], 0, 0.36, &[0.0, 0.0]),
+            term(1.0, &[0, 1], 1, 0.36, &[0.0, 0.0]),
+        ],
+    )
+    .unwrap()
+}
+
+fn line(low: f64, high: f64, count: usize) -> Vec<f64> {
+    (0..count)
+        .map(|i| low + (high - low) * i as f64 / (count - 1) as f64)
+        .collect()
+}
+
+#[test]
+fn terms_of_one_delay_and_power_add_up() {
+    let family = Family::new(
+        names("a b"),
+        vec![
+            term(2.0, &[1, 0], 1, 0.1, &[0.0, 0.0]),
+            term(-1.0, &[0, 2], 1, 0.1, &[0.0, 0.0]),
+            term(3.0, &[0, 0], 0, 0.0, &[0.0, 0.1]),
+        ],
+    )
+    .unwrap();
+    let h = family.at(&[5.0, 3.0]).unwrap();
+    assert_eq!(h.delays(), [0.1, 0.1 * 3.0]);
+    assert_eq!(h.coefficients(), [vec![0.0, 1.0], vec![3.0]]);
+    // b = 1 makes the two delays one.
+    let h = family.at(&[1.0, 1.0]).unwrap();
+    assert_eq!(h.delays(), [0.1]);
+    assert_eq!(h.coefficients(), [vec![3.0, 1.0]]);
+}
+
+#[test]
+fn delays_equal_but_for_rounding_are_merged_and_rounded_negative_ones_are_zero() {
+    let family = Family::new(
+        names("T"),
+        vec![
+            term(1.0, &[0], 0, 0.3, &[0.0]),
+            term(1.0, &[0], 0, 0.1, &[1.0]),
+        ],
+    )
+    .unwrap();
+    // 0.1 + 0.2 is an ulp above 0.3.
+    let h = family.at(&[0.2]).unwrap();
+    assert_eq!(h.delays(), [0.3]);
+    assert_eq!(h.coefficients(), [vec![2.0]]);
+    let family = Family::new(names("T"), vec![term(1.0, &[0], 1, -0.3, &[3.0])]).unwrap();
+    // 3 · 0.1 − 0.3 is 5.6e-17, and negative a few ulp below 0.1.
+    let below = f64::from_bits(0.1f64.to_bits() - 4);
+    assert!(3.0 * below - 0.3 < 0.0);
+    assert_eq!(family.at(&[below]).unwrap().delays()[0], 0.0);
+    let error = family.at(&[0.09]).unwrap_err().to_string();
+    assert!(error.contains("T=0.09"), "{error}");
+}
+
+#[test]
+fn bad_families_and_values_are_refused() {
+    let ok = term(1.0, &[0], 1, 0.0, &[0.0]);
+    for bad in [
+        term(f64::NAN, &[0], 1, 0.0, &[0.0]),
+        term(1.0, &[0], 1, f64::INFINITY, &[0.0]),
+        term(1.0, &[0], 1, 0.0, &[f64::NAN]),
+        term(1.0, &[0, 1], 1, 0.0, &[0.0]),
+        term(1.0, &[0], 1, 0.0, &[]),
+        term(1.0, &[5000], 1, 0.0, &[0.0]),
+        term(1.0, &[0], 5000, 0.0, &[0.0]),
+    ] {
+        let made = Family::new(names("K"), vec![ok.clone(), bad]);
+        assert!(matches!(made, Err(Error::Argument(_))), "{made:?}");
+    }
+    assert!(Family::new(names("K K"), vec![]).is_err());
+    let family = integrator();
+    for values in [
+        &[1.0][..],
+        &[1.0, -0.1],
+        &[f64::NAN, 0.1],
+        &[1.0, f64::INFINITY],
+    ] {
+        assert!(matches!(family.at(values), Err(Error::Argument(_))));
+    }
+    assert!(
+        Family::new(names("K"), vec![])
+            .unwrap()
+            .at(&[1.0])
+            .unwrap()
+            .is_zero()
+    );
+}
+
+#[test]
+fn cells_of_every_kind_are_told_apart() {
+    let task = Task::new();
+    let make = |rows: &[&[f64]], delays: &[f64]| {
+        QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec()).unwrap()
+    };
+    let told = |h: &QuasiPolynomial| {
+        let cell = judge(h, true, &task).unwrap();
+        (cell.unstable, cell.status)
+    };
+    let s: &[f64] = &[0.0, 1.0];
+    assert_eq!(told(&make(&[s, &[2.0]], &[0.0, 0.36])), (0, CellStatus::Ok));
+    assert_eq!(told(&make(&[s, &[5.0]], &[0.0, 0.36])), (2, CellStatus::Ok));
+    assert_eq!(told(&make(&[s], &[0.0])), (UNKNOWN, CellStatus::Boundary));
+    let chain_leads = make(&[s, &[0.12, 0.984]], &[0.0, 0.36]);
+    assert_eq!(told(&chain_leads), (0, CellStatus::Chain));
+    let cell = judge(&chain_leads, true, &task).unwrap();
+    assert!((cell.abscissa - 0.984f64.ln() / 0.36).abs() < 1e-14);
+    assert_eq!(
+        told(&make(&[s, &[2.0, 1.0]], &[0.0, 0.36])),
+        (UNKNOWN, CellStatus::Boundary)
+    );
+    assert_eq!(
+        told(&make(&[s, &[2.0, -1.1]], &[0.0, 0.36])),
+        (ENDLESS, CellStatus::Infinite)
+    );
+    assert_eq!(
+        told(&make(&[&[1.0], s], &[0.0, 0.36])),
+        (ENDLESS, CellStatus::Infinite)
+    );
+    assert_eq!(
+        told(&make(&[&[1.0], &[0.5]], &[0.0, 0.36])),
+        (0, CellStatus::Chain)
+    );
+    assert_eq!(
+        told(&make(&[&[1.0], &[2.5]], &[0.0, 0.36])),
+        (ENDLESS, CellStatus::Infinite)
+    );
+    assert_eq!(told(&make(&[&[3.0]], &[0.0])), (0, CellStatus::Ok));
+    assert_eq!(
+        told(&QuasiPolynomial::zero()),
+        (UNKNOWN, CellStatus::Undecided)
+    );
+}
+
+/// The pairs of s + K e^(−s T) cross at K T = π/2 + 2πk; for K < 0 a real root is unstable and
+/// pairs cross at −K T = 3π/2 + 2πk.
+fn unstable_by_hand(gain: f64, delay: f64) -> i32 {
+    let turns = |start: f64| {
+        (((gain * delay).abs() - start) / (2.0 * PI))
+            .ceil()
+            .max(0.0) as i32
+    };
+    if gain > 0.0 {
+        2 * turns(PI / 2.0)
+    } else {
+        1 + 2 * turns(1.5 * PI)
+    }
+}
+
+#[test]
+fn the_delayed_integrator_follows_the_closed_form_everywhere() {
+    let (gains, delays) = (line(-30.0, 30.0, 40), line(0.0, 2.0, 31));
+    let axes = [
+        Axis {
+            parameter: 0,
+            points: &gains,
+        },
+        Axis {
+            parameter: 1,
+            points: &delays,
+        },
+    ];
+    let task = Task::new();
+    let chart = map(&integrator(), &[0.0, 0.0], axes, false, &task).unwrap();
+    assert_eq!(task.done(), 40 * 31);
+    let cells = gains
+        .iter()
+        .flat_map(|gain| delays.iter().map(move |delay| (*gain, *delay)));
+    for ((gain, delay), unstable) in cells.zip(&chart.unstable) {
+        assert_eq!(
+            *unstable,
+            unstable_by_hand(gain, delay),
+            "K={gain}, T={delay}"
+        );
+    }
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_number_of_threads() {
+    let (kp, kv) = (line(-1.0, 6.0, 15), line(-1.2, 1.2, 13));
+    let axes = [
+        Axis {
+            parameter: 0,
+            points: &kp,
+        },
+        Axis {
+            parameter: 1,
+            points: &kv,
+        },
+    ];
+    let run = |threads| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap()
+            .install(|| map(&velocity(), &[0.0, 0.0], axes, true, &Task::new()).unwrap())
+    };
+    let (one, four) = (run(1), run(4));
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&one.abscissa), bits(&four.abscissa));
+    assert_eq!((one.unstable, one.status), (four.unstable, four.status));
+}
+
+#[test]
+fn a_stopped_map_stops_and_bad_axes_are_refused() {
+    let points = line(0.1, 1.0, 3);
+    let axis = |parameter| Axis {
+        parameter,
+        points: &points,
+    };
+    let run = |values: &[f64], axes, task: &Task| map(&integrator(), values, axes, false, task);
+    let task = Task::new();
+    task.stop();
+    assert_eq!(
+        run(&[0.0; 2], [axis(0), axis(1)], &task),
+        Err(Error::Interrupted)
+    );
+    let task = Task::new();
+    assert!(run(&[0.0; 2], [axis(0), axis(0)], &task).is_err());
+    assert!(run(&[0.0; 2], [axis(0), axis(2)], &task).is_err());
+    assert!(run(&[0.0; 1], [axis(0), axis(1)], &task).is_err());
+    let negative = [0.1, -0.1];
+    let delays = Axis {
+        parameter: 1,
+        points: &negative,
+    };
+    assert!(run(&[0.0; 2], [axis(0), delays], &task).is_err());
+    let endless = [f64::NAN];
+    let gains = Axis {
+        parameter: 0,
+        points: &endless,
+    };
+    assert!(run(&[0.0; 2], [gains, axis(1)], &task).is_err());
+    let many = vec![1.0; 10_000];
+    let [a, b] = [0, 1].map(|parameter| Axis {
+        parameter,
+        points: &many,
+    });
+    assert!(matches!(
+        run(&[0.0; 2], [a, b], &task),
+        Err(Error::TooMuch { .. })
+    ));
+    let none = Axis {
+        parameter: 0,
+        points: &[],
+    };
+    assert_eq!(
+        run(&[0.0; 2], [none, axis(1)], &task).unwrap().status.len(),
+        0
+    );
+    assert_eq!(task.done(), 0);
+}
+
+/// Terms over two parameters with delays that are not negative for positive parameters.
+fn any_terms() -> impl Strategy<Value = Vec<Term>> {
+    let one = (
+        -3.0..3.0f64,
+        0..3u32,
+        0..3u32,
+        0..4u32,
+        0.0..1.0f64,
+        0.0..2.0f64,
+        0.0..2.0f64,
+    );
+    let one =
+        one.prop_map(|(c, a, b, power, constant, x, y)| term(c, &[a, b], power, constant, &[x, y]));
+    prop::collection::vec(one, 1..6)
+}
+
+proptest! {
+    #[test]
+    fn a_member_is_the_sum_of_its_terms(
+        terms in any_terms(),
+        a in 0.0..2.0f64,
+        b in 0.0..2.0f64,
+        x in -1.0..1.0f64,
+        y in -3.0..3.0f64,
+    ) {
+        let h = Family::new(names("a b"), terms.clone()).unwrap().at(&[a, b]).unwrap();
+        let s = num_complex::Complex64::new(x, y);
+        let (mut sum, mut size) = (num_complex::Complex64::ZERO, 0.0);
+        for term in &terms {
+            let gain = term.coefficient
+                * a.powi(term.exponents[0] as i32)
+                * b.powi(term.exponents[1] as i32);
+            let delay = term.delay.constant + term.delay.slopes[0] * a + term.delay.slopes[1] * b;
+            let value = gain * s.powu(term.power) * (-s * delay).exp();
+            sum += value;
+            size += value.norm() * (1.0 + delay * s.norm());
+        }
+        // Each side rounds a handful of times.
+        prop_assert!((h.value(s) - sum).norm() <= 1e-13 * size);
+    }
+
+    #[test]
+    fn a_cell_is_the_pointwise_call(kp in -1.0..8.0f64, kv in -0.95..0.95f64) {
+        let task = Task::new();
+        let axes = [
+            Axis { parameter: 0, points: &[kp] },
+            Axis { parameter: 1, points: &[kv] },
+        ];
+        let chart = map(&velocity(), &[0.0, 0.0], axes, true, &task).unwrap();
+        let h = velocity().at(&[kp, kv]).unwrap();
+        prop_assert_eq!(chart.unstable[0] as u64, count_right_of(&h, 0.0, &task).unwrap());
+        prop_assert_eq!(chart.abscissa[0], spectral_abscissa(&h, &task).unwrap());
+        // Both proved, hence never at odds.
+        prop_assert_eq!(chart.unstable[0] > 0, chart.abscissa[0] > 0.0);
+    }
+}

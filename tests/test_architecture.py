@@ -1,0 +1,173 @@
+"""Data flows one way: imports are read, and an arrow that runs back fails."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE = ROOT / "rust" / "core" / "src"
+BINDINGS = ROOT / "rust" / "bindings" / "src"
+PACKAGE = ROOT / "python" / "deadtime"
+
+# What each room of the core may use besides itself; error, status and task are for everyone.
+FOUNDATION = {"error", "status", "task"}
+CORE_ARROWS = {
+    "lambertw": set(),
+    "quasipoly": set(),
+    "roots": {"lambertw", "quasipoly"},
+    "stability": {"lambertw", "quasipoly", "roots"},
+    "dde": {"quasipoly"},
+}
+
+# Floors of the Python package, lowest first: a module uses its own floor and those below.
+FLOORS = [
+    {"_errors", "_validation", "_deadtime"},
+    {
+        "_special",
+        "_rootset",
+        "_parametric",
+        "_quasipolynomial",
+        "_plants",
+        "_controllers",
+        "_response",
+        "_loop",
+        "_loop_model",
+        "_loop_run",
+        "_loop_stability",
+        "_stability",
+    },
+    {"_recording"},
+    {"_readers", "_estimation", "_design"},
+    {"_experiment"},
+    {"_plots"},
+    {"_report"},
+    {"_cli"},
+]
+NUMERICS = FLOORS[1]
+
+
+def rust_sources(folder):
+    return sorted(folder.rglob("*.rs"))
+
+
+def room_of(path, folder):
+    first = path.relative_to(folder).parts[0]
+    return first.removesuffix(".rs")
+
+
+def test_the_core_has_the_rooms_the_table_names():
+    rooms = {room_of(path, CORE) for path in rust_sources(CORE)} - {"lib"}
+    assert rooms == set(CORE_ARROWS) | FOUNDATION
+
+
+@pytest.mark.parametrize("room", sorted(CORE_ARROWS))
+def test_a_room_of_the_core_uses_only_what_stands_before_it(room):
+    allowed = CORE_ARROWS[room] | FOUNDATION | {room, "Error", "Task"}
+    for path in rust_sources(CORE / room):
+        text = re.sub(r"//.*", "", path.read_text(encoding="utf-8"))
+        used = set(re.findall(r"\bcrate::(\w+)", text))
+        for group in re.findall(r"\bcrate::\{(.*?)\}\s*;", text, flags=re.DOTALL):
+            used |= set(re.findall(r"(?:^|,)\s*(\w+)", group))
+        assert used <= allowed, f"{path.name} of {room} uses {used - allowed}"
+
+
+def test_the_foundation_of_the_core_stands_alone():
+    for name in FOUNDATION:
+        used = set(re.findall(r"\buse crate::(\w+)", (CORE / f"{name}.rs").read_text()))
+        assert used <= FOUNDATION | {"Error"}, name
+
+
+def test_the_core_knows_nothing_of_python():
+    for path in rust_sources(CORE):
+        assert not re.search(r"\b(pyo3|numpy::)", path.read_text(encoding="utf-8")), path.name
+
+
+def test_the_seam_holds_no_formula():
+    # Converting needs no transcendental function; whoever needs one belongs in the core.
+    for path in rust_sources(BINDINGS):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"\.(exp|ln|sin|cos|sqrt|powi|powf)\(", text), path.name
+
+
+def floor_of(module):
+    for level, floor in enumerate(FLOORS):
+        if module in floor:
+            return level
+    raise AssertionError(f"the module {module} is on no floor: add it to the table of this test")
+
+
+def imports(path):
+    """Modules of the package that a file imports when it is loaded."""
+    found = set()
+
+    def visit(node):
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                continue  # what a function imports when called is drawing, never numerics
+            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
+                continue
+            if isinstance(child, ast.ImportFrom) and child.module:
+                parts = child.module.split(".")
+                if parts == ["deadtime"]:
+                    found.update(alias.name for alias in child.names)
+                elif parts[0] == "deadtime":
+                    found.add(parts[1])
+            elif isinstance(child, ast.Import):
+                for alias in child.names:
+                    parts = alias.name.split(".")
+                    if parts[0] == "deadtime" and len(parts) > 1:
+                        found.add(parts[1])
+            visit(child)
+
+    visit(ast.parse(path.read_text(encoding="utf-8")))
+    return found
+
+
+def modules():
+    for path in sorted(PACKAGE.rglob("*.py")):
+        name = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        if name not in ("__init__", "__main__"):
+            yield name, path
+
+
+def test_no_import_of_the_package_runs_upwards():
+    for name, path in modules():
+        level = floor_of(name)
+        for used in imports(path):
+            above = [other for other in FLOORS[level + 1 :] if used in other]
+            assert not above, f"{path.relative_to(PACKAGE)} imports {used} from a floor above"
+
+
+def test_only_numerics_import_the_native_module():
+    for name, path in modules():
+        if "_deadtime" in imports(path):
+            assert name in NUMERICS, f"{path.relative_to(PACKAGE)} imports _deadtime"
+
+
+def test_functions_import_only_drawing_and_optional_modules_late():
+    for name, path in modules():
+        if name in ("_cli", "_plots", "_report"):
+            continue
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for function in ast.walk(tree):
+            if not isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                continue
+            for node in ast.walk(function):
+                if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("deadtime"):
+                    assert node.module == "deadtime._plots", f"{path.name}: {node.module}"
+
+
+def test_every_public_name_is_listed_once_and_in_order():
+    text = (PACKAGE / "__init__.py").read_text(encoding="utf-8")
+    listed = next(
+        ast.literal_eval(node.value)
+        for node in ast.parse(text).body
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"
+    )
+    assert len(listed) == len(set(listed))
+    import deadtime
+
+    for name in listed:
+        assert hasattr(deadtime, name), name
