@@ -83,8 +83,9 @@ pub(super) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
         // The coefficients span more than double precision does.
         return f64::INFINITY;
     }
-    while high > 1.01 * low {
-        let middle = libm::sqrt(low * high);
+    // Halving a radius that is next to nothing would go on for ever at zero.
+    while low >= f64::MIN_POSITIVE && high > 1.01 * low {
+        let middle = libm::sqrt(low) * libm::sqrt(high);
         if exceeds(middle) {
             high = middle;
         } else {
@@ -164,6 +165,15 @@ mod tests {
         let radius = dominance(&h, (0.0, f64::INFINITY)).map(|d| d.radius);
         assert!(radius.is_some_and(|r| (2.0..2.03).contains(&r)));
         assert!(dominance(&h, (f64::NEG_INFINITY, 0.0)).is_none());
+    }
+
+    #[test]
+    fn the_radius_of_tiny_coefficients_is_found_too() {
+        // low·high = 1e-582 underflowed once, and the bisection never ended
+        for tiny in [1e-291, 5e-324] {
+            let radius = cauchy_radius(1.0, &[tiny]);
+            assert!(radius >= tiny && radius <= 2.01 * tiny, "{radius:e}");
+        }
     }
 
     #[test]
