@@ -261,7 +261,8 @@ def test_p_loop_of_the_paper():
 
 # Properties
 
-gains = st.floats(-3, 3)
+# Thousandths: what a loop has. Coefficients of 1e-300 are refused with the reason, not solved.
+gains = st.integers(-3000, 3000).filter(bool).map(lambda n: n / 1000)
 
 
 @st.composite
