@@ -14,7 +14,7 @@ from rich import box
 from rich.table import Table
 
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, estimates_table, print_json, save_figure, stages
+from deadtime._cli.show import console, counted, estimates_table, print_json, save_figure, stages
 from deadtime._design import design as find_design
 from deadtime._errors import DeadtimeError
 from deadtime._estimation import estimate_delay
@@ -208,7 +208,8 @@ def map_(
 ) -> None:
     """Map which gains of a PV controller are stable."""
     loop = _pv_loop(delay, gain, lag, sample_time, None, filter)
-    chart = stability_map(loop, {"Kp": kp, "Kv": kv}, shape=shape)
+    with counted("mapping", shape[0] * shape[1], quiet=as_json) as progress:
+        chart = stability_map(loop, {"Kp": kp, "Kv": kv}, shape=shape, progress=progress)
     share = float(np.mean(chart.stable))
     best, abscissa = chart.best() if share > 0.0 else (None, np.nan)
     if plot is not None:
@@ -275,13 +276,15 @@ def design(
     loop = _pv_loop(delay, gain, lag, sample_time, limit, filter)
     if (kp is None) != (kv is None):
         raise ValueError("give both --kp and --kv, or neither")
-    found = find_design(
-        loop,
-        controller=loop.controller,
-        delay=delay if delay_to is None else (delay, delay_to),
-        objective=objective,
-        ranges=None if kp is None or kv is None else {"Kp": kp, "Kv": kv},
-    )
+    with stages(1, quiet=as_json) as begin:
+        begin("mapping and searching")
+        found = find_design(
+            loop,
+            controller=loop.controller,
+            delay=delay if delay_to is None else (delay, delay_to),
+            objective=objective,
+            ranges=None if kp is None or kv is None else {"Kp": kp, "Kv": kv},
+        )
     response = found.loop.step_response()
     if plot is not None:
         figure, axes = new_figure(7.0, 4.5)

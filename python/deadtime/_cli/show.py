@@ -19,7 +19,7 @@ from deadtime._estimation.compare import COLUMNS, Comparison, truth_row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["estimates_table", "print_json", "save_figure", "stages"]
+__all__ = ["counted", "estimates_table", "print_json", "save_figure", "stages"]
 
 console = Console()
 PICTURES = (".png", ".svg", ".pdf")
@@ -70,20 +70,36 @@ def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = 
     return table
 
 
-@contextmanager
-def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """A progress bar over named stages, on standard error; call it as each stage begins."""
-    if quiet:
-        yield lambda stage: None
-        return
-    with Progress(
+def _bar() -> Progress:
+    """A progress bar on standard error that leaves nothing behind."""
+    return Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         TimeElapsedColumn(),
         console=Console(stderr=True),
         transient=True,
-    ) as progress:
+    )
+
+
+@contextmanager
+def counted(what: str, total: int, quiet: bool) -> Iterator[Callable[[int], object] | None]:
+    """A progress bar over so many items; call it with the number that is done."""
+    if quiet:
+        yield None
+        return
+    with _bar() as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done: progress.update(task, completed=done)
+
+
+@contextmanager
+def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """A progress bar over named stages, on standard error; call it as each stage begins."""
+    if quiet:
+        yield lambda stage: None
+        return
+    with _bar() as progress:
         task = progress.add_task("", total=count)
         begun = 0
 
