@@ -91,6 +91,7 @@ def test_a_fork_in_the_middle_of_a_computation_does_not_hang():
     assert result.stdout.strip() == "7", result.stderr
 
 
+@pytest.mark.usefixtures("listens_to_ctrl_c")
 def test_ctrl_c_stops_a_long_call():
     # The promise is 0.2 s on an idle machine; the bound here only tells stopping from not stopping.
     threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()

@@ -334,6 +334,7 @@ def test_failing_progress_stops_the_map():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
+@pytest.mark.usefixtures("listens_to_ctrl_c")
 def test_ctrl_c_stops_a_big_map():
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
