@@ -103,6 +103,10 @@ class ControlLoop:
             )
         LoopModel.build(self.plant, self.controller, self.parameters)
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Without what is kept for speed: the native loop does not pickle and is soon made again.
+        return {name: getattr(self, name) for name in _FIELDS}
+
     @property
     def is_sampled(self) -> bool:
         """Whether the command is held between samples."""

@@ -6,7 +6,7 @@ delay, so outputs are asked for that much later and their breaks are moved back.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +31,22 @@ _LEAST = 0.01
 _DOUBLINGS = 10
 _SETTLED = 0.005
 _LOST = 20.0
+
+
+class _Again(NamedTuple):
+    """The output of one run at any times: the run is made again for them.
+
+    Holds the loop rather than its native form, which does not pickle.
+    """
+
+    loop: ControlLoop
+    start: float
+    ahead: float
+    arguments: tuple[Any, ...]
+
+    def __call__(self, times: Vector) -> Vector:
+        since = times - self.start + self.ahead
+        return self.loop._native.simulate(since, np.empty(0), *self.arguments)[0]
 
 
 class _Jumps(NamedTuple):
@@ -83,9 +99,6 @@ def simulate_loop(
     since = _on_samples(times - start, start, loop.sample_time, sample_phase)
     outputs, inputs, output_breaks, input_breaks = native.simulate(since + ahead, since, *arguments)
 
-    def dense(at: Vector) -> Vector:
-        return native.simulate(at - start + ahead, np.empty(0), *arguments)[0]
-
     breaks = np.concatenate([output_breaks - ahead, input_breaks])
     return Response(
         time=times,
@@ -94,7 +107,7 @@ def simulate_loop(
         breaks=_distinct(breaks[breaks >= 0.0], delay) + start,
         reference=jumps.at(times),
         steady_state=_steady_state(loop, float(jumps.values[-1])),
-        _dense=dense,
+        _dense=_Again(loop, start, ahead, arguments),
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._errors import RecordingError
+from deadtime._frozen import ReadOnlyArrays
 
 __all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
 
@@ -42,7 +43,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(ReadOnlyArrays):
     """Reference and output of a loop over time, with the command where it was logged.
 
     Parameters

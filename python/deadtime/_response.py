@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from deadtime._frozen import ReadOnlyArrays, read_only
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +24,8 @@ _POINTS = 101
 _MAGNIFICATIONS = 4
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(ReadOnlyArrays):
     """Output and command of a loop over time.
 
     Unpacks into ``time, outputs``.
@@ -61,13 +63,19 @@ class Response:
     breaks: Vector
     reference: Vector
     steady_state: float | None = None
-    _dense: Callable[[Vector], Vector] | None = field(default=None, repr=False)
+    _dense: Callable[[Vector], Vector] | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "outputs", "inputs", "breaks", "reference"):
             array = np.array(getattr(self, name), dtype=np.float64)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(array))
+
+    def __repr__(self) -> str:
+        rests = "" if self.steady_state is None else f", steady state {self.steady_state:g}"
+        return (
+            f"<Response: {len(self.time)} output times, {self.time[0]:g} to {self.time[-1]:g} s"
+            f"{rests}>"
+        )
 
     def __iter__(self) -> Iterator[Vector]:
         yield self.time

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._loop_stability import sampled_grid
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial
@@ -47,7 +48,7 @@ class MapStatus(IntEnum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StabilityMap:
+class StabilityMap(ReadOnlyArrays):
     """Stability over two parameters; made by `stability_map`.
 
     Attributes
@@ -262,7 +263,7 @@ def stability_map(
         progress(cells)
     arrays: list[NDArray[Any]] = [*axes.values(), *found]
     for array in arrays:
-        array.flags.writeable = False
+        read_only(array)
     return StabilityMap(names, axes, *found)
 
 
