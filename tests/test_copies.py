@@ -1,14 +1,13 @@
-"""Loops and results go through pickle and copy, as pools of processes send them, and stay fixed."""
+"""Loops, results and errors go through pickle and copy, and stay read-only on the way."""
 
 import copy
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+import deadtime as dtm
 import numpy as np
 import pytest
-
-import deadtime as dtm
 
 LOOP = dtm.ControlLoop(
     dtm.Integrator(0.8), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065, limit=1.0

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._validation import finite, positive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,7 +111,14 @@ class Response(ReadOnlyArrays):
             ``rise_time``, ``settling_time``, ``peak_time`` in s from the first output time (NaN
             where the response does not get there), ``overshoot`` and ``undershoot`` in percent of
             the step, ``settling_min``, ``settling_max`` (the range once risen), ``peak`` (the
-            output farthest from zero) and ``steady_state``.
+            output farthest from zero) and ``steady_state``. Where the output starts at the steady
+            state there is no step: all but the peak and the steady state are NaN.
+
+        Raises
+        ------
+        ValueError
+            If `settling` is not above zero, `rise` is no increasing pair, or a number is not
+            finite.
 
         Examples
         --------
@@ -119,6 +127,12 @@ class Response(ReadOnlyArrays):
         >>> round(loop.simulate(np.linspace(0, 10, 501)).info()["overshoot"], 9)     # Kp Td - 1/2
         50.0
         """
+        settling = positive("settling", settling)
+        rise = (finite("rise", rise[0]), finite("rise", rise[1]))
+        if not 0.0 <= rise[0] < rise[1]:
+            raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
+        if steady_state is not None:
+            steady_state = finite("steady_state", steady_state)
         start, first = float(self.time[0]), float(self.outputs[0])
         if steady_state is None:
             known = self.steady_state

@@ -73,7 +73,8 @@ def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = 
 @contextmanager
 def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """A progress bar over named stages, on standard error; call it as each stage begins."""
-    if quiet:
+    errors = Console(stderr=True)
+    if quiet or not errors.is_terminal:
         yield lambda stage: None
         return
     with Progress(
@@ -81,7 +82,7 @@ def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
         TextColumn("{task.description}"),
         BarColumn(),
         TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=errors,
         transient=True,
     ) as progress:
         task = progress.add_task("", total=count)

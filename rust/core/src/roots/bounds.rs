@@ -84,7 +84,11 @@ pub(super) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
         return f64::INFINITY;
     }
     while high > 1.01 * low {
-        let middle = libm::sqrt(low * high);
+        // Not the root of the product, which leaves the range of double precision.
+        let middle = libm::sqrt(low) * libm::sqrt(high);
+        if !(low < middle && middle < high) {
+            break;
+        }
         if exceeds(middle) {
             high = middle;
         } else {
@@ -164,6 +168,15 @@ mod tests {
         let radius = dominance(&h, (0.0, f64::INFINITY)).map(|d| d.radius);
         assert!(radius.is_some_and(|r| (2.0..2.03).contains(&r)));
         assert!(dominance(&h, (f64::NEG_INFINITY, 0.0)).is_none());
+    }
+
+    #[test]
+    fn the_radius_is_found_at_either_end_of_double_precision() {
+        // Squares of these overflow or vanish: the bisection once never ended.
+        for size in [1e-320, 1e-300, 1e-200, 1e200, 1e300] {
+            let radius = cauchy_radius(1.0, &[size]);
+            assert!((1.0..1.02).contains(&(radius / size)), "{size}: {radius}");
+        }
     }
 
     #[test]
