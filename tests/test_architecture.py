@@ -23,7 +23,7 @@ CORE_ARROWS = {
 
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
 FLOORS = [
-    {"_errors", "_validation", "_deadtime"},
+    {"_errors", "_frozen", "_validation", "_deadtime"},
     {
         "_special",
         "_rootset",

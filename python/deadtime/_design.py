@@ -35,7 +35,7 @@ SEARCH_BAND = 0.018
 NEVER = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Design:
     """Gains, and the loop that has them.
 
@@ -65,6 +65,15 @@ class Design:
     objective: Objective
     value: float
     charts: tuple[StabilityMap, ...]
+
+    def __repr__(self) -> str:
+        kind = type(self.loop.controller).__name__
+        gains = ", ".join(f"{name} = {gain:.4g}" for name, gain in self.gains.items())
+        late = " to ".join(f"{end:g}" for end in dict.fromkeys((self.delays[0], self.delays[-1])))
+        return (
+            f"<Design {kind}, {gains}: spectral abscissa {self.abscissa:.4g} 1/s at a delay of "
+            f"{late} s>"
+        )
 
 
 def design(

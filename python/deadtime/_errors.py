@@ -6,6 +6,7 @@ Bad arguments are `ValueError` or `TypeError`; everything else derives from `Dea
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 __all__ = [
     "ContourError",
@@ -19,6 +20,17 @@ __all__ = [
 
 class DeadtimeError(Exception):
     """Base of every error that `deadtime` raises for other reasons than a bad argument."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By default an exception is made anew from its message alone, which drops its evidence or
+        # fails; in a pool of processes such a failure hides the error itself.
+        return _revived, (type(self), self.args, self.__dict__)
+
+
+def _revived(kind: type[DeadtimeError], args: tuple[Any, ...], state: Any) -> DeadtimeError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
 
 
 class ConvergenceError(DeadtimeError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
@@ -102,6 +103,10 @@ class ControlLoop:
                 f"delay_path={self.delay_path!r}: give one of {', '.join(map(repr, _PATHS))}"
             )
         LoopModel.build(self.plant, self.controller, self.parameters)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Without what is kept for speed: the native loop does not pickle and is soon made again.
+        return {name: getattr(self, name) for name in _FIELDS}
 
     @property
     def is_sampled(self) -> bool:
@@ -346,11 +351,12 @@ class ControlLoop:
         ValueError
             If the delay is None or `n` is less than one.
         """
-        if n < 1:
+        number = operator.index(n)
+        if number < 1:
             raise ValueError(f"n={n}: ask for one pole at least")
         if self.sample_time is None:
-            return self.characteristic().rightmost(n)
-        return sampled_roots(self.transition_matrix(), self.sample_time, n)
+            return self.characteristic().rightmost(number)
+        return sampled_roots(self.transition_matrix(), self.sample_time, number)
 
     def spectral_abscissa(self) -> float:
         """Return the largest real part of the poles in 1/s, limit left out.

@@ -6,14 +6,15 @@ delay, so outputs are asked for that much later and their breaks are moved back.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._loop_model import state_at_rest
 from deadtime._response import Response
-from deadtime._validation import finite
+from deadtime._validation import finite, real_array
 
 if TYPE_CHECKING:
     from deadtime._loop import ControlLoop
@@ -31,6 +32,23 @@ _LEAST = 0.01
 _DOUBLINGS = 10
 _SETTLED = 0.005
 _LOST = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Again:
+    """The output of one run at any times: the run is made again for them.
+
+    Holds the loop rather than its native form, which does not pickle.
+    """
+
+    loop: ControlLoop
+    start: float
+    ahead: float
+    arguments: tuple[Any, ...]
+
+    def __call__(self, times: Vector) -> Vector:
+        since = times - self.start + self.ahead
+        return self.loop._native.simulate(since, np.empty(0), *self.arguments)[0]
 
 
 class _Jumps(NamedTuple):
@@ -77,14 +95,11 @@ def simulate_loop(
         jumps.before,
         _on_samples(jumps.times - start, start, loop.sample_time, sample_phase),
         jumps.values,
-        np.ravel(np.asarray(command_history, dtype=np.float64)),
+        np.ravel(real_array("command_history", command_history)),
         finite("sample_phase", sample_phase),
     )
     since = _on_samples(times - start, start, loop.sample_time, sample_phase)
     outputs, inputs, output_breaks, input_breaks = native.simulate(since + ahead, since, *arguments)
-
-    def dense(at: Vector) -> Vector:
-        return native.simulate(at - start + ahead, np.empty(0), *arguments)[0]
 
     breaks = np.concatenate([output_breaks - ahead, input_breaks])
     return Response(
@@ -94,7 +109,7 @@ def simulate_loop(
         breaks=_distinct(breaks[breaks >= 0.0], delay) + start,
         reference=jumps.at(times),
         steady_state=_steady_state(loop, float(jumps.values[-1])),
-        _dense=dense,
+        _dense=_Again(loop, start, ahead, arguments),
     )
 
 
@@ -126,7 +141,7 @@ def _steady_state(loop: ControlLoop, reference: float) -> float | None:
 def _jumps(
     times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
 ) -> _Jumps:
-    values = np.asarray(reference, dtype=np.float64)
+    values = real_array("reference", reference)
     if values.ndim == 0:
         if reference_time is not None:
             raise ValueError(
@@ -144,7 +159,7 @@ def _jumps(
 
 
 def _increasing(name: str, given: ArrayLike) -> Vector:
-    times = np.atleast_1d(np.asarray(given, dtype=np.float64))
+    times = np.atleast_1d(real_array(name, given))
     if times.ndim != 1:
         raise ValueError(f"{name} has shape {times.shape}: give a one-dimensional array")
     if not np.isfinite(times).all():

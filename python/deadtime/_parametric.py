@@ -16,10 +16,10 @@ import math
 import numbers
 from collections.abc import Mapping
 from functools import cached_property
-from typing import SupportsFloat, TypeAlias
+from typing import SupportsFloat, TypeAlias, cast
 
 from deadtime._deadtime import Family
-from deadtime._quasipolynomial import QuasiPolynomial
+from deadtime._quasipolynomial import QuasiPolynomial, is_number
 from deadtime._validation import finite
 
 __all__ = ["Parameter", "ParametricQuasiPolynomial", "parameters"]
@@ -93,6 +93,9 @@ class ParametricQuasiPolynomial:
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a {type(self).__name__} does not change: cannot set {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a {type(self).__name__} does not change: cannot delete {name!r}")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -233,8 +236,8 @@ class ParametricQuasiPolynomial:
         return power
 
     def __truediv__(self, other: object) -> ParametricQuasiPolynomial:
-        if isinstance(other, numbers.Real):
-            divisor = finite("divisor", other)
+        if is_number(other):
+            divisor = finite("divisor", cast(float, other))
             return self._of(
                 self._names, {key: value / divisor for key, value in self._terms.items()}
             )
@@ -266,6 +269,12 @@ class Parameter(ParametricQuasiPolynomial):
     """A named number that has no value yet; made by `parameters`."""
 
     def __init__(self, name: str) -> None:
+        if not isinstance(name, str):
+            raise TypeError(f"name={name!r}: give a string, such as 'Kp'")
+        if not name.isidentifier() or keyword.iskeyword(name):
+            raise ValueError(f"{name!r} is no name: use letters, digits and underscores")
+        if name == "s":
+            raise ValueError("'s' is the variable of every quasi-polynomial: use another name")
         self._adopt((name,), {(((name, 1),), 0, _NO_DELAY): 1.0})
 
     @property
@@ -311,10 +320,6 @@ def parameters(names: str) -> tuple[Parameter, ...]:
     if not words:
         raise ValueError(f"names={names!r}: give at least one name")
     for word in words:
-        if not word.isidentifier() or keyword.iskeyword(word):
-            raise ValueError(f"{word!r} is no name: use letters, digits and underscores")
-        if word == "s":
-            raise ValueError("'s' is the variable of every quasi-polynomial: use another name")
         if words.count(word) > 1:
             raise ValueError(f"{word!r} is given twice: give every parameter its own name")
     return tuple(Parameter(word) for word in words)
@@ -331,8 +336,8 @@ def _coerced(other: object) -> tuple[tuple[str, ...], _Terms] | None:
                 if value != 0.0:
                     terms[(), power, (delay, ())] = value
         return (), terms
-    if isinstance(other, numbers.Real):
-        return (), {_ONE: finite("number", other)}
+    if is_number(other):
+        return (), {_ONE: finite("number", cast(float, other))}
     return None
 
 

@@ -276,7 +276,11 @@ def _trimmed(coefficients: Sequence[float]) -> NDArray[np.float64]:
 
 
 def _coefficients(name: str, given: Sequence[SupportsFloat]) -> tuple[float, ...]:
-    numbers = np.atleast_1d(np.asarray([finite(name, c) for c in given], dtype=np.float64))
+    try:
+        listed = list(given)
+    except TypeError as error:
+        raise TypeError(f"{name}={given!r}: give a sequence of coefficients") from error
+    numbers = np.asarray([finite(name, c) for c in listed], dtype=np.float64)
     if numbers.size == 0 or not numbers.any():
-        raise ValueError(f"{name}={list(given)}: give at least one coefficient other than zero")
+        raise ValueError(f"{name}={listed}: give at least one coefficient other than zero")
     return tuple(float(c) for c in _trimmed(numbers.tolist()))

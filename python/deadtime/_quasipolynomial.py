@@ -94,6 +94,9 @@ class QuasiPolynomial:
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a QuasiPolynomial does not change: cannot set {name!r}")
 
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a QuasiPolynomial does not change: cannot delete {name!r}")
+
     def __reduce__(self) -> tuple[Any, ...]:
         return (QuasiPolynomial, (self._coefficients, self._delays))
 
@@ -170,14 +173,14 @@ class QuasiPolynomial:
     def __mul__(self, other: object) -> QuasiPolynomial:
         if isinstance(other, QuasiPolynomial):
             return self._wrap(self._native.mul(other._native))
-        if _is_number(other):
+        if is_number(other):
             return self._wrap(self._native.scale(float(cast(float, other))))
         return NotImplemented
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: object) -> QuasiPolynomial:
-        if _is_number(other):
+        if is_number(other):
             divisor = float(cast(float, other))
             if divisor == 0.0:
                 raise ZeroDivisionError("division of a quasi-polynomial by zero")
@@ -187,7 +190,7 @@ class QuasiPolynomial:
         return NotImplemented
 
     def __rtruediv__(self, other: object) -> QuasiPolynomial:
-        if _is_number(other):
+        if is_number(other):
             raise TypeError(_NO_QUOTIENT)
         return NotImplemented
 
@@ -467,7 +470,7 @@ def delay(
     """
     if hasattr(T, "_exponential"):
         return T._exponential()
-    if not _is_number(T):
+    if not is_number(T):
         raise TypeError(f"T={T!r}: a delay is a real number of seconds")
     return QuasiPolynomial([[1.0]], [float(T)])
 
@@ -476,12 +479,13 @@ def _operand(value: object) -> QuasiPolynomial | None:
     """Turn a real number into a quasi-polynomial; None for foreign types."""
     if isinstance(value, QuasiPolynomial):
         return value
-    if _is_number(value):
+    if is_number(value):
         return QuasiPolynomial([[float(cast(float, value))]], [0.0])
     return None
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Whether algebra takes `value` for a real number: 0-d arrays too."""
     scalar = isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "biuf"
     return isinstance(value, Real | np.bool_) or scalar
 

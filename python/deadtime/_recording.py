@@ -8,8 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._errors import RecordingError
+from deadtime._frozen import ReadOnlyArrays
 
 __all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
+
+#: Larger values are of no physical quantity in any sensible unit, and their squares overflow.
+LARGEST = 1e100
 
 #: Fewer samples than this determine no delay: two parameters, a start, and something left over
 #: to judge the fit by.
@@ -42,7 +46,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(ReadOnlyArrays):
     """Reference and output of a loop over time, with the command where it was logged.
 
     Parameters
@@ -63,8 +67,8 @@ class Recording:
     Raises
     ------
     RecordingError
-        When the time does not increase, lengths differ, values are not finite, or there are
-        fewer than 8 samples.
+        When the time does not increase, lengths differ, values are not finite or beyond 1e100,
+        or there are fewer than 8 samples.
 
     Examples
     --------
@@ -176,7 +180,10 @@ class Recording:
 
 def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     try:
-        array = np.array(values, dtype=np.float64)
+        given = np.asarray(values)
+        if given.dtype.kind == "c":
+            raise TypeError("it is complex")
+        array = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise RecordingError(f"the {name} is not an array of numbers: {error}") from None
     if array.ndim != 1:
@@ -190,6 +197,11 @@ def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise RecordingError(
             f"the {name} is {array[bad[0]]} at row {bad[0]} ({bad.size} such values): leave such "
             "rows out or choose a window without them"
+        )
+    if np.max(np.abs(array)) > LARGEST:
+        raise RecordingError(
+            f"the {name} reaches {array[np.argmax(np.abs(array))]:g}: values beyond {LARGEST:g} "
+            "cannot be worked with, choose another unit"
         )
     array.flags.writeable = False
     return array

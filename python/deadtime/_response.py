@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._validation import finite, positive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +25,8 @@ _POINTS = 101
 _MAGNIFICATIONS = 4
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(ReadOnlyArrays):
     """Output and command of a loop over time.
 
     Unpacks into ``time, outputs``.
@@ -61,13 +64,19 @@ class Response:
     breaks: Vector
     reference: Vector
     steady_state: float | None = None
-    _dense: Callable[[Vector], Vector] | None = field(default=None, repr=False)
+    _dense: Callable[[Vector], Vector] | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "outputs", "inputs", "breaks", "reference"):
             array = np.array(getattr(self, name), dtype=np.float64)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(array))
+
+    def __repr__(self) -> str:
+        rests = "" if self.steady_state is None else f", steady state {self.steady_state:g}"
+        return (
+            f"<Response: {len(self.time)} output times, {self.time[0]:g} to {self.time[-1]:g} s"
+            f"{rests}>"
+        )
 
     def __iter__(self) -> Iterator[Vector]:
         yield self.time
@@ -102,7 +111,14 @@ class Response:
             ``rise_time``, ``settling_time``, ``peak_time`` in s from the first output time (NaN
             where the response does not get there), ``overshoot`` and ``undershoot`` in percent of
             the step, ``settling_min``, ``settling_max`` (the range once risen), ``peak`` (the
-            output farthest from zero) and ``steady_state``.
+            output farthest from zero) and ``steady_state``. Where the output starts at the steady
+            state there is no step: all but the peak and the steady state are NaN.
+
+        Raises
+        ------
+        ValueError
+            If `settling` is not above zero, `rise` is no increasing pair, or a number is not
+            finite.
 
         Examples
         --------
@@ -111,6 +127,12 @@ class Response:
         >>> round(loop.simulate(np.linspace(0, 10, 501)).info()["overshoot"], 9)     # Kp Td - 1/2
         50.0
         """
+        settling = positive("settling", settling)
+        rise = (finite("rise", rise[0]), finite("rise", rise[1]))
+        if not 0.0 <= rise[0] < rise[1]:
+            raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
+        if steady_state is not None:
+            steady_state = finite("steady_state", steady_state)
         start, first = float(self.time[0]), float(self.outputs[0])
         if steady_state is None:
             known = self.steady_state

@@ -9,13 +9,15 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._frozen import ReadOnlyArrays, read_only
+
 __all__ = ["RootSet"]
 
 _SHOWN = 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RootSet:
+class RootSet(ReadOnlyArrays):
     """Roots of a quasi-polynomial, each the centre of a disc proved to hold it.
 
     Behaves like the array of its roots: it has a length, can be indexed and iterated over, and
@@ -59,7 +61,7 @@ class RootSet:
 
     def __post_init__(self) -> None:
         for array in (self.roots, self.multiplicities, self.radii, self.resolved):
-            array.flags.writeable = False
+            read_only(array)
 
     def __len__(self) -> int:
         return len(self.roots)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
+from deadtime._validation import thread_number
 
 __all__ = ["dde_roots", "lambertw"]
 
@@ -77,7 +78,7 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
     w = _deadtime.lambertw(
         _native(_spread(points, shape), np.complex128),
         branches if branches.size == 1 else _spread(branches, shape),
-        threads,
+        thread_number(threads),
     )
     return (w.astype(np.complex64) if narrow else w)[()]
 
@@ -157,7 +158,7 @@ def dde_roots(
         _one_or_all(delayed, shape),
         _one_or_all(lag, shape),
         _spread(branches, shape),
-        threads,
+        thread_number(threads),
     )
     return s[()]
 

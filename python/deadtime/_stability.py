@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._loop_stability import sampled_grid
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial
-from deadtime._validation import finite
+from deadtime._validation import finite, thread_number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +48,7 @@ class MapStatus(IntEnum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StabilityMap:
+class StabilityMap(ReadOnlyArrays):
     """Stability over two parameters; made by `stability_map`.
 
     Attributes
@@ -248,6 +249,7 @@ def stability_map(
     <StabilityMap Kp 0.1 to 6 (60), Kv -0.9 to 0.9 (37): 1321 of 2220 stable>
     """
     names, axes = _axes(ranges, shape)
+    threads = thread_number(threads)
     cells = len(axes[names[0]]) * len(axes[names[1]])
     if isinstance(family, ControlLoop):
         found = _map_loop(family, names, axes, abscissa, threads, progress)
@@ -262,7 +264,7 @@ def stability_map(
         progress(cells)
     arrays: list[NDArray[Any]] = [*axes.values(), *found]
     for array in arrays:
-        array.flags.writeable = False
+        read_only(array)
     return StabilityMap(names, axes, *found)
 
 

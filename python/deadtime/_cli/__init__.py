@@ -28,6 +28,10 @@ def main() -> None:
             file=sys.stderr,
         )
         raise SystemExit(1)
-    from deadtime._cli.app import run
+    try:
+        from deadtime._cli.app import run
 
-    run()
+        run()
+    except KeyboardInterrupt:  # also while the rest is still being imported
+        print("deadtime: interrupted", file=sys.stderr)
+        raise SystemExit(130) from None

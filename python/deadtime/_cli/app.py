@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -52,16 +53,42 @@ Objective = Literal["abscissa", "settling_time"]
 Ends = tuple[float, float]
 
 
+#: What ends a command with one line; anything else is a defect and shows where it is.
+FAILURES = (
+    DeadtimeError,
+    ArithmeticError,
+    ImportError,
+    MemoryError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+
+
+#: Exit code after Ctrl-C.
+INTERRUPTED = 130
+
+
 def run() -> None:
     """Run the command; a failure is one line on standard error and a non-zero exit."""
     try:
         app()
-    except (DeadtimeError, ValueError, TypeError, OSError) as error:
-        print(f"deadtime: {' '.join(str(error).split())}", file=sys.stderr)
+    except SystemExit as ended:
+        if ended.code == INTERRUPTED:  # typer says nothing when it ends so
+            raise KeyboardInterrupt from None
+        raise
+    except BrokenPipeError:  # whoever read the output has had enough of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
-    except KeyboardInterrupt:
-        print("deadtime: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    except FAILURES as error:
+        told = str(error)
+        if isinstance(error, OSError) and error.filename is not None:
+            told = f"{error.filename}: {error.strerror}"
+        elif isinstance(error, MemoryError):
+            told = "out of memory: ask for less at once"
+        print(f"deadtime: {' '.join(told.split())}", file=sys.stderr)
+        raise SystemExit(1) from None
 
 
 @app.command()
@@ -276,6 +303,7 @@ def design(
     loop = _pv_loop(delay, gain, lag, sample_time, limit, filter)
     if (kp is None) != (kv is None):
         raise ValueError("give both --kp and --kv, or neither")
+    opt.check_duration(loop if delay_to is None else loop.replace(delay=delay_to))
     with stages(1, quiet=as_json) as begin:
         begin("mapping and searching")
         found = find_design(
@@ -341,6 +369,7 @@ def simulate(
         limit=limit,
         corner=filter,
     )
+    opt.check_duration(loop, duration)
     time = np.linspace(0.0, duration, points)
     response = loop.simulate(time, amplitude)
     if out is not None:
@@ -371,7 +400,8 @@ def simulate(
         )
         return
     for name, value in response.info().items():
-        console.print(f"{name.replace('_', ' '):<20}{value:.6g}", highlight=False)
+        shown = f"{value:.6g}" if np.isfinite(value) else "never, or not defined"
+        console.print(f"{name.replace('_', ' '):<20}{shown}", highlight=False)
 
 
 @app.command()

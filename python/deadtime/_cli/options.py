@@ -11,6 +11,7 @@ import typer
 from deadtime._controllers import PV, Controller, DerivativeFilter, P
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
+from deadtime._validation import finite
 
 __all__ = [
     "As_json",
@@ -29,6 +30,7 @@ __all__ = [
     "Sample_time",
     "Time",
     "Window",
+    "check_duration",
     "described_loop",
 ]
 
@@ -57,6 +59,12 @@ Plot = Annotated[Path | None, typer.Option(help="Write a picture to this .png, .
 As_json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
+#: How often the shortest time of a loop may go into the time simulated: a minute's work.
+MOST_PARTS = 1e6
+
+SHORT_TIMES = ("delay", "lag", "sample_time")
+
+
 def described_loop(
     kp: float,
     kv: float = 0.0,
@@ -81,3 +89,23 @@ def described_loop(
         sample_time=sample_time,
         limit=limit,
     )
+
+
+def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
+    """Refuse a simulation that would go on for minutes, because its parts are so short.
+
+    Without a `duration`: of ten times the longest time of the loop, as for a step response.
+    """
+    numbers = loop.parameters
+    times = {f"--{name.replace('_', '-')}": numbers.get(name, 0.0) for name in SHORT_TIMES}
+    if "omega" in numbers:
+        times["one over --filter"] = 1.0 / numbers["omega"]
+    if duration is None:
+        duration = 10.0 * max(times.values())
+    finite("--duration", duration)
+    for name, length in times.items():
+        if 0.0 < length < duration / MOST_PARTS:
+            raise ValueError(
+                f"{name} is {length:g} s, less than a millionth of the {duration:g} s to simulate: "
+                "that takes too long; leave out what lasts almost nothing, or shorten the rest"
+            )

@@ -70,6 +70,9 @@ def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = 
     return table
 
 
+ERRORS = Console(stderr=True)
+
+
 def _bar() -> Progress:
     """A progress bar on standard error that leaves nothing behind."""
     return Progress(
@@ -77,7 +80,7 @@ def _bar() -> Progress:
         TextColumn("{task.description}"),
         BarColumn(),
         TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=ERRORS,
         transient=True,
     )
 
@@ -85,7 +88,7 @@ def _bar() -> Progress:
 @contextmanager
 def counted(what: str, total: int, quiet: bool) -> Iterator[Callable[[int], object] | None]:
     """A progress bar over so many items; call it with the number that is done."""
-    if quiet:
+    if quiet or not ERRORS.is_terminal:
         yield None
         return
     with _bar() as progress:
@@ -96,7 +99,7 @@ def counted(what: str, total: int, quiet: bool) -> Iterator[Callable[[int], obje
 @contextmanager
 def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """A progress bar over named stages, on standard error; call it as each stage begins."""
-    if quiet:
+    if quiet or not ERRORS.is_terminal:
         yield lambda stage: None
         return
     with _bar() as progress:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from deadtime._estimation.residuals import Whiteness
+from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 
@@ -43,7 +44,7 @@ class CramerRaoBound:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DelayEstimate:
+class DelayEstimate(ReadOnlyArrays):
     """A loop with its delay, and the uncertainty of every number that was fitted.
 
     Attributes
@@ -91,6 +92,10 @@ class DelayEstimate:
     message: str
     uncalibrated: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        read_only(self.cov)
+        read_only(self.residuals)
 
     @property
     def delay(self) -> float:

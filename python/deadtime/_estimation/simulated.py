@@ -13,12 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._controllers import P
+from deadtime._errors import RecordingError
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 
 __all__ = ["SimulatedRecording"]
 
 Array = NDArray[np.float64]
+
+#: Longest window, in samples of the recording and in samples of the loop.
+MOST_SAMPLES = 50_000
 
 
 class SimulatedRecording:
@@ -43,6 +47,7 @@ class SimulatedRecording:
         rows = recording.rows(*(window or (None, None)))
         self.loop = loop
         self.recording = recording.window(*(window or (None, None)))
+        _check_work(self.recording, loop)
         self._past = _past_commands(recording, loop, rows.start)
 
     def output(self, values: Mapping[str, float], start: float) -> Array:
@@ -60,6 +65,25 @@ class SimulatedRecording:
     def residuals(self, values: Mapping[str, float], start: float) -> Array:
         """Recorded minus simulated output."""
         return self.recording.output - self.output(values, start)
+
+
+def _check_work(window: Recording, loop: ControlLoop) -> None:
+    """Refuse what would take minutes: a fit simulates the window some hundred times."""
+    advice = "use a window around one step"
+    if len(window) > MOST_SAMPLES:
+        raise RecordingError(
+            f"{len(window)} samples are more than the {MOST_SAMPLES} that a fit can simulate in "
+            f"reasonable time: {advice}, or keep every tenth sample"
+        )
+    held = 0.0
+    if loop.sample_time is not None:
+        held = float(window.time[-1] - window.time[0]) / loop.sample_time
+    if held > MOST_SAMPLES:
+        raise RecordingError(
+            f"the recording lasts {window.time[-1] - window.time[0]:g} s, {held:.3g} times the "
+            f"sample_time of {loop.sample_time:g} s: {advice}, and check that its time stamps are "
+            "seconds"
+        )
 
 
 def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array:

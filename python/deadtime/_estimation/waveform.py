@@ -14,7 +14,7 @@ ones and the result says that the model is not adequate.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,6 +69,7 @@ def estimate_by_waveform(
     jacobian, residuals = solution.jacobian, -solution.misfit
     values = dict(zip(names, (float(value) for value in solution.parameters), strict=False))
 
+    _check_ends(values, problem.ends())
     held = [name for name in names if name != "gain" and values[name] <= 1e-9]
     loose = [i for i, name in enumerate((*names, "start")) if name not in held]
     _check_distinguishable(jacobian[:, loose], [(*names, "initial output")[i] for i in loose])
@@ -169,13 +170,15 @@ class _Problem:
         }
         return [grids[name] for name in self.names]
 
+    def ends(self) -> dict[str, tuple[float, float]]:
+        """Between which values each quantity is sought."""
+        gain = self.simulated.loop.parameters.get("gain", 1.0)
+        low, high = sorted((1e-3 * gain, 1e3 * gain))
+        return {"delay": (0.0, self.span), "gain": (low, high), "lag": (0.0, self.span)}
+
     def _refine(self, start: Array) -> _Minimum:
         gain = self.simulated.loop.parameters.get("gain", 1.0)
-        ends = {
-            "delay": (0.0, self.span),
-            "gain": tuple(sorted((1e-3 * gain, 1e3 * gain))),
-            "lag": (0.0, self.span),
-        }
+        ends = self.ends()
         low = [ends[name][0] for name in self.names] + [-np.inf]
         high = [ends[name][1] for name in self.names] + [np.inf]
         scale = {"delay": 0.1 * self.span, "gain": abs(gain), "lag": 0.1 * self.span}
@@ -226,6 +229,18 @@ def _check_excitation(data: Recording, parameters: int) -> None:
         raise NotIdentifiableError(
             f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
         )
+
+
+def _check_ends(values: Mapping[str, float], ends: Mapping[str, tuple[float, float]]) -> None:
+    """Refuse a fit that ran to an end of its search; a delay or lag of zero is an answer."""
+    for name, value in values.items():
+        for end in ends[name]:
+            if end != 0.0 and abs(value - end) <= 1e-3 * abs(end):
+                raise NotIdentifiableError(
+                    f"the fit runs away to a {name} of {end:g}, the end of its search: the output "
+                    "is no answer of such a loop to this reference; check columns, signs, units "
+                    "and gains, and choose a window around one step"
+                )
 
 
 def _check_distinguishable(jacobian: Array, names: list[str]) -> None:

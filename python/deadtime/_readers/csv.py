@@ -6,6 +6,7 @@ import csv
 import difflib
 import math
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from deadtime._errors import RecordingError
 from deadtime._recording import Recording
 
 __all__ = ["read_recording"]
+
+DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def read_recording(
@@ -72,6 +75,7 @@ def read_recording(
     columns: dict[str, list[float]] = {signal: [] for signal in names}
     last = None
     for number, cells in lines:
+        _check_width(path, number, cells, len(header))
         now = _value(path, number, cells, places["time"], time)
         if last is not None and now <= last:
             what = "repeats" if now == last else "goes back"
@@ -167,16 +171,30 @@ def _place(path: Path, header: list[str], signal: str, name: str) -> int:
     raise RecordingError(f"{path} has no column {name!r} for the {signal}: it has {shown}{hint}")
 
 
+def _check_width(path: Path, number: int, cells: list[str], width: int) -> None:
+    if any(cell.strip() for cell in cells[width:]):
+        raise RecordingError(
+            f"{path}, line {number}: {len(cells)} cells under {width} column names; if commas "
+            "stand for decimal points, write points"
+        )
+
+
 def _value(path: Path, number: int, cells: list[str], place: int, name: str) -> float:
     if place >= len(cells):
         raise RecordingError(
             f"{path}, line {number}: {len(cells)} cells, so none for the column {name!r}"
         )
+    cell = cells[place]
     try:
-        value = float(cells[place])
+        if "_" in cell:  # Python would read 1_000 as a thousand
+            raise ValueError
+        value = float(cell)
     except ValueError:
+        hint = ""
+        if DECIMAL_COMMA.fullmatch(cell.strip()):
+            hint = ": write a decimal point instead of the comma"
         raise RecordingError(
-            f"{path}, line {number}: {cells[place]!r} in column {name!r} is not a number"
+            f"{path}, line {number}: {cell!r} in column {name!r} is not a number{hint}"
         ) from None
     if not math.isfinite(value):
         raise RecordingError(

@@ -26,6 +26,9 @@ const POLL: Duration = Duration::from_millis(20);
 /// Environment variables that limit the number of threads, the first one set wins.
 const THREAD_VARIABLES: [&str; 2] = ["DEADTIME_NUM_THREADS", "RAYON_NUM_THREADS"];
 
+/// More threads than any machine this runs on has use for; asking for a million of them hangs it.
+const MAX_THREADS: usize = 1024;
+
 struct Pool {
     process: u32,
     threads: usize,
@@ -149,7 +152,7 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
 /// Number of threads: argument, then environment, then the machine.
 fn wanted(threads: Option<usize>) -> PyResult<usize> {
     if let Some(threads) = threads {
-        return at_least_one("threads", threads);
+        return sensible("threads", threads);
     }
     for variable in THREAD_VARIABLES {
         if let Ok(text) = std::env::var(variable) {
@@ -164,20 +167,20 @@ fn wanted(threads: Option<usize>) -> PyResult<usize> {
             })?;
             // Rayon reads 0 as "the machine decides".
             if threads > 0 {
-                return Ok(threads);
+                return sensible(variable, threads);
             }
         }
     }
     Ok(std::thread::available_parallelism().map_or(1, usize::from))
 }
 
-fn at_least_one(name: &str, threads: usize) -> PyResult<usize> {
-    if threads == 0 {
-        return Err(PyValueError::new_err(format!(
-            "{name}=0: give a whole number of at least 1, or None for all cores"
-        )));
+fn sensible(name: &str, threads: usize) -> PyResult<usize> {
+    if (1..=MAX_THREADS).contains(&threads) {
+        return Ok(threads);
     }
-    Ok(threads)
+    Err(PyValueError::new_err(format!(
+        "{name}={threads}: give a whole number from 1 to {MAX_THREADS}, or None for all cores"
+    )))
 }
 
 /// Number of threads that kernels use.
