@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 INTEGRATOR = dtm.Integrator()
@@ -679,3 +680,54 @@ def test_limit_and_hold_do_not_see_the_impulse():
             pv.replace(**fields).simulate(TIMES).outputs,
         )
     assert np.abs(pd.simulate(TIMES).outputs - pv.simulate(TIMES).outputs).max() > 0.1
+
+
+def test_a_slow_crossing_of_the_limit_is_passed():
+    # The integral takes the command through its limit again and again, rounding made each of
+    # these crossings look like many, in steps too short to change the state.
+    plant, limit = dtm.RationalPlant([1.0], [1.0, 0.4, 4.0]), 1.0
+    loop = dtm.ControlLoop(plant, dtm.PI(1.0, 0.3), delay=0.0, limit=limit)
+    time = np.linspace(0.0, 40.0, 401)
+
+    def slope(_, x):
+        y, v, integral = x
+        w = np.clip(1.0 - y + 0.3 * integral, -limit, limit)
+        return [v, w - 0.4 * v - 4.0 * y, 1.0 - y]
+
+    truth = solve_ivp(
+        slope, (0.0, 40.0), [0.0, 0.0, 0.0], t_eval=time, rtol=1e-11, atol=1e-12, max_step=0.1
+    )
+    # The error that solve_ivp was asked for, over 400 steps.
+    np.testing.assert_allclose(loop.simulate(time, 1.0).outputs, truth.y[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("fast", [30.0, 1000.0])
+def test_fast_poles_cost_what_their_rate_costs(fast):
+    # In observable canonical form the entries grow like fast², which the length of an element
+    # must not depend on: 20 million of them would not reach the end.
+    poles = np.array([-1.0, -fast, -1.3 * fast])
+    gain = -np.prod(poles)
+    loop = dtm.ControlLoop(dtm.RationalPlant([gain], np.poly(poles)), dtm.P(1.0), delay=2.0)
+    time = np.linspace(0.0, 4.0, 41)
+    residues = [gain / (p * np.prod(p - poles[poles != p])) for p in poles]
+    since = np.maximum(time - 2.0, 0.0)
+    truth = (time > 2.0) * (1.0 + np.exp(np.outer(since, poles)) @ residues)
+    # 1e-12: the cancellation of states of size fast² in the canonical form.
+    np.testing.assert_allclose(loop.simulate(time, 1.0).outputs, truth, atol=1e-12)
+
+
+def test_an_ideal_derivative_over_a_short_lag_without_a_delay():
+    # Closing the loop makes entries of 3e7 of a plant whose fastest rate is 1.3e4.
+    plant, controller = dtm.Integrator(1.0, 1e-4), dtm.PV(2.0, 0.3)
+    loop = dtm.ControlLoop(plant, controller, delay=0.0)
+    time = np.linspace(0.0, 5.0, 51)
+    poles = np.roots([1e-4, 1.3, 2.0])
+    residues = [2e4 / (p * (p - q)) for p, q in (poles, poles[::-1])]
+    truth = 1.0 + np.exp(np.outer(time, poles)) @ residues
+    np.testing.assert_allclose(loop.simulate(time, 1.0).outputs, truth, atol=1e-12)
+
+
+def test_a_delay_of_almost_nothing_is_refused_at_once():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=1e-9)
+    with pytest.raises(ValueError, match="set to zero"):
+        loop.simulate([0.0, 1.0])

@@ -6,7 +6,9 @@
 //! F(2h) = 2 F + F² for F = Φ − I, Γ(2h) = 2 Γ + F Γ. Working with Φ − I keeps slow modes beside
 //! fast ones, and keeping Γ apart from Φ keeps a large input gain from forcing more doublings
 //! than A needs. Sastre et al. and Higham (Functions of Matrices, 2008, section 10.3) treat
-//! scaling and squaring in general; this is its plain form for a handful of states.
+//! scaling and squaring in general; this is its plain form for a handful of states. The norm is
+//! that of A balanced: with states scaled by powers of two every operation here gives the same
+//! bits, so badly chosen units of the states must not cost doublings.
 //! Guaranteed: the truncated series is below rounding. Not guaranteed: full relative accuracy of
 //! entries far below ‖Φ‖ for strongly non-normal A.
 
@@ -24,7 +26,7 @@ impl Propagator {
     /// For A (n × n row-major), input columns g_i (n each) and step length `h` ≥ 0.
     pub fn new(a: &[f64], inputs: &[&[f64]], h: f64) -> Self {
         let n = inputs.first().map_or_else(|| side(a), |g| g.len());
-        let doublings = doublings(norm(a, n) * h);
+        let doublings = doublings(balanced_norm(a, n) * h);
         let step = h * 0.5_f64.powi(doublings);
         let mut growth = vec![0.0; n * n];
         let mut gamma = vec![0.0; n * inputs.len()];
@@ -150,8 +152,56 @@ pub(crate) fn multiply_add(a: &[f64], x: &[f64], out: &mut [f64]) {
     }
 }
 
+/// Rounds of balancing; few are needed, since states are few.
+const ROUNDS: usize = 100;
+
+/// ‖D⁻¹ A D‖₁, the largest column sum, with D = diag(2^k) chosen to make it small.
+///
+/// Osborne 1960, in powers of two: each state in turn is scaled until its row and its column,
+/// diagonal left out, are of one size. A state that only drives or is only driven can be scaled
+/// at will, and is, until that no longer matters beside the diagonal.
+pub(crate) fn balanced_norm(a: &[f64], n: usize) -> f64 {
+    let mut a = a.to_vec();
+    let diagonal = (0..n).fold(0.0_f64, |most, i| most.max(a[i * n + i].abs()));
+    let floor = (0.125 * diagonal).max(f64::MIN_POSITIVE);
+    for _ in 0..ROUNDS {
+        let mut settled = true;
+        for i in 0..n {
+            let others = (0..n).filter(|&j| j != i);
+            let column: f64 = others.clone().map(|j| a[j * n + i].abs()).sum();
+            let row: f64 = others.map(|j| a[i * n + j].abs()).sum();
+            if column.max(row) <= floor {
+                continue;
+            }
+            // A chain of integrators alone has no rate to stop at.
+            if (column == 0.0 || row == 0.0) && diagonal == 0.0 {
+                continue;
+            }
+            let (column, row) = (column.max(floor), row.max(floor));
+            let exponent = (0.5 * libm::log2(row / column))
+                .round()
+                .clamp(-500.0, 500.0);
+            let factor = libm::exp2(exponent);
+            if column * factor + row / factor >= 0.95 * (column + row) {
+                continue;
+            }
+            settled = false;
+            for j in 0..n {
+                if j != i {
+                    a[j * n + i] *= factor;
+                    a[i * n + j] /= factor;
+                }
+            }
+        }
+        if settled {
+            break;
+        }
+    }
+    norm(&a, n)
+}
+
 /// ‖A‖₁, the largest column sum.
-pub(crate) fn norm(a: &[f64], n: usize) -> f64 {
+fn norm(a: &[f64], n: usize) -> f64 {
     (0..n)
         .map(|column| (0..n).map(|row| a[row * n + column].abs()).sum())
         .fold(0.0, f64::max)
@@ -224,6 +274,32 @@ mod tests {
                 -388.702_329_230_797_95,
             ],
             1e-14,
+        );
+    }
+
+    #[test]
+    fn units_of_the_states_do_not_matter() {
+        // Poles −1000, −1300 and −1 in observable canonical form: entries up to 1.3e6, rates up
+        // to 1.3e3.
+        let a = [-2301.0, 1.0, 0.0, -1_302_300.0, 0.0, 1.0, -1.3e6, 0.0, 0.0];
+        assert!(balanced_norm(&a, 3) < 6e3);
+        let slow: Vec<f64> = a.iter().map(|a| a * 2f64.powi(-30)).collect();
+        assert_eq!(
+            balanced_norm(&slow, 3),
+            balanced_norm(&a, 3) * 2f64.powi(-30)
+        );
+        // A lag before an integrator: the integrator's unit is anyone's choice.
+        assert!(balanced_norm(&[-1e-6, 1.0, 0.0, 0.0], 2) < 2e-6);
+        assert_eq!(balanced_norm(&[0.0, 3.0, 0.0, 0.0], 2), 3.0);
+        assert_eq!(balanced_norm(&[], 0), 0.0);
+        // x₁ after a unit impulse on the last state, by partial fractions.
+        let h: f64 = 0.0325;
+        let found = Propagator::new(&a, &[&[0.0, 0.0, 1.0]], h).phi()[2];
+        let truth = (-h).exp() / (999.0 * 1299.0) - (-1000.0 * h).exp() / (999.0 * 300.0)
+            + (-1300.0 * h).exp() / (1299.0 * 300.0);
+        assert!(
+            (found / truth - 1.0).abs() < 2e-14,
+            "{found:e} is not {truth:e}"
         );
     }
 

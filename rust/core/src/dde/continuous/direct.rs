@@ -3,7 +3,9 @@
 //! For L < 1, or for any L ≠ 1 without a limit, w = sat(v) with v = (K x + M r)/(1 − L) is its one
 //! solution. The loop is then linear where |v| ≤ limit and has a constant command elsewhere; an
 //! element ends where v crosses the limit. The two fields agree there, so the state passes
-//! through and never slides.
+//! through and never slides. v is known to rounding of its parts, so a crossing counts only if
+//! v gets clear of the limit by more than that: else rounding alone could change the mode for
+//! ever, in steps of time too short to change the state.
 
 use crate::dde::linear::{
     LinearLoop, Reference, Start, Trajectory, Wanted, check_growth, dot, saturate, slack,
@@ -19,6 +21,22 @@ const MOST_CHANGES: u32 = 2;
 
 /// Room left when an element is shortened.
 const MARGIN: f64 = 0.95;
+
+/// Rounding of v, relative to the sum of its parts.
+const NOISE: f64 = 16.0 * f64::EPSILON;
+
+/// Does v get more than `noise` beyond the limit that `mode` and the mode of the stretch share?
+fn is_clear(v: &Series, stretch: &Stretch, mode: Mode, limit: f64, noise: f64) -> bool {
+    [0.25, 0.5, 0.75, 1.0].into_iter().any(|part| {
+        let v = v.at(stretch.start + part * (stretch.end - stretch.start));
+        match (mode, stretch.mode) {
+            (Mode::High, _) => v < limit - noise,
+            (Mode::Low, _) => v > -limit + noise,
+            (Mode::Free, Mode::High) => v > limit + noise,
+            (Mode::Free, _) => v < -limit - noise,
+        }
+    })
+}
 
 pub(super) fn run(
     plant: &LinearLoop,
@@ -98,8 +116,11 @@ pub(super) fn run(
         let mut end = 1.0;
         if let Some(limit) = limit {
             stretches(&v, limit, &mut modes);
+            let noise = NOISE * (expansion.size(&closed.k) + (closed.m * r).abs() + limit);
             let leaves = |stretch: &&Stretch| {
-                stretch.mode != mode && (stretch.start > 0.0 || changes < MOST_CHANGES)
+                stretch.mode != mode
+                    && (stretch.start > 0.0 || changes < MOST_CHANGES)
+                    && is_clear(&v, stretch, mode, limit, noise)
             };
             if let Some(other) = modes.iter().find(leaves).copied() {
                 end = other.start;

@@ -35,6 +35,10 @@ pub(crate) fn run(
     task: &Task,
 ) -> Result<Trajectory, Error> {
     if plant.delay() > 0.0 {
+        // No element is longer than the delay: work without end is refused before it starts.
+        if wanted.last() / plant.delay() >= MOST_ELEMENTS as f64 {
+            return Err(endless());
+        }
         run::run(plant, start, reference, wanted, task)
     } else {
         direct::run(plant, start, reference, wanted, task)
@@ -47,14 +51,18 @@ fn watch(elements: u64, task: &Task) -> Result<(), Error> {
         task.check()?;
     }
     if elements >= MOST_ELEMENTS {
-        return Err(Error::TooMuch {
-            what: "the continuous response",
-            limit: MOST_ELEMENTS,
-            unit: "elements of time",
-            advice: "shorten the time simulated; a delay or a lag of almost nothing is better set \
-                     to zero"
-                .to_owned(),
-        });
+        return Err(endless());
     }
     Ok(())
+}
+
+fn endless() -> Error {
+    Error::TooMuch {
+        what: "the continuous response",
+        limit: MOST_ELEMENTS,
+        unit: "elements of time",
+        advice: "shorten the time simulated; a delay or a lag of almost nothing is better set to \
+                 zero"
+            .to_owned(),
+    }
 }

@@ -14,7 +14,8 @@ const NEGLIGIBLE: f64 = 1e-17;
 /// have no relative precision, from shortening the element.
 const NOTHING: f64 = 1e-280;
 
-/// An element is tried no longer than this over ‖A‖₁, which keeps coefficients from overflowing.
+/// An element is tried no longer than this over the norm of A balanced, which keeps coefficients
+/// from overflowing.
 const TRIAL: f64 = 16.0;
 
 /// Coefficients of σ^j; those above `degree` are zero.
@@ -95,7 +96,7 @@ pub(super) struct Expansion {
 impl Expansion {
     /// For x′ = A x + …, A being the equations' own or a closed-loop one.
     pub(super) fn new(a: &[f64], n: usize) -> Self {
-        let norm = crate::dde::propagator::norm(a, n);
+        let norm = crate::dde::propagator::balanced_norm(a, n);
         Self {
             n,
             terms: vec![0.0; (DEGREE + 1) * n],
@@ -214,6 +215,16 @@ impl Expansion {
         }
         out.trim();
         out
+    }
+
+    /// Σ |k_i| max |x_i| on the element, or somewhat more: what rounding of `row` x is relative to.
+    pub(super) fn size(&self, row: &[f64]) -> f64 {
+        (0..=self.degree)
+            .map(|j| {
+                let terms = row.iter().zip(&self.terms[j * self.n..]);
+                terms.map(|(k, x)| (k * x).abs()).sum::<f64>()
+            })
+            .sum()
     }
 
     /// u on the element.
