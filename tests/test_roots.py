@@ -261,7 +261,8 @@ def test_p_loop_of_the_paper():
 
 # Properties
 
-gains = st.floats(-3, 3)
+# Coefficients of 1e-300 are beyond the promise: they are refused, see test_hostile.
+gains = st.floats(-3, 3).filter(lambda gain: gain == 0.0 or abs(gain) > 1e-100)
 
 
 @st.composite
