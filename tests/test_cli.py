@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -59,6 +60,27 @@ def test_the_demo_writes_a_flight_and_a_self_contained_report(demo):
     assert "<script" not in page
     assert "<link" not in page
     assert 'src="' not in page
+
+
+def test_the_report_is_valid_and_says_what_its_pictures_show(demo):
+    folder, _ = demo
+    page = (folder / "demo" / "report.html").read_text(encoding="utf-8")
+    names = re.findall(r'\bid="([^"]+)"', page)
+    assert len(names) == len(set(names)), "two parts of the page have one name"
+    used = re.findall(r'(?:href="#|url\(#|aria-labelledby=")([^")]+)', page)
+    assert used
+    assert set(used) <= set(names)
+    assert page.count('role="img"') == 3
+    assert '<html lang="en">' in page
+    assert '<th scope="col">' in page
+
+
+def test_a_narrow_terminal_leaves_out_no_digits(demo):
+    folder, _ = demo
+    file = folder / "demo" / "flight.csv"
+    narrow = run("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN, COLUMNS="40").stdout
+    assert "…" not in narrow
+    assert "waveform with lag" in narrow
 
 
 def test_the_three_commands_that_the_demo_ends_with_run(demo):

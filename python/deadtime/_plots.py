@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,15 +57,20 @@ def shown_axes(ax: Axes | None) -> Axes:
     return pyplot.subplots(layout="constrained")[1]
 
 
-def as_svg(figure: Figure) -> str:
-    """A figure as an SVG element to be put into a page; the same picture gives the same text."""
+def as_svg(figure: Figure, name: str) -> str:
+    """A figure as an SVG element to be put into a page; the same picture gives the same text.
+
+    Matplotlib names the parts of every picture alike; `name` before them tells the pictures of
+    one page apart.
+    """
     import matplotlib
 
     text = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "deadtime", "svg.fonttype": "none"}):
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     drawing = text.getvalue()
-    return drawing[drawing.index("<svg") :]
+    drawing = drawing[drawing.index("<svg") :]
+    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", drawing)
 
 
 def plot_fits(

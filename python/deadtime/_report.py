@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from deadtime._estimation.compare import COLUMNS, LABELS, truth_row
 from deadtime._experiment import Study
@@ -15,6 +16,9 @@ from deadtime._plots import (
     plot_responses,
     plot_stability_map,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["write_report"]
 
@@ -89,12 +93,13 @@ def _controlled(study: Study) -> str:
 
 def _estimates(study: Study) -> str:
     width = len(COLUMNS)
+    head = _row(COLUMNS, "th", width).replace("<th>", '<th scope="col">')
     body = [_row(row, "td", width) for row in study.comparison.rows()]
     if study.truth is not None:
         row = _row(truth_row(study.truth.numbers), "td", width)
         body.append(row.replace("<tr>", '<tr class="truth">'))
     return (
-        f"<table>{_row(COLUMNS, 'th', width)}{''.join(body)}</table>"
+        f"<table>{head}{''.join(body)}</table>"
         "<p>In brackets: taken as given, not fitted. Sum: delay and lag, which one step determines "
         "better than either. “As flown”: with the hold and the limit.</p>"
     )
@@ -119,7 +124,7 @@ def _fits(study: Study) -> str:
         if name in estimates
     }
     plot_fits(axes, study.fit.recording, fits)
-    return _figure(as_svg(figure), "The recorded step and the loops that the methods make of it.")
+    return _figure("fits", figure, "The recorded step and the loops that the methods make of it.")
 
 
 def _map(study: Study) -> str:
@@ -135,7 +140,7 @@ def _map(study: Study) -> str:
         f"{study.held_limit:.3f} with the hold"
         f" ({study.continuous_limit:.3f} if one forgets the hold)."
     )
-    return _figure(as_svg(figure), caption)
+    return _figure("map", figure, caption)
 
 
 def _responses(study: Study) -> str:
@@ -151,11 +156,16 @@ def _responses(study: Study) -> str:
         f"A step of 1 m on {study.flown_on}, limit included: gains made for the delay beside "
         "gains made in the same way as if there were none."
     )
-    return _figure(as_svg(figure), caption)
+    return _figure("responses", figure, caption)
 
 
-def _figure(drawing: str, caption: str) -> str:
-    return f"<figure>{drawing}<figcaption>{_text(caption)}</figcaption></figure>"
+def _figure(name: str, figure: Figure, caption: str) -> str:
+    drawing = as_svg(figure, name).replace(
+        "<svg ", f'<svg role="img" aria-labelledby="{name}-caption" ', 1
+    )
+    return (
+        f'<figure>{drawing}<figcaption id="{name}-caption">{_text(caption)}</figcaption></figure>'
+    )
 
 
 def _text(words: str) -> str:

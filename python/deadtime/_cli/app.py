@@ -15,7 +15,15 @@ from rich import box
 from rich.table import Table
 
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, counted, estimates_table, print_json, save_figure, stages
+from deadtime._cli.show import (
+    console,
+    counted,
+    estimates_table,
+    print_json,
+    print_table,
+    save_figure,
+    stages,
+)
 from deadtime._design import design as find_design
 from deadtime._errors import DeadtimeError
 from deadtime._estimation import estimate_delay
@@ -85,6 +93,8 @@ def run() -> None:
         told = str(error)
         if isinstance(error, OSError) and error.filename is not None:
             told = f"{error.filename}: {error.strerror}"
+        elif isinstance(error, ArithmeticError):
+            told = f"a number leaves the range of double precision ({told}): choose other units"
         elif isinstance(error, MemoryError):
             told = "out of memory: ask for less at once"
         print(f"deadtime: {' '.join(told.split())}", file=sys.stderr)
@@ -153,7 +163,7 @@ def _estimate_all(
             }
         )
         return
-    console.print(estimates_table(comparison))
+    print_table(estimates_table(comparison))
     console.print("in brackets: taken as given; sum: delay and lag", style="dim")
     for sentence in comparison.explanation():
         console.print(f"• {sentence}", highlight=False, markup=False)
@@ -202,7 +212,7 @@ def roots(
             }
         )
         return
-    console.print(_roots_table(found))
+    print_table(_roots_table(found))
     if np.isfinite(chain):
         console.print(f"neutral: a chain of roots approaches Re s = {chain:.6g}", highlight=False)
     state = "stable" if loop.is_stable() else "unstable"
@@ -463,7 +473,7 @@ def demo(
             }
         )
         return
-    console.print(estimates_table(found.comparison, flight.numbers))
+    print_table(estimates_table(found.comparison, flight.numbers))
     for sentence in found.comparison.explanation():
         console.print(f"• {sentence}", highlight=False, markup=False)
     console.print()

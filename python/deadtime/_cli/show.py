@@ -19,7 +19,14 @@ from deadtime._estimation.compare import COLUMNS, Comparison, truth_row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["counted", "estimates_table", "print_json", "save_figure", "stages"]
+__all__ = [
+    "counted",
+    "estimates_table",
+    "print_json",
+    "print_table",
+    "save_figure",
+    "stages",
+]
 
 console = Console()
 PICTURES = (".png", ".svg", ".pdf")
@@ -46,6 +53,12 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Path):
         return str(value)
     return value
+
+
+def print_table(table: Table) -> None:
+    """Print a table in its full width: where a terminal is too narrow, digits are not left out."""
+    needed = Console(width=1000).measure(table).maximum
+    Console(width=max(console.width, needed)).print(table, soft_wrap=True)
 
 
 def save_figure(figure: Figure, path: Path) -> None:

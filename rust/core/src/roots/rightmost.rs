@@ -116,9 +116,15 @@ pub fn spectral_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<f64, Error>
     let isolated = set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re);
     let abscissa = isolated.max(chain_abscissa(h));
     if abscissa == f64::NEG_INFINITY {
-        return Err(Error::argument(
-            "a constant has no roots, hence no spectral abscissa",
-        ));
+        return Err(if h.degree() == 0 && h.delays().len() < 2 {
+            Error::argument("a constant has no roots, hence no spectral abscissa")
+        } else {
+            Error::argument(
+                "no line that could be counted has a root to its right: the numbers of this \
+                 equation differ too much in size for double precision; leave out time constants \
+                 of almost nothing, or choose another unit of time",
+            )
+        });
     }
     Ok(abscissa)
 }
@@ -210,9 +216,10 @@ impl<'a> Lines<'a> {
                 Ok(line) if line.count < wanted => self.few = Some(line),
                 Ok(line) => self.enough = Some(line),
                 // Too close to the chains, or too far left for double precision.
-                Err(Error::TooMuch { .. } | Error::Argument(_)) if self.enough.is_none() => {
-                    let Some(few) = self.few.clone() else { break };
-                    return Ok((few, true));
+                Err(error @ (Error::TooMuch { .. } | Error::Argument(_)))
+                    if self.enough.is_none() =>
+                {
+                    return self.few.clone().map(|few| (few, true)).ok_or(error);
                 }
                 Err(error) => return Err(error),
             }
