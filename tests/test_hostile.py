@@ -218,6 +218,7 @@ def test_simulations_that_would_take_minutes_are_refused_on_one_line(arguments, 
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
+@pytest.mark.usefixtures("listens_to_ctrl_c")
 def test_ctrl_c_ends_a_command_with_one_line(tmp_path):
     slow = ["map", "--delay", "0.36", "--shape", "3000", "3000"]
     code = "import sys; from deadtime._cli import main; print('up', flush=True); main()"

@@ -56,6 +56,15 @@ class DerivativeFilter:
     ------
     ValueError
         If a number is not above zero or not finite.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> loop = dtm.ControlLoop(
+    ...     dtm.Integrator(), dtm.PV(2.0, 0.3, filter=dtm.DerivativeFilter(38.0)), delay=0.36
+    ... )
+    >>> loop.characteristic().kind          # with an ideal derivative: neutral
+    'retarded'
     """
 
     omega: float
@@ -216,6 +225,17 @@ class P(Controller):
     ----------
     Kp : float
         Gain, not zero.
+
+    Raises
+    ------
+    ValueError
+        If a gain is not finite, or all of them are zero.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=2.0), delay=0.36).characteristic()
+    s + 2 exp(-0.36 s)
     """
 
     Kp: float
@@ -241,6 +261,17 @@ class PV(Controller):
     filter : DerivativeFilter, optional
         H(s); without it the derivative is ideal and the loop is neutral where the plant's
         relative degree is one.
+
+    Raises
+    ------
+    ValueError
+        If a gain is not finite, or all of them are zero.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(Kp=2.0, Kv=0.3), delay=0.36).characteristic()
+    s + (2 + 0.3 s) exp(-0.36 s)
     """
 
     Kp: float
@@ -266,6 +297,18 @@ class PD(Controller):
     filter : DerivativeFilter, optional
         H(s); without it the derivative is ideal, and a step of the reference is an impulse of the
         command, which a limited or sampled loop does not see.
+
+    Raises
+    ------
+    ValueError
+        If a gain is not finite, or all of them are zero.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.PD(Kp=2.0, Kd=0.3), delay=0.36)
+    >>> loop.parameters
+    {'gain': 1.0, 'lag': 0.0, 'Kp': 2.0, 'Kd': 0.3, 'delay': 0.36}
     """
 
     Kp: float
@@ -290,6 +333,17 @@ class PI(Controller):
     ----------
     Kp, Ki : float
         Gains, not both zero. The integral does not stop while the command is limited.
+
+    Raises
+    ------
+    ValueError
+        If a gain is not finite, or all of them are zero.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.ControlLoop(dtm.Integrator(), dtm.PI(Kp=2.0, Ki=0.5), delay=0.36).characteristic()
+    s^2 + (0.5 + 2 s) exp(-0.36 s)
     """
 
     Kp: float
@@ -314,6 +368,17 @@ class PID(Controller):
     filter : DerivativeFilter, optional
         H(s); without it the derivative is ideal, and a step of the reference is an impulse of the
         command, which a limited or sampled loop does not see.
+
+    Raises
+    ------
+    ValueError
+        If a gain is not finite, or all of them are zero.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.PID(Kp=2.0, Ki=0.5, Kd=0.1).gains
+    {'Kp': 2.0, 'Ki': 0.5, 'Kd': 0.1}
     """
 
     Kp: float

@@ -388,6 +388,10 @@ class ControlLoop:
 
         For a neutral loop it must stay so under small changes of the delay (strong stability).
 
+        Returns
+        -------
+        bool
+
         Raises
         ------
         ValueError
