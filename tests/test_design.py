@@ -3,6 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime._design import critical_gain
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
 SAMPLED = dtm.ControlLoop(
@@ -77,6 +78,12 @@ def test_a_filter_of_the_template_is_kept():
 def test_what_cannot_be_designed_is_refused(change, error, words):
     with pytest.raises(error, match=words):
         dtm.design(LOOP, **({"shape": (5, 5)} | change))
+
+
+@pytest.mark.parametrize("delay", [1e-5, 0.01, 0.36, 20.0])
+def test_the_critical_gain_is_found_over_many_decades(delay):
+    # s + Kp e^(-sT) loses stability at Kp T = pi/2
+    assert critical_gain(LOOP.replace(delay=delay)) == pytest.approx(np.pi / 2 / delay, rel=1e-9)
 
 
 def test_an_unknown_delay_is_refused():

@@ -14,7 +14,7 @@ from deadtime._controllers import PV, Controller, P
 from deadtime._loop import ControlLoop
 from deadtime._stability import StabilityMap, stability_map
 
-__all__ = ["Design", "design"]
+__all__ = ["Design", "critical_gain", "design"]
 
 Objective = Literal["abscissa", "settling_time"]
 
@@ -216,8 +216,7 @@ def _delays(loop: ControlLoop, delay: float | tuple[float, float] | None) -> tup
 
 def _ranges(loop: ControlLoop, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
     """Ranges around what proportional control bears: the second gain through time constants."""
-    proportional = loop.replace(controller=P(_small_gain(loop)))
-    critical = proportional.stable_range("Kp")[1]
+    critical = critical_gain(loop)
     if not np.isfinite(critical):
         raise ValueError("no proportional gain makes this loop unstable: give ranges=")
     late = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0) + 0.5 * (loop.sample_time or 0.0)
@@ -228,14 +227,25 @@ def _ranges(loop: ControlLoop, names: tuple[str, ...]) -> dict[str, tuple[float,
     return {names[0]: (0.02 * critical, 1.25 * critical), names[1]: second}
 
 
-def _small_gain(loop: ControlLoop) -> float:
-    """A proportional gain small enough to be stable, found by halving."""
+def critical_gain(loop: ControlLoop) -> float:
+    """Proportional gain at which a loop loses stability, infinite where none is found.
+
+    From a gain that is stable, found by halving, one walk upwards covers three decades; a few
+    walks cover all that has a meaning.
+    """
     gain = 1.0
     for _ in range(60):
         if loop.replace(controller=P(gain)).is_stable():
-            return gain
+            break
         gain *= 0.5
-    raise ValueError("no proportional gain stabilises this loop: give ranges= and a controller")
+    else:
+        raise ValueError("no proportional gain stabilises this loop: give ranges= and a controller")
+    for _ in range(4):
+        edge = loop.replace(controller=P(gain)).stable_range("Kp")[1]
+        if np.isfinite(edge):
+            return float(edge)
+        gain *= 500.0
+    return float("inf")
 
 
 def _settling_time(loop: ControlLoop, band: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._controllers import PV, Controller, DerivativeFilter, P
-from deadtime._design import Design, design
+from deadtime._design import Design, critical_gain, design
 from deadtime._estimation import DelayEstimate
 from deadtime._estimation.compare import Comparison, compare_methods
 from deadtime._loop import ControlLoop
@@ -201,8 +201,8 @@ def study(
     comparison = compare_methods(recording, loop, window)
     fitted = comparison.best.loop
     progress("finding the limits of the gain")
-    held = _critical_gain(fitted)
-    continuous = _critical_gain(fitted.continuous())
+    held = critical_gain(fitted)
+    continuous = critical_gain(fitted.continuous())
     progress("mapping the gains")
     template = PV(Kp=1.0, Kv=0.1, filter=PAPER_FILTER)
     interval = comparison.best.ci(0.95, "delay")
@@ -230,10 +230,6 @@ def study(
         flown_on="the fitted loop" if truth is None else "the true loop",
         truth=truth,
     )
-
-
-def _critical_gain(loop: ControlLoop) -> float:
-    return loop.replace(controller=P(Kp=1e-3)).stable_range("Kp")[1]
 
 
 def _fly(loop: ControlLoop, controller: Controller) -> Response:
