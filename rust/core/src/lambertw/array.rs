@@ -1,10 +1,13 @@
 //! Whole arrays: elements are independent, so blocks go to threads as they come and an
 //! element's bits depend on nothing but its arguments.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{dde_root, kernel};
+use super::block;
 use crate::{Error, Task};
 
 /// Elements from which on an array is worth more than one thread.
@@ -37,7 +40,9 @@ pub fn lambertw_array(
         Argument::new("z", z, out.len())?,
         Argument::new("k", k, out.len())?,
     );
-    fill(out, task, |i| Some(kernel::lambertw(z.at(i)?, k.at(i)?)))
+    fill(out, task, |range, out| {
+        block::lambertw(&z.within(&range), &k.within(&range), out);
+    })
 }
 
 /// `out[i] = dde_root(a0[i], a1[i], delay[i], k[i])`; an argument of length 1 serves every
@@ -56,8 +61,9 @@ pub fn dde_root_array(
     let n = out.len();
     let (a0, a1) = (Argument::new("a0", a0, n)?, Argument::new("a1", a1, n)?);
     let (delay, k) = (Argument::new("delay", delay, n)?, Argument::new("k", k, n)?);
-    fill(out, task, |i| {
-        Some(dde_root(a0.at(i)?, a1.at(i)?, delay.at(i)?, k.at(i)?))
+    fill(out, task, |range, out| {
+        let (a0, a1) = (a0.within(&range), a1.within(&range));
+        block::dde_root(&a0, &a1, &delay.within(&range), &k.within(&range), out);
     })
 }
 
@@ -79,34 +85,30 @@ impl<'a, T: Copy> Argument<'a, T> {
         }
     }
 
-    #[inline(always)]
-    fn at(&self, i: usize) -> Option<T> {
+    fn within(&self, range: &Range<usize>) -> Cow<'a, [T]> {
         match self {
-            Self::Same(value) => Some(*value),
-            Self::Each(values) => values.get(i).copied(),
+            Self::Same(value) => Cow::Owned(vec![*value; range.len()]),
+            Self::Each(values) => Cow::Borrowed(values.get(range.clone()).unwrap_or_default()),
         }
     }
 }
 
-/// `out[i] = element(i)`; `element` knows every index below the length of `out`.
-fn fill<F>(out: &mut [Complex64], task: &Task, element: F) -> Result<(), Error>
+/// `out[range]` by `block(range, &mut out[range])`, blocks shared out among threads.
+fn fill<F>(out: &mut [Complex64], task: &Task, block: F) -> Result<(), Error>
 where
-    F: Fn(usize) -> Option<Complex64> + Sync,
+    F: Fn(Range<usize>, &mut [Complex64]) + Sync,
 {
-    let block = |(number, block): (usize, &mut [Complex64])| {
+    let work = |(number, out): (usize, &mut [Complex64])| {
         task.check()?;
-        for (place, i) in block.iter_mut().zip(number * BLOCK..) {
-            if let Some(value) = element(i) {
-                *place = value;
-            }
-        }
-        task.advance(block.len() as u64);
+        let start = number * BLOCK;
+        block(start..start + out.len(), out);
+        task.advance(out.len() as u64);
         Ok(())
     };
     if out.len() < PARALLEL_LENGTH {
-        out.chunks_mut(BLOCK).enumerate().try_for_each(block)
+        out.chunks_mut(BLOCK).enumerate().try_for_each(work)
     } else {
-        out.par_chunks_mut(BLOCK).enumerate().try_for_each(block)
+        out.par_chunks_mut(BLOCK).enumerate().try_for_each(work)
     }
 }
 
@@ -126,7 +128,7 @@ mod tests {
         let mut whole = vec![Complex64::ZERO; z.len()];
         lambertw_array(&z, &k, &mut whole, &Task::new()).unwrap();
         for ((z, k), w) in z.iter().zip(&k).zip(&whole) {
-            let alone = kernel::lambertw(*z, *k);
+            let alone = crate::lambertw::lambertw(*z, *k);
             assert_eq!(alone.re.to_bits(), w.re.to_bits());
             assert_eq!(alone.im.to_bits(), w.im.to_bits());
         }

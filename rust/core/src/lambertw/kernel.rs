@@ -1,164 +1,125 @@
-//! One element: which starting value, which last step.
+//! The element: which starting value, which last step.
 
-use num_complex::Complex64;
+use crate::lanes::{Complex, Mask, Real, Simd};
 
-use super::branch_point::{INVERSE_E, offset, one_plus_w, square_root};
-use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, from_logarithm, principal};
-use super::huge_branch::{self, HUGE_BRANCH};
-use super::refine::{Scaled, correction, residual};
-use super::special_values;
+use super::branch_point::{INVERSE_E, branch_root, offset, one_plus_w};
+use super::elementary::{rough_angle, rough_log};
+use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithmic_step, principal};
+use super::huge_branch::HUGE_BRANCH;
+use super::refine::{Scaled, correction, product_with_exp};
 
 /// Distance from -1/e below which the series is the answer.
-const SERIES_ANSWERS: f64 = 1.0 / 16_384.0;
+pub(super) const SERIES_ANSWERS: f64 = 1.0 / 16_384.0;
 /// Distance from -1/e below which the series is the starting value.
-const SERIES_STARTS: f64 = 0.046;
+pub(super) const SERIES_STARTS: f64 = 0.046;
 /// Angle between z and the real axis up to which dw/dz there is taken for the starting value.
 const NARROW: f64 = 1e-9;
 /// Modulus below which W_0(z) = z - z^2 to working precision.
 const SMALL: f64 = 1e-9;
 
-pub(super) fn lambertw(z: Complex64, k: i64) -> Complex64 {
-    if !(z.re.is_finite() && z.im.is_finite()) || (z.re == 0.0 && z.im == 0.0) {
-        return special_values::lambertw(z, k);
-    }
+/// W, and 1 + W to its own relative accuracy.
+pub(super) struct Answer<S: Simd> {
+    pub(super) w: Complex<S>,
+    pub(super) one_plus_w: Complex<S>,
+}
+
+/// Where the kernel does not reach: zero, infinities, NaN, and branches far out.
+#[inline(always)]
+pub(super) fn out_of_reach<S: Simd>(z: Complex<S>, k: Real<S>) -> Mask<S> {
+    // Whatever is compared with NaN is false.
+    let finite = z.re.abs().lt(f64::INFINITY) & z.im.abs().lt(f64::INFINITY);
+    let zero = z.re.eq(0.0) & z.im.eq(0.0);
+    !finite | zero | k.abs().ge(HUGE_BRANCH as f64)
+}
+
+/// W_k(z) for lanes within reach; `k` holds whole numbers.
+#[inline(always)]
+pub(super) fn lambertw<S: Simd>(z: Complex<S>, k: Real<S>) -> Answer<S> {
     // W_k(conj z) = conj W_-k(z) brings every case to k >= 0 and, for k = 0, to Im z >= 0;
     // there Im w >= 0.
-    let mirrored = if k == 0 {
-        z.im.is_sign_negative()
-    } else {
-        k < 0
-    };
-    let z = if mirrored { z.conj() } else { z };
-    let w = upper(z, k.unsigned_abs());
-    Complex64::new(w.re, if mirrored { -w.im.abs() } else { w.im.abs() })
+    let side = k.eq(0.0).select(z.im.sign(), k.sign());
+    let answer = upper(Complex::new(z.re, z.im.flipped(side)), k.abs());
+    Answer {
+        w: reflected(answer.w, side),
+        one_plus_w: reflected(answer.one_plus_w, side),
+    }
 }
 
 #[inline(always)]
-fn upper(z: Complex64, k: u64) -> Complex64 {
-    if k >= HUGE_BRANCH {
-        return huge_branch::lambertw(Scaled::new(z), k);
-    }
-    let largest = z.re.abs().max(z.im.abs());
-    if k == 0 && largest < SMALL {
-        return Complex64::new(
-            z.re - (z.re - z.im) * (z.re + z.im),
-            z.im - 2.0 * z.re * z.im,
-        );
-    }
-    // Only these two sheets are joined at -1/e.
-    let joined = k == 0 || (k == 1 && z.im.is_sign_negative());
-    let offset = offset(z);
-    let distance = offset.norm_sqr();
-    let start = if joined && distance < SERIES_STARTS * SERIES_STARTS {
-        let p = square_root(offset * (2.0 * std::f64::consts::E));
-        let w = one_plus_w(if k == 0 { p } else { -p }) - 1.0;
-        if distance < SERIES_ANSWERS * SERIES_ANSWERS {
-            return w;
-        }
-        w
-    } else if k == 0 && largest < PRINCIPAL_RADIUS {
-        principal(z, offset)
-    } else if k == 1 && joined && distance < BEHIND_RADIUS * BEHIND_RADIUS {
-        behind(offset)
-    } else {
-        let log = Complex64::new(
-            Scaled::new(z).log_modulus(),
-            libm::atan2(z.im, z.re) + std::f64::consts::TAU * k as f64,
-        );
-        let w = from_logarithm(log, if k == 1 { 2 } else { 1 });
-        // Along the segment on which W_1 is real from below, log z + 2 pi i - log w leaves an
-        // imaginary part of rounding errors; the true one is Im z dw/dz, zero where Im z is.
-        if joined && z.re < 0.0 && z.re > -INVERSE_E && z.im.abs() <= NARROW * z.re.abs() {
-            Complex64::new(w.re, (z.im / z.re) * (w.re / (w.re + 1.0)))
-        } else {
-            w
-        }
-    };
-    let w = Complex64::new(start.re, start.im.abs());
-    w + correction(w, residual(Scaled::new(z), w))
+fn reflected<S: Simd>(w: Complex<S>, side: Real<S>) -> Complex<S> {
+    Complex::new(w.re, w.im.signed(side))
 }
 
-#[cfg(test)]
-mod tests {
-    use std::f64::consts::TAU;
+#[inline(always)]
+fn upper<S: Simd>(z: Complex<S>, k: Real<S>) -> Answer<S> {
+    let principal_branch = k.eq(0.0);
+    let first = k.eq(1.0);
+    let largest = z.re.abs().larger(z.im.abs());
+    let small = principal_branch & largest.lt(SMALL);
+    let tiny = z;
+    // Nothing of what follows is kept there; subnormal numbers would only slow it down.
+    let one = z.re.constant(1.0);
+    let z = small.choose(Complex::new(one, one), z);
 
-    use proptest::prelude::*;
+    // Only these two sheets are joined at -1/e.
+    let joined = principal_branch | (first & z.im.is_negative());
+    let offset = offset(z);
+    let distance = offset.re.abs().larger(offset.im.abs());
+    let close = joined & distance.lt(1.0);
+    let square = close
+        .choose(offset, Complex::new(one, one))
+        .square_modulus();
+    let by_series = joined & square.lt(SERIES_STARTS * SERIES_STARTS);
+    let answered = joined & square.lt(SERIES_ANSWERS * SERIES_ANSWERS);
+    let by_principal = principal_branch & largest.lt(PRINCIPAL_RADIUS);
+    let by_behind = first & joined & square.lt(BEHIND_RADIUS * BEHIND_RADIUS);
+    let by_logarithm = !(by_principal | by_behind);
 
-    use super::*;
-
-    /// Numbers where something happens: any exponent, next to -1/e, on the axes.
-    fn troublesome() -> impl Strategy<Value = Complex64> {
-        let anywhere = (-1070.0..1020.0_f64, -4.0..4.0_f64)
-            .prop_map(|(power, angle)| Complex64::from_polar(power.exp2(), angle));
-        let near_branch_point = (-54.0..1.0_f64, -4.0..4.0_f64)
-            .prop_map(|(power, angle)| Complex64::from_polar(power.exp2(), angle) - INVERSE_E);
-        let on_axes = (-60.0..60.0_f64, 0..4_u8, any::<bool>()).prop_map(|(power, axis, side)| {
-            let (length, zero) = (power.exp2(), if side { 0.0 } else { -0.0 });
-            match axis {
-                0 => Complex64::new(length, zero),
-                1 => Complex64::new(-length, zero),
-                2 => Complex64::new(zero, length),
-                _ => Complex64::new(zero, -length),
-            }
-        });
-        prop_oneof![anywhere, near_branch_point, on_axes]
-    }
-
-    fn branch() -> impl Strategy<Value = i64> {
-        prop_oneof![
-            -2..3_i64,
-            -1000..1000_i64,
-            -(1_i64 << 21)..(1_i64 << 21),
-            any::<i64>()
-        ]
-    }
-
-    fn bits(w: Complex64) -> (u64, u64) {
-        (w.re.to_bits(), w.im.to_bits())
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4096))]
-
-        #[test]
-        fn conjugates_belong_together(z in troublesome(), k in branch()) {
-            prop_assume!(k != i64::MIN);
-            prop_assert_eq!(bits(lambertw(z.conj(), -k)), bits(lambertw(z, k).conj()));
+    let scaled = Scaled::new(z);
+    let mut start = Complex::new(one, one);
+    let mut near = Complex::new(one, one);
+    let rooted = by_principal | by_behind;
+    if rooted.any() {
+        let root = branch_root(rooted.choose(offset, start));
+        start = principal(rooted.choose(z, start), root);
+        if by_behind.any() {
+            start = by_behind.choose(behind(root), start);
         }
-
-        #[test]
-        fn the_branch_is_the_one_asked_for(z in troublesome(), k in branch()) {
-            let w = lambertw(z, k);
-            prop_assume!(w != Complex64::ZERO);
-            let angle = |z: Complex64| libm::atan2(z.im, z.re);
-            let turns = (w.im + angle(w) - angle(z)) / TAU;
-            // Rounding of w, and of the angle where 1 + w nearly vanishes.
-            prop_assert!((turns - k as f64).abs() <= 1e-7 + 1e-15 * turns.abs(), "{w} {turns}");
-        }
-
-        #[test]
-        fn it_solves_its_equation(z in troublesome(), k in -1000..1000_i64) {
-            let w = lambertw(z, k);
-            prop_assume!(w.norm() > 1e-300);
-            let lost = residual(Scaled::new(z), w).norm() / w.norm();
-            // Half an ulp of w moves w e^w by |1 + w| times as much; the residual itself is
-            // good to 2^-64.
-            let allowed = 0.51 * f64::EPSILON * (1.0 + w).norm() + 1.0 / (1_u64 << 62) as f64;
-            prop_assert!(lost <= allowed, "{w} {lost:e}");
+        if by_series.any() {
+            near = one_plus_w(by_behind.choose(-root, root));
+            start = by_series.choose(near.shifted(-1.0), start);
         }
     }
-
-    #[test]
-    fn rational_and_series_meet_without_a_step() {
-        for distance in [SERIES_ANSWERS, SERIES_STARTS, BEHIND_RADIUS] {
-            for k in [-1, 0, 1] {
-                for side in [0.0, -0.0] {
-                    let at = |d: f64| lambertw(Complex64::new(d - INVERSE_E, side), k);
-                    let (below, above) =
-                        (at(distance * (1.0 - 1e-13)), at(distance * (1.0 + 1e-13)));
-                    assert!((below - above).norm() < 1e-12);
-                }
-            }
+    if by_logarithm.any() {
+        let modulus = scaled.exponent.mul_add(
+            std::f64::consts::LN_2,
+            rough_log(scaled.value.square_modulus()) * 0.5,
+        );
+        let log = Complex::new(modulus, k.mul_add(std::f64::consts::TAU, rough_angle(z)));
+        let mut w = logarithmic_step(log, log);
+        if first.any() {
+            w = first.choose(logarithmic_step(w, log), w);
         }
+        // Along the segment on which W_1 is real from below, log z + 2 pi i - log w leaves an
+        // imaginary part of rounding errors; the true one is Im z dw/dz, zero where Im z is.
+        let narrow =
+            joined & z.re.lt(0.0) & z.re.gt(-INVERSE_E) & z.im.abs().le(z.re.abs() * NARROW);
+        let slope = (z.im / z.re) * (w.re / (w.re + 1.0));
+        w.im = narrow.select(slope, w.im);
+        start = by_logarithm.choose(w, start);
+    }
+
+    let w = start.folded();
+    let change = correction(w, product_with_exp(scaled, w).less(w));
+    let series = Complex::new(
+        tiny.re.mul_sub(tiny.re, tiny.im * tiny.im),
+        tiny.re * tiny.im * 2.0,
+    );
+    let tiny = tiny - series;
+    let stepped = small.choose(tiny, w + change);
+    let one_plus_stepped = small.choose(tiny.shifted(1.0), w.shifted(1.0) + change);
+    Answer {
+        w: answered.choose(near.shifted(-1.0), stepped).folded(),
+        one_plus_w: answered.choose(near, one_plus_stepped).folded(),
     }
 }
