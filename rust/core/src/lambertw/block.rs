@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use crate::lanes::{Complex, Real, Simd};
 
 use super::columns::{BLOCK, Kernel, SHORT, sweep};
+use super::route::Order;
 use super::{delay, huge_branch, kernel, special_values};
 
 struct LambertW;
@@ -15,12 +16,10 @@ struct LambertW;
 impl Kernel<3, 3> for LambertW {
     #[inline(always)]
     fn lanes<S: Simd>(&self, [re, im, k]: [Real<S>; 3]) -> [Real<S>; 3] {
-        let (zero, one) = (re.constant(0.0), re.constant(1.0));
         let z = Complex::new(re, im);
+        let w = kernel::lambertw(z, k).w;
         let far = kernel::out_of_reach(z, k);
-        let z = far.choose(Complex::new(one, zero), z);
-        let w = kernel::lambertw(z, far.select(zero, k)).w;
-        [w.re, w.im, far.select(one, zero)]
+        [w.re, w.im, far.select(1.0, re.constant(0.0))]
     }
 }
 
@@ -54,14 +53,36 @@ pub fn lambertw(z: &[Complex64], k: &[i64], w: &mut [Complex64]) {
 fn lambertw_by<const W: usize>(z: &[Complex64], k: &[i64], w: &mut [Complex64]) {
     let mut arguments = [[0.0; W]; 3];
     let mut values = [[0.0; W]; 3];
+    let mut order = Order::<W>::new();
     for ((z, k), w) in z.chunks(W).zip(k.chunks(W)).zip(w.chunks_mut(W)) {
         let [re, im, branch] = &mut arguments;
         let places = re.iter_mut().zip(im).zip(branch);
-        for ((z, k), ((re, im), branch)) in z.iter().zip(k).zip(places) {
-            (*re, *im, *branch) = (z.re, z.im, *k as f64);
+        if order.sort(z, k) {
+            for (i, ((re, im), branch)) in order.indices(w.len()).zip(places) {
+                if let (Some(z), Some(k)) = (z.get(i), k.get(i)) {
+                    (*re, *im, *branch) = (z.re, z.im, *k as f64);
+                }
+            }
+            sweep(&LambertW, &arguments, &mut values, w.len());
+            let [re, im, beyond] = &values;
+            let results = re.iter().zip(im).zip(beyond);
+            for (i, ((re, im), beyond)) in order.indices(w.len()).zip(results) {
+                if let Some(w) = w.get_mut(i) {
+                    *w = Complex64::new(*re, *im);
+                    if *beyond != 0.0
+                        && let (Some(z), Some(k)) = (z.get(i), k.get(i))
+                    {
+                        *w = far(*z, *k);
+                    }
+                }
+            }
+        } else {
+            for ((z, k), ((re, im), branch)) in z.iter().zip(k).zip(places) {
+                (*re, *im, *branch) = (z.re, z.im, *k as f64);
+            }
+            sweep(&LambertW, &arguments, &mut values, w.len());
+            gather(&values, w, |i| Some(far(*z.get(i)?, *k.get(i)?)));
         }
-        sweep(&LambertW, &arguments, &mut values, w.len());
-        gather(&values, w, |i| Some(far(*z.get(i)?, *k.get(i)?)));
     }
 }
 

@@ -12,9 +12,8 @@ use crate::lanes::{Complex, Simd};
 pub(super) const INVERSE_E: f64 = 0.367_879_441_171_442_33;
 pub(super) const INVERSE_E_LOW: f64 = -1.242_875_367_278_836_3e-17;
 
-/// Coefficients of p, p^2, …, p^13.
-const SERIES: [f64; 13] = [
-    1.0,
+/// Coefficients of p^2, p^3, …, p^13; that of p is 1.
+const SERIES: [f64; 12] = [
     -1.0 / 3.0,
     11.0 / 72.0,
     -43.0 / 540.0,
@@ -45,9 +44,14 @@ pub(super) fn branch_root<S: Simd>(offset: Complex<S>) -> Complex<S> {
 #[inline(always)]
 pub(super) fn one_plus_w<S: Simd>(p: Complex<S>) -> Complex<S> {
     let zero = p.re.constant(0.0);
-    let mut sum = Complex::new(zero, zero);
+    let mut tail = Complex::new(zero, zero);
     for &coefficient in SERIES.iter().rev() {
-        sum = (sum * p).shifted(coefficient);
+        tail = tail.mul_add(p, coefficient);
     }
-    sum * p
+    // The first term is p itself, and by far the largest: it is added last.
+    let tail = tail * p;
+    Complex::new(
+        tail.re.mul_add(p.re, tail.im.negated_mul_add(p.im, p.re)),
+        tail.re.mul_add(p.im, tail.im.mul_add(p.re, p.im)),
+    )
 }

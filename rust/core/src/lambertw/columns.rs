@@ -8,9 +8,9 @@ use pulp::WithSimd;
 use crate::lanes::{Instructions, Real, Simd};
 
 /// Elements in a block.
-pub(super) const BLOCK: usize = 128;
-/// Elements of a short block, for a single call: one vector of the widest instruction set.
-pub(super) const SHORT: usize = 8;
+pub(super) const BLOCK: usize = 256;
+/// Elements of a short block, for a single call: two vectors of the widest instruction set.
+pub(super) const SHORT: usize = 16;
 
 /// A function of `IN` doubles with `OUT` doubles as its value.
 pub(super) trait Kernel<const IN: usize, const OUT: usize>: Sync {
@@ -36,15 +36,16 @@ where
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let mut lanes = [Real::splat(simd, 0.0); IN];
-        for vector in 0..self.length.div_ceil(S::F64_LANES) {
+        for pair in 0..self.length.div_ceil(2 * S::F64_LANES) {
             for (lane, column) in lanes.iter_mut().zip(self.arguments) {
-                if let Some(values) = S::as_simd_f64s(column).0.get(vector) {
-                    *lane = Real::new(simd, *values);
+                if let Some([a, b]) = S::as_simd_f64s(column).0.as_chunks().0.get(pair) {
+                    *lane = Real::new(simd, [*a, *b]);
                 }
             }
             let results = self.kernel.lanes(lanes);
             for (result, column) in results.iter().zip(self.values.iter_mut()) {
-                if let Some(place) = S::as_mut_simd_f64s(column).0.get_mut(vector) {
+                let places = S::as_mut_simd_f64s(column).0.as_chunks_mut().0;
+                if let Some(place) = places.get_mut(pair) {
                     *place = result.lanes();
                 }
             }

@@ -15,7 +15,7 @@ use num_complex::Complex64;
 use crate::lanes::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{INVERSE_E, one_plus_w};
-use super::elementary::{cos_sin, exp, rough_log};
+use super::elementary::{Reduced, cos_sin, exp, rough_log};
 use super::guess::{
     BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithm, logarithmic_step, principal,
 };
@@ -222,7 +222,7 @@ impl<S: Simd> Problem<S> {
         seen.select(self.factor.hi * factor.hi * power, zero)
     }
 
-    /// 1 + e z to 2^-63 where `wanted`.
+    /// 1 + e z to 2^-61 where `wanted`.
     #[inline(always)]
     fn one_plus_ez(&self, wanted: Mask<S>) -> Real<S> {
         let zero = self.alpha.hi.constant(0.0);
@@ -241,14 +241,24 @@ impl<S: Simd> Problem<S> {
     #[inline(always)]
     fn step(&self, sigma: Complex<S>) -> Complex<S> {
         let (modulus, power) = exp(-sigma.re, sigma.re.constant(0.0));
-        let (cosine, sine) = cos_sin(sigma.im);
-        let modulus = modulus.times(self.factor);
+        let Reduced {
+            cosine,
+            sine,
+            quarters,
+        } = cos_sin(sigma.im);
+        // The quarter turns exchange cosine and sine; their signs follow.
+        let odd = quarters.abs().eq(1.0);
+        let half = quarters.abs().eq(2.0);
+        let zero = quarters.constant(0.0);
+        let flip_re = (half | quarters.eq(1.0)).select(-0.0, zero);
+        let flip_im = (half | quarters.eq(-1.0)).select(0.0, zero.constant(-0.0));
         let power = (power + self.exponent).power_of_two();
+        let modulus = modulus.times(self.factor).scaled(power);
         let w_re = TwoWord::from_word(sigma.re)
             .plus(self.alpha.negated())
             .normalised();
-        let t_re = modulus.times(cosine).scaled(power);
-        let t_im = modulus.times(sine).negated().scaled(power);
+        let t_re = modulus.times(chosen(odd, sine, cosine)).flipped(flip_re);
+        let t_im = modulus.times(chosen(odd, cosine, sine)).flipped(flip_im);
         let d = Complex::new(
             t_re.plus(w_re.negated()).rounded(),
             (t_im.hi - sigma.im) + t_im.lo,
@@ -304,4 +314,10 @@ impl<S: Simd> Problem<S> {
 #[inline(always)]
 fn folded<S: Simd>(sigma: Complex<S>, real: Mask<S>) -> Complex<S> {
     Complex::new(sigma.re, real.select(0.0, sigma.im.abs()))
+}
+
+/// Lane by lane: `yes` where true, `no` elsewhere.
+#[inline(always)]
+fn chosen<S: Simd>(mask: Mask<S>, yes: TwoWord<S>, no: TwoWord<S>) -> TwoWord<S> {
+    TwoWord::new(mask.select(yes.hi, no.hi), mask.select(yes.lo, no.lo))
 }

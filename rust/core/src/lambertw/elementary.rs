@@ -1,12 +1,12 @@
-//! Exponential, sine and cosine to about 2^-63, as sums of two words; rough logarithms.
+//! Exponential, sine and cosine to 2^-61, as sums of two words; rough logarithms.
 //!
 //! Reduction by multiples of ln 2 and pi/2 in pieces short enough that each product is exact
 //! (Cody & Waite 1980), then the Taylor series: its first terms in two words, the tail, at most
 //! 2^-10 of the sum, in one. What is lost is the rounding of that tail.
 //! Valid for |a| < 5000 (exponential) and |b| < 2^23 (sine and cosine). Errors are meant beside 1:
-//! a sine next to a multiple of pi (other than 0) is good to 2^-63, not to 2^-63 of itself.
+//! a sine next to a multiple of pi (other than 0) is good to 2^-61, not to 2^-61 of itself.
 
-use crate::lanes::{Complex, Mask, Real, Simd};
+use crate::lanes::{Complex, Real, Simd};
 
 use super::two_word::{Constant, TwoWord, ordered_sum, product, sum};
 
@@ -27,14 +27,14 @@ const ONE_OVER_120: Constant = Constant(0.008_333_333_333_333_333, 1.156_482_317
 const HALF: Constant = Constant(0.5, 0.0);
 const ONE: Constant = Constant(1.0, 0.0);
 
-/// 1/4!, 1/5!, …, 1/15!
+/// 1/5!, 1/6!, …, 1/16!
 const EXP_TAIL: [[f64; 2]; 6] = [
-    [1.0 / 24.0, 1.0 / 120.0],
-    [1.0 / 720.0, 1.0 / 5_040.0],
-    [1.0 / 40_320.0, 1.0 / 362_880.0],
-    [1.0 / 3_628_800.0, 1.0 / 39_916_800.0],
-    [1.0 / 479_001_600.0, 1.0 / 6_227_020_800.0],
-    [1.0 / 87_178_291_200.0, 1.0 / 1_307_674_368_000.0],
+    [1.0 / 120.0, 1.0 / 720.0],
+    [1.0 / 5_040.0, 1.0 / 40_320.0],
+    [1.0 / 362_880.0, 1.0 / 3_628_800.0],
+    [1.0 / 39_916_800.0, 1.0 / 479_001_600.0],
+    [1.0 / 6_227_020_800.0, 1.0 / 87_178_291_200.0],
+    [1.0 / 1_307_674_368_000.0, 1.0 / 20_922_789_888_000.0],
 ];
 /// -1/7!, 1/9!, …, -1/19!
 const SIN_TAIL: [[f64; 2]; 4] = [
@@ -79,15 +79,6 @@ fn polynomial<S: Simd, const PAIRS: usize>(
     sum
 }
 
-/// Lane by lane: `yes` where true, `no` elsewhere, negated as `flip` says.
-#[inline(always)]
-fn choose<S: Simd>(mask: Mask<S>, yes: TwoWord<S>, no: TwoWord<S>, flip: Real<S>) -> TwoWord<S> {
-    TwoWord::new(
-        mask.select(yes.hi, no.hi).flipped(flip),
-        mask.select(yes.lo, no.lo).flipped(flip),
-    )
-}
-
 /// `e^(a + low)` as a factor in [0.7, 1.42] and a power of two; `low` is at most an ulp of `a`.
 #[inline(always)]
 pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (TwoWord<S>, Real<S>) {
@@ -104,21 +95,32 @@ pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (TwoWord<S>, Real<S>) {
     let cube = square.times(r);
     let third = product(cube.hi, r.hi.constant(SIXTH.0));
     let third_low = cube.lo.mul_add(SIXTH.0, cube.hi.mul_add(SIXTH.1, third.lo));
-    let fourth = square.hi * square.hi;
-    let tail = fourth * polynomial(&EXP_TAIL, r.hi);
+    let fourth = cube.hi * r.hi;
+    let fifth = fourth * r.hi * polynomial(&EXP_TAIL, r.hi);
+    let tail = fourth.mul_add(TWENTY_FOURTH.0, fifth);
 
-    // 1 + (r + (r^2/2 + r^3/6)), the rest among the second words.
+    // 1 + (r + (r^2/2 + r^3/6)); the rest comes last to the second words, being the largest there.
     let curved = ordered_sum(square.hi * 0.5, third.hi);
-    let low = square.lo.mul_add(0.5, curved.lo + third_low) + tail;
     let change = ordered_sum(r.hi, curved.hi);
-    let low = low + (change.lo + r.lo);
     let whole = ordered_sum(change.hi.constant(1.0), change.hi);
-    (ordered_sum(whole.hi, whole.lo + low), n)
+    let low = square.lo.mul_add(0.5, curved.lo + third_low) + (change.lo + r.lo) + whole.lo;
+    // r^4/24 was taken from the first word alone; the second moves it by r^3/6 of itself.
+    let low = r.lo.mul_add(third.hi, low);
+    (ordered_sum(whole.hi, tail + low), n)
 }
 
-/// `(cos b, sin b)`.
+/// Cosine and sine of an angle less whole quarter turns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reduced<S: Simd> {
+    pub(super) cosine: TwoWord<S>,
+    pub(super) sine: TwoWord<S>,
+    /// The quarter turns taken off, modulo 4: -2 or 2, -1, 0 or 1.
+    pub(super) quarters: Real<S>,
+}
+
+/// Cosine and sine of `b` less quarter turns, so that what is left is at most pi/4.
 #[inline(always)]
-pub(super) fn cos_sin<S: Simd>(b: Real<S>) -> (TwoWord<S>, TwoWord<S>) {
+pub(super) fn cos_sin<S: Simd>(b: Real<S>) -> Reduced<S> {
     let n = (b * TWO_OVER_PI).nearest();
     let [first, second, third] = HALF_PI;
     // n < 2^23 and 30 bits: the products are exact; the first difference is exact as well.
@@ -140,16 +142,24 @@ pub(super) fn cos_sin<S: Simd>(b: Real<S>) -> (TwoWord<S>, TwoWord<S>) {
     let series = series.times(square).negated().added_to(HALF).negated();
     let cosine = series.times(square).added_to(ONE);
 
-    // The quarter turns: -2 or 2, -1, 0, 1.
-    let quarter = (n * 0.25).nearest().negated_mul_add(4.0, n);
-    let odd = quarter.abs().eq(1.0);
-    let half = quarter.abs().eq(2.0);
-    let zero = b.constant(0.0);
-    let flip_cosine = (half | quarter.eq(1.0)).select(-0.0, zero);
-    let flip_sine = (half | quarter.eq(-1.0)).select(-0.0, zero);
-    (
-        choose(odd, sine, cosine, flip_cosine),
-        choose(odd, cosine, sine, flip_sine),
+    Reduced {
+        cosine,
+        sine,
+        quarters: (n * 0.25).nearest().negated_mul_add(4.0, n),
+    }
+}
+
+/// `z (-i)^quarters`, for -2 to 2 quarter turns.
+#[inline(always)]
+pub(super) fn turned_back<S: Simd>(z: Complex<S>, quarters: Real<S>) -> Complex<S> {
+    let half = quarters.abs().eq(2.0);
+    let odd = quarters.abs().eq(1.0);
+    let zero = quarters.constant(0.0);
+    let flip_re = (half | quarters.eq(-1.0)).select(-0.0, zero);
+    let flip_im = (half | quarters.eq(1.0)).select(-0.0, zero);
+    Complex::new(
+        odd.select(z.im, z.re).flipped(flip_re),
+        odd.select(z.re, z.im).flipped(flip_im),
     )
 }
 
@@ -181,14 +191,15 @@ mod tests {
     use proptest::prelude::*;
     use pulp::{Scalar128b, cast};
 
-    const BOUND: f64 = 1.0 / (1_u64 << 62) as f64;
+    /// The errors of two factors.
+    const BOUND: f64 = 1.0 / (1_u64 << 60) as f64;
 
     fn lane(value: f64) -> Real<Scalar128b> {
         Real::splat(Scalar128b, value)
     }
 
     fn first(value: Real<Scalar128b>) -> f64 {
-        let lanes: [f64; 2] = cast(value.lanes());
+        let [lanes, _]: [[f64; 2]; 2] = value.lanes().map(cast);
         lanes[0]
     }
 
@@ -217,7 +228,7 @@ mod tests {
 
         #[test]
         fn the_squares_of_cosine_and_sine_add_to_one(b in -8e6..8e6_f64) {
-            let (c, s) = cos_sin(lane(b));
+            let Reduced { cosine: c, sine: s, .. } = cos_sin(lane(b));
             prop_assert!(beside_one(c.times(c).plus(s.times(s))) < BOUND);
         }
 
@@ -226,8 +237,10 @@ mod tests {
             let (factor, n) = exp(lane(a), lane(0.0));
             let near = |x: f64, y: f64| (x - y).abs() <= 2.0 * f64::EPSILON * y.abs();
             prop_assert!(near(first(factor.hi * n.power_of_two()), libm::exp(a)));
-            let (c, s) = cos_sin(lane(b));
-            prop_assert!(near(first(c.hi), libm::cos(b)) && near(first(s.hi), libm::sin(b)));
+            let reduced = cos_sin(lane(b));
+            let conjugate = Complex::new(reduced.cosine.hi, -reduced.sine.hi);
+            let z = turned_back(conjugate, reduced.quarters);
+            prop_assert!(near(first(z.re), libm::cos(b)) && near(first(-z.im), libm::sin(b)));
         }
 
         #[test]

@@ -2,7 +2,7 @@
 
 use crate::lanes::{Complex, Mask, Real, Simd};
 
-use super::branch_point::{INVERSE_E, branch_root, offset, one_plus_w};
+use super::branch_point::{INVERSE_E, branch_root, offset, one_plus_w as near_branch_point};
 use super::elementary::{rough_angle, rough_log};
 use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithmic_step, principal};
 use super::huge_branch::HUGE_BRANCH;
@@ -15,7 +15,7 @@ pub(super) const SERIES_STARTS: f64 = 0.046;
 /// Angle between z and the real axis up to which dw/dz there is taken for the starting value.
 const NARROW: f64 = 1e-9;
 /// Modulus below which W_0(z) = z - z^2 to working precision.
-const SMALL: f64 = 1e-9;
+pub(super) const SMALL: f64 = 1e-9;
 
 /// W, and 1 + W to its own relative accuracy.
 pub(super) struct Answer<S: Simd> {
@@ -52,74 +52,85 @@ fn reflected<S: Simd>(w: Complex<S>, side: Real<S>) -> Complex<S> {
 
 #[inline(always)]
 fn upper<S: Simd>(z: Complex<S>, k: Real<S>) -> Answer<S> {
+    let one = z.re.constant(1.0);
+    let unit = Complex::new(one, one);
     let principal_branch = k.eq(0.0);
     let first = k.eq(1.0);
     let largest = z.re.abs().larger(z.im.abs());
     let small = principal_branch & largest.lt(SMALL);
-    let tiny = z;
-    // Nothing of what follows is kept there; subnormal numbers would only slow it down.
-    let one = z.re.constant(1.0);
-    let z = small.choose(Complex::new(one, one), z);
 
     // Only these two sheets are joined at -1/e.
     let joined = principal_branch | (first & z.im.is_negative());
     let offset = offset(z);
-    let distance = offset.re.abs().larger(offset.im.abs());
-    let close = joined & distance.lt(1.0);
-    let square = close
-        .choose(offset, Complex::new(one, one))
-        .square_modulus();
+    // An overflow here is as far away as anything else.
+    let square = offset.square_modulus();
     let by_series = joined & square.lt(SERIES_STARTS * SERIES_STARTS);
     let answered = joined & square.lt(SERIES_ANSWERS * SERIES_ANSWERS);
     let by_principal = principal_branch & largest.lt(PRINCIPAL_RADIUS);
     let by_behind = first & joined & square.lt(BEHIND_RADIUS * BEHIND_RADIUS);
     let by_logarithm = !(by_principal | by_behind);
 
-    let scaled = Scaled::new(z);
-    let mut start = Complex::new(one, one);
-    let mut near = Complex::new(one, one);
-    let rooted = by_principal | by_behind;
-    if rooted.any() {
-        let root = branch_root(rooted.choose(offset, start));
-        start = principal(rooted.choose(z, start), root);
+    let mut w = unit;
+    let mut one_plus_w = unit;
+    let mut root = unit;
+    if (by_series | by_behind | (by_principal & !small)).any() {
+        root = branch_root(offset);
+    }
+    if by_series.any() {
+        one_plus_w = near_branch_point(by_behind.choose(-root, root));
+        w = one_plus_w.shifted(-1.0);
+    }
+    if small.any() {
+        // As a product of sums, so that an underflow keeps the sign.
+        let square = Complex::new((z.re - z.im) * (z.re + z.im), z.re * z.im * 2.0);
+        w = small.choose(z - square, w);
+        one_plus_w = small.choose((z - square).shifted(1.0), one_plus_w);
+    }
+    let done = small | answered;
+    if (!done).any() {
+        let mut start = w;
+        if by_principal.any() {
+            start = (by_principal & !by_series).choose(principal(z, root), start);
+        }
         if by_behind.any() {
-            start = by_behind.choose(behind(root), start);
+            start = (by_behind & !by_series).choose(behind(root), start);
         }
-        if by_series.any() {
-            near = one_plus_w(by_behind.choose(-root, root));
-            start = by_series.choose(near.shifted(-1.0), start);
+        let scaled = Scaled::new(z);
+        if by_logarithm.any() {
+            start = by_logarithm.choose(by_log(z, scaled, k, joined), start);
         }
+        let start = start.folded();
+        let change = correction(start, product_with_exp(scaled, start).less(start));
+        w = done.choose(w, start + change);
+        one_plus_w = done.choose(one_plus_w, start.shifted(1.0) + change);
     }
-    if by_logarithm.any() {
-        let modulus = scaled.exponent.mul_add(
-            std::f64::consts::LN_2,
-            rough_log(scaled.value.square_modulus()) * 0.5,
-        );
-        let log = Complex::new(modulus, k.mul_add(std::f64::consts::TAU, rough_angle(z)));
-        let mut w = logarithmic_step(log, log);
-        if first.any() {
-            w = first.choose(logarithmic_step(w, log), w);
-        }
-        // Along the segment on which W_1 is real from below, log z + 2 pi i - log w leaves an
-        // imaginary part of rounding errors; the true one is Im z dw/dz, zero where Im z is.
-        let narrow =
-            joined & z.re.lt(0.0) & z.re.gt(-INVERSE_E) & z.im.abs().le(z.re.abs() * NARROW);
-        let slope = (z.im / z.re) * (w.re / (w.re + 1.0));
-        w.im = narrow.select(slope, w.im);
-        start = by_logarithm.choose(w, start);
-    }
-
-    let w = start.folded();
-    let change = correction(w, product_with_exp(scaled, w).less(w));
-    let series = Complex::new(
-        tiny.re.mul_sub(tiny.re, tiny.im * tiny.im),
-        tiny.re * tiny.im * 2.0,
-    );
-    let tiny = tiny - series;
-    let stepped = small.choose(tiny, w + change);
-    let one_plus_stepped = small.choose(tiny.shifted(1.0), w.shifted(1.0) + change);
     Answer {
-        w: answered.choose(near.shifted(-1.0), stepped).folded(),
-        one_plus_w: answered.choose(near, one_plus_stepped).folded(),
+        w: w.folded(),
+        one_plus_w: one_plus_w.folded(),
     }
+}
+
+/// The starting value from log z + 2 pi i k.
+#[inline(always)]
+fn by_log<S: Simd>(z: Complex<S>, scaled: Scaled<S>, k: Real<S>, joined: Mask<S>) -> Complex<S> {
+    let first = k.eq(1.0);
+    let modulus = scaled.exponent.mul_add(
+        std::f64::consts::LN_2,
+        rough_log(scaled.value.square_modulus()) * 0.5,
+    );
+    let angle = k.mul_add(std::f64::consts::TAU, rough_angle(z));
+    let log = Complex::new(modulus, angle);
+    let mut w = logarithmic_step(log, log);
+    if first.any() {
+        w = first.choose(logarithmic_step(w, log), w);
+    }
+    // Along the segment on which W_1 is real from below, log z + 2 pi i - log w leaves an
+    // imaginary part of rounding errors; the true one is Im z dw/dz, zero where Im z is.
+    let flat = z.im.abs().le(z.re.abs() * NARROW);
+    let narrow = joined & flat & z.re.lt(0.0) & z.re.gt(-INVERSE_E);
+    if narrow.any() {
+        let slope = (z.im * w.re) / (z.re * (w.re + 1.0));
+        w.im = narrow.select(slope, w.im);
+    }
+    w
 }

@@ -61,6 +61,7 @@ mod guess;
 mod huge_branch;
 mod kernel;
 mod refine;
+mod route;
 mod special_values;
 mod two_word;
 

@@ -100,6 +100,12 @@ impl<S: Simd> TwoWord<S> {
         Self::new(high.hi, self.lo.mul_add(b, high.lo))
     }
 
+    /// Negated where `sign`, which is +0 or -0, has its bit set.
+    #[inline(always)]
+    pub(super) fn flipped(self, sign: Real<S>) -> Self {
+        Self::new(self.hi.flipped(sign), self.lo.flipped(sign))
+    }
+
     /// Multiplied by a power of two.
     #[inline(always)]
     pub(super) fn scaled(self, power: Real<S>) -> Self {
@@ -124,8 +130,11 @@ mod tests {
     }
 
     fn words(value: TwoWord<Scalar128b>) -> (f64, f64) {
-        let (hi, lo): ([f64; 2], [f64; 2]) = (cast(value.hi.lanes()), cast(value.lo.lanes()));
-        (hi[0], lo[0])
+        let first = |value: Real<Scalar128b>| {
+            let [lanes, _]: [[f64; 2]; 2] = value.lanes().map(cast);
+            lanes[0]
+        };
+        (first(value.hi), first(value.lo))
     }
 
     proptest! {

@@ -4,53 +4,80 @@ use pulp::{Simd, cast};
 
 use super::real::{Mask, Real};
 
-const SIGN: f64 = -0.0;
+const SIGN: u64 = 0x8000_0000_0000_0000;
 /// All bits of the exponent.
 const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
 /// All bits below the exponent.
 const FRACTION: u64 = 0x000f_ffff_ffff_ffff;
-/// The bits of 1.
-const ONE: u64 = 0x3ff0_0000_0000_0000;
 /// 2^32, the place value of the upper half of the bits.
 const HALF: f64 = 4_294_967_296.0;
 /// 1.5 * 2^52: added to a whole number below 2^51, its last bits are those of that number.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// 2^52: a double with these bits above a whole number in its lower bits has that number added.
-const CARRIER: u64 = 0x4330_0000_0000_0000;
+const CARRIER: f64 = 4_503_599_627_370_496.0;
 
 impl<S: Simd> Real<S> {
     #[inline(always)]
-    fn bits(self) -> S::u64s {
-        self.simd.transmute_u64s_f64s(self.lanes)
+    fn bits(self) -> [S::u64s; 2] {
+        let [a, b] = self.lanes;
+        [
+            self.simd.transmute_u64s_f64s(a),
+            self.simd.transmute_u64s_f64s(b),
+        ]
     }
 
     #[inline(always)]
-    fn from_bits(simd: S, bits: S::u64s) -> Self {
-        Self::new(simd, simd.transmute_f64s_u64s(bits))
+    fn from_bits(simd: S, [a, b]: [S::u64s; 2]) -> Self {
+        Self::new(
+            simd,
+            [simd.transmute_f64s_u64s(a), simd.transmute_f64s_u64s(b)],
+        )
     }
 
     #[inline(always)]
     pub(crate) fn abs(self) -> Self {
-        Self::new(self.simd, self.simd.abs_f64s(self.lanes))
+        let [a, b] = self.lanes;
+        Self::new(self.simd, [self.simd.abs_f64s(a), self.simd.abs_f64s(b)])
+    }
+
+    /// The bits that are also set in `mask`.
+    #[inline(always)]
+    fn masked(self, mask: u64) -> Self {
+        let ([a, b], mask) = (self.bits(), self.simd.splat_u64s(mask));
+        let simd = self.simd;
+        Self::from_bits(simd, [simd.and_u64s(a, mask), simd.and_u64s(b, mask)])
     }
 
     /// The sign alone: +0 or -0.
     #[inline(always)]
     pub(crate) fn sign(self) -> Self {
-        let sign = self.simd.transmute_u64s_f64s(self.simd.splat_f64s(SIGN));
-        Self::from_bits(self.simd, self.simd.and_u64s(self.bits(), sign))
+        self.masked(SIGN)
     }
 
     /// Negated where `sign`, which is +0 or -0, has its bit set.
     #[inline(always)]
     pub(crate) fn flipped(self, sign: Self) -> Self {
-        Self::from_bits(self.simd, self.simd.xor_u64s(self.bits(), sign.bits()))
+        let ([a, b], [c, d]) = (self.bits(), sign.bits());
+        Self::from_bits(
+            self.simd,
+            [self.simd.xor_u64s(a, c), self.simd.xor_u64s(b, d)],
+        )
+    }
+
+    /// With the bits of `other` set as well.
+    #[inline(always)]
+    fn joined(self, other: Self) -> Self {
+        let ([a, b], [c, d]) = (self.bits(), other.bits());
+        Self::from_bits(
+            self.simd,
+            [self.simd.or_u64s(a, c), self.simd.or_u64s(b, d)],
+        )
     }
 
     /// The modulus of `self` with the sign of `sign`, which is +0 or -0.
     #[inline(always)]
     pub(crate) fn signed(self, sign: Self) -> Self {
-        Self::from_bits(self.simd, self.simd.or_u64s(self.abs().bits(), sign.bits()))
+        self.abs().joined(sign)
     }
 
     /// Is the sign bit set (also of a zero)?
@@ -69,41 +96,41 @@ impl<S: Simd> Real<S> {
     #[inline(always)]
     pub(crate) fn power_of_two(self) -> Self {
         // The exponent, biased, comes to the last bits of the upper half; that half is shifted.
-        let biased = self.mul_add(HALF, WHOLE + 1023.0 * HALF);
-        let halves: S::u32s = cast(biased.bits());
-        let shifted = self
-            .simd
-            .wrapping_dyn_shl_u32s(halves, self.simd.splat_u32s(20));
-        Self::from_bits(self.simd, cast(shifted))
+        let [a, b] = self.mul_add(HALF, WHOLE + 1023.0 * HALF).bits();
+        let simd = self.simd;
+        let places = simd.splat_u32s(20);
+        let shifted = [
+            cast(simd.wrapping_dyn_shl_u32s(cast(a), places)),
+            cast(simd.wrapping_dyn_shl_u32s(cast(b), places)),
+        ];
+        Self::from_bits(simd, shifted)
     }
 
     /// The power of two at or below the modulus of a normal number.
     #[inline(always)]
     pub(crate) fn binade(self) -> Self {
-        let exponent = self.simd.splat_u64s(EXPONENT);
-        Self::from_bits(self.simd, self.simd.and_u64s(self.bits(), exponent))
+        self.masked(EXPONENT)
     }
 
     /// The modulus of a normal number brought to [1, 2) by a power of two.
     #[inline(always)]
     pub(crate) fn mantissa(self) -> Self {
-        let fraction = self.simd.splat_u64s(FRACTION);
-        let one = self.simd.splat_u64s(ONE);
-        let bits = self.simd.and_u64s(self.bits(), fraction);
-        Self::from_bits(self.simd, self.simd.or_u64s(bits, one))
+        self.masked(FRACTION).joined(self.constant(1.0))
     }
 
     /// `log2` of a positive power of two.
     #[inline(always)]
     pub(crate) fn exponent(self) -> Self {
         // Shifted to the last bits of the upper half, then read as the whole number there.
-        let halves: S::u32s = cast(self.bits());
-        let shifted = self
-            .simd
-            .wrapping_dyn_shr_u32s(halves, self.simd.splat_u32s(20));
-        let carrier = self.simd.splat_u64s(CARRIER);
-        let whole = Self::from_bits(self.simd, self.simd.or_u64s(cast(shifted), carrier));
-        (whole - 4_503_599_627_370_496.0) * (1.0 / HALF) - 1023.0
+        let [a, b] = self.bits();
+        let simd = self.simd;
+        let places = simd.splat_u32s(20);
+        let shifted = [
+            cast(simd.wrapping_dyn_shr_u32s(cast(a), places)),
+            cast(simd.wrapping_dyn_shr_u32s(cast(b), places)),
+        ];
+        let whole = Self::from_bits(simd, shifted).joined(self.constant(CARRIER));
+        (whole - CARRIER) * (1.0 / HALF) - 1023.0
     }
 }
 
@@ -117,7 +144,7 @@ mod tests {
     }
 
     fn first(value: Real<Scalar128b>) -> f64 {
-        let lanes: [f64; 2] = cast(value.lanes());
+        let [lanes, _]: [[f64; 2]; 2] = value.lanes().map(cast);
         lanes[0]
     }
 

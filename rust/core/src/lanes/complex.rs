@@ -31,10 +31,33 @@ impl<S: Simd> Complex<S> {
         Self::new(self.re * factor, self.im * factor)
     }
 
+    /// `self * factor + summand` with real factor and summand.
+    #[inline(always)]
+    pub(crate) fn affine(self, factor: f64, summand: f64) -> Self {
+        Self::new(self.re.mul_add(factor, summand), self.im * factor)
+    }
+
     /// With a real number added.
     #[inline(always)]
     pub(crate) fn shifted(self, summand: impl Operand<S>) -> Self {
         Self::new(self.re + summand, self.im)
+    }
+
+    /// `1 / self`.
+    #[inline(always)]
+    pub(crate) fn inverse(self) -> Self {
+        let inverse = self.re.constant(1.0) / self.square_modulus();
+        Self::new(self.re * inverse, -(self.im * inverse))
+    }
+
+    /// `self * factor + summand` with a real summand.
+    #[inline(always)]
+    pub(crate) fn mul_add(self, factor: Self, summand: impl Operand<S>) -> Self {
+        let re = self.im.negated_mul_add(factor.im, summand);
+        Self::new(
+            self.re.mul_add(factor.re, re),
+            self.re.mul_add(factor.im, self.im * factor.re),
+        )
     }
 
     /// `self / divisor`.
