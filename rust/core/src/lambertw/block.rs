@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use crate::lanes::{Complex, Real, Simd};
 
 use super::columns::{BLOCK, Kernel, SHORT, sweep};
+use super::kernel::Point;
 use super::route::Order;
 use super::{delay, huge_branch, kernel, special_values};
 
@@ -17,7 +18,7 @@ impl Kernel<3, 3> for LambertW {
     #[inline(always)]
     fn lanes<S: Simd>(&self, [re, im, k]: [Real<S>; 3]) -> [Real<S>; 3] {
         let z = Complex::new(re, im);
-        let w = kernel::lambertw(z, k).w;
+        let w = kernel::lambertw(Point::new(z), k).w;
         let far = kernel::out_of_reach(z, k);
         [w.re, w.im, far.select(1.0, re.constant(0.0))]
     }

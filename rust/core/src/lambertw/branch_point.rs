@@ -13,7 +13,7 @@ pub(super) const INVERSE_E: f64 = 0.367_879_441_171_442_33;
 pub(super) const INVERSE_E_LOW: f64 = -1.242_875_367_278_836_3e-17;
 
 /// Coefficients of p^2, p^3, …, p^13; that of p is 1.
-const SERIES: [f64; 12] = [
+pub(super) const SERIES: [f64; 12] = [
     -1.0 / 3.0,
     11.0 / 72.0,
     -43.0 / 540.0,

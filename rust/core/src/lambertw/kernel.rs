@@ -2,14 +2,19 @@
 
 use crate::lanes::{Complex, Mask, Real, Simd};
 
-use super::branch_point::{INVERSE_E, branch_root, offset, one_plus_w as near_branch_point};
+use super::branch_point::{
+    INVERSE_E, INVERSE_E_LOW, branch_root, offset, one_plus_w as near_branch_point,
+};
 use super::elementary::{rough_angle, rough_log};
 use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithmic_step, principal};
 use super::huge_branch::HUGE_BRANCH;
 use super::refine::{Scaled, correction, product_with_exp};
+use super::two_word::{ordered_sum, sum};
 
 /// Distance from -1/e below which the series is the answer.
 pub(super) const SERIES_ANSWERS: f64 = 1.0 / 16_384.0;
+/// Distance from -1/e below which the series knows 1 + W better than a step does.
+const SERIES_TRUSTED: f64 = 1.0 / 2_048.0;
 /// Distance from -1/e below which the series is the starting value.
 pub(super) const SERIES_STARTS: f64 = 0.046;
 /// Angle between z and the real axis up to which dw/dz there is taken for the starting value.
@@ -32,26 +37,67 @@ pub(super) fn out_of_reach<S: Simd>(z: Complex<S>, k: Real<S>) -> Mask<S> {
     !finite | zero | k.abs().ge(HUGE_BRANCH as f64)
 }
 
-/// W_k(z) for lanes within reach; `k` holds whole numbers.
+/// An argument, and what belongs to it.
+pub(super) struct Point<S: Simd> {
+    z: Complex<S>,
+    /// The second word of Re z, where there is one.
+    low: Option<Real<S>>,
+    /// z + 1/e.
+    offset: Complex<S>,
+}
+
+impl<S: Simd> Point<S> {
+    #[inline(always)]
+    pub(super) fn new(z: Complex<S>) -> Self {
+        Self {
+            z,
+            low: None,
+            offset: offset(z),
+        }
+    }
+
+    /// The point at `offset` from -1/e.
+    #[inline(always)]
+    pub(super) fn from_offset(offset: Complex<S>) -> Self {
+        let near = sum(offset.re, offset.re.constant(-INVERSE_E));
+        let re = ordered_sum(near.hi, near.lo - INVERSE_E_LOW);
+        Self {
+            z: Complex::new(re.hi, offset.im),
+            low: Some(re.lo),
+            offset,
+        }
+    }
+}
+
+/// W_k for lanes within reach; `k` holds whole numbers.
 #[inline(always)]
-pub(super) fn lambertw<S: Simd>(z: Complex<S>, k: Real<S>) -> Answer<S> {
+pub(super) fn lambertw<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
     // W_k(conj z) = conj W_-k(z) brings every case to k >= 0 and, for k = 0, to Im z >= 0;
     // there Im w >= 0.
-    let side = k.eq(0.0).select(z.im.sign(), k.sign());
-    let answer = upper(Complex::new(z.re, z.im.flipped(side)), k.abs());
+    let side = k.eq(0.0).select(point.z.im.sign(), k.sign());
+    let answer = upper(
+        Point {
+            z: reflected(point.z, side),
+            offset: reflected(point.offset, side),
+            ..point
+        },
+        k.abs(),
+    );
     Answer {
         w: reflected(answer.w, side),
         one_plus_w: reflected(answer.one_plus_w, side),
     }
 }
 
+/// Conjugated where `side`, which is +0 or -0, has its bit set.
 #[inline(always)]
 fn reflected<S: Simd>(w: Complex<S>, side: Real<S>) -> Complex<S> {
-    Complex::new(w.re, w.im.signed(side))
+    Complex::new(w.re, w.im.flipped(side))
 }
 
 #[inline(always)]
-fn upper<S: Simd>(z: Complex<S>, k: Real<S>) -> Answer<S> {
+fn upper<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
+    let Point { z, low, offset } = point;
     let one = z.re.constant(1.0);
     let unit = Complex::new(one, one);
     let principal_branch = k.eq(0.0);
@@ -61,7 +107,6 @@ fn upper<S: Simd>(z: Complex<S>, k: Real<S>) -> Answer<S> {
 
     // Only these two sheets are joined at -1/e.
     let joined = principal_branch | (first & z.im.is_negative());
-    let offset = offset(z);
     // An overflow here is as far away as anything else.
     let square = offset.square_modulus();
     let by_series = joined & square.lt(SERIES_STARTS * SERIES_STARTS);
@@ -95,14 +140,15 @@ fn upper<S: Simd>(z: Complex<S>, k: Real<S>) -> Answer<S> {
         if by_behind.any() {
             start = (by_behind & !by_series).choose(behind(root), start);
         }
-        let scaled = Scaled::new(z);
+        let scaled = Scaled::new(z).with_low(low);
         if by_logarithm.any() {
             start = by_logarithm.choose(by_log(z, scaled, k, joined), start);
         }
         let start = start.folded();
         let change = correction(start, product_with_exp(scaled, start).less(start));
         w = done.choose(w, start + change);
-        one_plus_w = done.choose(one_plus_w, start.shifted(1.0) + change);
+        let trusted = small | (joined & square.lt(SERIES_TRUSTED * SERIES_TRUSTED));
+        one_plus_w = trusted.choose(one_plus_w, start.shifted(1.0) + change);
     }
     Answer {
         w: w.folded(),

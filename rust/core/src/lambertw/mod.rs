@@ -60,6 +60,7 @@ mod elementary;
 mod guess;
 mod huge_branch;
 mod kernel;
+mod real;
 mod refine;
 mod route;
 mod special_values;

@@ -10,11 +10,16 @@ use crate::lanes::{Complex, Real, Simd};
 use super::elementary::{Reduced, cos_sin, exp, turned_back};
 use super::two_word::TwoWord;
 
+/// 2^64 lifts a subnormal number among the normal ones.
+pub(super) const SCALE_LIFT: f64 = 18_446_744_073_709_551_616.0;
+
 /// A complex number as (re + i im) 2^exponent, its larger component in [1, 2).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scaled<S: Simd> {
     pub(super) value: Complex<S>,
     pub(super) exponent: Real<S>,
+    /// The second word of the real part, where there is one.
+    pub(super) low: Option<Real<S>>,
 }
 
 impl<S: Simd> Scaled<S> {
@@ -25,7 +30,7 @@ impl<S: Simd> Scaled<S> {
         // A subnormal number has no exponent of its own: bring it among the normal ones first.
         let subnormal = largest.lt(f64::MIN_POSITIVE);
         let one = largest.constant(1.0);
-        let lifted = subnormal.select(18_446_744_073_709_551_616.0, one);
+        let lifted = subnormal.select(SCALE_LIFT, one);
         let lift = subnormal.select(64.0, one.constant(0.0));
         let exponent = (largest * lifted).binade().exponent();
         // 2^-1023 would be subnormal.
@@ -33,6 +38,19 @@ impl<S: Simd> Scaled<S> {
         Self {
             value: z.scaled(lifted).scaled(factor),
             exponent: exponent.smaller(1022.0) - lift,
+            low: None,
+        }
+    }
+
+    /// With a second word of the real part, in units of the number itself (which is not subnormal).
+    #[inline(always)]
+    pub(super) fn with_low(self, low: Option<Real<S>>) -> Self {
+        match low {
+            None => self,
+            Some(low) => Self {
+                low: Some(low * (-self.exponent).power_of_two()),
+                ..self
+            },
         }
     }
 }
@@ -54,9 +72,18 @@ pub(super) fn product_with_exp<S: Simd>(z: Scaled<S>, w: Complex<S>) -> TwoWordC
         sine,
         quarters,
     } = cos_sin(w.im);
-    let z = turned_back(z.value, quarters);
-    let re = cosine.times_word(z.re).plus(sine.times_word(z.im));
-    let im = cosine.times_word(z.im).plus(sine.times_word(-z.re));
+    let turned = turned_back(z.value, quarters);
+    let mut re = cosine
+        .times_word(turned.re)
+        .plus(sine.times_word(turned.im));
+    let mut im = cosine
+        .times_word(turned.im)
+        .plus(sine.times_word(-turned.re));
+    if let Some(low) = z.low {
+        let low = turned_back(Complex::new(low, low.constant(0.0)), quarters);
+        re.lo = re.lo + low.re.mul_add(cosine.hi, low.im * sine.hi);
+        im.lo = im.lo + low.im.mul_sub(cosine.hi, low.re * sine.hi);
+    }
     TwoWordComplex {
         re: re.times(modulus),
         im: im.times(modulus),
