@@ -26,6 +26,7 @@ FLOORS = [
     {"_errors", "_frozen", "_validation", "_deadtime"},
     {
         "_special",
+        "_low_level",
         "_rootset",
         "_parametric",
         "_quasipolynomial",

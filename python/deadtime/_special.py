@@ -1,19 +1,40 @@
-"""The Lambert W function and the characteristic roots it gives in closed form."""
+"""The Lambert W function and the characteristic roots it gives in closed form.
+
+The functions are NumPy ufuncs with a thin layer on top: single numbers go past NumPy's machinery,
+which takes longer than W itself; and where NumPy refuses the arguments, the reason is looked up.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._validation import thread_number
 
-__all__ = ["dde_roots", "lambertw"]
+__all__ = ["dde_roots", "lambertw", "lambertw0", "lambertwm1"]
 
 
-def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> Any:
+class UfuncOptions(TypedDict, total=False):
+    """What every ufunc takes and few need."""
+
+    casting: Literal["no", "equiv", "safe", "same_kind", "unsafe"]
+    order: Literal["K", "A", "C", "F"]
+    subok: bool
+
+
+def lambertw(
+    z: ArrayLike,
+    k: ArrayLike = 0,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None = None,
+    *,
+    where: ArrayLike = True,
+    dtype: DTypeLike | None = None,
+    threads: int | None = None,
+    **options: Unpack[UfuncOptions],
+) -> Any:
     r"""Lambert W function, every branch.
 
     :math:`w = W_k(z)` solves :math:`w e^w = z`; the branch is the integer :math:`k` in
@@ -27,21 +48,34 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
     k : array_like of int, optional
         Branch, any 64-bit integer. Broadcasts against `z`. The real branches are ``k=0`` for
         real ``z >= -1/e`` and ``k=-1`` for real ``-1/e <= z < 0``.
+    out : ndarray or tuple of one ndarray, optional
+        Where to put the result, of complex numbers; it may be `z` itself.
+    where : array_like of bool, optional
+        Where to compute; elsewhere `out` stays as it is (and is arbitrary without `out`).
+    dtype : dtype, optional
+        Type of the result, complex64 or complex128.
     threads : int, optional
         Number of threads for large arrays; all cores unless told (see ``DEADTIME_NUM_THREADS``).
         The result does not depend on it.
+    **options
+        `casting`, `order`, `subok`, as for any NumPy ufunc.
 
     Returns
     -------
     ndarray or scalar of complex128
-        W with the common shape of `z` and `k`; complex64 when `z` is complex64.
+        W with the common shape of `z` and `k`; complex64 when `z` is complex64. Subclasses of
+        arrays and objects with an ``__array_ufunc__`` of their own are treated as by any ufunc.
 
     Raises
     ------
     TypeError
         `z` is not numeric (or has more precision than complex128), or `k` is not of integers.
     ValueError
-        The shapes do not broadcast, or `k` exceeds 64 bits.
+        The shapes do not broadcast, `k` exceeds 64 bits, or `out` does not fit.
+
+    See Also
+    --------
+    lambertw0, lambertwm1 : the real branches of real arguments.
 
     Notes
     -----
@@ -70,17 +104,128 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
     array([-2.542641, -0.259171])
     >>> bool(np.allclose(w * np.exp(w), -0.2))
     True
+
+    In place, without a new array:
+
+    >>> z = np.array([1.0 + 1.0j, -5.0 + 0.0j])
+    >>> dtm.lambertw(z, out=z) is z
+    True
     """
-    points = _numbers("z", z, np.complex128)
-    branches = _integers("k", k)
-    narrow = points.dtype == np.complex64
-    shape = _common_shape(z=points, k=branches)
-    w = _deadtime.lambertw(
-        _native(_spread(points, shape), np.complex128),
-        branches if branches.size == 1 else _spread(branches, shape),
-        thread_number(threads),
-    )
-    return (w.astype(np.complex64) if narrow else w)[()]
+    if out is None and threads is None and where is True and dtype is None and not options:
+        number = _deadtime.lambertw_number(z, k)
+        if number is not None:
+            return number
+    arguments = {"z": z, "k": _branches(k)}
+    return _apply(_deadtime.lambertw, arguments, np.complex128, out, where, dtype, threads, options)
+
+
+def lambertw0(
+    x: ArrayLike,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None = None,
+    *,
+    where: ArrayLike = True,
+    dtype: DTypeLike | None = None,
+    threads: int | None = None,
+    **options: Unpack[UfuncOptions],
+) -> Any:
+    r"""Principal branch of the Lambert W function for real numbers.
+
+    The solution :math:`w \ge -1` of :math:`w e^w = x`; real in, real out, and several times
+    faster than `lambertw`.
+
+    Parameters
+    ----------
+    x : array_like of float
+        Where to evaluate.
+    out, where, dtype, threads, **options
+        As for `lambertw`, with real types.
+
+    Returns
+    -------
+    ndarray or scalar of float64
+        :math:`W_0(x)`; NaN for :math:`x < -1/e`, where it is not real. float32 when `x` is.
+
+    Raises
+    ------
+    TypeError
+        `x` is not real, or has more precision than float64.
+
+    Notes
+    -----
+    The double next to :math:`-1/e` lies below it by 1.2e-17 and counts as :math:`-1/e` here: W is
+    -1. As a complex number, `lambertw` takes it for what it is.
+
+    References
+    ----------
+    R. M. Corless et al., "On the Lambert W function", Advances in Computational Mathematics 5
+    (1996) 329-359.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> print(dtm.lambertw0(1.0))
+    0.5671432904097838
+    >>> dtm.lambertw0([-0.2, 0.0, np.e]).round(6)
+    array([-0.259171,  0.      ,  1.      ])
+    """
+    if out is None and threads is None and where is True and dtype is None and not options:
+        number = _deadtime.lambertw0_number(x)
+        if number is not None:
+            return number
+    return _apply(_deadtime.lambertw0, {"x": x}, np.float64, out, where, dtype, threads, options)
+
+
+def lambertwm1(
+    x: ArrayLike,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None = None,
+    *,
+    where: ArrayLike = True,
+    dtype: DTypeLike | None = None,
+    threads: int | None = None,
+    **options: Unpack[UfuncOptions],
+) -> Any:
+    r"""Lower real branch of the Lambert W function.
+
+    The solution :math:`w \le -1` of :math:`w e^w = x` for :math:`-1/e \le x < 0`; real in, real
+    out.
+
+    Parameters
+    ----------
+    x : array_like of float
+        Where to evaluate.
+    out, where, dtype, threads, **options
+        As for `lambertw`, with real types.
+
+    Returns
+    -------
+    ndarray or scalar of float64
+        :math:`W_{-1}(x)`; NaN outside :math:`[-1/e, 0]`, ``-inf`` at 0. float32 when `x` is.
+
+    Raises
+    ------
+    TypeError
+        `x` is not real, or has more precision than float64.
+
+    Notes
+    -----
+    The double next to :math:`-1/e` counts as :math:`-1/e`, as for `lambertw0`.
+
+    References
+    ----------
+    R. M. Corless et al., "On the Lambert W function", Advances in Computational Mathematics 5
+    (1996) 329-359.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.lambertwm1([-0.3, -0.2, 0.0]).round(6)
+    array([-1.781337, -2.542641,      -inf])
+    """
+    if out is None and threads is None and where is True and dtype is None and not options:
+        number = _deadtime.lambertwm1_number(x)
+        if number is not None:
+            return number
+    return _apply(_deadtime.lambertwm1, {"x": x}, np.float64, out, where, dtype, threads, options)
 
 
 def dde_roots(
@@ -88,8 +233,11 @@ def dde_roots(
     a1: ArrayLike,
     delay: ArrayLike,
     k: ArrayLike = 0,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None = None,
     *,
+    where: ArrayLike = True,
     threads: int | None = None,
+    **options: Unpack[UfuncOptions],
 ) -> Any:
     r"""Characteristic roots of the scalar equation with one delay.
 
@@ -107,8 +255,8 @@ def dde_roots(
     k : array_like of int, optional
         Which root; all four arguments broadcast. ``k=0`` is rightmost. The roots k and -k are
         conjugate when ``a1 > 0``, k and -1-k when ``a1 < 0`` (unless both are real).
-    threads : int, optional
-        Number of threads for large arrays; the result does not depend on it.
+    out, where, threads, **options
+        As for `lambertw`; arguments are not looked at where `where` is false.
 
     Returns
     -------
@@ -146,43 +294,88 @@ def dde_roots(
     array([-1.5154 +3.1005j, -1.5154 -3.1005j, -6.6601+20.9621j,
            -6.6601-20.9621j])
     """
-    own, delayed = _numbers("a0", a0, np.float64), _numbers("a1", a1, np.float64)
-    lag = _numbers("delay", delay, np.float64)
-    branches = _integers("k", k)
-    for name, values in (("a0", own), ("a1", delayed), ("delay", lag)):
-        _refuse(values, ~np.isfinite(values), f"{name} must be finite")
-    _refuse(lag, lag < 0, "delay must not be negative")
-    shape = _common_shape(a0=own, a1=delayed, delay=lag, k=branches)
-    s = _deadtime.dde_roots(
-        _one_or_all(own, shape),
-        _one_or_all(delayed, shape),
-        _one_or_all(lag, shape),
-        _spread(branches, shape),
-        thread_number(threads),
-    )
-    return s[()]
+    if out is None and threads is None and where is True and not options:
+        number = _deadtime.dde_root_number(a0, a1, delay, k)
+        if number is not None:
+            return number
+    arguments: dict[str, Any] = {"a0": a0, "a1": a1, "delay": delay}
+    for name, values in arguments.items():
+        if not _foreign(values):
+            array = arguments[name] = _numbers(name, values, np.float64)
+            _refuse(array, ~np.isfinite(array), where, f"{name} must be finite")
+    if not _foreign(delay):
+        lag = arguments["delay"]
+        _refuse(lag, lag < 0, where, "delay must not be negative")
+    arguments["k"] = _branches(k)
+    return _apply(_deadtime.dde_roots, arguments, np.float64, out, where, None, threads, options)
 
 
-def _one_or_all(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Broadcast, except a single value, which the native code repeats."""
-    return _native(values if values.size == 1 else _spread(values, shape), np.float64)
+def _apply(
+    ufunc: np.ufunc,
+    arguments: dict[str, Any],
+    widest: type,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None,
+    where: ArrayLike,
+    dtype: DTypeLike | None,
+    threads: int | None,
+    options: UfuncOptions,
+) -> Any:
+    """Call `ufunc`; where it refuses the arguments, say which and why."""
+    keywords: dict[str, Any] = {**options}
+    if out is not None:
+        keywords["out"] = out
+    if where is not True:
+        keywords["where"] = where
+    if dtype is not None:
+        keywords["dtype"] = dtype
+    if threads is not None:
+        before = _deadtime.limit_threads(thread_number(threads))
+    try:
+        return ufunc(*arguments.values(), **keywords)
+    except (TypeError, ValueError, OverflowError) as error:
+        refused = error
+    finally:
+        if threads is not None:
+            _deadtime.limit_threads(before)
+    _explain(arguments, widest)
+    raise refused
 
 
-def _spread(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    return values if values.shape == shape else np.broadcast_to(values, shape)
+def _explain(arguments: dict[str, Any], widest: type) -> None:
+    """Raise what is wrong with the arguments, in their own names, unless something else is."""
+    arrays = {}
+    for name, values in arguments.items():
+        if _foreign(values):
+            return
+        arrays[name] = _integers(name, values) if name == "k" else _numbers(name, values, widest)
+    shapes = [array.shape for array in arrays.values()]
+    try:
+        np.broadcast_shapes(*shapes)
+    except ValueError:
+        listed = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ValueError(f"shapes do not broadcast: {listed}") from None
 
 
-def _native(values: NDArray[Any], dtype: type) -> NDArray[Any]:
-    """Values as the native code reads them: aligned, machine byte order, `dtype`."""
-    if values.dtype == dtype and values.flags.aligned:
-        return values
-    return np.require(values, dtype, "A")
+def _foreign(values: object) -> bool:
+    """Whether the object has its own way with ufuncs, which is left to it."""
+    way = getattr(type(values), "__array_ufunc__", None)
+    return way is not None and way is not np.ndarray.__array_ufunc__
 
 
-def _numbers(name: str, values: ArrayLike, dtype: type) -> NDArray[Any]:
-    array = np.asarray(values)
-    if not np.can_cast(array.dtype, dtype, "safe"):
-        kind = "real" if dtype is np.float64 else "real or complex"
+def _branches(k: ArrayLike) -> Any:
+    """Branches as NumPy takes them without a wrong cast: it would wrap the largest uint64."""
+    if type(k) is int or getattr(k, "dtype", None) is _INT64 or _foreign(k):
+        return k
+    return _integers("k", k)
+
+
+_INT64 = np.dtype(np.int64)
+
+
+def _numbers(name: str, values: ArrayLike, widest: type) -> NDArray[Any]:
+    array = np.asanyarray(values)
+    if not np.can_cast(array.dtype, widest, "safe"):
+        kind = "real" if widest is np.float64 else "real or complex"
         raise TypeError(
             f"{name} has dtype {array.dtype}: give {kind} numbers of at most double precision"
         )
@@ -190,7 +383,7 @@ def _numbers(name: str, values: ArrayLike, dtype: type) -> NDArray[Any]:
 
 
 def _integers(name: str, values: ArrayLike) -> NDArray[np.int64]:
-    array = np.asarray(values)
+    array = np.asanyarray(values)
     if array.dtype.kind not in "iu":
         example = next(iter(array.flat), None)
         if array.dtype == object and array.size and all(type(i) is int for i in array.flat):
@@ -201,24 +394,15 @@ def _integers(name: str, values: ArrayLike) -> NDArray[np.int64]:
         )
     if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
         raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")
-    return _native(array, np.int64)
+    return array.astype(np.int64, copy=False)
 
 
 def _largest(array: NDArray[Any]) -> int:
     return max((int(i) for i in array.flat), key=abs)
 
 
-def _common_shape(**arrays: NDArray[Any]) -> tuple[int, ...]:
-    present = [array.shape for array in arrays.values()]
-    if present.count(present[0]) == len(present):
-        return present[0]
-    try:
-        return np.broadcast_shapes(*present)
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ValueError(f"shapes do not broadcast: {shapes}") from None
-
-
-def _refuse(values: NDArray[Any], bad: NDArray[np.bool_], reason: str) -> None:
+def _refuse(values: NDArray[Any], bad: NDArray[np.bool_], where: ArrayLike, reason: str) -> None:
+    if where is not True:
+        bad, values = np.broadcast_arrays(np.logical_and(bad, where), values)
     if bad.any():
         raise ValueError(f"{reason}, got {values[bad].flat[0]}")

@@ -51,6 +51,7 @@
 #![cfg_attr(test, allow(clippy::indexing_slicing))]
 
 mod array;
+pub mod block;
 mod branch_point;
 mod coefficients;
 mod delay;
