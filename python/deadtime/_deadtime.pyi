@@ -19,6 +19,7 @@ __all__ = [
     "lambertwm1",
     "lambertwm1_number",
     "limit_threads",
+    "nap",
     "sampled_abscissa_grid",
     "spin",
     "thread_count",
@@ -67,6 +68,7 @@ lambertw: np.ufunc
 lambertw0: np.ufunc
 lambertwm1: np.ufunc
 dde_roots: np.ufunc
+nap: np.ufunc
 __pyx_capi__: dict[str, object]
 
 def lambertw_number(z: object, k: object) -> np.complex128 | None: ...

@@ -6,7 +6,7 @@ which takes longer than W itself; and where NumPy refuses the arguments, the rea
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypedDict, Unpack
+from typing import Any, Literal, TypedDict, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -53,7 +53,7 @@ def lambertw(
     where : array_like of bool, optional
         Where to compute; elsewhere `out` stays as it is (and is arbitrary without `out`).
     dtype : dtype, optional
-        Type of the result, complex64 or complex128.
+        Type of the result, complex64 or complex128; NumPy converts `z` to it first.
     threads : int, optional
         Number of threads for large arrays; all cores unless told (see ``DEADTIME_NUM_THREADS``).
         The result does not depend on it.
@@ -115,8 +115,7 @@ def lambertw(
         number = _deadtime.lambertw_number(z, k)
         if number is not None:
             return number
-    arguments = {"z": z, "k": _branches(k)}
-    return _apply(_deadtime.lambertw, arguments, np.complex128, out, where, dtype, threads, options)
+    return _apply(_deadtime.lambertw, (z, _branches(k)), options, out, where, dtype, threads)
 
 
 def lambertw0(
@@ -172,7 +171,7 @@ def lambertw0(
         number = _deadtime.lambertw0_number(x)
         if number is not None:
             return number
-    return _apply(_deadtime.lambertw0, {"x": x}, np.float64, out, where, dtype, threads, options)
+    return _apply(_deadtime.lambertw0, (x,), options, out, where, dtype, threads)
 
 
 def lambertwm1(
@@ -225,7 +224,7 @@ def lambertwm1(
         number = _deadtime.lambertwm1_number(x)
         if number is not None:
             return number
-    return _apply(_deadtime.lambertwm1, {"x": x}, np.float64, out, where, dtype, threads, options)
+    return _apply(_deadtime.lambertwm1, (x,), options, out, where, dtype, threads)
 
 
 def dde_roots(
@@ -298,61 +297,67 @@ def dde_roots(
         number = _deadtime.dde_root_number(a0, a1, delay, k)
         if number is not None:
             return number
-    arguments: dict[str, Any] = {"a0": a0, "a1": a1, "delay": delay}
-    for name, values in arguments.items():
-        if not _foreign(values):
-            array = arguments[name] = _numbers(name, values, np.float64)
-            _refuse(array, ~np.isfinite(array), where, f"{name} must be finite")
-    if not _foreign(delay):
-        lag = arguments["delay"]
+    own, delayed = _finite("a0", a0, where), _finite("a1", a1, where)
+    lag = _finite("delay", delay, where)
+    if not _foreign(lag):
         _refuse(lag, lag < 0, where, "delay must not be negative")
-    arguments["k"] = _branches(k)
-    return _apply(_deadtime.dde_roots, arguments, np.float64, out, where, None, threads, options)
+    arguments = (own, delayed, lag, _branches(k))
+    return _apply(_deadtime.dde_roots, arguments, options, out, where, None, threads)
 
 
 def _apply(
     ufunc: np.ufunc,
-    arguments: dict[str, Any],
-    widest: type,
+    arguments: tuple[Any, ...],
+    options: UfuncOptions,
     out: NDArray[Any] | tuple[NDArray[Any]] | None,
     where: ArrayLike,
     dtype: DTypeLike | None,
     threads: int | None,
-    options: UfuncOptions,
 ) -> Any:
     """Call `ufunc`; where it refuses the arguments, say which and why."""
-    keywords: dict[str, Any] = {**options}
+    keywords: dict[str, Any] = cast("dict[str, Any]", options)
     if out is not None:
         keywords["out"] = out
     if where is not True:
         keywords["where"] = where
     if dtype is not None:
         keywords["dtype"] = dtype
-    if threads is not None:
-        before = _deadtime.limit_threads(thread_number(threads))
+    before = None if threads is None else _deadtime.limit_threads(thread_number(threads))
     try:
-        return ufunc(*arguments.values(), **keywords)
+        return ufunc(*arguments, **keywords)
     except (TypeError, ValueError, OverflowError) as error:
         refused = error
     finally:
         if threads is not None:
             _deadtime.limit_threads(before)
-    _explain(arguments, widest)
+    _explain(ufunc, arguments)
     raise refused
 
 
-def _explain(arguments: dict[str, Any], widest: type) -> None:
-    """Raise what is wrong with the arguments, in their own names, unless something else is."""
-    arrays = {}
-    for name, values in arguments.items():
-        if _foreign(values):
-            return
-        arrays[name] = _integers(name, values) if name == "k" else _numbers(name, values, widest)
-    shapes = [array.shape for array in arrays.values()]
+# The names of the arguments in messages, and the widest type that each may have.
+_COMPLEX, _FLOAT, _BRANCH = np.complex128, np.float64, np.int64
+_ARGUMENTS: dict[np.ufunc, dict[str, type]] = {
+    _deadtime.lambertw: {"z": _COMPLEX, "k": _BRANCH},
+    _deadtime.lambertw0: {"x": _FLOAT},
+    _deadtime.lambertwm1: {"x": _FLOAT},
+    _deadtime.dde_roots: {"a0": _FLOAT, "a1": _FLOAT, "delay": _FLOAT, "k": _BRANCH},
+}
+
+
+def _explain(ufunc: np.ufunc, arguments: tuple[Any, ...]) -> None:
+    """Raise what is wrong with the arguments, in their own names, unless it is something else."""
+    if any(_foreign(values) for values in arguments):
+        return
+    shapes = {}
+    for (name, widest), values in zip(_ARGUMENTS[ufunc].items(), arguments, strict=True):
+        if widest is _BRANCH:
+            shapes[name] = _integers(name, values).shape
+        else:
+            shapes[name] = _numbers(name, values, widest).shape
     try:
-        np.broadcast_shapes(*shapes)
+        np.broadcast_shapes(*shapes.values())
     except ValueError:
-        listed = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
         raise ValueError(f"shapes do not broadcast: {listed}") from None
 
 
@@ -382,10 +387,18 @@ def _numbers(name: str, values: ArrayLike, widest: type) -> NDArray[Any]:
     return array
 
 
+def _finite(name: str, values: ArrayLike, where: ArrayLike) -> Any:
+    if _foreign(values):
+        return values
+    array = _numbers(name, values, np.float64)
+    _refuse(array, ~np.isfinite(array), where, f"{name} must be finite")
+    return array
+
+
 def _integers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     array = np.asanyarray(values)
     if array.dtype.kind not in "iu":
-        example = next(iter(array.flat), None)
+        example = next(iter(array.ravel()[:1].tolist()), None)
         if array.dtype == object and array.size and all(type(i) is int for i in array.flat):
             raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")
         raise TypeError(

@@ -7,6 +7,7 @@
 //! flags, so that none of them warns of an overflow inside a kernel.
 #![allow(unsafe_code)]
 
+mod flags;
 pub(crate) mod scalar;
 mod strided;
 

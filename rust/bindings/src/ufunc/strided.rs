@@ -10,7 +10,7 @@ use std::cell::Cell;
 use std::ffi::{c_char, c_int};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use num_complex::{Complex32, Complex64};
 use numpy::npyffi::{NpyAuxData, npy_intp};
@@ -19,6 +19,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use rayon::prelude::*;
 
+use super::flags;
 use crate::runtime;
 
 /// Most operands, inputs and outputs together, that a ufunc of this package has.
@@ -31,12 +32,15 @@ const BLOCK: usize = 512;
 /// clear than a few elements to compute.
 const SHORT: usize = 8;
 
-/// Elements that one thread takes at a time, and between two looks at the task: whole blocks,
-/// well below a millisecond.
+/// Elements that one thread takes at a time, and between two looks at the task: whole blocks, up
+/// to a millisecond.
 const PIECE: usize = 8 * BLOCK;
 
-/// Elements from which on a loop goes to the thread pool, whose start takes 60 us.
-const PARALLEL_LENGTH: usize = 16_384;
+/// Elements after which a loop looks how long they took, and decides on the thread pool.
+const SAMPLE: usize = 2 * BLOCK;
+
+/// Work left from which on the thread pool pays; its start takes some 20 us to 60 us.
+const WORTHWHILE: Duration = Duration::from_micros(200);
 
 /// The element types that loops read and write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -272,8 +276,10 @@ pub(super) unsafe extern "C" fn strided<L: Loop>(
         let length = usize::try_from(dimensions.read()).unwrap_or(0);
         Operands::new::<L>(data, strides, length)
     };
+    let raised = flags::read();
     let outcome = catch_unwind(AssertUnwindSafe(|| compute::<L>(&operands)))
         .unwrap_or_else(|panic| Err(runtime::internal(panic.as_ref())));
+    flags::restore(raised);
     match outcome {
         Ok(()) => 0,
         Err(error) => {
@@ -289,27 +295,38 @@ fn compute<L: Loop>(operands: &Operands) -> PyResult<()> {
         L::compute::<SHORT>(operands, 0..length);
         return listen(length);
     }
-    if length >= PARALLEL_LENGTH && operands.outputs_apart() {
-        let threads = runtime::wanted(LIMIT.get())?;
-        if threads > 1 {
-            return runtime::run_detached(threads, |task| {
-                (0..length.div_ceil(PIECE))
-                    .into_par_iter()
-                    .try_for_each(|piece| {
-                        task.check()?;
-                        let start = piece * PIECE;
-                        L::compute::<BLOCK>(operands, start..length.min(start + PIECE));
-                        Ok(())
-                    })
-            });
+    let mut done = 0;
+    if length > PIECE && operands.outputs_apart() {
+        let start = Instant::now();
+        L::compute::<BLOCK>(operands, 0..SAMPLE);
+        done = SAMPLE;
+        if start.elapsed() * u32::try_from(length / SAMPLE).unwrap_or(u32::MAX) > WORTHWHILE {
+            let threads = runtime::wanted(LIMIT.get())?;
+            if threads > 1 {
+                return in_pool::<L>(operands, done, threads);
+            }
         }
     }
-    for start in (0..length).step_by(PIECE) {
+    for start in (done..length).step_by(PIECE) {
         let end = length.min(start + PIECE);
         L::compute::<BLOCK>(operands, start..end);
         listen(end - start)?;
     }
     Ok(())
+}
+
+/// The elements from `done` on, by several threads.
+fn in_pool<L: Loop>(operands: &Operands, done: usize, threads: usize) -> PyResult<()> {
+    let length = operands.length;
+    runtime::run_detached(threads, |task| {
+        let pieces = (length - done).div_ceil(PIECE);
+        (0..pieces).into_par_iter().try_for_each(|piece| {
+            task.check()?;
+            let start = done + piece * PIECE;
+            L::compute::<BLOCK>(operands, start..length.min(start + PIECE));
+            Ok(())
+        })
+    })
 }
 
 thread_local! {
