@@ -254,6 +254,7 @@ def test_numbers_take_a_short_way_to_the_same_bits():
                 w = dtm.lambertw(z, k)
                 assert type(w) is np.complex128
                 assert same_bits(w, dtm.lambertw(np.array([z]), np.array([k]))[0])
+                assert same_bits(w, dtm.lambertw(z, np.int64(k)))
     for x in (1, 0.5, np.float64(0.5), -0.2, -0.0, 0, -1.0, math.nan, math.inf):
         for f in (dtm.lambertw0, dtm.lambertwm1):
             assert type(f(x)) is np.float64
@@ -321,6 +322,18 @@ def test_they_are_ufuncs():
         ufunc = getattr(native, name)
         assert isinstance(ufunc, np.ufunc)
         assert (ufunc.__name__, ufunc.nin, ufunc.nout) == (name, nin, 1)
+
+
+def test_methods_of_ufuncs_work_or_say_no():
+    z = points(4)
+    work = z.copy()
+    native.lambertw.at(work, [0, 2, 2], -1)
+    assert work[0] == dtm.lambertw(z[0], -1)
+    assert work[1] == z[1]
+    assert work[2] == dtm.lambertw(dtm.lambertw(z[2], -1), -1)
+    for method in (native.lambertw.reduce, native.lambertw.accumulate):
+        with pytest.raises(TypeError):
+            method(z)
 
 
 # --- floating-point flags -----------------------------------------------------------------
@@ -433,6 +446,20 @@ def test_the_interpreter_runs_on_while_a_loop_works():
         time.sleep(0.001)
     # Holding the lock would leave this loop a handful of turns.
     assert ticks > 20
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_kernel_may_call_back_into_a_loop(threads):
+    # NumPy detaches from the interpreter here while pyo3 believes the thread attached.
+    z, results = points(LARGE), []
+
+    def progress(done):
+        if not results:
+            native.nap(np.full(40_000, 1e-6))
+            results.append(dtm.lambertw(z, threads=threads))
+
+    native.spin(0.1, 2, progress)
+    assert same_bits(results[0], dtm.lambertw(z))
 
 
 def run_python(code, **environment):

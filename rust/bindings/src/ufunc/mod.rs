@@ -8,6 +8,7 @@
 #![allow(unsafe_code)]
 
 mod flags;
+mod operands;
 pub(crate) mod scalar;
 mod strided;
 
@@ -23,7 +24,8 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyCapsule, PyTuple, PyType};
 
-pub(crate) use strided::{Loop, Memory, Operands, Type, limit_threads};
+pub(crate) use operands::{Memory, Operands, Type};
+pub(crate) use strided::{Loop, limit_threads};
 
 /// A ufunc and its loops; those first in the list are preferred.
 pub(crate) trait Ufunc {
@@ -60,7 +62,7 @@ impl LoopEntry {
 /// Define a type for a ufunc: documentation, name, then a line for each loop.
 ///
 /// The types of a line are those of the arrays; the kernel takes slices of its own types, between
-/// which and those [`strided::Cast`] converts. All loops of a ufunc have as many operands.
+/// which and those [`operands::Cast`] converts. All loops of a ufunc have as many operands.
 macro_rules! ufunc {
     (
         $(#[doc = $doc:literal])+

@@ -7,7 +7,7 @@ use numpy::{Element, PyArrayDescrMethods, dtype};
 use pyo3::prelude::*;
 use pyo3::types::{PyComplex, PyComplexMethods, PyFloat, PyInt};
 
-/// The value of a Python float or int, or of NumPy's float64; None for anything else.
+/// The value of a Python float or int, or of NumPy's float64 or int64; None for anything else.
 ///
 /// Of exactly those types, as subclasses may have wishes of their own; an int of more than 64
 /// bits is left to NumPy too.
@@ -31,14 +31,14 @@ pub(crate) fn complex(value: &Bound<'_, PyAny>) -> Option<Complex64> {
     }
 }
 
-/// The value of a Python int that fits 64 bits; None for anything else.
+/// The value of a Python int that fits 64 bits, or of NumPy's int64; None for anything else.
 #[inline]
 pub(crate) fn integer(value: &Bound<'_, PyAny>) -> Option<i64> {
-    if value.is_exact_instance_of::<PyInt>() {
-        value.extract().ok()
-    } else {
-        None
-    }
+    // NumPy has two types of 64 bits where C has.
+    let integer = value.is_exact_instance_of::<PyInt>()
+        || is(value, NpyTypes::PyLongArrType_Type)
+        || is(value, NpyTypes::PyLongLongArrType_Type);
+    if integer { value.extract().ok() } else { None }
 }
 
 fn is(value: &Bound<'_, PyAny>, kind: NpyTypes) -> bool {

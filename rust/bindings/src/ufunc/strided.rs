@@ -1,9 +1,7 @@
-//! NumPy's inner loop: elements gathered into blocks, a kernel run on each, results scattered.
+//! NumPy's inner loop: blocks of elements on this thread, or pieces of them on many.
 //!
-//! Operands come as addresses with any strides and may be the same memory (`out=z`), which Rust's
-//! references must never be; so elements are copied in and out, a few hundred at a time, small
-//! beside the work of a kernel. Long loops go to the thread pool in pieces. Ctrl-C is heard while
-//! a loop runs, and between the many short ones of a broadcast or a cast in pieces.
+//! Long loops go to the thread pool, judged by the time that their first elements take. Ctrl-C is
+//! heard while a loop runs, and between the many short ones of a broadcast or a cast in pieces.
 #![allow(unsafe_code)]
 
 use std::cell::Cell;
@@ -12,18 +10,14 @@ use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use num_complex::{Complex32, Complex64};
 use numpy::npyffi::{NpyAuxData, npy_intp};
-use numpy::{PyArrayDescr, dtype};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use rayon::prelude::*;
 
 use super::flags;
+use super::operands::{Operands, Type};
 use crate::runtime;
-
-/// Most operands, inputs and outputs together, that a ufunc of this package has.
-pub(super) const MAX_OPERANDS: usize = 6;
 
 /// Elements of a block: the blocks of all operands stay in the first-level cache.
 const BLOCK: usize = 512;
@@ -42,91 +36,6 @@ const SAMPLE: usize = 2 * BLOCK;
 /// Work left from which on the thread pool pays; its start takes some 20 us to 60 us.
 const WORTHWHILE: Duration = Duration::from_micros(200);
 
-/// The element types that loops read and write.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Type {
-    Single,
-    Double,
-    SingleComplex,
-    DoubleComplex,
-    Int64,
-}
-
-impl Type {
-    pub(super) fn dtype(self, py: Python<'_>) -> Bound<'_, PyArrayDescr> {
-        match self {
-            Self::Single => dtype::<f32>(py),
-            Self::Double => dtype::<f64>(py),
-            Self::SingleComplex => dtype::<Complex32>(py),
-            Self::DoubleComplex => dtype::<Complex64>(py),
-            Self::Int64 => dtype::<i64>(py),
-        }
-    }
-}
-
-/// A type as it lies in an array.
-pub(crate) trait Memory: Copy {
-    const TYPE: Type;
-}
-
-impl Memory for f32 {
-    const TYPE: Type = Type::Single;
-}
-impl Memory for f64 {
-    const TYPE: Type = Type::Double;
-}
-impl Memory for Complex32 {
-    const TYPE: Type = Type::SingleComplex;
-}
-impl Memory for Complex64 {
-    const TYPE: Type = Type::DoubleComplex;
-}
-impl Memory for i64 {
-    const TYPE: Type = Type::Int64;
-}
-
-/// Conversion between an array's type and the kernel's, rounded once where it narrows.
-pub(crate) trait Cast<To>: Copy {
-    fn cast(self) -> To;
-}
-
-impl<T: Copy> Cast<T> for T {
-    #[inline(always)]
-    fn cast(self) -> T {
-        self
-    }
-}
-impl Cast<f64> for f32 {
-    #[inline(always)]
-    fn cast(self) -> f64 {
-        f64::from(self)
-    }
-}
-impl Cast<f32> for f64 {
-    #[inline(always)]
-    fn cast(self) -> f32 {
-        self as f32
-    }
-}
-impl Cast<Complex64> for f64 {
-    #[inline(always)]
-    fn cast(self) -> Complex64 {
-        Complex64::new(self, 0.0)
-    }
-}
-impl Cast<Complex64> for Complex32 {
-    #[inline(always)]
-    fn cast(self) -> Complex64 {
-        Complex64::new(f64::from(self.re), f64::from(self.im))
-    }
-}
-impl Cast<Complex32> for Complex64 {
-    #[inline(always)]
-    fn cast(self) -> Complex32 {
-        Complex32::new(self.re as f32, self.im as f32)
-    }
-}
-
 /// One loop of a ufunc: a kernel with the types of its operands.
 pub(crate) trait Loop {
     /// Inputs, then outputs.
@@ -135,128 +44,6 @@ pub(crate) trait Loop {
 
     /// Compute the elements of `range` in blocks of at most `N`.
     fn compute<const N: usize>(operands: &Operands, range: Range<usize>);
-}
-
-/// The operands of one call of an inner loop.
-pub(crate) struct Operands {
-    types: &'static [Type],
-    inputs: usize,
-    length: usize,
-    address: [*mut u8; MAX_OPERANDS],
-    stride: [isize; MAX_OPERANDS],
-}
-
-// SAFETY: the addresses are of memory that NumPy keeps in place during the call, and threads
-// write to parts of it that do not overlap (`outputs_apart`, disjoint ranges).
-unsafe impl Sync for Operands {}
-
-impl Operands {
-    /// # Safety
-    /// `data` and `strides` hold an entry for each of `L`'s operands, which describes `length`
-    /// elements of the operand's type, the outputs' writable; inputs and outputs may only be the
-    /// same memory where element i is the same in both.
-    unsafe fn new<L: Loop>(
-        data: *const *mut c_char,
-        strides: *const npy_intp,
-        length: usize,
-    ) -> Self {
-        let mut address = [std::ptr::null_mut(); MAX_OPERANDS];
-        let mut stride = [0; MAX_OPERANDS];
-        for i in 0..L::TYPES.len() {
-            // SAFETY: both hold an entry for each operand.
-            unsafe {
-                address[i] = data.add(i).read().cast();
-                stride[i] = strides.add(i).read();
-            }
-        }
-        Self {
-            types: L::TYPES,
-            inputs: L::INPUTS,
-            length,
-            address,
-            stride,
-        }
-    }
-
-    /// Copy elements of input `operand`, from `start` on, into `block`.
-    ///
-    /// A value repeated for all elements is only copied where `first` tells a new `block`.
-    #[inline(always)]
-    pub(crate) fn gather<M, T>(&self, operand: usize, start: usize, block: &mut [T], first: bool)
-    where
-        M: Memory + Cast<T>,
-        T: Copy,
-    {
-        let stride = self.checked::<M>(operand, start, block.len());
-        let base = self.address[operand];
-        if stride == 0 {
-            if first {
-                // SAFETY: the operand has elements of type M, all of them at its address.
-                block.fill(unsafe { base.cast::<M>().read_unaligned() }.cast());
-            }
-        } else if stride == size_of::<M>() as isize {
-            // SAFETY: `checked` has found elements of type M up to start + block.len().
-            let from = unsafe { base.cast::<M>().add(start) };
-            for (i, place) in block.iter_mut().enumerate() {
-                // SAFETY: as above.
-                *place = unsafe { from.add(i).read_unaligned() }.cast();
-            }
-        } else {
-            for (place, i) in block.iter_mut().zip(start as isize..) {
-                // SAFETY: as above.
-                *place = unsafe { base.offset(i * stride).cast::<M>().read_unaligned() }.cast();
-            }
-        }
-    }
-
-    /// Copy `block` to elements of output `operand`, from `start` on.
-    #[inline(always)]
-    pub(crate) fn scatter<M, T>(&self, operand: usize, start: usize, block: &[T])
-    where
-        M: Memory,
-        T: Cast<M>,
-    {
-        assert!(operand >= self.inputs);
-        let stride = self.checked::<M>(operand, start, block.len());
-        let base = self.address[operand];
-        if stride == size_of::<M>() as isize {
-            // SAFETY: `checked` has found elements of type M up to start + block.len(), and
-            // outputs are writable.
-            let to = unsafe { base.cast::<M>().add(start) };
-            for (i, value) in block.iter().enumerate() {
-                // SAFETY: as above.
-                unsafe { to.add(i).write_unaligned((*value).cast()) };
-            }
-        } else {
-            for (value, i) in block.iter().zip(start as isize..) {
-                // SAFETY: as above.
-                unsafe {
-                    base.offset(i * stride)
-                        .cast::<M>()
-                        .write_unaligned((*value).cast());
-                }
-            }
-        }
-    }
-
-    /// The stride of `operand`, which is of type `M` and has `count` elements from `start` on.
-    #[inline(always)]
-    fn checked<M: Memory>(&self, operand: usize, start: usize, count: usize) -> isize {
-        assert!(self.types[operand] == M::TYPE && start + count <= self.length);
-        self.stride[operand]
-    }
-
-    /// Whether different elements of an output are different memory, as threads need it.
-    fn outputs_apart(&self) -> bool {
-        (self.inputs..self.types.len()).all(|i| {
-            let size = match self.types[i] {
-                Type::Single => size_of::<f32>(),
-                Type::Double | Type::SingleComplex | Type::Int64 => size_of::<f64>(),
-                Type::DoubleComplex => size_of::<Complex64>(),
-            };
-            self.stride[i].unsigned_abs() >= size
-        })
-    }
 }
 
 /// The loop `L` as NumPy calls it, with or without the interpreter's lock.
@@ -274,7 +61,7 @@ pub(super) unsafe extern "C" fn strided<L: Loop>(
     // overlap in any way but element by element.
     let operands = unsafe {
         let length = usize::try_from(dimensions.read()).unwrap_or(0);
-        Operands::new::<L>(data, strides, length)
+        Operands::new(L::TYPES, L::INPUTS, data, strides, length)
     };
     let raised = flags::read();
     let outcome = catch_unwind(AssertUnwindSafe(|| compute::<L>(&operands)))
@@ -290,7 +77,7 @@ pub(super) unsafe extern "C" fn strided<L: Loop>(
 }
 
 fn compute<L: Loop>(operands: &Operands) -> PyResult<()> {
-    let length = operands.length;
+    let length = operands.length();
     if length <= SHORT {
         L::compute::<SHORT>(operands, 0..length);
         return listen(length);
@@ -317,7 +104,7 @@ fn compute<L: Loop>(operands: &Operands) -> PyResult<()> {
 
 /// The elements from `done` on, by several threads.
 fn in_pool<L: Loop>(operands: &Operands, done: usize, threads: usize) -> PyResult<()> {
-    let length = operands.length;
+    let length = operands.length();
     runtime::run_detached(threads, |task| {
         let pieces = (length - done).div_ceil(PIECE);
         (0..pieces).into_par_iter().try_for_each(|piece| {
