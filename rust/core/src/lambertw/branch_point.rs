@@ -28,6 +28,9 @@ pub(super) const SERIES: [f64; 12] = [
     0.001_026_263_320_507_607_6,
 ];
 
+/// Modulus below which a square is no longer a normal number.
+const DEEP: f64 = 1e-130;
+
 /// `z + 1/e`, to full relative accuracy however close the two are.
 #[inline(always)]
 pub(super) fn offset<S: Simd>(z: Complex<S>) -> Complex<S> {
@@ -38,6 +41,15 @@ pub(super) fn offset<S: Simd>(z: Complex<S>) -> Complex<S> {
 #[inline(always)]
 pub(super) fn branch_root<S: Simd>(offset: Complex<S>) -> Complex<S> {
     offset.scaled(2.0 * std::f64::consts::E).sqrt()
+}
+
+/// The same for an offset of any size.
+#[inline(always)]
+pub(super) fn deep_branch_root<S: Simd>(offset: Complex<S>) -> Complex<S> {
+    let deep = offset.re.abs().larger(offset.im.abs()).lt(DEEP);
+    let one = offset.re.constant(1.0);
+    let lift = deep.select(2.0_f64.powi(600), one);
+    branch_root(offset.scaled(lift)).scaled(deep.select(2.0_f64.powi(-300), one))
 }
 
 /// `1 + w` from `p`.

@@ -245,7 +245,7 @@ impl<S: Simd> Problem<S> {
             cosine,
             sine,
             quarters,
-        } = cos_sin(sigma.im);
+        } = cos_sin(sigma.im, sigma.im.constant(0.0));
         // The quarter turns exchange cosine and sine; their signs follow.
         let odd = quarters.abs().eq(1.0);
         let half = quarters.abs().eq(2.0);

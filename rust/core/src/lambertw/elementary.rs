@@ -118,14 +118,15 @@ pub(super) struct Reduced<S: Simd> {
     pub(super) quarters: Real<S>,
 }
 
-/// Cosine and sine of `b` less quarter turns, so that what is left is at most pi/4.
+/// Cosine and sine of `b + low` less quarter turns, so that what is left is at most pi/4; `low` is
+/// at most an ulp of `b`.
 #[inline(always)]
-pub(super) fn cos_sin<S: Simd>(b: Real<S>) -> Reduced<S> {
+pub(super) fn cos_sin<S: Simd>(b: Real<S>, low: Real<S>) -> Reduced<S> {
     let n = (b * TWO_OVER_PI).nearest();
     let [first, second, third] = HALF_PI;
     // n < 2^23 and 30 bits: the products are exact; the first difference is exact as well.
     let near = sum(n.negated_mul_add(first, b), -(n * second));
-    let r = ordered_sum(near.hi, n.negated_mul_add(third, near.lo));
+    let r = ordered_sum(near.hi, n.negated_mul_add(third, near.lo + low));
 
     let square = product(r.hi, r.hi);
     let square = TwoWord::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
@@ -228,7 +229,7 @@ mod tests {
 
         #[test]
         fn the_squares_of_cosine_and_sine_add_to_one(b in -8e6..8e6_f64) {
-            let Reduced { cosine: c, sine: s, .. } = cos_sin(lane(b));
+            let Reduced { cosine: c, sine: s, .. } = cos_sin(lane(b), lane(0.0));
             prop_assert!(beside_one(c.times(c).plus(s.times(s))) < BOUND);
         }
 
@@ -237,7 +238,7 @@ mod tests {
             let (factor, n) = exp(lane(a), lane(0.0));
             let near = |x: f64, y: f64| (x - y).abs() <= 2.0 * f64::EPSILON * y.abs();
             prop_assert!(near(first(factor.hi * n.power_of_two()), libm::exp(a)));
-            let reduced = cos_sin(lane(b));
+            let reduced = cos_sin(lane(b), lane(0.0));
             let conjugate = Complex::new(reduced.cosine.hi, -reduced.sine.hi);
             let z = turned_back(conjugate, reduced.quarters);
             prop_assert!(near(first(z.re), libm::cos(b)) && near(first(-z.im), libm::sin(b)));

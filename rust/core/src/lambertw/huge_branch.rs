@@ -14,7 +14,7 @@ const TURN: [f64; 2] = [std::f64::consts::TAU, 2.449_293_598_294_706_4e-16];
 const LIFT: f64 = 18_446_744_073_709_551_616.0;
 
 /// `2 pi k` in two words.
-fn turns(k: u64) -> [f64; 2] {
+pub(super) fn turns(k: u64) -> [f64; 2] {
     let high = k as f64;
     let low = (i128::from(k) - high as i128) as f64;
     let product = high * TURN[0];

@@ -3,7 +3,8 @@
 use crate::lanes::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{
-    INVERSE_E, INVERSE_E_LOW, branch_root, offset, one_plus_w as near_branch_point,
+    INVERSE_E, INVERSE_E_LOW, branch_root, deep_branch_root, offset,
+    one_plus_w as near_branch_point,
 };
 use super::elementary::{rough_angle, rough_log};
 use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithmic_step, principal};
@@ -91,7 +92,7 @@ pub(super) fn lambertw<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
 
 /// Conjugated where `side`, which is +0 or -0, has its bit set.
 #[inline(always)]
-fn reflected<S: Simd>(w: Complex<S>, side: Real<S>) -> Complex<S> {
+pub(super) fn reflected<S: Simd>(w: Complex<S>, side: Real<S>) -> Complex<S> {
     Complex::new(w.re, w.im.flipped(side))
 }
 
@@ -119,7 +120,10 @@ fn upper<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
     let mut one_plus_w = unit;
     let mut root = unit;
     if (by_series | by_behind | (by_principal & !small)).any() {
-        root = branch_root(offset);
+        root = match low {
+            None => branch_root(offset),
+            Some(_) => deep_branch_root(offset),
+        };
     }
     if by_series.any() {
         one_plus_w = near_branch_point(by_behind.choose(-root, root));
@@ -128,6 +132,10 @@ fn upper<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
     if small.any() {
         // As a product of sums, so that an underflow keeps the sign.
         let square = Complex::new((z.re - z.im) * (z.re + z.im), z.re * z.im * 2.0);
+        let square = match low {
+            None => square,
+            Some(low) => square.shifted(-low),
+        };
         w = small.choose(z - square, w);
         one_plus_w = small.choose((z - square).shifted(1.0), one_plus_w);
     }
@@ -145,7 +153,7 @@ fn upper<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
             start = by_logarithm.choose(by_log(z, scaled, k, joined), start);
         }
         let start = start.folded();
-        let change = correction(start, product_with_exp(scaled, start).less(start));
+        let change = correction(start, product_with_exp(scaled, start, None).less(start));
         w = done.choose(w, start + change);
         let trusted = small | (joined & square.lt(SERIES_TRUSTED * SERIES_TRUSTED));
         one_plus_w = trusted.choose(one_plus_w, start.shifted(1.0) + change);
@@ -179,4 +187,19 @@ fn by_log<S: Simd>(z: Complex<S>, scaled: Scaled<S>, k: Real<S>, joined: Mask<S>
         w.im = narrow.select(slope, w.im);
     }
     w
+}
+
+/// dW/dz = W/(z (1 + W)) for lanes within reach.
+#[inline(always)]
+pub(super) fn derivative<S: Simd>(z: Complex<S>, k: Real<S>) -> Complex<S> {
+    let Answer { w, one_plus_w } = lambertw(Point::new(z), k);
+    let (z, w) = (Scaled::new(z), Scaled::new(w));
+    let exponent = w.exponent - z.exponent;
+    // In two halves: the quotient of extreme numbers is out of the range of one factor.
+    let half = (exponent * 0.5).nearest();
+    w.value
+        .over(z.value)
+        .scaled(half.power_of_two())
+        .over(one_plus_w)
+        .scaled((exponent - half).power_of_two())
 }

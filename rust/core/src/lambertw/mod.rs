@@ -50,7 +50,6 @@
 #![deny(clippy::indexing_slicing)]
 #![cfg_attr(test, allow(clippy::indexing_slicing))]
 
-mod array;
 pub mod block;
 mod branch_point;
 mod coefficients;
@@ -60,15 +59,16 @@ mod elementary;
 mod guess;
 mod huge_branch;
 mod kernel;
+mod log_form;
 mod real;
 mod refine;
 mod route;
 mod special_values;
+#[cfg(test)]
+mod tests;
 mod two_word;
 
 use num_complex::Complex64;
-
-pub use array::{PARALLEL_LENGTH, dde_root_array, lambertw_array};
 
 /// W_k(z), the solution of w e^w = z on branch `k`.
 ///
@@ -111,4 +111,22 @@ pub fn dde_root(a0: f64, a1: f64, delay: f64, k: i64) -> Complex64 {
     block::dde_root(&[a0], &[a1], &[delay], &[k], &mut s);
     let [s] = s;
     s
+}
+
+/// W_k(z) for z given by its logarithm, which may be any size: the solution of
+/// w + log w = log z + 2 pi i k.
+///
+/// ```
+/// use deadtime::lambertw::{lambertw, lambertw_log};
+/// use num_complex::Complex64;
+///
+/// let far = lambertw_log(Complex64::new(1e6, 0.0), 0); // W_0(e^1000000)
+/// assert!((far.re + far.re.ln() - 1e6).abs() < 1e-9 && far.im == 0.0);
+/// assert_eq!(lambertw_log(Complex64::ZERO, -3), lambertw(Complex64::ONE, -3));
+/// ```
+pub fn lambertw_log(log_z: Complex64, k: i64) -> Complex64 {
+    let mut w = [Complex64::ZERO];
+    block::lambertw_log(&[log_z], &[k], &mut w);
+    let [w] = w;
+    w
 }

@@ -42,6 +42,17 @@ impl<S: Simd> Scaled<S> {
         }
     }
 
+    /// A power of two.
+    #[inline(always)]
+    pub(super) fn power(exponent: Real<S>) -> Self {
+        let (one, zero) = (exponent.constant(1.0), exponent.constant(0.0));
+        Self {
+            value: Complex::new(one, zero),
+            exponent,
+            low: None,
+        }
+    }
+
     /// With a second word of the real part, in units of the number itself (which is not subnormal).
     #[inline(always)]
     pub(super) fn with_low(self, low: Option<Real<S>>) -> Self {
@@ -62,16 +73,22 @@ pub(super) struct TwoWordComplex<S: Simd> {
     pub(super) im: TwoWord<S>,
 }
 
-/// `z e^-w`, to 2^-61 of its modulus.
+/// `z e^-w`, to 2^-61 of its modulus; `low` holds second words of w, where there are any.
 #[inline(always)]
-pub(super) fn product_with_exp<S: Simd>(z: Scaled<S>, w: Complex<S>) -> TwoWordComplex<S> {
-    let (modulus, exponent) = exp(-w.re, w.re.constant(0.0));
+pub(super) fn product_with_exp<S: Simd>(
+    z: Scaled<S>,
+    w: Complex<S>,
+    low: Option<Complex<S>>,
+) -> TwoWordComplex<S> {
+    let zero = w.re.constant(0.0);
+    let low = low.unwrap_or(Complex::new(zero, zero));
+    let (modulus, exponent) = exp(-w.re, -low.re);
     let modulus = modulus.scaled((exponent + z.exponent).power_of_two());
     let Reduced {
         cosine,
         sine,
         quarters,
-    } = cos_sin(w.im);
+    } = cos_sin(w.im, low.im);
     let turned = turned_back(z.value, quarters);
     let mut re = cosine
         .times_word(turned.re)
