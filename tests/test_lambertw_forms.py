@@ -46,7 +46,7 @@ everywhere = st.one_of(inside, st.floats(-323, 308.2).map(lambda p: 10.0**p))
 
 @given(everywhere)
 @settings(max_examples=400)
-def test_the_principal_branch_is_rounded_correctly_but_for_a_hundredth(x):
+def test_the_principal_branch_is_rounded_correctly_but_for_a_few_hundredths(x):
     w = dtm.lambertw0(x)
     if x == BRANCH_POINT:
         assert w == -1
@@ -57,12 +57,12 @@ def test_the_principal_branch_is_rounded_correctly_but_for_a_hundredth(x):
         if abs(start + 1) < 1e-9:
             start = -1 + mpmath.sqrt(2 * mpmath.e * offset)
         # One ulp of a subnormal number is the best there is.
-        assert ulps(w, refined(start, mpmath.mpf(x))) <= 0.52
+        assert ulps(w, refined(start, mpmath.mpf(x))) <= 0.54
 
 
 @given(inside)
 @settings(max_examples=400)
-def test_the_lower_branch_is_rounded_correctly_but_for_a_hundredth(x):
+def test_the_lower_branch_is_rounded_correctly_but_for_a_few_hundredths(x):
     w = dtm.lambertwm1(x)
     if x == BRANCH_POINT:
         assert w == -1
@@ -72,7 +72,7 @@ def test_the_lower_branch_is_rounded_correctly_but_for_a_hundredth(x):
         start = mpmath.mpf(w)
         if abs(start + 1) < 1e-9:
             start = -1 - mpmath.sqrt(2 * mpmath.e * offset)
-        assert ulps(w, refined(start, mpmath.mpf(x))) <= 0.52
+        assert ulps(w, refined(start, mpmath.mpf(x))) <= 0.54
 
 
 def test_real_branches_agree_with_the_complex_one():
@@ -262,7 +262,8 @@ import deadtime as dtm
 generator = np.random.default_rng(8)
 n = 3000
 z = 10 ** generator.uniform(-320, 308, n) * np.exp(2j * np.pi * generator.random(n))
-z[::3] = 10 ** generator.uniform(-17, 3, n)[::3] * np.exp(6j * generator.random(n))[::3] - 0.36787944117144233
+near = 10 ** generator.uniform(-17, 3, n) * np.exp(6j * generator.random(n))
+z[::3] = near[::3] - 0.36787944117144233
 z.imag[::7] = 0.0
 z.imag[1::7] = -0.0
 k = generator.integers(-3, 4, n)
