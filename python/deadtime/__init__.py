@@ -22,6 +22,7 @@ from deadtime._estimation import (
     estimate_delay,
 )
 from deadtime._loop import ControlLoop
+from deadtime._low_level import low_level_callable
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s
@@ -29,7 +30,15 @@ from deadtime._readers import read_recording
 from deadtime._recording import Recording, Step
 from deadtime._response import Response
 from deadtime._rootset import RootSet
-from deadtime._special import dde_roots, lambertw
+from deadtime._scalar_delay import dde_roots, rightmost_branches
+from deadtime._special import lambertw, lambertw0, lambertwm1
+from deadtime._special_forms import (
+    OffsetW,
+    lambertw_derivative,
+    lambertw_log,
+    lambertw_offset,
+    wrightomega,
+)
 from deadtime._stability import MapStatus, StabilityMap, stability_map
 
 __all__ = [
@@ -51,6 +60,7 @@ __all__ = [
     "Integrator",
     "MapStatus",
     "NotIdentifiableError",
+    "OffsetW",
     "P",
     "Parameter",
     "ParametricQuasiPolynomial",
@@ -71,8 +81,16 @@ __all__ = [
     "estimate_delay",
     "kit_plant",
     "lambertw",
+    "lambertw0",
+    "lambertw_derivative",
+    "lambertw_log",
+    "lambertw_offset",
+    "lambertwm1",
+    "low_level_callable",
     "parameters",
     "read_recording",
+    "rightmost_branches",
     "s",
     "stability_map",
+    "wrightomega",
 ]
