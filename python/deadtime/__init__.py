@@ -22,6 +22,7 @@ from deadtime._estimation import (
     estimate_delay,
 )
 from deadtime._loop import ControlLoop
+from deadtime._margins import Margins
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s
@@ -31,6 +32,7 @@ from deadtime._response import Response
 from deadtime._rootset import RootSet
 from deadtime._special import dde_roots, lambertw
 from deadtime._stability import MapStatus, StabilityMap, stability_map
+from deadtime._transfer import TransferFunction, feedback
 
 __all__ = [
     "PD",
@@ -50,6 +52,7 @@ __all__ = [
     "FirstOrder",
     "Integrator",
     "MapStatus",
+    "Margins",
     "NotIdentifiableError",
     "P",
     "Parameter",
@@ -63,12 +66,14 @@ __all__ = [
     "RootSet",
     "StabilityMap",
     "Step",
+    "TransferFunction",
     "Whiteness",
     "damping_ratio",
     "dde_roots",
     "delay",
     "design",
     "estimate_delay",
+    "feedback",
     "kit_plant",
     "lambertw",
     "parameters",
