@@ -43,6 +43,7 @@ FLOORS = [
         "_margins",
         "_ratio",
         "_transfer",
+        "_systems",
     },
     {"_recording"},
     {"_readers", "_estimation", "_design"},

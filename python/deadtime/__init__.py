@@ -32,6 +32,7 @@ from deadtime._response import Response
 from deadtime._rootset import RootSet
 from deadtime._special import dde_roots, lambertw
 from deadtime._stability import MapStatus, StabilityMap, stability_map
+from deadtime._systems import DelaySystem
 from deadtime._transfer import TransferFunction, feedback
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "CramerRaoBound",
     "DeadtimeError",
     "DelayEstimate",
+    "DelaySystem",
     "DerivativeFilter",
     "Design",
     "FirstOrder",
