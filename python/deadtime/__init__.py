@@ -23,6 +23,7 @@ from deadtime._estimation import (
 )
 from deadtime._loop import ControlLoop
 from deadtime._low_level import low_level_callable
+from deadtime._margins import Margins
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s
@@ -40,6 +41,8 @@ from deadtime._special_forms import (
     wrightomega,
 )
 from deadtime._stability import MapStatus, StabilityMap, stability_map
+from deadtime._systems import DelaySystem
+from deadtime._transfer import TransferFunction, feedback
 
 __all__ = [
     "PD",
@@ -54,11 +57,13 @@ __all__ = [
     "CramerRaoBound",
     "DeadtimeError",
     "DelayEstimate",
+    "DelaySystem",
     "DerivativeFilter",
     "Design",
     "FirstOrder",
     "Integrator",
     "MapStatus",
+    "Margins",
     "NotIdentifiableError",
     "OffsetW",
     "P",
@@ -73,12 +78,14 @@ __all__ = [
     "RootSet",
     "StabilityMap",
     "Step",
+    "TransferFunction",
     "Whiteness",
     "damping_ratio",
     "dde_roots",
     "delay",
     "design",
     "estimate_delay",
+    "feedback",
     "kit_plant",
     "lambertw",
     "lambertw0",
