@@ -9,7 +9,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
@@ -132,17 +132,27 @@ pub(crate) fn attached<T>(work: impl FnOnce(Python<'_>) -> T) -> T {
     Python::attach(work)
 }
 
-/// Run short `work` (well below a millisecond) on the calling thread, interpreter released.
+/// Run `work` that knows no threads on the calling one, interpreter released; Ctrl-C stops it at
+/// one of its next checks. A call costs a tenth of one through the pool.
 pub(crate) fn run_here<T, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
-    let task = Task::new();
-    match py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task)))) {
-        Ok(result) => result.map_err(|error| to_python(py, error)),
-        Err(panic) => Err(internal(panic.as_ref())),
-    }
+    let refused = Arc::new(Mutex::new(None));
+    let keep = Arc::clone(&refused);
+    let task = Task::asking(POLL, move || match attached(|py| py.check_signals()) {
+        Ok(()) => true,
+        Err(error) => {
+            if let Ok(mut place) = keep.lock() {
+                *place = Some(error);
+            }
+            false
+        }
+    });
+    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task))));
+    let refused = refused.lock().ok().and_then(|mut place| place.take());
+    settle(Some(result), refused)
 }
 
 fn look_up(py: Python<'_>, task: &Task, progress: Option<&Py<PyAny>>) -> PyResult<()> {
