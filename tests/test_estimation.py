@@ -416,3 +416,19 @@ def test_a_real_flight_without_overshoot():
     other, other_loop = real("ardrone2_height_step_2_4_0_25.csv", 2.4)
     better = dtm.estimate_delay(other, other_loop, window=window)
     assert fit.stderr["delay"] > 2 * better.stderr["delay"]
+
+
+@pytest.mark.parametrize("free", [("delay",), ("delay", "gain"), ("delay", "gain", "lag")])
+def test_a_search_for_a_delay_that_is_not_there_comes_to_an_end(free):
+    """A continuous fit drifted to ever shorter delays and lags, each dearer to simulate."""
+    time = np.arange(0.0, 12.0, 0.065)
+    reference = np.where(time >= 3.0, 1.0, 0.0)
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.4))
+    noise = 0.002 * np.random.default_rng(0).normal(size=len(time))
+    output = loop.replace(delay=0.0).simulate(time, reference).outputs + noise
+    fit = dtm.estimate_delay(dtm.Recording(time, reference, output), loop, free=free)
+    assert fit.delay == 0.0
+    assert fit.lag == 0.0
+    # An output that is the reference itself is no loop's at all, or of one that knows no delay.
+    same = dtm.estimate_delay(dtm.Recording(time, reference, reference.copy()), loop, free=free)
+    assert not same.adequate or same.stderr["delay"] > 1.0

@@ -47,6 +47,10 @@ INDISTINGUISHABLE = 1e-6
 #: A lag that changes the cost by less than this share is none: least squares itself stops there.
 VANISHING = 1e-6
 
+#: Delays and lags of a continuous loop below this share of the window, or of the time between two samples,
+#: take long to simulate and cannot be told from none: they are taken for it.
+SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
+
 #: A residual for simulations that leave all bounds, in units of the step.
 HOPELESS = 1e3
 
@@ -123,6 +127,10 @@ class _Problem:
         self.span = float(data.time[-1] - step.time)
         self.start = float(np.mean(data.output[: max(1, step.index)]))
         self.size = max(float(np.ptp(data.output)), float(np.ptp(data.reference)))
+        self.shortest = 0.0
+        if not simulated.loop.is_sampled:
+            between = float(np.median(np.diff(data.time)))
+            self.shortest = min(SHORTEST_OF_WINDOW * self.span, SHORTEST_OF_SAMPLE * between)
 
     def residuals(self, parameters: Array) -> Array:
         """Simulated minus recorded output; bounded where the loop with these numbers is not."""
@@ -144,7 +152,20 @@ class _Problem:
             if best is None or solution.cost < best.cost:
                 best = solution
         assert best is not None
-        return self._without_vanishing_lag(best)
+        # A lag that vanishes leaves its length to the delay, which may then be the shortest.
+        found = self._without_vanishing_lag(self._without_shortest_delay(best))
+        return self._without_shortest_delay(found)
+
+    def _without_shortest_delay(self, found: _Minimum) -> _Minimum:
+        """Put the delay at zero where the search ended at the shortest one it tries."""
+        if "delay" not in self.names or self.shortest == 0.0:
+            return found
+        delay = self.names.index("delay")
+        if found.parameters[delay] > self.shortest * (1.0 + 1e-6):
+            return found
+        moved = found.parameters.copy()
+        moved[delay] = 0.0
+        return replace(found, parameters=moved, misfit=self.residuals(moved))
 
     def _without_vanishing_lag(self, found: _Minimum) -> _Minimum:
         """Put a lag at zero that is there for rounding's sake only.
@@ -159,7 +180,9 @@ class _Problem:
         moved[delay] += moved[lag]
         moved[lag] = 0.0
         shifted = replace(found, parameters=moved, misfit=self.residuals(moved))
-        return shifted if shifted.cost <= found.cost * (1.0 + VANISHING) else found
+        shortest = 0.0 < found.parameters[lag] <= self.shortest * (1.0 + 1e-6)
+        alike = shifted.cost <= found.cost * (1.0 + VANISHING)
+        return shifted if shortest or alike else found
 
     def _grid(self) -> list[Array]:
         plant = self.simulated.loop.parameters
@@ -179,7 +202,9 @@ class _Problem:
     def _refine(self, start: Array) -> _Minimum:
         gain = self.simulated.loop.parameters.get("gain", 1.0)
         ends = self.ends()
-        low = [ends[name][0] for name in self.names] + [-np.inf]
+        least = {name: end[0] for name, end in ends.items()}
+        least |= {"delay": self.shortest, "lag": self.shortest}
+        low = [least[name] for name in self.names] + [-np.inf]
         high = [ends[name][1] for name in self.names] + [np.inf]
         scale = {"delay": 0.1 * self.span, "gain": abs(gain), "lag": 0.1 * self.span}
         found = least_squares(
