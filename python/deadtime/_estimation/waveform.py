@@ -47,8 +47,8 @@ INDISTINGUISHABLE = 1e-6
 #: A lag that changes the cost by less than this share is none: least squares itself stops there.
 VANISHING = 1e-6
 
-#: Delays and lags of a continuous loop below this share of the window, or of the time between two samples,
-#: take long to simulate and cannot be told from none: they are taken for it.
+#: Delays and lags of a continuous loop below this share of the window, or of the time between two
+#: samples, take long to simulate and cannot be told from none: they are taken for it.
 SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
 #: A residual for simulations that leave all bounds, in units of the step.
