@@ -124,8 +124,9 @@ pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Close
         re = (re.0.max(-radius), re.1.min(radius));
     }
     let height = im.0.abs().max(im.1.abs());
-    if re.1.is_infinite() {
-        re.1 = bounds::right_edge(h, height);
+    if re.1.is_infinite() || region.re.1.is_infinite() {
+        // Mostly closer than the radius, which chains far up may make large.
+        re.1 = re.1.min(bounds::right_edge(h, height));
     }
     if re.0.is_infinite() {
         re.0 = bounds::left_edge(h, height);

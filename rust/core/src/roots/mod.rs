@@ -3,7 +3,7 @@
 //! `winding` proves how arg h turns along a line; `cell` builds rectangles with counts from it,
 //! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
 //! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
-//! decides;
+//! decides; `sensitivity` says how a root moves;
 //! `bounds` says where roots cannot be. All proofs take exp, sin and cos of the `libm` crate to
 //! be right within 2 ulp.
 
@@ -16,6 +16,7 @@ mod newton;
 mod real;
 mod region;
 mod rightmost;
+mod sensitivity;
 mod set;
 mod stable;
 mod winding;
@@ -23,7 +24,8 @@ mod winding;
 pub use count::{count, count_right_of};
 pub use neutral::chain_abscissa;
 pub use region::Region;
-pub use rightmost::{rightmost, spectral_abscissa};
+pub use rightmost::{rightmost, spectral_abscissa, unstable_and_rightmost};
+pub use sensitivity::sensitivity;
 pub use set::{RootSet, roots};
 pub use stable::is_stable;
 
