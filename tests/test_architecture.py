@@ -27,6 +27,7 @@ FLOORS = [
     {
         "_special",
         "_rootset",
+        "_sensitivity",
         "_parametric",
         "_quasipolynomial",
         "_plants",

@@ -29,6 +29,7 @@ from deadtime._readers import read_recording
 from deadtime._recording import Recording, Step
 from deadtime._response import Response
 from deadtime._rootset import RootSet
+from deadtime._sensitivity import Sensitivity
 from deadtime._special import dde_roots, lambertw
 from deadtime._stability import MapStatus, StabilityMap, stability_map
 
@@ -61,6 +62,7 @@ __all__ = [
     "RecordingError",
     "Response",
     "RootSet",
+    "Sensitivity",
     "StabilityMap",
     "Step",
     "Whiteness",

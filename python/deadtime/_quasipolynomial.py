@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._rootset import RootSet
+from deadtime._sensitivity import Sensitivity
 
 if TYPE_CHECKING:
     from deadtime._parametric import ParametricQuasiPolynomial
@@ -427,6 +428,49 @@ class QuasiPolynomial:
         (True, False)
         """
         return self._native.is_stable(bool(strong))
+
+    def sensitivity(self, root: complex) -> Sensitivity:
+        r"""Derivatives of a simple root by every coefficient and every delay.
+
+        Parameters
+        ----------
+        root : complex
+            A root in 1/s, as `roots` or `rightmost` list it; its last digits do not matter.
+
+        Returns
+        -------
+        Sensitivity
+            ``coefficients``, shape (m, d+1), and ``delays``, shape (m,), arranged as those of the
+            quasi-polynomial.
+
+        Raises
+        ------
+        ValueError
+            If the place given is no root, or the root is multiple or in a cluster that double
+            precision does not tell apart: it has no derivative.
+
+        Notes
+        -----
+        :math:`ds/dp = -(\partial h/\partial p) / h'(s)` for :math:`h(s; p) = 0`, the exponential
+        of the dominating term cancelled beforehand so that nothing overflows.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> h = s + 4.0 * delay(0.36)
+        >>> move = h.sensitivity(h.rightmost()[0])
+        >>> bool(move.coefficients[1, 0].real > 0), bool(move.delays[1].real > 0)
+        (True, True)
+        """
+        place = complex(root)
+        rows, width = self._coefficients.shape
+        found, slopes = self._native.sensitivity(
+            place, np.repeat(self._delays, width).tolist(), list(range(width)) * rows
+        )
+        coefficients = slopes.reshape(rows, width)
+        # h depends on a delay through its row alone, d/dtau of which is -s times the row.
+        delays = -found * (coefficients * self._coefficients).sum(axis=1)
+        return Sensitivity(found, coefficients, delays)
 
 
 _NO_QUOTIENT: Final = (
