@@ -39,7 +39,7 @@ FLOORS = [
         "_loop_stability",
         "_stability",
     },
-    {"_recording"},
+    {"_recording", "_gallery_entries", "gallery"},
     {"_readers", "_estimation", "_design"},
     {"_experiment"},
     {"_plots"},

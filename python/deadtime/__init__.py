@@ -4,6 +4,7 @@ The delay of a recorded loop with its uncertainty, the characteristic roots of t
 maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
+from deadtime import gallery
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime._design import Design, design
 from deadtime._errors import (
@@ -71,6 +72,7 @@ __all__ = [
     "delay",
     "design",
     "estimate_delay",
+    "gallery",
     "kit_plant",
     "lambertw",
     "parameters",
