@@ -26,6 +26,7 @@ FLOORS = [
     {"_errors", "_frozen", "_validation", "_deadtime"},
     {
         "_special",
+        "_chains",
         "_rootset",
         "_sensitivity",
         "_parametric",

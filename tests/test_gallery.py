@@ -16,7 +16,7 @@ CLUSTER_ON_THE_AXIS = {"mazanti2021", "boussaada2016"}
 def test_keys_are_in_order_and_looked_up():
     assert list(KEYS) == sorted(KEYS)
     assert [p.key for p in gallery.problems()] == list(KEYS)
-    with pytest.raises(KeyError, match="appeltans2023-2.12"):
+    with pytest.raises(KeyError, match=r"appeltans2023-2\.12"):
         gallery.problem("appeltans2023")
     assert pickle.loads(pickle.dumps(gallery.problem("yi2007"))) is gallery.problem("yi2007")
 

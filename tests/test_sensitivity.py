@@ -137,6 +137,6 @@ def test_what_is_no_root_is_refused():
             h.sensitivity(place)
     with pytest.raises(ValueError, match="finite"):
         h.sensitivity(math.nan)
+    K, T = dtm.parameters("K T")
     with pytest.raises(ValueError, match="no value for T"):
-        K, T = dtm.parameters("K T")
         (s + K * delay(T)).sensitivity(1j, K=1.0)

@@ -5,6 +5,7 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
 from deadtime import gallery
+from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime._design import Design, design
 from deadtime._errors import (
@@ -39,6 +40,7 @@ __all__ = [
     "PI",
     "PID",
     "PV",
+    "Chain",
     "ContourError",
     "ControlLoop",
     "Controller",

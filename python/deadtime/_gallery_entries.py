@@ -118,7 +118,9 @@ _TWO_STATES = QuasiPolynomial(
 )
 
 
-def _member(family: ParametricQuasiPolynomial, **values: float) -> dict[str, Any]:
+def _member(family: ParametricQuasiPolynomial | QuasiPolynomial, **values: float) -> dict[str, Any]:
+    # To a type checker, s plus anything is a QuasiPolynomial.
+    assert isinstance(family, ParametricQuasiPolynomial)
     return {"family": family, "values": values, "h": family.at(**values)}
 
 

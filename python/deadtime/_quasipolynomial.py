@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
+from deadtime._chains import Chain, chains_of
 from deadtime._rootset import RootSet
 from deadtime._sensitivity import Sensitivity
 
@@ -394,6 +395,37 @@ class QuasiPolynomial:
         -3.3444
         """
         return self._native.chain_abscissa()
+
+    def chains(self) -> tuple[Chain, ...]:
+        r"""Give the laws that the roots of large modulus follow.
+
+        Returns
+        -------
+        tuple of Chain
+            One for every sequence of roots in the upper half plane, from the least bend to the
+            largest; none for a polynomial.
+
+        Notes
+        -----
+        Each edge of the upper convex hull of the points (delay, degree of its row) makes chains
+        with :math:`\mathrm{Re}\, s \approx c - \mu \ln|s|`, the slope of the edge being
+        :math:`-\mu` [1]_. Asymptotic: nothing is proved about any single root.
+
+        References
+        ----------
+        .. [1] R. Bellman and K. L. Cooke, Differential-Difference Equations, Academic Press
+           (1963), chapter 12.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> (chain,) = (s + 2.0 * delay(0.36)).chains()
+        >>> chain.kind, round(chain.bend, 4), round(chain.spacing, 4)
+        ('retarded', 2.7778, 17.4533)
+        >>> [chain.kind for chain in (s + (2.0 + 0.3 * s) * delay(0.36)).chains()]
+        ['neutral']
+        """
+        return chains_of(self)
 
     def is_stable(self, strong: bool = True) -> bool:
         """Tell whether every root is proved to lie left of the imaginary axis.
