@@ -45,6 +45,12 @@ pub(super) fn value(h: &QuasiPolynomial, s: Complex64) -> Complex64 {
         .sum();
     // In two halves, as the sum may be small where its largest term overflows.
     let half = libm::exp(0.5 * largest);
-    let grow = |part: f64| if part == 0.0 { part } else { part * half * half };
+    let grow = |part: f64| {
+        if part == 0.0 {
+            part
+        } else {
+            part * half * half
+        }
+    };
     Complex64::new(grow(sum.re), grow(sum.im))
 }

@@ -89,7 +89,9 @@ fn along_the_chains(h: &QuasiPolynomial, sigma: f64, known: f64) -> f64 {
     };
     let next = |row: &[f64], top: f64| {
         let index = degree.checked_sub(1);
-        index.and_then(|k| row.get(k)).map_or(0.0, |c| c.abs() / top)
+        index
+            .and_then(|k| row.get(k))
+            .map_or(0.0, |c| c.abs() / top)
     };
     let own_next = next(first, own);
     let holds = |r: f64| {
@@ -112,10 +114,8 @@ fn along_the_chains(h: &QuasiPolynomial, sigma: f64, known: f64) -> f64 {
             }
             let size = if leads {
                 let stretch = tail(row, top, 1, r);
-                let numerator = 1.0
-                    + 2.0 * slope * lean
-                    + 2.0 * tail(row, top, 2, r)
-                    + stretch * stretch;
+                let numerator =
+                    1.0 + 2.0 * slope * lean + 2.0 * tail(row, top, 2, r) + stretch * stretch;
                 top / own * numerator.sqrt()
             } else {
                 tail(row, own, 1, r)

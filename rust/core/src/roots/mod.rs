@@ -1,6 +1,7 @@
 //! Characteristic roots: counted, located, each with a proof.
 //!
-//! `winding` proves how arg h turns along a line; `cell` builds rectangles with counts from it,
+//! `winding` proves how arg h turns along a line, `dominated` the same in long steps where one row
+//! outweighs the others; `cell` builds rectangles with counts from it,
 //! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
 //! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
 //! decides; `sensitivity` says how a root moves;
@@ -10,6 +11,7 @@
 mod bounds;
 mod cell;
 mod count;
+mod dominated;
 mod isolate;
 mod neutral;
 mod newton;

@@ -20,7 +20,7 @@ use super::neutral::chain_abscissa;
 use super::newton::Disc;
 use super::region::Region;
 use super::set::{RootSet, add_zeros, locate, with_mirror_image};
-use super::winding::{MAX_HINTS, Walker};
+use super::winding::Walker;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::{Error, Task};
 
@@ -270,13 +270,15 @@ impl<'a> Lines<'a> {
                     if few.sigma - self.barrier <= self.margin || self.given_up >= MAX_GIVEN_UP {
                         return Ok((few, true));
                     }
-                    if let Some(sigma) = self.beyond_known_roots(&few, wanted)? {
-                        sigma
-                    } else {
-                        let ahead = few.sigma - self.step;
-                        self.step *= 1.5;
-                        // Never onto the barrier, only half the way.
-                        ahead.max(0.5 * (few.sigma + self.barrier))
+                    let ahead = few.sigma - self.step;
+                    match self.beyond_known_roots(&few, wanted)? {
+                        // Further left than that there may be many that no hint tells of.
+                        Some(sigma) if sigma >= ahead => sigma,
+                        _ => {
+                            self.step *= 1.5;
+                            // Never onto the barrier, only half the way.
+                            ahead.max(0.5 * (few.sigma + self.barrier))
+                        }
                     }
                 }
                 (few, Some(enough)) => {
@@ -318,13 +320,15 @@ impl<'a> Lines<'a> {
     fn beyond_known_roots(&mut self, line: &Line, wanted: u64) -> Result<Option<f64>, Error> {
         let mut starts = line.hints.clone();
         starts.sort_by(|a, b| b.re.total_cmp(&a.re));
-        starts.truncate(usize::try_from(2 * wanted).unwrap_or(0).saturating_add(MORE_STARTS));
-        if line.hints.len() >= MAX_HINTS {
-            // The walk began far up and forgot the hints of its lower end.
-            let spacing = PI * self.first_step;
-            starts.extend((0..MORE_STARTS).map(|k| Complex64::new(line.sigma, k as f64 * spacing)));
-        }
+        starts.truncate(
+            usize::try_from(2 * wanted)
+                .unwrap_or(0)
+                .saturating_add(MORE_STARTS),
+        );
         self.learn(&starts, u64::MAX, f64::NEG_INFINITY)?;
+        if self.given_up > 0 {
+            self.learn(&self.low_starts(line.sigma), u64::MAX, f64::NEG_INFINITY)?;
+        }
         self.known
             .sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
         let mut total = 0;
@@ -342,9 +346,20 @@ impl<'a> Lines<'a> {
             .find(|right| *right < edge)
             .unwrap_or(f64::NEG_INFINITY);
         let free = edge - next.max(self.barrier);
-        let sigma = edge - (CLEARANCE * free).min(self.step);
+        // The closer to the root, the more lines have been given up.
+        let share = (0..self.given_up).fold(CLEARANCE, |share, _| 0.1 * share);
+        let sigma = edge - (share * free).min(self.step);
         let further = line.sigma - sigma > 1e-3 * self.margin;
         Ok((sigma > self.barrier && further).then_some(sigma))
+    }
+
+    /// Places near the lower end of a line, of which its hints may tell nothing: where one row
+    /// dominates it is not walked, and the hints kept are the first ones, from far up.
+    fn low_starts(&self, sigma: f64) -> Vec<Complex64> {
+        let spacing = 0.5 * PI * self.first_step;
+        (0..MORE_STARTS)
+            .map(|k| Complex64::new(sigma, k as f64 * spacing))
+            .collect()
     }
 
     /// Newton's iteration from the hints, until the discs right of `sigma` add up to `count`.
@@ -364,6 +379,7 @@ impl<'a> Lines<'a> {
     /// Discs, Im ≥ 0, that hold all roots right of a line.
     fn discs_right_of(&mut self, line: &Line) -> Result<Vec<Disc>, Error> {
         self.learn(&line.hints, line.count, line.sigma)?;
+        self.learn(&self.low_starts(line.sigma), line.count, line.sigma)?;
         let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
         let discs: Vec<Disc> = self.known.iter().filter(right).copied().collect();
         if discs.iter().map(Disc::weight).sum::<u64>() == line.count {

@@ -80,11 +80,9 @@ fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Comp
     match newton(&mut walker.probe, upper, window) {
         Outcome::Simple(Disc {
             center, isolation, ..
-        }) if modulus(center - upper) <= isolation => Ok(if near.im < 0.0 {
-            center.conj()
-        } else {
-            center
-        }),
+        }) if modulus(center - upper) <= isolation => {
+            Ok(if near.im < 0.0 { center.conj() } else { center })
+        }
         Outcome::Stalled(place) => {
             let many = match cluster(&mut walker, place, reach)? {
                 Some(disc) => format!(

@@ -25,7 +25,7 @@ const CHECK_EVERY: u64 = 1024;
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
 /// Hints kept of a walk, the first ones.
-pub(super) const MAX_HINTS: usize = 1000;
+const MAX_HINTS: usize = 1000;
 
 /// Below this, underflow could matter and values prove nothing.
 const UNDERFLOW: f64 = 1e-250;
