@@ -105,7 +105,7 @@ pub(super) fn descend(
         }
         last = own.value;
         let step = step(&rows, leader, &weights, here.im).min(here.im);
-        if !(step * span >= WORTH) {
+        if step * span < WORTH {
             slack += 1.58 * own.rounding / size;
             break;
         }
