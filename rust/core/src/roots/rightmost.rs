@@ -4,10 +4,11 @@
 //! A line Re s = σ is sought with at least the wanted number of roots to its right, but not many
 //! more. Newton's iteration from the points where the walk along a line came closest to a root
 //! tells where the next line should be: just left of the roots wanted. Where it tells nothing,
-//! lines step to the left, by growing steps but never more than half the way to the chains of a
-//! neutral equation or to a line that could not be counted, and back by bisection. If the discs
-//! known add up to the count of a line, all is known, else the half plane is searched cell by cell. Right of the chains there may be fewer roots than wanted, or
-//! none at all: the chains themselves then lead, and the set holds what there is.
+//! lines step to the left, by growing steps but never all the way to the chains of a neutral
+//! equation or to a line that could not be counted, and back by bisection. If the discs known add
+//! up to the count of a line, all is known, else the half plane is searched cell by cell. Right of
+//! the chains there may be fewer roots than wanted, or none at all: the chains themselves then
+//! lead, and the set holds what there is.
 
 use std::f64::consts::PI;
 
@@ -44,6 +45,9 @@ const MAX_GIVEN_UP: u32 = 3;
 
 /// Newton iterations from a line, besides two for every root wanted.
 const MORE_STARTS: usize = 12;
+
+/// Share of the distance to the chains, or to a line given up, that the next line keeps.
+const APPROACH: f64 = 0.2;
 
 /// Share of the way from a root to the chains, or to its neighbour, at which a line is laid.
 const CLEARANCE: f64 = 0.3;
@@ -276,8 +280,10 @@ impl<'a> Lines<'a> {
                         Some(sigma) if sigma >= ahead => sigma,
                         _ => {
                             self.step *= 1.5;
-                            // Never onto the barrier, only half the way.
-                            ahead.max(0.5 * (few.sigma + self.barrier))
+                            // Never onto the barrier, only most of the way: a line costs as
+                            // much as its distance is small, so halving it would pay twice.
+                            let kept = APPROACH * (few.sigma - self.barrier);
+                            ahead.max(self.barrier + kept.max(0.99 * self.margin))
                         }
                     }
                 }
