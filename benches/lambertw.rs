@@ -6,8 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use deadtime::Task;
-use deadtime::lambertw::{dde_root_array, lambertw_array};
+use deadtime::lambertw::block;
 use num_complex::Complex64;
 
 const LENGTH: u32 = 1000;
@@ -25,46 +24,89 @@ fn spiral(low: f64, high: f64) -> Vec<Complex64> {
         .collect()
 }
 
+/// Square of side 6 around 0, filled evenly and unordered.
+fn square() -> Vec<Complex64> {
+    const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
+    (0..LENGTH)
+        .map(|i| {
+            let part = f64::from(i) / f64::from(LENGTH);
+            let other = (GOLDEN_RATIO * f64::from(i)).fract();
+            Complex64::new(6.0 * part - 3.0, 6.0 * other - 3.0)
+        })
+        .collect()
+}
+
 fn lambertw(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("lambertw");
     group.throughput(Throughput::Elements(u64::from(LENGTH)));
     let near: Vec<_> = spiral(-16.0, -1.0).iter().map(|d| d - INVERSE_E).collect();
     let mixed: Vec<i64> = (0..i64::from(LENGTH)).map(|i| i % 11 - 5).collect();
+    let branch = |k| vec![k; LENGTH as usize];
     let cases = [
-        ("disc k=0", spiral(-3.0, 3.0), vec![0]),
-        ("disc k=-1", spiral(-3.0, 3.0), vec![-1]),
-        ("disc k=3", spiral(-3.0, 3.0), vec![3]),
+        ("disc k=0", spiral(-3.0, 3.0), branch(0)),
+        ("disc k=-1", spiral(-3.0, 3.0), branch(-1)),
+        ("disc k=3", spiral(-3.0, 3.0), branch(3)),
         ("disc k mixed", spiral(-3.0, 3.0), mixed.clone()),
-        ("near -1/e k=0", near.clone(), vec![0]),
-        ("near -1/e k=-1", near, vec![-1]),
-        ("wide k=0", spiral(-300.0, 300.0), vec![0]),
+        ("square k=0", square(), branch(0)),
+        ("square k=-1", square(), branch(-1)),
+        ("near -1/e k=0", near.clone(), branch(0)),
+        ("near -1/e k=-1", near, branch(-1)),
+        ("wide k=0", spiral(-300.0, 300.0), branch(0)),
+        ("wide k=-1", spiral(-300.0, 300.0), branch(-1)),
         ("wide k mixed", spiral(-300.0, 300.0), mixed),
     ];
-    let mut out = vec![Complex64::ZERO; LENGTH as usize];
-    let task = Task::new();
+    let mut w = vec![Complex64::ZERO; LENGTH as usize];
     for (name, z, k) in cases {
         group.bench_function(BenchmarkId::from_parameter(name), |bencher| {
-            bencher.iter(|| lambertw_array(black_box(&z), black_box(&k), &mut out, &task));
+            bencher.iter(|| block::lambertw(black_box(&z), black_box(&k), &mut w));
         });
     }
+    let (z, k) = ([Complex64::new(1.0, 2.0)], [-1]);
+    group.throughput(Throughput::Elements(1));
+    group.bench_function(BenchmarkId::from_parameter("one element"), |bencher| {
+        bencher.iter(|| block::lambertw(black_box(&z), black_box(&k), black_box(&mut w[..1])));
+    });
+    group.finish();
+}
+
+fn real_branches(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("lambertw real");
+    group.throughput(Throughput::Elements(u64::from(LENGTH)));
+    let positive: Vec<_> = spiral(-3.0, 3.0).iter().map(|z| z.norm()).collect();
+    let negative: Vec<_> = (1..=LENGTH)
+        .map(|i| -INVERSE_E * f64::from(i) / f64::from(LENGTH + 1))
+        .collect();
+    let mut w = vec![0.0; LENGTH as usize];
+    group.bench_function(BenchmarkId::from_parameter("k=0"), |bencher| {
+        bencher.iter(|| block::lambertw0(black_box(&positive), &mut w));
+    });
+    group.bench_function(BenchmarkId::from_parameter("k=0 below zero"), |bencher| {
+        bencher.iter(|| block::lambertw0(black_box(&negative), &mut w));
+    });
+    group.bench_function(BenchmarkId::from_parameter("k=-1"), |bencher| {
+        bencher.iter(|| block::lambertwm1(black_box(&negative), &mut w));
+    });
     group.finish();
 }
 
 fn dde_roots(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("dde_root");
     group.throughput(Throughput::Elements(u64::from(LENGTH)));
+    let length = LENGTH as usize;
+    let (own, delay) = (vec![-0.1; length], vec![0.36; length]);
     let gains: Vec<_> = (1..=LENGTH).map(|i| -0.005 * f64::from(i)).collect();
-    let mut out = vec![Complex64::ZERO; LENGTH as usize];
-    let task = Task::new();
-    for k in [0, -3] {
-        group.bench_function(BenchmarkId::from_parameter(format!("k={k}")), |bencher| {
-            bencher.iter(|| {
-                dde_root_array(&[-0.1], black_box(&gains), &[0.36], &[k], &mut out, &task)
-            });
-        });
+    let mut s = vec![Complex64::ZERO; length];
+    for branch in [0, -3] {
+        let k = vec![branch; length];
+        group.bench_function(
+            BenchmarkId::from_parameter(format!("k={branch}")),
+            |bencher| {
+                bencher.iter(|| block::dde_root(&own, black_box(&gains), &delay, &k, &mut s));
+            },
+        );
     }
     group.finish();
 }
 
-criterion_group!(benches, lambertw, dde_roots);
+criterion_group!(benches, lambertw, real_branches, dde_roots);
 criterion_main!(benches);

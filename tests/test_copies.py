@@ -41,6 +41,7 @@ RESULTS = {
     "StabilityMap": mapped,
     "RootSet": LOOP.rightmost,
     "Design": designed,
+    "Margins": LOOP.continuous().margin,
 }
 WAYS = {
     "pickle": lambda one: pickle.loads(pickle.dumps(one)),

@@ -36,10 +36,12 @@ RECORDED = {
     "J_reW0": 0.4617,
     "K_unitcircle": 0.4365,
 }
-# Components, in spacings of their own: all but the two where one component nearly vanishes.
-COMPONENTS = 0.51
-NOT_BY_COMPONENT = {"J_reW0", "B_branchpt", "B_branchpt_axis"}
-NOT_BY_COMPONENT |= {"B_branchpt_tinyim", "B_branchpt_ulps"}
+# Components, in spacings of their own, where they are not below 1e-3 of |W|: nearly vanishing
+# ones have the error of the large one. Next to -1/e, Im W is small beside 1 and comes from a
+# square root and a series; elsewhere components are rounded correctly but for a hundredth.
+COMPONENTS = {"B_branchpt": 2.2, "B_branchpt_axis": 1.8, "B_branchpt_tinyim": 0.9}
+COMPONENTS |= dict.fromkeys(set(RECORDED) - set(COMPONENTS), 0.51)
+SMALL_COMPONENT = 1e-3
 
 
 def pair(re, im):
@@ -84,12 +86,16 @@ def test_errors_do_not_grow_beyond_what_was_reached(table, category):
     assert error.max() <= RECORDED[category]
 
 
-@pytest.mark.parametrize("category", sorted(set(RECORDED) - NOT_BY_COMPONENT))
+@pytest.mark.parametrize("category", RECORDED)
 def test_components_are_rounded_correctly_too(table, category):
     inside = table["names"] == category
+    size = np.hypot(table["w_re"], table["w_im"])
     for part in ("re", "im"):
-        spacing = np.spacing(np.abs(table[f"w_{part}"][inside]))
-        assert np.abs(table[f"error_{part}"][inside] / spacing).max() <= COMPONENTS
+        seen = inside & (np.abs(table[f"w_{part}"]) >= SMALL_COMPONENT * size)
+        if seen.any():
+            spacing = np.spacing(np.abs(table[f"w_{part}"][seen]))
+            error = np.abs(table[f"error_{part}"][seen]) / spacing
+            assert error.max() <= COMPONENTS[category]
 
 
 def test_real_answers_have_a_zero_of_the_right_sign(table):

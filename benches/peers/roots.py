@@ -1,7 +1,11 @@
-"""All roots of a region beside qpmr: time of both, alternated in one process, and their errors.
+"""All roots of a region beside qpmr, tdcpy and cxroots, on every certified reference case.
 
-Errors are the largest distance of a certified root from the nearest one found; `missed` counts
-those further than 1e-6 from any. Run ``python benches/peers/roots.py [--quick]``.
+Each peer runs in a process of its own that is ended after a time limit; ours and theirs take
+turns. A peer is right when it finds every certified root of the upper half plane and no other:
+`miss` counts certified roots further than 1e-6 (of their modulus) from any it returned, `extra`
+what it returned further than that from any certified one. Distances within clusters are those to
+the nearest member, so a multiple root given once is not missed.
+Run ``python benches/peers/roots.py [--quick] [--limit SECONDS]``.
 """
 
 from __future__ import annotations
@@ -9,87 +13,183 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import multiprocessing
 import time
 import warnings
 from collections.abc import Callable
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import deadtime as dtm
 import numpy as np
 
-try:
-    import qpmr
-except ImportError as error:
-    raise SystemExit("qpmr is missing: pip install qpmr") from error
-
 CASES = Path(__file__).parents[2] / "tests" / "reference" / "root_cases.json"
 QUICK = ("armah_K2", "armah_neutral_Kv0.3", "mackey_glass")
-MORE = (
-    "qpmr_ex1",
-    "qpmr_ex1_tall",
-    "qpmr_ex3_neutral",
-    "humphries_k3",
-    "ring_cars_5",
-    "near_double",
-    "peec",
-    "delay_1e3",
-)
-FAR = 1e-6
+NEAR = 1e-6
+Region = tuple[float, float, float, float]
 
 
-def seconds(call: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    call()
-    return time.perf_counter() - start
+def with_qpmr(coefficients: np.ndarray, delays: np.ndarray, region: Region) -> Any:
+    import qpmr
+
+    return qpmr.qpmr(coefficients, delays, region=region)[0]
 
 
-def judge(found: Any, case: dict[str, Any]) -> tuple[float, int]:
-    """Largest error of a root that was found, and how many were not."""
-    roots = np.array([complex(re, im) for re, im, _ in case["roots"]])
-    found = np.asarray(found)
-    if not len(found):
-        return np.nan, len(roots)
-    distances = np.abs(roots[:, None] - found[None, :]).min(axis=1)
-    near = distances[distances < FAR]
-    return float(near.max(initial=0.0)), int(np.sum(distances >= FAR))
+def with_tdcpy(coefficients: np.ndarray, delays: np.ndarray, region: Region) -> Any:
+    import tdcpy
+    from tdcpy.common.quasipoly import qp_to_ndde
+
+    a, delays_a, h, delays_h = qp_to_ndde(coefficients, delays)
+    neutral = h is not None and np.size(h) > 0
+    system = tdcpy.NDDE(a, delays_a, h, delays_h) if neutral else tdcpy.RDDE(a, delays_a)
+    return tdcpy.roots(system, r=list(region))[0]
+
+
+def with_cxroots(coefficients: np.ndarray, delays: np.ndarray, region: Region) -> Any:
+    import cxroots
+
+    rows = [np.polynomial.Polynomial(row) for row in coefficients]
+    slopes = [row.deriv() for row in rows]
+
+    def h(s: Any) -> Any:
+        return sum(row(s) * np.exp(-s * tau) for row, tau in zip(rows, delays, strict=True))
+
+    def slope(s: Any) -> Any:
+        terms = zip(rows, slopes, delays, strict=True)
+        return sum((dp(s) - tau * p(s)) * np.exp(-s * tau) for p, dp, tau in terms)
+
+    rectangle = cxroots.Rectangle(region[:2], region[2:])
+    return rectangle.roots(h, slope, verbose=False).roots
+
+
+PEERS: dict[str, Callable[[np.ndarray, np.ndarray, Region], Any]] = {
+    "qpmr": with_qpmr,
+    "tdcpy": with_tdcpy,
+    "cxroots": with_cxroots,
+}
+
+
+def serve(name: str, pipe: Connection) -> None:
+    """Answer cases until the pipe closes: roots and seconds, or what went wrong."""
+    warnings.simplefilter("ignore")
+    logging.disable(logging.CRITICAL)
+    np.seterr(all="ignore")
+    while True:
+        try:
+            coefficients, delays, region = pipe.recv()
+        except EOFError:
+            return
+        start = time.perf_counter()
+        try:
+            roots = np.asarray(PEERS[name](coefficients, delays, region), complex).ravel()
+            pipe.send((roots, time.perf_counter() - start))
+        except Exception as error:
+            pipe.send((f"{type(error).__name__}", 0.0))
+
+
+class Peer:
+    """A peer in its process, which a call that takes too long ends."""
+
+    def __init__(self, name: str, limit: float) -> None:
+        self.name, self.limit = name, limit
+        self.start()
+
+    def start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, other = context.Pipe()
+        self.process = context.Process(target=serve, args=(self.name, other), daemon=True)
+        self.process.start()
+        # The first call imports the package.
+        self.pipe.send((np.array([[1.0, 1.0]]), np.array([0.0]), (-2.0, 1.0, -1.0, 1.0)))
+        self.pipe.poll(60.0)
+        self.pipe.recv()
+
+    def roots(self, case: tuple[np.ndarray, np.ndarray, Region]) -> tuple[Any, float]:
+        self.pipe.send(case)
+        if self.pipe.poll(self.limit):
+            found, seconds = self.pipe.recv()
+            return found, seconds
+        self.process.kill()
+        self.start()
+        return "too slow", 0.0
+
+
+def judge(found: Any, case: dict[str, Any]) -> tuple[int, int]:
+    """How many certified roots were missed, and how many of the others are none."""
+    certified = np.array([complex(re, im) for re, im, _ in case["roots"]])
+    a, b, _, d = case["region"]
+    upper = found[(found.imag > -NEAR) & (found.imag <= d) & (found.real >= a) & (found.real <= b)]
+    if not len(certified):
+        return 0, len(upper)
+    if not len(upper):
+        return len(certified), 0
+    distance = np.abs(certified[:, None] - upper[None, :]) / (1.0 + np.abs(certified))[:, None]
+    spread = case.get("cluster_radius", 0.0) + NEAR
+    return int((distance.min(axis=1) > spread).sum()), int((distance.min(axis=0) > spread).sum())
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a moment's run, rough numbers")
-    quick = parser.parse_args().quick
-    names, rounds = (QUICK, 3) if quick else (QUICK + MORE, 7)
-    logging.disable(logging.CRITICAL)
-    warnings.simplefilter("ignore")
-    cases = {c["name"]: c for c in json.loads(CASES.read_text(encoding="utf-8"))["cases"]}
+    parser.add_argument("--limit", type=float, help="seconds a peer has for a case (20)")
+    options = parser.parse_args()
+    limit = options.limit or (2.0 if options.quick else 20.0)
+    cases = json.loads(CASES.read_text(encoding="utf-8"))["cases"]
+    if options.quick:
+        cases = [case for case in cases if case["name"] in QUICK]
+    peers = []
+    for name in PEERS:
+        try:
+            __import__(name)
+        except ImportError:
+            print(f"{name} is missing: pip install {name}")
+        else:
+            peers.append(Peer(name, limit))
 
-    print(f"median of {rounds} alternated rounds")
-    head = ("roots", "qpmr ms", "ours ms", "ratio", "qpmr err", "missed", "err", "missed")
-    print(f"{'case':22s}" + "".join(f"{title:>10s}" for title in head))
-    for name in names:
-        case = cases[name]
-        h = dtm.QuasiPolynomial(case["coefs"], case["delays"])
+    print(f"{'case':22s}{'roots':>6s}{'ours ms':>10s}" + "".join(f"{p.name:>24s}" for p in peers))
+    ratios: dict[str, list[float]] = {peer.name: [] for peer in peers}
+    right: dict[str, int] = dict.fromkeys(("ours", *ratios), 0)
+    for case in cases:
         a, b, c, d = case["region"]
         coefficients, delays = np.array(case["coefs"]), np.array(case["delays"])
-
-        def theirs(
-            coefficients: Any = coefficients, delays: Any = delays, region: Any = (a, b, c, d)
-        ) -> Any:
-            return qpmr.qpmr(coefficients, delays, region=region)[0]
-
-        def ours(h: Any = h, re: Any = (a, b), im: Any = (c, d)) -> Any:
-            return h.roots(re=re, im=im)
-
-        errors = (*judge(theirs(), case), *judge(ours(), case))
-        # Slow cases are not repeated beyond what a coffee takes.
-        repeat = rounds if seconds(theirs) < 1.0 else 1
-        times = np.median([(seconds(theirs), seconds(ours)) for _ in range(repeat)], axis=0) * 1e3
-        print(
-            f"{name:22s}{len(case['roots']):10d}{times[0]:10.2f}{times[1]:10.3f}"
-            f"{times[0] / times[1]:10.0f}{errors[0]:10.1e}{errors[1]:10d}"
-            f"{errors[2]:10.1e}{errors[3]:10d}"
-        )
+        h = dtm.QuasiPolynomial(coefficients, delays)
+        times: dict[str, list[float]] = {name: [] for name in ("ours", *ratios)}
+        verdicts: dict[str, str] = {}
+        for _ in range(3 if options.quick else 5):
+            start = time.perf_counter()
+            try:
+                missed, extra = judge(np.asarray(h.roots(re=(a, b), im=(c, d)).roots), case)
+                verdicts["ours"] = "ok" if not missed + extra else f"miss {missed} extra {extra}"
+            except dtm.DeadtimeError as error:
+                verdicts["ours"] = type(error).__name__
+            times["ours"].append(time.perf_counter() - start)
+            for peer in peers:
+                if verdicts.get(peer.name, "") == "too slow" or sum(times[peer.name]) > 2.0:
+                    continue
+                found, seconds = peer.roots((coefficients, delays, (a, b, c, d)))
+                if isinstance(found, str):
+                    verdicts[peer.name] = found
+                    continue
+                missed, extra = judge(found, case)
+                verdicts[peer.name] = "ok" if not missed + extra else f"miss {missed} extra {extra}"
+                times[peer.name].append(seconds)
+        own = float(np.median(times["ours"]))
+        right["ours"] += verdicts["ours"] == "ok"
+        line = f"{case['name']:22s}{len(case['roots']):6d}{own * 1e3:10.3f}"
+        line += "" if verdicts["ours"] == "ok" else f" ({verdicts['ours']})"
+        for peer in peers:
+            spent = times[peer.name]
+            took = f"{np.median(spent) * 1e3:.1f} ms " if spent else ""
+            line += f"{took + verdicts[peer.name]:>24s}"
+            if verdicts[peer.name] == "ok":
+                right[peer.name] += 1
+                ratios[peer.name].append(float(np.median(spent)) / own)
+        print(line, flush=True)
+    print(f"right: ours {right['ours']} of {len(cases)}")
+    for name, values in ratios.items():
+        median = f", where right {np.median(values):.0f} x our time (median)" if values else ""
+        print(f"right: {name} {right[name]} of {len(cases)}{median}")
 
 
 if __name__ == "__main__":

@@ -24,6 +24,8 @@ from deadtime._estimation import (
     estimate_delay,
 )
 from deadtime._loop import ControlLoop
+from deadtime._low_level import low_level_callable
+from deadtime._margins import Margins
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s
@@ -31,9 +33,19 @@ from deadtime._readers import read_recording
 from deadtime._recording import Recording, Step
 from deadtime._response import Response
 from deadtime._rootset import RootSet
+from deadtime._scalar_delay import dde_roots, rightmost_branches
 from deadtime._sensitivity import Sensitivity
-from deadtime._special import dde_roots, lambertw
+from deadtime._special import lambertw, lambertw0, lambertwm1
+from deadtime._special_forms import (
+    OffsetW,
+    lambertw_derivative,
+    lambertw_log,
+    lambertw_offset,
+    wrightomega,
+)
 from deadtime._stability import MapStatus, StabilityMap, stability_map
+from deadtime._systems import DelaySystem
+from deadtime._transfer import TransferFunction, feedback
 
 __all__ = [
     "PD",
@@ -49,12 +61,15 @@ __all__ = [
     "CramerRaoBound",
     "DeadtimeError",
     "DelayEstimate",
+    "DelaySystem",
     "DerivativeFilter",
     "Design",
     "FirstOrder",
     "Integrator",
     "MapStatus",
+    "Margins",
     "NotIdentifiableError",
+    "OffsetW",
     "P",
     "Parameter",
     "ParametricQuasiPolynomial",
@@ -68,17 +83,27 @@ __all__ = [
     "Sensitivity",
     "StabilityMap",
     "Step",
+    "TransferFunction",
     "Whiteness",
     "damping_ratio",
     "dde_roots",
     "delay",
     "design",
     "estimate_delay",
+    "feedback",
     "gallery",
     "kit_plant",
     "lambertw",
+    "lambertw0",
+    "lambertw_derivative",
+    "lambertw_log",
+    "lambertw_offset",
+    "lambertwm1",
+    "low_level_callable",
     "parameters",
     "read_recording",
+    "rightmost_branches",
     "s",
     "stability_map",
+    "wrightomega",
 ]

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._transfer import TransferFunction
 from deadtime._validation import finite, positive
 
 __all__ = ["PD", "PI", "PID", "PV", "Controller", "DerivativeFilter", "P"]
@@ -109,6 +110,21 @@ class Controller(ABC):
         if self._filter is not None:
             numbers |= {"omega": self._filter.omega, "damping": self._filter.damping}
         return numbers
+
+    def transfer_function(self) -> TransferFunction:
+        """Return the feedback F(s) of u = R(s) r - F(s) y.
+
+        Returns
+        -------
+        TransferFunction
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.PI(Kp=2.0, Ki=0.5).transfer_function()
+        (0.5 + 2 s) / s
+        """
+        return TransferFunction(*self._feedback(self.parameters))
 
     def _replace(self, numbers: Mapping[str, float]) -> Controller:
         """Return the same controller with other numbers."""

@@ -10,11 +10,23 @@ __all__ = [
     "Family",
     "LinearLoop",
     "QuasiPolynomial",
+    "dde_root_number",
     "dde_roots",
     "lambertw",
+    "lambertw0",
+    "lambertw0_number",
+    "lambertw_derivative",
+    "lambertw_log",
+    "lambertw_number",
+    "lambertw_offset",
+    "lambertwm1",
+    "lambertwm1_number",
+    "limit_threads",
+    "nap",
     "sampled_abscissa_grid",
     "spin",
     "thread_count",
+    "wrightomega",
 ]
 
 _Listed: TypeAlias = tuple[
@@ -57,16 +69,23 @@ def thread_count(threads: int | None = None) -> int: ...
 def spin(
     seconds: float, threads: int | None = None, progress: Callable[[int], object] | None = None
 ) -> int: ...
-def lambertw(
-    z: NDArray[np.complex128], k: NDArray[np.int64], threads: int | None = None
-) -> NDArray[np.complex128]: ...
-def dde_roots(
-    a0: NDArray[np.float64],
-    a1: NDArray[np.float64],
-    delay: NDArray[np.float64],
-    k: NDArray[np.int64],
-    threads: int | None = None,
-) -> NDArray[np.complex128]: ...
+def limit_threads(threads: int | None) -> int | None: ...
+
+lambertw: np.ufunc
+lambertw0: np.ufunc
+lambertwm1: np.ufunc
+lambertw_log: np.ufunc
+wrightomega: np.ufunc
+lambertw_derivative: np.ufunc
+lambertw_offset: np.ufunc
+dde_roots: np.ufunc
+nap: np.ufunc
+__pyx_capi__: dict[str, object]
+
+def lambertw_number(z: object, k: object) -> np.complex128 | None: ...
+def lambertw0_number(x: object) -> np.float64 | None: ...
+def lambertwm1_number(x: object) -> np.float64 | None: ...
+def dde_root_number(a0: object, a1: object, delay: object, k: object) -> np.complex128 | None: ...
 
 @final
 class Family:

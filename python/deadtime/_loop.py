@@ -1,4 +1,7 @@
-"""A feedback loop with a delay: plant, controller, delay, and the hold and limit around them."""
+"""A feedback loop with a delay: plant, controller, delay, and the hold and limit around them.
+
+One class, kept whole: most of the file is its documentation.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ from deadtime._loop_model import LoopModel
 from deadtime._loop_run import settled_step, simulate_loop
 from deadtime._loop_stability import (
     characteristic,
+    closed_loop,
+    open_loop,
     sampled_abscissa,
     sampled_roots,
     stable_range,
@@ -26,7 +31,7 @@ from deadtime._response import Response
 from deadtime._validation import finite, non_negative, positive
 
 if TYPE_CHECKING:
-    from deadtime import QuasiPolynomial, RootSet
+    from deadtime import Margins, QuasiPolynomial, RootSet, TransferFunction
     from deadtime._deadtime import LinearLoop
 
 __all__ = ["ControlLoop"]
@@ -286,18 +291,99 @@ class ControlLoop:
         >>> h.kind
         'neutral'
         """
-        if self.is_sampled:
-            raise ValueError(
-                f"a loop with sample_time={self.sample_time} has finitely many poles and no "
-                "characteristic quasi-polynomial: use transition_matrix() or rightmost(), or "
-                "continuous().characteristic() for the loop without its hold"
-            )
+        self._refuse_hold(
+            "has finitely many poles and no characteristic quasi-polynomial: use "
+            "transition_matrix() or rightmost(), or continuous().characteristic() for the loop "
+            "without its hold"
+        )
         self._known_delay()
         return cast("QuasiPolynomial", self._characteristic(self.parameters))
 
     def _characteristic(self, values: Mapping[str, Any]) -> Any:
         """Characteristic function with numbers or symbols from `values`, which name them all."""
         return characteristic(self.plant, self.controller, values)
+
+    def open_loop(self) -> TransferFunction:
+        """Return the loop gain of the continuous loop, cut at the command, its limit left out.
+
+        Returns
+        -------
+        TransferFunction
+            b f exp(-s delay) / (a g) for the plant b/a and the feedback f/g; ``feedback`` of it
+            has `characteristic` as its denominator.
+
+        Raises
+        ------
+        ValueError
+            If the loop is sampled or its delay is None.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).open_loop()
+        (2 + 0.3 s) exp(-0.36 s) / s
+        """
+        self._refuse_hold(
+            "has a hold in it, which this transfer function would leave out: use "
+            "continuous().open_loop() to leave it out on purpose"
+        )
+        self._known_delay()
+        return open_loop(self.plant, self.controller, self.parameters)
+
+    def closed_loop(self) -> TransferFunction:
+        """Return the transfer function from reference to output, the limit left out.
+
+        Returns
+        -------
+        TransferFunction
+            With the delay in the numerator where `delay_path` is "command".
+
+        Raises
+        ------
+        ValueError
+            If the loop is sampled or its delay is None.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).closed_loop()
+        2 exp(-0.36 s) / (s + (2 + 0.3 s) exp(-0.36 s))
+        """
+        self._refuse_hold(
+            "has a hold in it, which this transfer function would leave out: use "
+            "continuous().closed_loop() to leave it out on purpose"
+        )
+        self._known_delay()
+        late = self.delay_path == "command"
+        return closed_loop(self.plant, self.controller, self.parameters, late)
+
+    def margin(self) -> Margins:
+        """Return the gain, phase and delay margin of the continuous loop, its limit left out.
+
+        Returns
+        -------
+        Margins
+
+        Raises
+        ------
+        ValueError
+            If the loop is sampled, its delay is None, or its gain grows with frequency.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36)
+        >>> loop.margin()
+        <Margins: gain 2.182 at 4.363 rad/s, phase 48.75° at 2 rad/s, delay 0.4254 s at 2 rad/s>
+        >>> round(loop.stable_range("delay")[1] - loop.delay, 4)
+        0.4254
+        """
+        self._refuse_hold(
+            "has a hold in it, which these margins would leave out and so be too large: use "
+            'stable_range("delay"), or stable_range of a gain, which take it into account, or '
+            "continuous().margin() to leave it out on purpose"
+        )
+        return self.open_loop().margin()
 
     def transition_matrix(self) -> NDArray[np.float64]:
         """Return the matrix that takes a sampled loop, limit left out, from sample to sample.
@@ -470,6 +556,10 @@ class ControlLoop:
     @cached_property
     def _native(self) -> LinearLoop:
         return self._model.native(self._known_delay(), self.sample_time, self.limit)
+
+    def _refuse_hold(self, why: str) -> None:
+        if self.is_sampled:
+            raise ValueError(f"a loop with sample_time={self.sample_time} {why}")
 
     def _known_delay(self) -> float:
         if self.delay is None:

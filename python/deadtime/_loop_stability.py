@@ -20,9 +20,12 @@ from deadtime._loop_model import LoopModel
 from deadtime._plants import Plant
 from deadtime._quasipolynomial import delay, s
 from deadtime._rootset import RootSet
+from deadtime._transfer import TransferFunction
 
 __all__ = [
     "characteristic",
+    "closed_loop",
+    "open_loop",
     "sampled_abscissa",
     "sampled_grid",
     "sampled_roots",
@@ -48,6 +51,27 @@ def characteristic(plant: Plant, controller: Controller, values: Mapping[str, An
     b, a = plant._polynomials(values)
     f, g = controller._feedback(values)
     return _in_s(a) * _in_s(g) + _in_s(b) * _in_s(f) * delay(values["delay"])
+
+
+def open_loop(
+    plant: Plant, controller: Controller, values: Mapping[str, float]
+) -> TransferFunction:
+    """Build b f e^(-s delay) / (a g)."""
+    b, a = plant._polynomials(values)
+    f, g = controller._feedback(values)
+    return TransferFunction(_in_s(b) * _in_s(f) * delay(values["delay"]), _in_s(a) * _in_s(g))
+
+
+def closed_loop(
+    plant: Plant, controller: Controller, values: Mapping[str, float], late: bool
+) -> TransferFunction:
+    """Build b r [e^(-s delay)] / (a g + b f e^(-s delay)) with the controller's R = r/g."""
+    b, _ = plant._polynomials(values)
+    r, _ = controller._reference(values)
+    num = _in_s(b) * _in_s(r)
+    if late:
+        num = num * delay(values["delay"])
+    return TransferFunction(num, characteristic(plant, controller, values))
 
 
 def _in_s(coefficients: Sequence[Any]) -> Any:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, SupportsFloat, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._transfer import TransferFunction
 from deadtime._validation import finite, non_negative, non_zero
 
 __all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
@@ -72,6 +73,21 @@ class Plant(ABC):
         """
         num, den = self._polynomials(self.parameters)
         return _trimmed(num), _trimmed(den)
+
+    def transfer_function(self) -> TransferFunction:
+        """Return the plant as a transfer function.
+
+        Returns
+        -------
+        TransferFunction
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.Integrator(gain=0.9, lag=0.2).transfer_function() * dtm.delay(0.36)
+        0.9 exp(-0.36 s) / (s + 0.2 s^2)
+        """
+        return TransferFunction(*self.polynomials())
 
     def state_space(self) -> StateSpace:
         """State space in observable canonical form: the first state is y - D w.

@@ -9,7 +9,7 @@ import math
 import operator
 from collections.abc import Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, cast, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeAlias, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,7 @@ from deadtime._sensitivity import Sensitivity
 
 if TYPE_CHECKING:
     from deadtime._parametric import ParametricQuasiPolynomial
+    from deadtime._transfer import TransferFunction
 
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
@@ -66,6 +67,9 @@ class QuasiPolynomial:
 
     # NumPy leaves `array * h` and `number * h` to this class.
     __array_ufunc__ = None
+
+    # What a quotient is: set by the module of transfer functions, which builds on this one.
+    _ratio: ClassVar[type[TransferFunction]]
 
     _native: _deadtime.QuasiPolynomial
     _coefficients: NDArray[np.float64]
@@ -181,30 +185,37 @@ class QuasiPolynomial:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: object) -> QuasiPolynomial:
+    @overload
+    def __truediv__(self, other: float) -> QuasiPolynomial: ...
+    @overload
+    def __truediv__(self, other: QuasiPolynomial) -> TransferFunction: ...
+    def __truediv__(self, other: object) -> QuasiPolynomial | TransferFunction:
+        """By a number: a quasi-polynomial; by a quasi-polynomial: a `TransferFunction`."""
         if is_number(other):
             divisor = float(cast(float, other))
             if divisor == 0.0:
                 raise ZeroDivisionError("division of a quasi-polynomial by zero")
             return self._wrap(_deadtime.QuasiPolynomial(self._coefficients / divisor, self._delays))
         if isinstance(other, QuasiPolynomial):
-            raise TypeError(_NO_QUOTIENT)
+            return self._ratio(self, other)
         return NotImplemented
 
-    def __rtruediv__(self, other: object) -> QuasiPolynomial:
-        if is_number(other):
-            raise TypeError(_NO_QUOTIENT)
-        return NotImplemented
+    def __rtruediv__(self, other: float) -> TransferFunction:
+        first = _operand(other)
+        if first is None:
+            return NotImplemented
+        return self._ratio(first, self)
 
-    def __pow__(self, exponent: object) -> QuasiPolynomial:
+    def __pow__(self, exponent: object) -> Any:
+        """To a whole power; to a negative one it is a `TransferFunction`."""
         try:
             power = operator.index(cast(int, exponent))
         except TypeError:
             return NotImplemented
-        if power < 0:
-            raise TypeError(_NO_QUOTIENT)
-        if power >= 2**31:
+        if abs(power) >= 2**31:
             raise ValueError(f"exponent {power}: a power that high does not fit into memory")
+        if power < 0:
+            return 1.0 / self._wrap(self._native.pow(-power))
         return self._wrap(self._native.pow(power))
 
     # Values
@@ -503,12 +514,6 @@ class QuasiPolynomial:
         # h depends on a delay through its row alone, d/dtau of which is -s times the row.
         delays = -found * (coefficients * self._coefficients).sum(axis=1)
         return Sensitivity(found, coefficients, delays)
-
-
-_NO_QUOTIENT: Final = (
-    "quotients are not quasi-polynomials: keep numerator and denominator apart "
-    "(their roots are the zeros and the poles)"
-)
 
 
 @overload

@@ -1,19 +1,31 @@
-"""The Lambert W function and the characteristic roots it gives in closed form."""
+"""The Lambert W function: every branch, and the two real ones.
+
+The functions are NumPy ufuncs with a thin layer on top: single numbers go past NumPy's machinery,
+which takes longer than W itself; and where NumPy refuses the arguments, the reason is looked up.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from deadtime import _deadtime
-from deadtime._validation import thread_number
+from deadtime._ufunc import UfuncOptions, apply, branches
 
-__all__ = ["dde_roots", "lambertw"]
+__all__ = ["lambertw", "lambertw0", "lambertwm1"]
 
 
-def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> Any:
+def lambertw(
+    z: ArrayLike,
+    k: ArrayLike = 0,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None = None,
+    *,
+    where: ArrayLike = True,
+    dtype: DTypeLike | None = None,
+    threads: int | None = None,
+    **options: Unpack[UfuncOptions],
+) -> Any:
     r"""Lambert W function, every branch.
 
     :math:`w = W_k(z)` solves :math:`w e^w = z`; the branch is the integer :math:`k` in
@@ -27,21 +39,34 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
     k : array_like of int, optional
         Branch, any 64-bit integer. Broadcasts against `z`. The real branches are ``k=0`` for
         real ``z >= -1/e`` and ``k=-1`` for real ``-1/e <= z < 0``.
+    out : ndarray or tuple of one ndarray, optional
+        Where to put the result, of complex numbers; it may be `z` itself.
+    where : array_like of bool, optional
+        Where to compute; elsewhere `out` stays as it is (and is arbitrary without `out`).
+    dtype : dtype, optional
+        Type of the result, complex64 or complex128; NumPy converts `z` to it first.
     threads : int, optional
         Number of threads for large arrays; all cores unless told (see ``DEADTIME_NUM_THREADS``).
         The result does not depend on it.
+    **options
+        `casting`, `order`, `subok`, as for any NumPy ufunc.
 
     Returns
     -------
     ndarray or scalar of complex128
-        W with the common shape of `z` and `k`; complex64 when `z` is complex64.
+        W with the common shape of `z` and `k`; complex64 when `z` is complex64. Subclasses of
+        arrays and objects with an ``__array_ufunc__`` of their own are treated as by any ufunc.
 
     Raises
     ------
     TypeError
         `z` is not numeric (or has more precision than complex128), or `k` is not of integers.
     ValueError
-        The shapes do not broadcast, or `k` exceeds 64 bits.
+        The shapes do not broadcast, `k` exceeds 64 bits, or `out` does not fit.
+
+    See Also
+    --------
+    lambertw0, lambertwm1 : the real branches of real arguments.
 
     Notes
     -----
@@ -62,6 +87,7 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
 
     Examples
     --------
+    >>> import numpy as np
     >>> import deadtime as dtm
     >>> print(dtm.lambertw(1.0))
     (0.5671432904097838+0j)
@@ -70,155 +96,125 @@ def lambertw(z: ArrayLike, k: ArrayLike = 0, *, threads: int | None = None) -> A
     array([-2.542641, -0.259171])
     >>> bool(np.allclose(w * np.exp(w), -0.2))
     True
+
+    In place, without a new array:
+
+    >>> z = np.array([1.0 + 1.0j, -5.0 + 0.0j])
+    >>> dtm.lambertw(z, out=z) is z
+    True
     """
-    points = _numbers("z", z, np.complex128)
-    branches = _integers("k", k)
-    narrow = points.dtype == np.complex64
-    shape = _common_shape(z=points, k=branches)
-    w = _deadtime.lambertw(
-        _native(_spread(points, shape), np.complex128),
-        branches if branches.size == 1 else _spread(branches, shape),
-        thread_number(threads),
-    )
-    return (w.astype(np.complex64) if narrow else w)[()]
+    if out is None and threads is None and where is True and dtype is None and not options:
+        number = _deadtime.lambertw_number(z, k)
+        if number is not None:
+            return number
+    return apply(_deadtime.lambertw, (z, branches(k)), options, out, where, dtype, threads)
 
 
-def dde_roots(
-    a0: ArrayLike,
-    a1: ArrayLike,
-    delay: ArrayLike,
-    k: ArrayLike = 0,
+def lambertw0(
+    x: ArrayLike,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None = None,
     *,
+    where: ArrayLike = True,
+    dtype: DTypeLike | None = None,
     threads: int | None = None,
+    **options: Unpack[UfuncOptions],
 ) -> Any:
-    r"""Characteristic roots of the scalar equation with one delay.
+    r"""Principal branch of the Lambert W function for real numbers.
 
-    The roots of :math:`s = a_0 + a_1 e^{-s T}`, which belong to
-    :math:`x'(t) = a_0\,x(t) + a_1\,x(t - T)`, are
-
-    .. math:: s_k = \frac{1}{T} W_k(T a_1 e^{-a_0 T}) + a_0, \qquad k \in \mathbb{Z}.
+    The solution :math:`w \ge -1` of :math:`w e^w = x`; real in, real out, and several times
+    faster than `lambertw`.
 
     Parameters
     ----------
-    a0, a1 : array_like of float
-        Coefficients of the present and the delayed state, 1/s.
-    delay : array_like of float
-        Delay T in s, not negative.
-    k : array_like of int, optional
-        Which root; all four arguments broadcast. ``k=0`` is rightmost. The roots k and -k are
-        conjugate when ``a1 > 0``, k and -1-k when ``a1 < 0`` (unless both are real).
-    threads : int, optional
-        Number of threads for large arrays; the result does not depend on it.
+    x : array_like of float
+        Where to evaluate.
+    out, where, dtype, threads, **options
+        As for `lambertw`, with real types.
 
     Returns
     -------
-    ndarray or scalar of complex128
-        The roots in 1/s. With ``delay=0`` or ``a1=0`` one root is left, ``a0 + a1``; the others
-        have real part ``-inf``. NaN where ``a0*delay`` or ``a1*delay`` exceeds 1e300.
+    ndarray or scalar of float64
+        :math:`W_0(x)`; NaN for :math:`x < -1/e`, where it is not real. float32 when `x` is.
 
     Raises
     ------
     TypeError
-        An argument is not real, or `k` is not of integers.
-    ValueError
-        A coefficient or delay is not finite, a delay is negative, or shapes do not broadcast.
+        `x` is not real, or has more precision than float64.
 
     Notes
     -----
-    The formula overflows for large :math:`|a_0 T|` and loses digits where its terms cancel. Here
-    W only gives the start; the last steps are taken on s itself, so that every root comes to
-    nearly full precision. Where two roots meet, they are as sensitive to rounding of the
-    arguments as any computed value can be.
+    The double next to :math:`-1/e` lies below it by 1.2e-17 and counts as :math:`-1/e` here: W is
+    -1. As a complex number, `lambertw` takes it for what it is.
 
     References
     ----------
-    Armah & Yi, eq. (3), after F. M. Asl, A. G. Ulsoy, "Analysis of a system of linear delay
-    differential equations", J. Dyn. Syst. Meas. Control 125 (2003) 215-223, and S. Yi,
-    P. W. Nelson, A. G. Ulsoy, "Time-Delay Systems: Analysis and Control Using the Lambert W
-    Function", World Scientific 2010.
+    R. M. Corless et al., "On the Lambert W function", Advances in Computational Mathematics 5
+    (1996) 329-359.
 
     Examples
     --------
-    Proportional control of an integrator, gain 2/s, delay 0.36 s:
-
+    >>> import numpy as np
     >>> import deadtime as dtm
-    >>> dtm.dde_roots(0.0, -2.0, 0.36, [0, -1, 1, -2]).round(4)
-    array([-1.5154 +3.1005j, -1.5154 -3.1005j, -6.6601+20.9621j,
-           -6.6601-20.9621j])
+    >>> print(dtm.lambertw0(1.0))
+    0.5671432904097838
+    >>> dtm.lambertw0([-0.2, 0.0, np.e]).round(6)
+    array([-0.259171,  0.      ,  1.      ])
     """
-    own, delayed = _numbers("a0", a0, np.float64), _numbers("a1", a1, np.float64)
-    lag = _numbers("delay", delay, np.float64)
-    branches = _integers("k", k)
-    for name, values in (("a0", own), ("a1", delayed), ("delay", lag)):
-        _refuse(values, ~np.isfinite(values), f"{name} must be finite")
-    _refuse(lag, lag < 0, "delay must not be negative")
-    shape = _common_shape(a0=own, a1=delayed, delay=lag, k=branches)
-    s = _deadtime.dde_roots(
-        _one_or_all(own, shape),
-        _one_or_all(delayed, shape),
-        _one_or_all(lag, shape),
-        _spread(branches, shape),
-        thread_number(threads),
-    )
-    return s[()]
+    if out is None and threads is None and where is True and dtype is None and not options:
+        number = _deadtime.lambertw0_number(x)
+        if number is not None:
+            return number
+    return apply(_deadtime.lambertw0, (x,), options, out, where, dtype, threads)
 
 
-def _one_or_all(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Broadcast, except a single value, which the native code repeats."""
-    return _native(values if values.size == 1 else _spread(values, shape), np.float64)
+def lambertwm1(
+    x: ArrayLike,
+    out: NDArray[Any] | tuple[NDArray[Any]] | None = None,
+    *,
+    where: ArrayLike = True,
+    dtype: DTypeLike | None = None,
+    threads: int | None = None,
+    **options: Unpack[UfuncOptions],
+) -> Any:
+    r"""Lower real branch of the Lambert W function.
 
+    The solution :math:`w \le -1` of :math:`w e^w = x` for :math:`-1/e \le x < 0`; real in, real
+    out.
 
-def _spread(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    return values if values.shape == shape else np.broadcast_to(values, shape)
+    Parameters
+    ----------
+    x : array_like of float
+        Where to evaluate.
+    out, where, dtype, threads, **options
+        As for `lambertw`, with real types.
 
+    Returns
+    -------
+    ndarray or scalar of float64
+        :math:`W_{-1}(x)`; NaN outside :math:`[-1/e, 0]`, ``-inf`` at 0. float32 when `x` is.
 
-def _native(values: NDArray[Any], dtype: type) -> NDArray[Any]:
-    """Values as the native code reads them: aligned, machine byte order, `dtype`."""
-    if values.dtype == dtype and values.flags.aligned:
-        return values
-    return np.require(values, dtype, "A")
+    Raises
+    ------
+    TypeError
+        `x` is not real, or has more precision than float64.
 
+    Notes
+    -----
+    The double next to :math:`-1/e` counts as :math:`-1/e`, as for `lambertw0`.
 
-def _numbers(name: str, values: ArrayLike, dtype: type) -> NDArray[Any]:
-    array = np.asarray(values)
-    if not np.can_cast(array.dtype, dtype, "safe"):
-        kind = "real" if dtype is np.float64 else "real or complex"
-        raise TypeError(
-            f"{name} has dtype {array.dtype}: give {kind} numbers of at most double precision"
-        )
-    return array
+    References
+    ----------
+    R. M. Corless et al., "On the Lambert W function", Advances in Computational Mathematics 5
+    (1996) 329-359.
 
-
-def _integers(name: str, values: ArrayLike) -> NDArray[np.int64]:
-    array = np.asarray(values)
-    if array.dtype.kind not in "iu":
-        example = next(iter(array.flat), None)
-        if array.dtype == object and array.size and all(type(i) is int for i in array.flat):
-            raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")
-        raise TypeError(
-            f"{name}={example!r} (dtype {array.dtype}) is not an integer: branches are "
-            "numbered by integers such as 0 and -1"
-        )
-    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
-        raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")
-    return _native(array, np.int64)
-
-
-def _largest(array: NDArray[Any]) -> int:
-    return max((int(i) for i in array.flat), key=abs)
-
-
-def _common_shape(**arrays: NDArray[Any]) -> tuple[int, ...]:
-    present = [array.shape for array in arrays.values()]
-    if present.count(present[0]) == len(present):
-        return present[0]
-    try:
-        return np.broadcast_shapes(*present)
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ValueError(f"shapes do not broadcast: {shapes}") from None
-
-
-def _refuse(values: NDArray[Any], bad: NDArray[np.bool_], reason: str) -> None:
-    if bad.any():
-        raise ValueError(f"{reason}, got {values[bad].flat[0]}")
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.lambertwm1([-0.3, -0.2, 0.0]).round(6)
+    array([-1.781337, -2.542641,      -inf])
+    """
+    if out is None and threads is None and where is True and dtype is None and not options:
+        number = _deadtime.lambertwm1_number(x)
+        if number is not None:
+            return number
+    return apply(_deadtime.lambertwm1, (x,), options, out, where, dtype, threads)

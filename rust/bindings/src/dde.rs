@@ -13,9 +13,6 @@ use crate::runtime::{run, run_here};
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
-/// A run with more steps than this is worth a thread that listens for Ctrl-C.
-const SHORT: f64 = 2000.0;
-
 /// The linear loop x' = A x + B w + E r, u = K x + L w + M r, y = C x + D w, w(t) = sat(u(t - Td)).
 #[pyclass(frozen, module = "deadtime._deadtime", name = "LinearLoop")]
 pub(crate) struct PyLinearLoop {
@@ -96,17 +93,10 @@ impl PyLinearLoop {
             command_history: in_order(&command_history).into_owned(),
             sample_phase,
         };
-        let steps = self.steps(&output_times) + self.steps(&input_times);
         let plant = &self.inner;
-        let found = if steps < SHORT {
-            run_here(py, |task| {
-                plant.simulate(&start, &reference, &output_times, &input_times, task)
-            })
-        } else {
-            run(py, None, None, |task| {
-                plant.simulate(&start, &reference, &output_times, &input_times, task)
-            })
-        }?;
+        let found = run_here(py, |task| {
+            plant.simulate(&start, &reference, &output_times, &input_times, task)
+        })?;
         Ok((
             found.outputs.to_pyarray(py),
             found.inputs.to_pyarray(py),
@@ -124,26 +114,6 @@ impl PyLinearLoop {
     /// Poles s = ln(z)/Ts of a sampled loop, limit left out, rightmost first.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
         Ok(run_here(py, |_| sampled::poles(&self.inner))?.to_pyarray(py))
-    }
-}
-
-impl PyLinearLoop {
-    /// A rough number of samples or elements up to the last of `times`.
-    fn steps(&self, times: &[f64]) -> f64 {
-        let last = times.last().copied().unwrap_or(0.0);
-        let step = match self.inner.sample_time() {
-            Some(sample_time) => sample_time,
-            None => {
-                let rate: f64 = self.inner.equations().a.iter().map(|a| a.abs()).sum();
-                let span = 1.0 / rate;
-                if self.inner.delay() > 0.0 {
-                    span.min(self.inner.delay())
-                } else {
-                    span
-                }
-            }
-        };
-        last / step + times.len() as f64
     }
 }
 

@@ -3,10 +3,12 @@
 mod arrays;
 mod dde;
 mod errors;
+mod pointers;
 mod quasipoly;
 mod runtime;
 mod special;
 mod stability;
+mod ufunc;
 
 use pyo3::prelude::*;
 
@@ -20,7 +22,16 @@ mod _deadtime {
     #[pymodule_export]
     use super::runtime::{spin, thread_count};
     #[pymodule_export]
-    use super::special::{dde_roots, lambertw};
+    use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]
     use super::stability::PyFamily;
+    #[pymodule_export]
+    use super::ufunc::limit_threads;
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::special::add_ufuncs(module)?;
+        super::pointers::add_pointers(module)
+    }
 }

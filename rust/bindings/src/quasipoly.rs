@@ -121,33 +121,29 @@ impl QuasiPolynomial {
     }
 
     fn count(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<u64> {
-        run(py, None, None, |task| {
+        run_here(py, |task| {
             roots::count(&self.core, &Region { re, im }, task)
         })
     }
 
     fn is_stable(&self, py: Python<'_>, strong: bool) -> PyResult<bool> {
-        run(py, None, None, |task| {
-            roots::is_stable(&self.core, strong, task)
-        })
+        run_here(py, |task| roots::is_stable(&self.core, strong, task))
     }
 
     fn roots<'py>(&self, py: Python<'py>, re: (f64, f64), im: (f64, f64)) -> PyResult<Listed<'py>> {
-        let set = run(py, None, None, |task| {
+        let set = run_here(py, |task| {
             roots::roots(&self.core, &Region { re, im }, task)
         })?;
         Ok(listed(py, set))
     }
 
     fn rightmost<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Listed<'py>> {
-        let set = run(py, None, None, |task| roots::rightmost(&self.core, n, task))?;
+        let set = run_here(py, |task| roots::rightmost(&self.core, n, task))?;
         Ok(listed(py, set))
     }
 
     fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {
-        run(py, None, None, |task| {
-            roots::spectral_abscissa(&self.core, task)
-        })
+        run_here(py, |task| roots::spectral_abscissa(&self.core, task))
     }
 
     /// A root, and its derivatives by the coefficients of s^power e^(-s delay).

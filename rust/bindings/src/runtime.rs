@@ -9,7 +9,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
@@ -21,7 +21,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::errors::to_python;
 
 /// How often the waiting thread looks for signals and reports progress.
-const POLL: Duration = Duration::from_millis(20);
+pub(crate) const POLL: Duration = Duration::from_millis(20);
 
 /// Environment variables that limit the number of threads, the first one set wins.
 const THREAD_VARIABLES: [&str; 2] = ["DEADTIME_NUM_THREADS", "RAYON_NUM_THREADS"];
@@ -52,50 +52,107 @@ where
 {
     let pool = pool(threads)?;
     let task = Task::new();
-    let outcome = py.detach(|| {
-        pool.pool.in_place_scope(|scope| {
-            let (tell, hear) = channel();
-            let task = &task;
-            scope.spawn(move |_| {
-                let result = catch_unwind(AssertUnwindSafe(|| work(task)));
-                // The receiver outlives this job: the caller waits below until it has the result.
-                let _ = tell.send(result);
-            });
-            let mut refused = None;
-            loop {
-                match hear.recv_timeout(POLL) {
-                    Ok(result) => return (Some(result), refused),
-                    Err(RecvTimeoutError::Disconnected) => return (None, refused),
-                    Err(RecvTimeoutError::Timeout) if refused.is_none() => {
-                        if let Err(error) = Python::attach(|py| look_up(py, task, progress)) {
-                            task.stop();
-                            refused = Some(error);
-                        }
+    let (result, refused) = py.detach(|| wait(&pool, &task, progress, work));
+    settle(result, refused)
+}
+
+/// [`run`] for a caller that NumPy may have detached from the interpreter, or not.
+pub(crate) fn run_detached<T, F>(threads: usize, work: F) -> PyResult<T>
+where
+    T: Send,
+    F: FnOnce(&Task) -> Result<T, Error> + Send,
+{
+    let pool = pool(Some(threads))?;
+    let (result, refused) = wait(&pool, &Task::new(), None, work);
+    settle(result, refused)
+}
+
+type Finished<T> = std::thread::Result<Result<T, Error>>;
+
+/// Have `work` done in the pool, looking for signals and reporting progress until it is.
+///
+/// What comes back is the result, if there is one, and the exception for which it was stopped.
+fn wait<T, F>(
+    pool: &Pool,
+    task: &Task,
+    progress: Option<&Py<PyAny>>,
+    work: F,
+) -> (Option<Finished<T>>, Option<PyErr>)
+where
+    T: Send,
+    F: FnOnce(&Task) -> Result<T, Error> + Send,
+{
+    pool.pool.in_place_scope(|scope| {
+        let (tell, hear) = channel();
+        scope.spawn(move |_| {
+            let result = catch_unwind(AssertUnwindSafe(|| work(task)));
+            // The receiver outlives this job: the caller waits below until it has the result.
+            let _ = tell.send(result);
+        });
+        let mut refused = None;
+        loop {
+            match hear.recv_timeout(POLL) {
+                Ok(result) => return (Some(result), refused),
+                Err(RecvTimeoutError::Disconnected) => return (None, refused),
+                Err(RecvTimeoutError::Timeout) if refused.is_none() => {
+                    if let Err(error) = attached(|py| look_up(py, task, progress)) {
+                        task.stop();
+                        refused = Some(error);
                     }
-                    Err(RecvTimeoutError::Timeout) => {}
                 }
+                Err(RecvTimeoutError::Timeout) => {}
             }
-        })
-    });
-    match outcome {
+        }
+    })
+}
+
+fn settle<T>(result: Option<Finished<T>>, refused: Option<PyErr>) -> PyResult<T> {
+    match (result, refused) {
         (_, Some(error)) => Err(error),
-        (Some(Ok(result)), None) => result.map_err(|error| to_python(py, error)),
+        (Some(Ok(result)), None) => result.map_err(|error| attached(|py| to_python(py, error))),
         (Some(Err(panic)), None) => Err(internal(panic.as_ref())),
         (None, None) => Err(internal(&"the worker vanished")),
     }
 }
 
-/// Run short `work` (well below a millisecond) on the calling thread, interpreter released.
+/// Call `work` attached to the interpreter, whatever this thread's state is.
+///
+/// pyo3 keeps books of its own on who is attached, and NumPy detaches without an entry in them.
+#[allow(unsafe_code)]
+pub(crate) fn attached<T>(work: impl FnOnce(Python<'_>) -> T) -> T {
+    struct Release(pyo3::ffi::PyGILState_STATE);
+    impl Drop for Release {
+        fn drop(&mut self) {
+            // SAFETY: made by the call below, on the same thread, released once.
+            unsafe { pyo3::ffi::PyGILState_Release(self.0) };
+        }
+    }
+    // SAFETY: may be called attached or not; the interpreter runs, as its caller is Python.
+    let _release = Release(unsafe { pyo3::ffi::PyGILState_Ensure() });
+    Python::attach(work)
+}
+
+/// Run `work` that knows no threads on the calling one, interpreter released; Ctrl-C stops it at
+/// one of its next checks. A call costs a tenth of one through the pool.
 pub(crate) fn run_here<T, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
-    let task = Task::new();
-    match py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task)))) {
-        Ok(result) => result.map_err(|error| to_python(py, error)),
-        Err(panic) => Err(internal(panic.as_ref())),
-    }
+    let refused = Arc::new(Mutex::new(None));
+    let keep = Arc::clone(&refused);
+    let task = Task::asking(POLL, move || match attached(|py| py.check_signals()) {
+        Ok(()) => true,
+        Err(error) => {
+            if let Ok(mut place) = keep.lock() {
+                *place = Some(error);
+            }
+            false
+        }
+    });
+    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task))));
+    let refused = refused.lock().ok().and_then(|mut place| place.take());
+    settle(Some(result), refused)
 }
 
 fn look_up(py: Python<'_>, task: &Task, progress: Option<&Py<PyAny>>) -> PyResult<()> {
@@ -106,7 +163,7 @@ fn look_up(py: Python<'_>, task: &Task, progress: Option<&Py<PyAny>>) -> PyResul
     Ok(())
 }
 
-fn internal(panic: &(dyn Any + Send)) -> PyErr {
+pub(crate) fn internal(panic: &(dyn Any + Send)) -> PyErr {
     let reason = panic
         .downcast_ref::<&str>()
         .map(|text| (*text).to_owned())
@@ -150,7 +207,7 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
 }
 
 /// Number of threads: argument, then environment, then the machine.
-fn wanted(threads: Option<usize>) -> PyResult<usize> {
+pub(crate) fn wanted(threads: Option<usize>) -> PyResult<usize> {
     if let Some(threads) = threads {
         return sensible("threads", threads);
     }

@@ -2,11 +2,13 @@
 //! differential equations.
 //!
 //! Everything numerical of the `deadtime` Python package is here, and nothing of Python.
-//! Dependencies run one way: error ← lambertw, quasipoly ← roots ← stability; quasipoly ← dde.
+//! Dependencies run one way: error, lanes ← lambertw; error ← quasipoly ← roots ← stability;
+//! quasipoly ← dde.
 
 pub mod dde;
 pub mod error;
 pub mod lambertw;
+mod lanes;
 pub mod quasipoly;
 pub mod roots;
 pub mod stability;
@@ -14,4 +16,5 @@ pub mod status;
 pub mod task;
 
 pub use error::Error;
+pub use lanes::instructions;
 pub use task::Task;

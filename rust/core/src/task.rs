@@ -4,15 +4,55 @@
 //! A kernel calls [`Task::check`] at least every few milliseconds of work and
 //! [`Task::advance`] as it finishes items; both are a relaxed atomic access.
 
+use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use crate::Error;
+
+/// Checks between two looks at the clock: reading it costs more than a check.
+const CHECKS: u64 = 32;
 
 /// Stop flag and progress counter of one running computation.
 #[derive(Debug, Default)]
 pub struct Task {
     stop: AtomicBool,
     done: AtomicU64,
+    lookout: Option<Lookout>,
+}
+
+/// Somebody to ask now and then, on the computing thread, whether to go on.
+struct Lookout {
+    start: Instant,
+    every: Duration,
+    checks: AtomicU64,
+    asked: AtomicU64,
+    go_on: Box<dyn Fn() -> bool + Send + Sync>,
+}
+
+impl fmt::Debug for Lookout {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Lookout")
+            .field("every", &self.every)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Lookout {
+    /// Ask, if it is time to.
+    fn go_on(&self) -> bool {
+        if !self
+            .checks
+            .fetch_add(1, Ordering::Relaxed)
+            .is_multiple_of(CHECKS)
+        {
+            return true;
+        }
+        let period = self.start.elapsed().as_nanos() / self.every.as_nanos().max(1);
+        let period = u64::try_from(period).unwrap_or(u64::MAX);
+        self.asked.swap(period, Ordering::Relaxed) == period || (self.go_on)()
+    }
 }
 
 impl Task {
@@ -21,6 +61,21 @@ impl Task {
         Self {
             stop: AtomicBool::new(false),
             done: AtomicU64::new(0),
+            lookout: None,
+        }
+    }
+
+    /// A task that asks `go_on` by itself, about so often, when it is checked; `false` stops it.
+    pub fn asking(every: Duration, go_on: impl Fn() -> bool + Send + Sync + 'static) -> Self {
+        Self {
+            lookout: Some(Lookout {
+                start: Instant::now(),
+                every,
+                checks: AtomicU64::new(0),
+                asked: AtomicU64::new(0),
+                go_on: Box::new(go_on),
+            }),
+            ..Self::new()
         }
     }
 
@@ -31,6 +86,13 @@ impl Task {
 
     /// `Err(Error::Interrupted)` once somebody has asked to stop.
     pub fn check(&self) -> Result<(), Error> {
+        if self
+            .lookout
+            .as_ref()
+            .is_some_and(|lookout| !lookout.go_on())
+        {
+            self.stop();
+        }
         if self.stop.load(Ordering::Relaxed) {
             Err(Error::Interrupted)
         } else {
@@ -59,6 +121,18 @@ mod tests {
         assert_eq!(task.check(), Ok(()));
         task.stop();
         assert_eq!(task.check(), Err(Error::Interrupted));
+    }
+
+    #[test]
+    fn a_task_that_asks_hears_the_answer() {
+        let task = Task::asking(Duration::from_millis(1), || false);
+        let start = Instant::now();
+        while task.check().is_ok() {
+            assert!(start.elapsed() < Duration::from_secs(60));
+        }
+        assert_eq!(task.check(), Err(Error::Interrupted));
+        let willing = Task::asking(Duration::from_nanos(1), || true);
+        assert!((0..1000).all(|_| willing.check().is_ok()));
     }
 
     #[test]

@@ -6,15 +6,14 @@
 //! from h = e (z + 1/e) with 1/e in two words: -1/e itself is not a double.
 //! Guaranteed: relative error of 1 + w of a few 2^-53 for |p| < 0.02, and 1e-8 for |p| < 0.52.
 
-use num_complex::Complex64;
+use crate::lanes::{Complex, Simd};
 
 /// 1/e = INVERSE_E + INVERSE_E_LOW to 106 bits.
 pub(super) const INVERSE_E: f64 = 0.367_879_441_171_442_33;
-const INVERSE_E_LOW: f64 = -1.242_875_367_278_836_3e-17;
+pub(super) const INVERSE_E_LOW: f64 = -1.242_875_367_278_836_3e-17;
 
-/// Coefficients of p, p^2, …, p^13.
-const SERIES: [f64; 13] = [
-    1.0,
+/// Coefficients of p^2, p^3, …, p^13; that of p is 1.
+pub(super) const SERIES: [f64; 12] = [
     -1.0 / 3.0,
     11.0 / 72.0,
     -43.0 / 540.0,
@@ -29,31 +28,42 @@ const SERIES: [f64; 13] = [
     0.001_026_263_320_507_607_6,
 ];
 
+/// Modulus below which a square is no longer a normal number.
+const DEEP: f64 = 1e-130;
+
 /// `z + 1/e`, to full relative accuracy however close the two are.
 #[inline(always)]
-pub(super) fn offset(z: Complex64) -> Complex64 {
-    Complex64::new((z.re + INVERSE_E) + INVERSE_E_LOW, z.im)
+pub(super) fn offset<S: Simd>(z: Complex<S>) -> Complex<S> {
+    Complex::new((z.re + INVERSE_E) + INVERSE_E_LOW, z.im)
 }
 
-/// Square root in the right half plane; for numbers whose squares stay in range.
+/// `sqrt(2 (1 + e z))` in the right half plane, from `offset` = z + 1/e.
 #[inline(always)]
-pub(super) fn square_root(z: Complex64) -> Complex64 {
-    let modulus = (z.re * z.re + z.im * z.im).sqrt();
-    if z.re >= 0.0 {
-        let re = ((modulus + z.re) * 0.5).sqrt();
-        Complex64::new(re, if re == 0.0 { z.im } else { z.im / (2.0 * re) })
-    } else {
-        let im = ((modulus - z.re) * 0.5).sqrt();
-        Complex64::new(z.im.abs() / (2.0 * im), im.copysign(z.im))
-    }
+pub(super) fn branch_root<S: Simd>(offset: Complex<S>) -> Complex<S> {
+    offset.scaled(2.0 * std::f64::consts::E).sqrt()
+}
+
+/// The same for an offset of any size.
+#[inline(always)]
+pub(super) fn deep_branch_root<S: Simd>(offset: Complex<S>) -> Complex<S> {
+    let deep = offset.re.abs().larger(offset.im.abs()).lt(DEEP);
+    let one = offset.re.constant(1.0);
+    let lift = deep.select(2.0_f64.powi(600), one);
+    branch_root(offset.scaled(lift)).scaled(deep.select(2.0_f64.powi(-300), one))
 }
 
 /// `1 + w` from `p`.
 #[inline(always)]
-pub(super) fn one_plus_w(p: Complex64) -> Complex64 {
-    SERIES
-        .iter()
-        .rev()
-        .fold(Complex64::ZERO, |sum, &coefficient| sum * p + coefficient)
-        * p
+pub(super) fn one_plus_w<S: Simd>(p: Complex<S>) -> Complex<S> {
+    let zero = p.re.constant(0.0);
+    let mut tail = Complex::new(zero, zero);
+    for &coefficient in SERIES.iter().rev() {
+        tail = tail.mul_add(p, coefficient);
+    }
+    // The first term is p itself, and by far the largest: it is added last.
+    let tail = tail * p;
+    Complex::new(
+        tail.re.mul_add(p.re, tail.im.negated_mul_add(p.im, p.re)),
+        tail.re.mul_add(p.im, tail.im.mul_add(p.re, p.im)),
+    )
 }

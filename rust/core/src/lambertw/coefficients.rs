@@ -5,23 +5,25 @@
 //! weights of Sanathanan & Koerner (1963) and Lawson (1961) on the boundary of the region, where
 //! an analytic error is largest. Ascending powers of y; the denominator starts with 1.
 
-/// Numerator of W_0(z)/z on |z| <= 23, Re y >= 0: relative error 1.2e-5.
-pub(super) const PRINCIPAL_NUMERATOR: [f64; 6] = [
-    2.718_313_557_824_961,
-    1.747_764_721_921_232_2,
-    0.299_164_057_573_535_15,
-    0.013_742_269_814_467_642,
-    5.908_877_640_445_326e-5,
-    -3.556_926_445_778_412e-7,
+/// Numerator of W_0(z)/z on |z| <= 1449, Re y >= 0: relative error 1.2e-4.
+pub(super) const PRINCIPAL_NUMERATOR: [f64; 7] = [
+    2.718_598_776_526_885_5,
+    1.296_518_846_237_051_4,
+    0.156_124_140_591_705_98,
+    0.005_472_265_598_009_772,
+    4.823_218_575_605_810_6e-5,
+    3.017_952_621_588_143e-8,
+    -3.726_280_744_630_558e-11,
 ];
 /// Denominator that belongs to [`PRINCIPAL_NUMERATOR`].
-pub(super) const PRINCIPAL_DENOMINATOR: [f64; 6] = [
+pub(super) const PRINCIPAL_DENOMINATOR: [f64; 7] = [
     1.0,
-    1.643_023_933_580_899_4,
-    0.919_607_790_238_078_8,
-    0.208_483_546_808_462_96,
-    0.018_104_601_638_990_55,
-    4.519_059_069_673_065_5e-4,
+    1.477_440_803_620_741_6,
+    0.700_568_392_295_711_8,
+    0.125_521_134_867_066_34,
+    0.008_355_993_808_071_855,
+    0.000_187_225_563_372_916_53,
+    1.068_985_342_690_769_6e-6,
 ];
 
 /// Numerator of W_{-1} and W_1 on the sheet behind the branch point, at -y, |y| <= 1.2:
@@ -40,4 +42,21 @@ pub(super) const BEHIND_DENOMINATOR: [f64; 5] = [
     0.928_341_957_270_121_5,
     0.194_536_471_190_430_77,
     0.010_735_523_836_686_491,
+];
+
+/// Numerator of the real W_-1 on [-1/e, -1/256], in sqrt(2 (e x + 1)): relative error 6.3e-05.
+pub(super) const LOWER_NUMERATOR: [f64; 5] = [
+    -1.000_062_895_041_829_3,
+    1.168_960_408_217_634_8,
+    0.141_935_157_683_218_82,
+    -0.552_170_205_880_106_7,
+    0.156_162_637_405_647_95,
+];
+/// Denominator that belongs to [`LOWER_NUMERATOR`].
+pub(super) const LOWER_DENOMINATOR: [f64; 5] = [
+    1.0,
+    -2.167_138_222_301_640_7,
+    1.682_195_008_700_218_2,
+    -0.540_671_808_274_954_1,
+    0.057_418_151_776_336_16,
 ];

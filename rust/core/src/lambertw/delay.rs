@@ -12,10 +12,12 @@
 
 use num_complex::Complex64;
 
-use super::branch_point::one_plus_w;
-use super::elementary::{cos_sin, exp, power_of_two};
+use crate::lanes::{Complex, Mask, Real, Simd};
+
+use super::branch_point::{INVERSE_E, one_plus_w};
+use super::elementary::{Reduced, cos_sin, exp, rough_log};
 use super::guess::{
-    BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, from_logarithm, logarithm, principal, quotient,
+    BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithm, logarithmic_step, principal,
 };
 use super::huge_branch::{HUGE_BRANCH, fixed_point};
 use super::refine::{Scaled, correction};
@@ -26,7 +28,9 @@ use super::two_word::{TwoWord, product};
 const LARGEST: f64 = 1e300;
 /// log |z| below which W_0 is its own Taylor polynomial.
 const SMALL: f64 = -20.0;
-/// |w| above which w + 1 = w and the powers of w in the usual step might overflow.
+/// log |z| from which on two roots can no longer be near each other.
+const APART: f64 = 3.0;
+/// |log z| above which w is real but for rounding, and its powers might overflow.
 const LARGE: f64 = 1e40;
 /// |1 + e z| below which two roots (nearly) meet and the series is the answer.
 const MEETING: f64 = 1.0 / 8_192.0;
@@ -34,27 +38,30 @@ const MEETING: f64 = 1.0 / 8_192.0;
 const NEARLY_MEETING: f64 = 0.125;
 /// |sigma| below which the difference of 1 and e^-sigma is summed as such.
 const NEAR_ZERO: f64 = 1.0 / 256.0;
+/// -1/7!, 1/6!, …, 1/2!: what follows 1/8! in (e^-s - 1 + s)/s^2, highest power first.
+const EXP_TAIL: [f64; 6] = [
+    -1.0 / 5_040.0,
+    1.0 / 720.0,
+    -1.0 / 120.0,
+    1.0 / 24.0,
+    -1.0 / 6.0,
+    0.5,
+];
 
-/// Root `k` of `s = a0 + a1 e^(-s delay)`, in 1/s when `delay` is in s.
-///
-/// Root 0 has the largest real part; roots `k` and `-k` are conjugate unless `a1 < 0`, where
-/// `0` and `-1` are the rightmost pair (conjugate, or both real). `delay = 0` leaves one root,
-/// `a0 + a1`, and so does `a1 = 0`; the others have real part `-inf` then.
-/// NaN for arguments that are not finite, a negative delay, or products beyond 1e300.
-///
-/// ```
-/// use deadtime::lambertw::dde_root;
-///
-/// // x'(t) = -x(t - pi/2) is marginally stable: s = i.
-/// let s = dde_root(0.0, -1.0, std::f64::consts::FRAC_PI_2, 0);
-/// assert!(s.re.abs() < 1e-16 && (s.im - 1.0).abs() < 1e-15);
-///
-/// // e^(-a0 T) would overflow; the root does not care.
-/// let s = dde_root(-1000.0, 500.0, 1.0, 0);
-/// assert!((s - (-1000.0 + 500.0 * (-s).exp()) + 0.0).norm() < 1e-9);
-/// assert_eq!(dde_root(-1.0, 0.5, 0.0, 0).re, -0.5);
-/// ```
-pub fn dde_root(a0: f64, a1: f64, delay: f64, k: i64) -> Complex64 {
+/// Where the kernel does not reach: arguments that are not sound, no delayed term, branches far
+/// out.
+#[inline(always)]
+pub(super) fn out_of_reach<S: Simd>([a0, a1, delay, k]: [Real<S>; 4]) -> Mask<S> {
+    let sound = a0.abs().lt(f64::INFINITY)
+        & a1.abs().lt(f64::INFINITY)
+        & delay.lt(f64::INFINITY)
+        & delay.gt(0.0);
+    let moderate = (a0 * delay).abs().le(LARGEST) & (a1 * delay).abs().le(LARGEST);
+    !(sound & moderate) | a1.eq(0.0) | k.abs().ge(HUGE_BRANCH as f64)
+}
+
+/// The root where the kernel in lanes does not reach.
+pub(super) fn far_root(a0: f64, a1: f64, delay: f64, k: i64) -> Complex64 {
     let (alpha, beta) = (a0 * delay, a1 * delay);
     let sound = a0.is_finite() && a1.is_finite() && delay.is_finite() && delay >= 0.0;
     if !sound || alpha.abs() > LARGEST || beta.abs() > LARGEST {
@@ -63,14 +70,12 @@ pub fn dde_root(a0: f64, a1: f64, delay: f64, k: i64) -> Complex64 {
     if a1 == 0.0 || delay == 0.0 {
         return without_delay(a0, a1, k);
     }
-    let problem = Problem {
-        alpha: exact_product(a0, delay, alpha),
-        beta: exact_product(a1, delay, beta),
-        mirrored: k < 0,
-        k: k.unsigned_abs(),
-    };
-    let sigma = problem.solve();
-    // The half plane Im W >= 0 belongs to k >= 0.
+    let angle = libm::atan2(0.0, beta);
+    let log = Complex64::new(
+        libm::log(a1.abs()) + libm::log(delay),
+        if k < 0 { -angle } else { angle },
+    );
+    let sigma = fixed_point(log, alpha, k.unsigned_abs());
     let im = sigma.im.abs() / delay;
     Complex64::new(sigma.re / delay, if k < 0 { -im } else { im })
 }
@@ -88,223 +93,231 @@ fn without_delay(a0: f64, a1: f64, k: i64) -> Complex64 {
     Complex64::new(f64::NEG_INFINITY, im)
 }
 
-fn exact_product(a: f64, b: f64, rounded: f64) -> TwoWord {
-    let limit = 2.0_f64.powi(990);
-    if a.abs() < limit && b.abs() < limit && rounded.abs() < limit {
-        product(a, b)
-    } else {
-        TwoWord::new(rounded, 0.0)
-    }
+/// (sigma - alpha) e^sigma = beta on branch k >= 0, below the cut where mirrored.
+struct Problem<S: Simd> {
+    alpha: TwoWord<S>,
+    /// beta = factor 2^exponent.
+    factor: TwoWord<S>,
+    exponent: Real<S>,
 }
 
-/// (sigma - alpha) e^sigma = beta on branch k >= 0, below the cut if mirrored.
-struct Problem {
-    alpha: TwoWord,
-    beta: TwoWord,
-    mirrored: bool,
-    k: u64,
+/// The root within reach.
+#[inline(always)]
+pub(super) fn root<S: Simd>([a0, a1, delay, k]: [Real<S>; 4]) -> Complex<S> {
+    let zero = k.constant(0.0);
+    let scaled = Scaled::new(Complex::new(a1, zero));
+    let lag = Scaled::new(Complex::new(delay, zero));
+    let problem = Problem {
+        alpha: product(a0, delay),
+        factor: product(scaled.value.re, lag.value.re),
+        exponent: scaled.exponent + lag.exponent,
+    };
+    let sigma = problem.solve(k.abs(), k.lt(0.0));
+    // The half plane Im W >= 0 belongs to k >= 0.
+    Complex::new(
+        sigma.re / delay,
+        (sigma.im / delay).signed(k.lt(0.0).select(-0.0, zero)),
+    )
 }
 
-impl Problem {
-    fn solve(&self) -> Complex64 {
-        let (alpha, beta) = (self.alpha.hi, self.beta.hi);
-        let angle = libm::atan2(0.0, beta);
-        let log_beta = Complex64::new(
-            libm::log(beta.abs()),
-            if self.mirrored { -angle } else { angle },
-        );
-        let log_modulus = log_beta.re - alpha;
-        let joined = self.k == 0 || (self.k == 1 && self.mirrored && beta < 0.0);
+impl<S: Simd> Problem<S> {
+    #[inline(always)]
+    fn solve(&self, k: Real<S>, mirrored: Mask<S>) -> Complex<S> {
+        let zero = k.constant(0.0);
+        let alpha = self.alpha.hi;
+        let negative = self.factor.hi.lt(0.0);
+        let angle = negative.select(std::f64::consts::PI, zero);
+        let turned = k.mul_add(std::f64::consts::TAU, mirrored.select(-angle, angle));
+        let log_beta = self
+            .exponent
+            .mul_add(std::f64::consts::LN_2, rough_log(self.factor.hi.abs()));
+        let log_modulus = log_beta - alpha;
 
-        if self.k >= HUGE_BRANCH {
-            return fixed_point(log_beta, alpha, self.k);
+        let principal_branch = k.eq(0.0);
+        let joined = principal_branch | (k.eq(1.0) & mirrored & negative);
+        let small = principal_branch & log_modulus.lt(SMALL);
+        // Where the sheets that meet at -1/e can be near.
+        let close = joined & log_modulus.gt(SMALL) & log_modulus.lt(APART);
+        let large = log_modulus.abs().gt(LARGE);
+
+        let mut start = Complex::new(zero, zero);
+        let mut met = start;
+        let mut real = joined & (!negative | log_modulus.lt(0.0));
+        let mut meeting = k.lt(0.0);
+        let mut started = small;
+        if small.any() {
+            let z = self.small_argument(small);
+            let w = z * (((z * -1.5 + 1.0) * -z) + 1.0);
+            start = Complex::new(alpha + w, zero);
         }
-        if self.k == 0 && log_modulus < SMALL {
-            let z = self.argument();
-            let sigma = Complex64::new(alpha + z * (1.0 - z * (1.0 - 1.5 * z)), 0.0);
-            return self.near_zero(sigma);
+        if close.any() {
+            let h = self.one_plus_ez(close);
+            real = (close & h.ge(0.0)) | (real & !close);
+            meeting = close & h.abs().lt(MEETING);
+            let one = zero.constant(1.0);
+            let magnitude = (h.abs() * 2.0).sqrt();
+            let complex = h.lt(0.0);
+            let root = Complex::new(
+                complex.select(0.0, magnitude),
+                complex.select(magnitude, zero),
+            );
+            // Below the axis the root of 1 + e z is conjugate and the sheet behind takes minus.
+            let back = !(principal_branch | complex);
+            let near = one_plus_w(back.choose(-root, root));
+            met = Complex::new((alpha - 1.0) + (near.re + self.alpha.lo), near.im);
+            let z = (h - 1.0) * INVERSE_E;
+            let within = close & h.abs().lt(NEARLY_MEETING);
+            let front = principal_branch & z.abs().lt(PRINCIPAL_RADIUS);
+            let behind_it = !principal_branch & h.abs().lt(BEHIND_RADIUS * std::f64::consts::E);
+            let by_root = close & (within | front | behind_it);
+            let root = by_root.choose(root, Complex::new(one, zero));
+            let flat = Complex::new(by_root.select(z, one), zero);
+            let below = Complex::new(root.re, -root.im);
+            let rational = principal_branch.choose(principal(flat, root), behind(below));
+            let w = within.choose(near.shifted(-1.0), rational);
+            start = by_root.choose(w.shifted(alpha), start);
+            started = started | by_root;
         }
-        // z and 1 + e z where the sheets that meet at -1/e can be near.
-        let close = joined && log_modulus > SMALL && log_modulus < 3.0;
-        let h = if close { self.one_plus_ez() } else { 0.0 };
-        let real = if close {
-            h >= 0.0
-        } else {
-            joined && (beta > 0.0 || log_modulus < 0.0)
-        };
-        if close && h.abs() < MEETING {
-            let u = self.series(h);
-            return Complex64::new((alpha - 1.0) + (u.re + self.alpha.lo), u.im.abs());
-        }
-        let start = if close && h.abs() < NEARLY_MEETING {
-            alpha + (self.series(h) - 1.0)
-        } else if close && self.k == 0 && self.argument().abs() < PRINCIPAL_RADIUS {
-            let offset = Complex64::new(h / std::f64::consts::E, 0.0);
-            alpha + principal(Complex64::new(self.argument(), 0.0), offset)
-        } else if close && self.k == 1 && h.abs() < BEHIND_RADIUS * std::f64::consts::E {
-            alpha + behind(Complex64::new(h / std::f64::consts::E, -0.0))
-        } else {
-            let turned = log_beta.im + std::f64::consts::TAU * self.k as f64;
-            let log = Complex64::new(log_modulus, turned);
-            if log_modulus.abs() > LARGE {
-                fixed_point(log_beta, alpha, self.k)
-            } else {
-                let taken = logarithm(from_logarithm(log, if self.k == 1 { 2 } else { 1 }));
-                Complex64::new(log_beta.re - taken.re, turned - taken.im)
+        if (!started).any() {
+            let log = Complex::new(large.select(1.0, log_modulus), turned);
+            let mut w = logarithmic_step(log, log);
+            let first = k.eq(1.0);
+            if first.any() {
+                w = first.choose(logarithmic_step(w, log), w);
             }
-        };
-        let sigma = (0..2).fold(folded(start, real), |sigma, _| {
-            folded(sigma + self.step(sigma), real)
-        });
-        self.near_zero(sigma)
-    }
-
-    /// z = beta e^-alpha, zero where it underflows.
-    fn argument(&self) -> f64 {
-        if self.alpha.hi > 4_000.0 {
-            return 0.0;
+            let mut taken = logarithm(w);
+            if large.any() {
+                let along = log_modulus.is_negative().select(std::f64::consts::PI, zero);
+                let huge = Complex::new(rough_log(log_modulus.abs().larger(1.0)), along);
+                taken = large.choose(huge, taken);
+            }
+            let sigma = Complex::new(log_beta - taken.re, turned - taken.im);
+            start = started.choose(start, sigma);
         }
-        let (factor, exponent) = exp(-self.alpha.hi, -self.alpha.lo);
-        let scaled = Scaled::new(Complex64::new(self.beta.hi, 0.0));
-        scaled.re * factor.hi * power_of_two(exponent + scaled.exponent)
+
+        let kept = small | meeting;
+        let mut sigma = folded(start, real);
+        for _ in 0..2 {
+            let stepped = folded(sigma + self.step(sigma), real);
+            sigma = kept.choose(sigma, stepped);
+        }
+        let near = sigma.re.abs().lt(NEAR_ZERO) & sigma.im.abs().lt(NEAR_ZERO);
+        if near.any() {
+            sigma = near.choose(self.near_zero(sigma), sigma);
+        }
+        meeting.choose(met, sigma).folded()
     }
 
-    /// 1 + e z to 2^-64.
-    fn one_plus_ez(&self) -> f64 {
-        let exponent = TwoWord::new(1.0, 0.0).plus(self.alpha.negated());
-        let (factor, power) = exp(exponent.hi, exponent.lo);
-        let (beta, exponent) = self.scaled_beta();
-        let ez = factor.times(beta).scaled(power_of_two(power + exponent));
-        let h = TwoWord::new(1.0, 0.0).plus(ez);
-        h.hi + h.lo
+    /// z = beta e^-alpha where `wanted`, zero where it underflows.
+    #[inline(always)]
+    fn small_argument(&self, wanted: Mask<S>) -> Real<S> {
+        let zero = self.alpha.hi.constant(0.0);
+        let reached = wanted & self.alpha.hi.lt(1_500.0);
+        let alpha = reached.select(self.alpha.hi, zero);
+        let (factor, exponent) = exp(-alpha, reached.select(-self.alpha.lo, zero));
+        let exponent = exponent + self.exponent;
+        // Beyond the normal numbers nothing is left beside alpha.
+        let seen = reached & exponent.gt(-1_000.0);
+        let power = seen.select(exponent, zero).power_of_two();
+        seen.select(self.factor.hi * factor.hi * power, zero)
     }
 
-    fn scaled_beta(&self) -> (TwoWord, i32) {
-        let exponent = Scaled::new(Complex64::new(self.beta.hi, 0.0)).exponent;
-        // In two halves: the exponent of a tiny beta is out of the range of one factor.
-        let half = exponent / 2;
-        let beta = self
-            .beta
-            .scaled(power_of_two(-half))
-            .scaled(power_of_two(half - exponent));
-        (beta, exponent)
+    /// 1 + e z to 2^-61 where `wanted`.
+    #[inline(always)]
+    fn one_plus_ez(&self, wanted: Mask<S>) -> Real<S> {
+        let zero = self.alpha.hi.constant(0.0);
+        let one = zero.constant(1.0);
+        let alpha = TwoWord::new(
+            wanted.select(self.alpha.hi, zero),
+            wanted.select(self.alpha.lo, zero),
+        );
+        let argument = TwoWord::from_word(one).plus(alpha.negated()).normalised();
+        let (factor, power) = exp(argument.hi, argument.lo);
+        let power = wanted.select(power + self.exponent, zero).power_of_two();
+        let ez = factor.times(self.factor).scaled(power);
+        TwoWord::from_word(one).plus(ez).rounded()
     }
 
-    /// 1 + w from 1 + e z.
-    fn series(&self, h: f64) -> Complex64 {
-        let modulus = (2.0 * h.abs()).sqrt();
-        let p = if h < 0.0 {
-            Complex64::new(0.0, modulus)
-        } else {
-            Complex64::new(modulus, 0.0)
-        };
-        // Below the axis the root of 1 + e z is conjugate and the sheet behind takes minus.
-        one_plus_w(match (self.k, h < 0.0) {
-            (0, _) | (_, true) => p,
-            _ => -p,
-        })
-    }
-
-    fn step(&self, sigma: Complex64) -> Complex64 {
-        let (modulus, power) = exp(-sigma.re, 0.0);
-        let (cosine, sine) = cos_sin(sigma.im);
-        let (beta, exponent) = self.scaled_beta();
-        let modulus = modulus.times(beta);
-        let power = power_of_two(power + exponent);
-        let w_re = TwoWord::new(sigma.re, 0.0).plus(self.alpha.negated());
-        let t_re = modulus.times(cosine).scaled(power);
-        let t_im = modulus.times(sine).negated().scaled(power);
-        let d_re = t_re.plus(w_re.negated());
-        let d = Complex64::new(d_re.hi, (t_im.hi - sigma.im) + t_im.lo);
-        let w = Complex64::new(w_re.hi, sigma.im);
-        if w_re.hi.abs() > LARGE {
-            let unit = power_of_two(-Scaled::new(w).exponent);
-            quotient(d * unit, w * unit)
+    #[inline(always)]
+    fn step(&self, sigma: Complex<S>) -> Complex<S> {
+        let (modulus, power) = exp(-sigma.re, sigma.re.constant(0.0));
+        let Reduced {
+            cosine,
+            sine,
+            quarters,
+        } = cos_sin(sigma.im, sigma.im.constant(0.0));
+        // The quarter turns exchange cosine and sine; their signs follow.
+        let odd = quarters.abs().eq(1.0);
+        let half = quarters.abs().eq(2.0);
+        let zero = quarters.constant(0.0);
+        let flip_re = (half | quarters.eq(1.0)).select(-0.0, zero);
+        let flip_im = (half | quarters.eq(-1.0)).select(0.0, zero.constant(-0.0));
+        let power = (power + self.exponent).power_of_two();
+        let modulus = modulus.times(self.factor).scaled(power);
+        let w_re = TwoWord::from_word(sigma.re)
+            .plus(self.alpha.negated())
+            .normalised();
+        let t_re = modulus.times(chosen(odd, sine, cosine)).flipped(flip_re);
+        let t_im = modulus.times(chosen(odd, cosine, sine)).flipped(flip_im);
+        let d = Complex::new(
+            t_re.plus(w_re.negated()).rounded(),
+            (t_im.hi - sigma.im) + t_im.lo,
+        );
+        let w = Complex::new(w_re.hi, sigma.im);
+        let large = w.re.abs().gt(LARGE);
+        if large.any() {
+            let one = w.re.constant(1.0);
+            let moderate = Complex::new(large.select(one, w.re), w.im);
+            let kept = Complex::new(large.select(0.0, d.re), large.select(0.0, d.im));
+            let along = Complex::new(d.re / w.re, d.im / w.re);
+            large.choose(along, correction(moderate, kept))
         } else {
             correction(w, d)
         }
     }
 
     /// Newton's method on sigma - (alpha + beta) - beta (e^-sigma - 1) where its terms are small.
-    fn near_zero(&self, sigma: Complex64) -> Complex64 {
-        let sum = self.alpha.plus(self.beta).hi;
-        let one_plus_beta = TwoWord::new(1.0, 0.0).plus(self.beta).hi;
-        let beta = self.beta.hi;
-        (0..3).fold(sigma, |s, _| {
+    #[inline(always)]
+    fn near_zero(&self, sigma: Complex<S>) -> Complex<S> {
+        // beta is of the size of alpha there, or so small that it does not matter.
+        let zero = sigma.re.constant(0.0);
+        let power = self
+            .exponent
+            .larger(-1_000.0)
+            .smaller(1_000.0)
+            .power_of_two();
+        let beta = self.factor.scaled(power);
+        let sum = self.alpha.plus(beta).rounded();
+        let one = zero.constant(1.0);
+        let one_plus_beta = TwoWord::from_word(one).plus(beta).rounded();
+        // A common factor keeps the squares of the division in range.
+        let unit = one / (beta.hi.abs() + 1.0);
+        let mut s = sigma;
+        for _ in 0..3 {
             // e^-s - 1 + s = s^2 times this.
-            let series = s
-                * (s * (s
-                    * (s * (s * (s / 40_320.0 - 1.0 / 5_040.0) + 1.0 / 720.0) - 1.0 / 120.0)
-                    + 1.0 / 24.0)
-                    - 1.0 / 6.0)
-                + 0.5;
+            let mut series = Complex::new(zero.constant(1.0 / 40_320.0), zero);
+            for coefficient in EXP_TAIL {
+                series = (series * s).shifted(coefficient);
+            }
             let tail = s * s * series;
-            let value = s * one_plus_beta - sum - tail * beta;
-            let slope = (tail - s) * beta + one_plus_beta;
-            if s.norm() < NEAR_ZERO && slope.norm() > 0.0 {
-                s - value / slope
-            } else {
-                s
-            }
-        })
+            let value = s.scaled(one_plus_beta).shifted(-sum) - tail.scaled(beta.hi);
+            let slope = (tail - s).scaled(beta.hi).shifted(one_plus_beta);
+            let flat = slope.re.eq(0.0) & slope.im.eq(0.0);
+            let divisor = flat.choose(Complex::new(one, zero), slope.scaled(unit));
+            s = flat.choose(s, s - value.scaled(unit).over(divisor));
+        }
+        s
     }
 }
 
-fn folded(sigma: Complex64, real: bool) -> Complex64 {
-    Complex64::new(sigma.re, if real { 0.0 } else { sigma.im.abs() })
+/// In the upper half plane; on the real axis where `real`.
+#[inline(always)]
+fn folded<S: Simd>(sigma: Complex<S>, real: Mask<S>) -> Complex<S> {
+    Complex::new(sigma.re, real.select(0.0, sigma.im.abs()))
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn relative_residual(a0: f64, a1: f64, delay: f64, s: Complex64) -> f64 {
-        let feedback = a1 * (-s * delay).exp();
-        // The rounding of e^(-s T) is proportional to |s T|.
-        let scale = s.norm() + a0.abs() + feedback.norm() * (1.0 + (s * delay).norm());
-        (s - a0 - feedback).norm() / scale
-    }
-
-    proptest! {
-        #[test]
-        fn every_root_solves_the_characteristic_equation(
-            a0 in -50.0..50.0_f64, a1 in -50.0..50.0_f64, delay in 0.001..5.0_f64, k in -40_i64..40,
-        ) {
-            let s = dde_root(a0, a1, delay, k);
-            prop_assert!(relative_residual(a0, a1, delay, s) < 1e-14, "{s}");
-        }
-
-        #[test]
-        fn the_root_of_branch_zero_is_rightmost(
-            a0 in -5.0..5.0_f64, a1 in -5.0..5.0_f64, delay in 0.01..5.0_f64,
-        ) {
-            let rightmost = dde_root(a0, a1, delay, 0).re;
-            for k in -4..4 {
-                prop_assert!(dde_root(a0, a1, delay, k).re <= rightmost + 1e-12 * rightmost.abs());
-            }
-        }
-
-        #[test]
-        fn the_sum_of_the_coefficients_is_kept(a in 0.001..0.9_f64, gap in 1e-18..1e-9_f64) {
-            // Next to a0 + a1 = 0 the root is (a0 + a1)/(1 + a1 T) to first order.
-            let s = dde_root(-a, a + gap, 1.0, 0);
-            let sum = -a + (a + gap);
-            prop_assert!((s.re - sum / (1.0 + a)).abs() <= 1e-8 * sum.abs());
-        }
-    }
-
-    #[test]
-    fn a_double_root_is_met_exactly() {
-        assert_eq!(dde_root(1.0, -1.0, 1.0, 0), Complex64::new(0.0, 0.0));
-        assert_eq!(dde_root(1.0, -1.0, 1.0, -1).re, 0.0);
-    }
-
-    #[test]
-    fn without_a_delayed_term_one_root_is_left() {
-        assert_eq!(dde_root(-2.0, 0.0, 1.0, 0).re, -2.0);
-        assert_eq!(dde_root(-2.0, 0.0, 1.0, 3).re, f64::NEG_INFINITY);
-        assert!(dde_root(f64::NAN, 1.0, 1.0, 0).re.is_nan());
-        assert!(dde_root(1.0, 1.0, -1.0, 0).re.is_nan());
-    }
+/// Lane by lane: `yes` where true, `no` elsewhere.
+#[inline(always)]
+fn chosen<S: Simd>(mask: Mask<S>, yes: TwoWord<S>, no: TwoWord<S>) -> TwoWord<S> {
+    TwoWord::new(mask.select(yes.hi, no.hi), mask.select(yes.lo, no.lo))
 }

@@ -1,40 +1,48 @@
 //! Branches so far out that |w| exceeds millions: iterate on the logarithm.
 //!
 //! w <- log z + 2 pi i k - log w contracts by 1/|w| < 2e-7, and w is so large that its logarithm
-//! in one word is exact enough; 2 pi k needs two.
+//! in one word is exact enough; 2 pi k needs two. One element at a time: nobody asks for many.
 
 use num_complex::Complex64;
-
-use super::refine::Scaled;
-use super::two_word::{TwoWord, product, sum};
 
 /// The first branch treated here; below it the reduction of Im w by pi/2 is exact.
 pub(super) const HUGE_BRANCH: u64 = 1 << 20;
 
 /// 2 pi to 106 bits.
-const TURN: TwoWord = TwoWord::new(std::f64::consts::TAU, 2.449_293_598_294_706_4e-16);
+const TURN: [f64; 2] = [std::f64::consts::TAU, 2.449_293_598_294_706_4e-16];
+/// 2^64 lifts a subnormal number among the normal ones.
+const LIFT: f64 = 18_446_744_073_709_551_616.0;
 
-/// `2 pi k`.
-fn turns(k: u64) -> TwoWord {
+/// `2 pi k` in two words.
+pub(super) fn turns(k: u64) -> [f64; 2] {
     let high = k as f64;
     let low = (i128::from(k) - high as i128) as f64;
-    let turns = product(high, TURN.hi);
-    sum(turns.hi, turns.lo + (high * TURN.lo + low * TURN.hi))
+    let product = high * TURN[0];
+    let rest = high.mul_add(TURN[0], -product) + (high * TURN[1] + low * TURN[0]);
+    let turns = product + rest;
+    [turns, rest - (turns - product)]
 }
 
-/// W_k(z) for k >= [`HUGE_BRANCH`].
-pub(super) fn lambertw(z: Scaled, k: u64) -> Complex64 {
-    let log = Complex64::new(z.log_modulus(), libm::atan2(z.im, z.re));
-    fixed_point(log, 0.0, k)
+/// W_k(z) for k >= [`HUGE_BRANCH`] and finite z other than zero.
+pub(super) fn lambertw(z: Complex64, k: u64) -> Complex64 {
+    // Neither tiny nor huge components may meet in the hypotenuse.
+    let factor = if z.re.abs().max(z.im.abs()) < 1.0 {
+        LIFT
+    } else {
+        1.0 / LIFT
+    };
+    let modulus = libm::hypot(z.re * factor, z.im * factor);
+    let log = libm::log(modulus) - libm::log(factor);
+    fixed_point(Complex64::new(log, libm::atan2(z.im, z.re)), 0.0, k)
 }
 
 /// The solution of `(s - shift) e^s = z` on branch `k`, given the principal `log` of z.
 pub(super) fn fixed_point(log: Complex64, shift: f64, k: u64) -> Complex64 {
-    let turns = turns(k);
-    (0..4).fold(Complex64::new(log.re, turns.hi), |s, _| {
+    let [turns, rest] = turns(k);
+    (0..4).fold(Complex64::new(log.re, turns), |s, _| {
         let w = s - shift;
         let modulus = libm::log(libm::hypot(w.re, w.im));
         let angle = libm::atan2(w.im, w.re);
-        Complex64::new(log.re - modulus, turns.hi + ((log.im - angle) + turns.lo))
+        Complex64::new(log.re - modulus, turns + ((log.im - angle) + rest))
     })
 }

@@ -1,164 +1,205 @@
-//! One element: which starting value, which last step.
+//! The element: which starting value, which last step.
 
-use num_complex::Complex64;
+use crate::lanes::{Complex, Mask, Real, Simd};
 
-use super::branch_point::{INVERSE_E, offset, one_plus_w, square_root};
-use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, from_logarithm, principal};
-use super::huge_branch::{self, HUGE_BRANCH};
-use super::refine::{Scaled, correction, residual};
-use super::special_values;
+use super::branch_point::{
+    INVERSE_E, INVERSE_E_LOW, branch_root, deep_branch_root, offset,
+    one_plus_w as near_branch_point,
+};
+use super::elementary::{rough_angle, rough_log};
+use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithmic_step, principal};
+use super::huge_branch::HUGE_BRANCH;
+use super::refine::{Scaled, correction, product_with_exp};
+use super::two_word::{ordered_sum, sum};
 
 /// Distance from -1/e below which the series is the answer.
-const SERIES_ANSWERS: f64 = 1.0 / 16_384.0;
+pub(super) const SERIES_ANSWERS: f64 = 1.0 / 16_384.0;
+/// Distance from -1/e below which the series knows 1 + W better than a step does.
+const SERIES_TRUSTED: f64 = 1.0 / 2_048.0;
 /// Distance from -1/e below which the series is the starting value.
-const SERIES_STARTS: f64 = 0.046;
+pub(super) const SERIES_STARTS: f64 = 0.046;
 /// Angle between z and the real axis up to which dw/dz there is taken for the starting value.
 const NARROW: f64 = 1e-9;
 /// Modulus below which W_0(z) = z - z^2 to working precision.
-const SMALL: f64 = 1e-9;
+pub(super) const SMALL: f64 = 1e-9;
 
-pub(super) fn lambertw(z: Complex64, k: i64) -> Complex64 {
-    if !(z.re.is_finite() && z.im.is_finite()) || (z.re == 0.0 && z.im == 0.0) {
-        return special_values::lambertw(z, k);
+/// W, and 1 + W to its own relative accuracy.
+pub(super) struct Answer<S: Simd> {
+    pub(super) w: Complex<S>,
+    pub(super) one_plus_w: Complex<S>,
+}
+
+/// Where the kernel does not reach: zero, infinities, NaN, and branches far out.
+#[inline(always)]
+pub(super) fn out_of_reach<S: Simd>(z: Complex<S>, k: Real<S>) -> Mask<S> {
+    // Whatever is compared with NaN is false.
+    let finite = z.re.abs().lt(f64::INFINITY) & z.im.abs().lt(f64::INFINITY);
+    let zero = z.re.eq(0.0) & z.im.eq(0.0);
+    !finite | zero | k.abs().ge(HUGE_BRANCH as f64)
+}
+
+/// An argument, and what belongs to it.
+pub(super) struct Point<S: Simd> {
+    z: Complex<S>,
+    /// The second word of Re z, where there is one.
+    low: Option<Real<S>>,
+    /// z + 1/e.
+    offset: Complex<S>,
+}
+
+impl<S: Simd> Point<S> {
+    #[inline(always)]
+    pub(super) fn new(z: Complex<S>) -> Self {
+        Self {
+            z,
+            low: None,
+            offset: offset(z),
+        }
     }
+
+    /// The point at `offset` from -1/e.
+    #[inline(always)]
+    pub(super) fn from_offset(offset: Complex<S>) -> Self {
+        let near = sum(offset.re, offset.re.constant(-INVERSE_E));
+        let re = ordered_sum(near.hi, near.lo - INVERSE_E_LOW);
+        Self {
+            z: Complex::new(re.hi, offset.im),
+            low: Some(re.lo),
+            offset,
+        }
+    }
+}
+
+/// W_k for lanes within reach; `k` holds whole numbers.
+#[inline(always)]
+pub(super) fn lambertw<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
     // W_k(conj z) = conj W_-k(z) brings every case to k >= 0 and, for k = 0, to Im z >= 0;
     // there Im w >= 0.
-    let mirrored = if k == 0 {
-        z.im.is_sign_negative()
-    } else {
-        k < 0
-    };
-    let z = if mirrored { z.conj() } else { z };
-    let w = upper(z, k.unsigned_abs());
-    Complex64::new(w.re, if mirrored { -w.im.abs() } else { w.im.abs() })
+    let side = k.eq(0.0).select(point.z.im.sign(), k.sign());
+    let answer = upper(
+        Point {
+            z: reflected(point.z, side),
+            offset: reflected(point.offset, side),
+            ..point
+        },
+        k.abs(),
+    );
+    Answer {
+        w: reflected(answer.w, side),
+        one_plus_w: reflected(answer.one_plus_w, side),
+    }
+}
+
+/// Conjugated where `side`, which is +0 or -0, has its bit set.
+#[inline(always)]
+pub(super) fn reflected<S: Simd>(w: Complex<S>, side: Real<S>) -> Complex<S> {
+    Complex::new(w.re, w.im.flipped(side))
 }
 
 #[inline(always)]
-fn upper(z: Complex64, k: u64) -> Complex64 {
-    if k >= HUGE_BRANCH {
-        return huge_branch::lambertw(Scaled::new(z), k);
-    }
-    let largest = z.re.abs().max(z.im.abs());
-    if k == 0 && largest < SMALL {
-        return Complex64::new(
-            z.re - (z.re - z.im) * (z.re + z.im),
-            z.im - 2.0 * z.re * z.im,
-        );
-    }
+fn upper<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
+    let Point { z, low, offset } = point;
+    let one = z.re.constant(1.0);
+    let unit = Complex::new(one, one);
+    let principal_branch = k.eq(0.0);
+    let first = k.eq(1.0);
+    let largest = z.re.abs().larger(z.im.abs());
+    let small = principal_branch & largest.lt(SMALL);
+
     // Only these two sheets are joined at -1/e.
-    let joined = k == 0 || (k == 1 && z.im.is_sign_negative());
-    let offset = offset(z);
-    let distance = offset.norm_sqr();
-    let start = if joined && distance < SERIES_STARTS * SERIES_STARTS {
-        let p = square_root(offset * (2.0 * std::f64::consts::E));
-        let w = one_plus_w(if k == 0 { p } else { -p }) - 1.0;
-        if distance < SERIES_ANSWERS * SERIES_ANSWERS {
-            return w;
+    let joined = principal_branch | (first & z.im.is_negative());
+    // An overflow here is as far away as anything else.
+    let square = offset.square_modulus();
+    let by_series = joined & square.lt(SERIES_STARTS * SERIES_STARTS);
+    let answered = joined & square.lt(SERIES_ANSWERS * SERIES_ANSWERS);
+    let by_principal = principal_branch & largest.lt(PRINCIPAL_RADIUS);
+    let by_behind = first & joined & square.lt(BEHIND_RADIUS * BEHIND_RADIUS);
+    let by_logarithm = !(by_principal | by_behind);
+
+    let mut w = unit;
+    let mut one_plus_w = unit;
+    let mut root = unit;
+    if (by_series | by_behind | (by_principal & !small)).any() {
+        root = match low {
+            None => branch_root(offset),
+            Some(_) => deep_branch_root(offset),
+        };
+    }
+    if by_series.any() {
+        one_plus_w = near_branch_point(by_behind.choose(-root, root));
+        w = one_plus_w.shifted(-1.0);
+    }
+    if small.any() {
+        // As a product of sums, so that an underflow keeps the sign.
+        let square = Complex::new((z.re - z.im) * (z.re + z.im), z.re * z.im * 2.0);
+        let square = match low {
+            None => square,
+            Some(low) => square.shifted(-low),
+        };
+        w = small.choose(z - square, w);
+        one_plus_w = small.choose((z - square).shifted(1.0), one_plus_w);
+    }
+    let done = small | answered;
+    if (!done).any() {
+        let mut start = w;
+        if by_principal.any() {
+            start = (by_principal & !by_series).choose(principal(z, root), start);
         }
-        w
-    } else if k == 0 && largest < PRINCIPAL_RADIUS {
-        principal(z, offset)
-    } else if k == 1 && joined && distance < BEHIND_RADIUS * BEHIND_RADIUS {
-        behind(offset)
-    } else {
-        let log = Complex64::new(
-            Scaled::new(z).log_modulus(),
-            libm::atan2(z.im, z.re) + std::f64::consts::TAU * k as f64,
-        );
-        let w = from_logarithm(log, if k == 1 { 2 } else { 1 });
-        // Along the segment on which W_1 is real from below, log z + 2 pi i - log w leaves an
-        // imaginary part of rounding errors; the true one is Im z dw/dz, zero where Im z is.
-        if joined && z.re < 0.0 && z.re > -INVERSE_E && z.im.abs() <= NARROW * z.re.abs() {
-            Complex64::new(w.re, (z.im / z.re) * (w.re / (w.re + 1.0)))
-        } else {
-            w
+        if by_behind.any() {
+            start = (by_behind & !by_series).choose(behind(root), start);
         }
-    };
-    let w = Complex64::new(start.re, start.im.abs());
-    w + correction(w, residual(Scaled::new(z), w))
+        let scaled = Scaled::new(z).with_low(low);
+        if by_logarithm.any() {
+            start = by_logarithm.choose(by_log(z, scaled, k, joined), start);
+        }
+        let start = start.folded();
+        let change = correction(start, product_with_exp(scaled, start, None).less(start));
+        w = done.choose(w, start + change);
+        let trusted = small | (joined & square.lt(SERIES_TRUSTED * SERIES_TRUSTED));
+        one_plus_w = trusted.choose(one_plus_w, start.shifted(1.0) + change);
+    }
+    Answer {
+        w: w.folded(),
+        one_plus_w: one_plus_w.folded(),
+    }
 }
 
-#[cfg(test)]
-mod tests {
-    use std::f64::consts::TAU;
-
-    use proptest::prelude::*;
-
-    use super::*;
-
-    /// Numbers where something happens: any exponent, next to -1/e, on the axes.
-    fn troublesome() -> impl Strategy<Value = Complex64> {
-        let anywhere = (-1070.0..1020.0_f64, -4.0..4.0_f64)
-            .prop_map(|(power, angle)| Complex64::from_polar(power.exp2(), angle));
-        let near_branch_point = (-54.0..1.0_f64, -4.0..4.0_f64)
-            .prop_map(|(power, angle)| Complex64::from_polar(power.exp2(), angle) - INVERSE_E);
-        let on_axes = (-60.0..60.0_f64, 0..4_u8, any::<bool>()).prop_map(|(power, axis, side)| {
-            let (length, zero) = (power.exp2(), if side { 0.0 } else { -0.0 });
-            match axis {
-                0 => Complex64::new(length, zero),
-                1 => Complex64::new(-length, zero),
-                2 => Complex64::new(zero, length),
-                _ => Complex64::new(zero, -length),
-            }
-        });
-        prop_oneof![anywhere, near_branch_point, on_axes]
+/// The starting value from log z + 2 pi i k.
+#[inline(always)]
+fn by_log<S: Simd>(z: Complex<S>, scaled: Scaled<S>, k: Real<S>, joined: Mask<S>) -> Complex<S> {
+    let first = k.eq(1.0);
+    let modulus = scaled.exponent.mul_add(
+        std::f64::consts::LN_2,
+        rough_log(scaled.value.square_modulus()) * 0.5,
+    );
+    let angle = k.mul_add(std::f64::consts::TAU, rough_angle(z));
+    let log = Complex::new(modulus, angle);
+    let mut w = logarithmic_step(log, log);
+    if first.any() {
+        w = first.choose(logarithmic_step(w, log), w);
     }
-
-    fn branch() -> impl Strategy<Value = i64> {
-        prop_oneof![
-            -2..3_i64,
-            -1000..1000_i64,
-            -(1_i64 << 21)..(1_i64 << 21),
-            any::<i64>()
-        ]
+    // Along the segment on which W_1 is real from below, log z + 2 pi i - log w leaves an
+    // imaginary part of rounding errors; the true one is Im z dw/dz, zero where Im z is.
+    let flat = z.im.abs().le(z.re.abs() * NARROW);
+    let narrow = joined & flat & z.re.lt(0.0) & z.re.gt(-INVERSE_E);
+    if narrow.any() {
+        let slope = (z.im * w.re) / (z.re * (w.re + 1.0));
+        w.im = narrow.select(slope, w.im);
     }
+    w
+}
 
-    fn bits(w: Complex64) -> (u64, u64) {
-        (w.re.to_bits(), w.im.to_bits())
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4096))]
-
-        #[test]
-        fn conjugates_belong_together(z in troublesome(), k in branch()) {
-            prop_assume!(k != i64::MIN);
-            prop_assert_eq!(bits(lambertw(z.conj(), -k)), bits(lambertw(z, k).conj()));
-        }
-
-        #[test]
-        fn the_branch_is_the_one_asked_for(z in troublesome(), k in branch()) {
-            let w = lambertw(z, k);
-            prop_assume!(w != Complex64::ZERO);
-            let angle = |z: Complex64| libm::atan2(z.im, z.re);
-            let turns = (w.im + angle(w) - angle(z)) / TAU;
-            // Rounding of w, and of the angle where 1 + w nearly vanishes.
-            prop_assert!((turns - k as f64).abs() <= 1e-7 + 1e-15 * turns.abs(), "{w} {turns}");
-        }
-
-        #[test]
-        fn it_solves_its_equation(z in troublesome(), k in -1000..1000_i64) {
-            let w = lambertw(z, k);
-            prop_assume!(w.norm() > 1e-300);
-            let lost = residual(Scaled::new(z), w).norm() / w.norm();
-            // Half an ulp of w moves w e^w by |1 + w| times as much; the residual itself is
-            // good to 2^-64.
-            let allowed = 0.51 * f64::EPSILON * (1.0 + w).norm() + 1.0 / (1_u64 << 62) as f64;
-            prop_assert!(lost <= allowed, "{w} {lost:e}");
-        }
-    }
-
-    #[test]
-    fn rational_and_series_meet_without_a_step() {
-        for distance in [SERIES_ANSWERS, SERIES_STARTS, BEHIND_RADIUS] {
-            for k in [-1, 0, 1] {
-                for side in [0.0, -0.0] {
-                    let at = |d: f64| lambertw(Complex64::new(d - INVERSE_E, side), k);
-                    let (below, above) =
-                        (at(distance * (1.0 - 1e-13)), at(distance * (1.0 + 1e-13)));
-                    assert!((below - above).norm() < 1e-12);
-                }
-            }
-        }
-    }
+/// dW/dz = W/(z (1 + W)) for lanes within reach.
+#[inline(always)]
+pub(super) fn derivative<S: Simd>(z: Complex<S>, k: Real<S>) -> Complex<S> {
+    let Answer { w, one_plus_w } = lambertw(Point::new(z), k);
+    let (z, w) = (Scaled::new(z), Scaled::new(w));
+    let exponent = w.exponent - z.exponent;
+    // In two halves: the quotient of extreme numbers is out of the range of one factor.
+    let half = (exponent * 0.5).nearest();
+    w.value
+        .over(z.value)
+        .scaled(half.power_of_two())
+        .over(one_plus_w)
+        .scaled((exponent - half).power_of_two())
 }

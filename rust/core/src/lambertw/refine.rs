@@ -1,86 +1,156 @@
 //! The last step: a residual in two words and one step of fourth order.
 //!
-//! With t = z e^-w the residual d = t - w is formed from t in two words, so its error is 2^-64 |w|
-//! rather than 2^-53 |w|, and the step of Fritsch, Shafer & Crowley (1973, CACM 16, eq. 5) on
-//! r = log(t/w) = log(1 + d/w) carries it to w. The step leaves the relative error
-//! |2 w^2 - 8 w - 1| / (72 |1 + w|^6) r^4, below 1e-17 for the starting values of `guess`; what remains
-//! is the rounding of the result and 2^-64 / |1 + w|.
+//! With t = z e^-w the residual d = t - w is formed from t in two words, so its error is 2^-61 |w|
+//! rather than 2^-53 |w|, and the Taylor series of the solution in d carries it to w. Cut after
+//! the fourth power it leaves less than 1e-17 |w| for the starting values of `guess`; what remains
+//! is the rounding of the result and 2^-61 / |1 + w|.
 
-use num_complex::Complex64;
+use crate::lanes::{Complex, Real, Simd};
 
-use super::elementary::{cos_sin, exp, power_of_two};
-use super::guess::quotient;
-use super::two_word::{TwoWord, sum};
+use super::elementary::{Reduced, cos_sin, exp, turned_back};
+use super::two_word::TwoWord;
+
+/// 2^64 lifts a subnormal number among the normal ones.
+pub(super) const SCALE_LIFT: f64 = 18_446_744_073_709_551_616.0;
 
 /// A complex number as (re + i im) 2^exponent, its larger component in [1, 2).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Scaled {
-    pub(super) re: f64,
-    pub(super) im: f64,
-    pub(super) exponent: i32,
+pub(super) struct Scaled<S: Simd> {
+    pub(super) value: Complex<S>,
+    pub(super) exponent: Real<S>,
+    /// The second word of the real part, where there is one.
+    pub(super) low: Option<Real<S>>,
 }
 
-impl Scaled {
-    /// Split off the exponent of a finite number that is not zero.
+impl<S: Simd> Scaled<S> {
+    /// Split off the exponent of finite numbers that are not zero.
     #[inline(always)]
-    pub(super) fn new(z: Complex64) -> Self {
-        let largest = z.re.abs().max(z.im.abs());
+    pub(super) fn new(z: Complex<S>) -> Self {
+        let largest = z.re.abs().larger(z.im.abs());
         // A subnormal number has no exponent of its own: bring it among the normal ones first.
-        let (lift, lifted) = if largest < f64::MIN_POSITIVE {
-            (64, power_of_two(64))
-        } else {
-            (0, 1.0)
-        };
-        let exponent = (((largest * lifted).to_bits() >> 52) as i32 - 1023).min(1022);
-        let factor = power_of_two(-exponent);
+        let subnormal = largest.lt(f64::MIN_POSITIVE);
+        let one = largest.constant(1.0);
+        let lifted = subnormal.select(SCALE_LIFT, one);
+        let lift = subnormal.select(64.0, one.constant(0.0));
+        let exponent = (largest * lifted).binade().exponent();
+        // 2^-1023 would be subnormal.
+        let factor = (-exponent.smaller(1022.0)).power_of_two();
         Self {
-            re: z.re * lifted * factor,
-            im: z.im * lifted * factor,
-            exponent: exponent - lift,
+            value: z.scaled(lifted).scaled(factor),
+            exponent: exponent.smaller(1022.0) - lift,
+            low: None,
         }
     }
 
-    /// `log |z|`.
+    /// A power of two.
     #[inline(always)]
-    pub(super) fn log_modulus(self) -> f64 {
-        f64::from(self.exponent) * std::f64::consts::LN_2
-            + 0.5 * libm::log(self.re * self.re + self.im * self.im)
+    pub(super) fn power(exponent: Real<S>) -> Self {
+        let (one, zero) = (exponent.constant(1.0), exponent.constant(0.0));
+        Self {
+            value: Complex::new(one, zero),
+            exponent,
+            low: None,
+        }
+    }
+
+    /// With a second word of the real part, in units of the number itself (which is not subnormal).
+    #[inline(always)]
+    pub(super) fn with_low(self, low: Option<Real<S>>) -> Self {
+        match low {
+            None => self,
+            Some(low) => Self {
+                low: Some(low * (-self.exponent).power_of_two()),
+                ..self
+            },
+        }
     }
 }
 
-/// `z e^-w - w`.
-#[inline(always)]
-pub(super) fn residual(z: Scaled, w: Complex64) -> Complex64 {
-    let (modulus, exponent) = exp(-w.re, 0.0);
-    let (cosine, sine) = cos_sin(w.im);
-    let (cosine, sine) = (modulus.times(cosine), modulus.times(sine));
-    let power = power_of_two(exponent + z.exponent);
-    let less = |a: TwoWord, b: TwoWord, w: f64| {
-        let high = sum(a.hi, b.hi);
-        (high.hi * power - w) + (high.lo + (a.lo + b.lo)) * power
-    };
-    Complex64::new(
-        less(cosine.times_word(z.re), sine.times_word(z.im), w.re),
-        less(cosine.times_word(z.im), sine.times_word(-z.re), w.im),
-    )
+/// A complex number whose components have two words.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TwoWordComplex<S: Simd> {
+    pub(super) re: TwoWord<S>,
+    pub(super) im: TwoWord<S>,
 }
 
-/// The step from `w` with `r = log(z/w) - w`.
+/// `z e^-w`, to 2^-61 of its modulus; `low` holds second words of w, where there are any.
 #[inline(always)]
-pub(super) fn fritsch_step(w: Complex64, r: Complex64) -> Complex64 {
-    let one_plus_w = w + 1.0;
-    let q = (one_plus_w * 2.0) * (one_plus_w + r * (2.0 / 3.0));
-    w + quotient((w * r) * (q - r), one_plus_w * (q - r * 2.0))
+pub(super) fn product_with_exp<S: Simd>(
+    z: Scaled<S>,
+    w: Complex<S>,
+    low: Option<Complex<S>>,
+) -> TwoWordComplex<S> {
+    let zero = w.re.constant(0.0);
+    let low = low.unwrap_or(Complex::new(zero, zero));
+    let (modulus, exponent) = exp(-w.re, -low.re);
+    let modulus = modulus.scaled((exponent + z.exponent).power_of_two());
+    let Reduced {
+        cosine,
+        sine,
+        quarters,
+    } = cos_sin(w.im, low.im);
+    let turned = turned_back(z.value, quarters);
+    let mut re = cosine
+        .times_word(turned.re)
+        .plus(sine.times_word(turned.im));
+    let mut im = cosine
+        .times_word(turned.im)
+        .plus(sine.times_word(-turned.re));
+    if let Some(low) = z.low {
+        let low = turned_back(Complex::new(low, low.constant(0.0)), quarters);
+        re.lo = re.lo + low.re.mul_add(cosine.hi, low.im * sine.hi);
+        im.lo = im.lo + low.im.mul_sub(cosine.hi, low.re * sine.hi);
+    }
+    TwoWordComplex {
+        re: re.times(modulus),
+        im: im.times(modulus),
+    }
+}
+
+impl<S: Simd> TwoWordComplex<S> {
+    /// `self - w`, for a `w` that is near.
+    #[inline(always)]
+    pub(super) fn less(self, w: Complex<S>) -> Complex<S> {
+        Complex::new(
+            (self.re.hi - w.re) + self.re.lo,
+            (self.im.hi - w.im) + self.im.lo,
+        )
+    }
+}
+
+/// The step of Fritsch, Shafer & Crowley (1973, CACM 16, eq. 5) from `w` with
+/// `r = log(z/w) - w`.
+#[inline(always)]
+pub(super) fn fritsch_step<S: Simd>(w: Complex<S>, r: Complex<S>) -> Complex<S> {
+    let one_plus_w = w.shifted(1.0);
+    let q = one_plus_w.scaled(2.0) * (one_plus_w + r.scaled(2.0 / 3.0));
+    w + ((w * r) * (q - r)).over(one_plus_w * (q - r.scaled(2.0)))
 }
 
 /// What to add to `w`, which may be small, given `d = z e^-w - w`.
+///
+/// With eta = d/w, r = log(1 + eta) and u = 1 + w, the solution moves by
+/// w (r/u + r^2/(2 u^3) + (1 - 2 w) r^3/(6 u^5) + (6 w^2 - 8 w + 1) r^4/(24 u^7) + …), the Taylor
+/// series of dw/dr = w/u. In powers of eta this is d/u times a cubic whose coefficients are
+/// polynomials in v = 1/u. All of them, and both divisions, are at hand before d is.
 #[inline(always)]
-pub(super) fn correction(w: Complex64, d: Complex64) -> Complex64 {
-    let eta = quotient(d, w);
-    // log(1 + eta)/eta; the next term is below 1e-18 for |eta| < 5e-4.
-    let series = eta * (eta * (eta * (eta * 0.2 - 0.25) + 1.0 / 3.0) - 0.5) + 1.0;
-    let r = eta * series;
-    let one_plus_w = w + 1.0;
-    let q = (one_plus_w * 2.0) * (one_plus_w + r * (2.0 / 3.0));
-    quotient((d * series) * (q - r), one_plus_w * (q - r * 2.0))
+pub(super) fn correction<S: Simd>(w: Complex<S>, d: Complex<S>) -> Complex<S> {
+    let v = w.shifted(1.0).inverse();
+    let square = v * v;
+    let first = square.affine(0.5, -0.5);
+    let second = v
+        .affine(0.5, -1.0 / 3.0)
+        .mul_add(v, -0.5)
+        .mul_add(square, 1.0 / 3.0);
+    let third = v
+        .affine(0.625, -5.0 / 6.0)
+        .mul_add(v, -0.5)
+        .mul_add(v, 0.5)
+        .mul_add(v, 11.0 / 24.0)
+        .mul_add(square, -0.25);
+    let eta = d * w.inverse();
+    // Of the next coefficient its constant term is enough.
+    let third = third + eta.scaled(0.2);
+    let series = (third * eta + second) * eta + first;
+    (d * v) * series.mul_add(eta, 1.0)
 }

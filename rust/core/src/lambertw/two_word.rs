@@ -1,20 +1,27 @@
-//! Sums of two words: a value as `hi + lo` with `|lo|` at most half an ulp of `hi`.
+//! Sums of two words: a value as `hi + lo`, with `lo` at most a few ulps of `hi`.
 //!
 //! Sums and products of doubles leave an error that is itself a double (Møller 1965, Knuth 1969,
-//! Dekker 1971). The product is split after Dekker and needs no fused multiply-add; where one is
-//! used instead, the bits are the same, because both give the exact error. Relative error of
-//! every operation here: a few 2^-104, provided nothing underflows and no factor exceeds 2^996.
+//! Dekker 1971); a fused multiply-add gives that of a product at once. Second words are summed as
+//! they come and brought below half an ulp of the first only by [`TwoWord::normalised`]: the
+//! relative error of an operation is a few 2^-104 then, and some 2^-100 in a short chain.
+//! Provided nothing underflows and nothing overflows.
 
-/// An unevaluated sum `hi + lo`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TwoWord {
-    pub(super) hi: f64,
-    pub(super) lo: f64,
+use crate::lanes::{Real, Simd};
+
+/// An unevaluated sum `hi + lo` in each lane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TwoWord<S: Simd> {
+    pub(super) hi: Real<S>,
+    pub(super) lo: Real<S>,
 }
+
+/// A constant in two words.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Constant(pub(super) f64, pub(super) f64);
 
 /// `a + b` without loss.
 #[inline(always)]
-pub(super) fn sum(a: f64, b: f64) -> TwoWord {
+pub(super) fn sum<S: Simd>(a: Real<S>, b: Real<S>) -> TwoWord<S> {
     let hi = a + b;
     let from_b = hi - a;
     let from_a = hi - from_b;
@@ -26,7 +33,7 @@ pub(super) fn sum(a: f64, b: f64) -> TwoWord {
 
 /// `a + b` without loss when `|a| >= |b|` or `a == 0`.
 #[inline(always)]
-pub(super) fn ordered_sum(a: f64, b: f64) -> TwoWord {
+pub(super) fn ordered_sum<S: Simd>(a: Real<S>, b: Real<S>) -> TwoWord<S> {
     let hi = a + b;
     TwoWord {
         hi,
@@ -34,30 +41,26 @@ pub(super) fn ordered_sum(a: f64, b: f64) -> TwoWord {
     }
 }
 
-/// Two halves of at most 26 bits each.
-#[inline(always)]
-fn halves(a: f64) -> (f64, f64) {
-    const SPLITTER: f64 = 134_217_729.0; // 2^27 + 1
-    let wide = SPLITTER * a;
-    let upper = wide - (wide - a);
-    (upper, a - upper)
-}
-
 /// `a * b` without loss.
 #[inline(always)]
-pub(super) fn product(a: f64, b: f64) -> TwoWord {
+pub(super) fn product<S: Simd>(a: Real<S>, b: Real<S>) -> TwoWord<S> {
     let hi = a * b;
-    let (a_upper, a_lower) = halves(a);
-    let (b_upper, b_lower) = halves(b);
-    let lo =
-        a_lower * b_lower - (((hi - a_upper * b_upper) - a_lower * b_upper) - a_upper * b_lower);
-    TwoWord { hi, lo }
+    TwoWord {
+        hi,
+        lo: a.mul_sub(b, hi),
+    }
 }
 
-impl TwoWord {
+impl<S: Simd> TwoWord<S> {
     #[inline(always)]
-    pub(super) const fn new(hi: f64, lo: f64) -> Self {
+    pub(super) fn new(hi: Real<S>, lo: Real<S>) -> Self {
         Self { hi, lo }
+    }
+
+    /// One word as two.
+    #[inline(always)]
+    pub(super) fn from_word(hi: Real<S>) -> Self {
+        Self::new(hi, hi.constant(0.0))
     }
 
     #[inline(always)]
@@ -65,37 +68,54 @@ impl TwoWord {
         Self::new(-self.hi, -self.lo)
     }
 
+    /// The same value with a second word of at most half an ulp of the first.
+    #[inline(always)]
+    pub(super) fn normalised(self) -> Self {
+        ordered_sum(self.hi, self.lo)
+    }
+
     #[inline(always)]
     pub(super) fn plus(self, other: Self) -> Self {
         let high = sum(self.hi, other.hi);
-        let low = sum(self.lo, other.lo);
-        let joined = ordered_sum(high.hi, high.lo + low.hi);
-        ordered_sum(joined.hi, joined.lo + low.lo)
+        Self::new(high.hi, high.lo + (self.lo + other.lo))
     }
 
-    /// `self + other` for an `other` that is not larger than `self`.
+    /// `constant + self` for a `self` that is not larger.
     #[inline(always)]
-    pub(super) fn plus_smaller(self, other: Self) -> Self {
-        let high = ordered_sum(self.hi, other.hi);
-        ordered_sum(high.hi, high.lo + (self.lo + other.lo))
+    pub(super) fn added_to(self, constant: Constant) -> Self {
+        let high = ordered_sum(self.hi.constant(constant.0), self.hi);
+        Self::new(high.hi, high.lo + (self.lo + constant.1))
     }
 
     #[inline(always)]
     pub(super) fn times(self, other: Self) -> Self {
         let high = product(self.hi, other.hi);
-        ordered_sum(high.hi, high.lo + (self.hi * other.lo + self.lo * other.hi))
+        let low = self.hi.mul_add(other.lo, high.lo);
+        Self::new(high.hi, self.lo.mul_add(other.hi, low))
     }
 
     #[inline(always)]
-    pub(super) fn times_word(self, b: f64) -> Self {
+    pub(super) fn times_word(self, b: Real<S>) -> Self {
         let high = product(self.hi, b);
-        ordered_sum(high.hi, high.lo + self.lo * b)
+        Self::new(high.hi, self.lo.mul_add(b, high.lo))
+    }
+
+    /// Negated where `sign`, which is +0 or -0, has its bit set.
+    #[inline(always)]
+    pub(super) fn flipped(self, sign: Real<S>) -> Self {
+        Self::new(self.hi.flipped(sign), self.lo.flipped(sign))
     }
 
     /// Multiplied by a power of two.
     #[inline(always)]
-    pub(super) fn scaled(self, power: f64) -> Self {
+    pub(super) fn scaled(self, power: Real<S>) -> Self {
         Self::new(self.hi * power, self.lo * power)
+    }
+
+    /// The value in one word.
+    #[inline(always)]
+    pub(super) fn rounded(self) -> Real<S> {
+        self.hi + self.lo
     }
 }
 
@@ -103,6 +123,19 @@ impl TwoWord {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use pulp::{Scalar128b, cast};
+
+    fn lane(value: f64) -> Real<Scalar128b> {
+        Real::splat(Scalar128b, value)
+    }
+
+    fn words(value: TwoWord<Scalar128b>) -> (f64, f64) {
+        let first = |value: Real<Scalar128b>| {
+            let [lanes, _]: [[f64; 2]; 2] = value.lanes().map(cast);
+            lanes[0]
+        };
+        (first(value.hi), first(value.lo))
+    }
 
     proptest! {
         #[test]
@@ -110,25 +143,25 @@ mod tests {
             // Whole multiples of 2^-60 below 2^30 fit the 128-bit integers used as truth.
             let whole = |x: f64| (x * 2.0_f64.powi(60)) as i128;
             let (a, b) = ((a * 1024.0).round() / 1024.0, (b * 2.0_f64.powi(50)).round() / 2.0_f64.powi(50));
-            let s = sum(a, b);
-            prop_assert_eq!(whole(s.hi) + whole(s.lo), whole(a) + whole(b));
-            prop_assert_eq!(s.hi, a + b);
+            let (hi, lo) = words(sum(lane(a), lane(b)));
+            prop_assert_eq!(whole(hi) + whole(lo), whole(a) + whole(b));
+            prop_assert_eq!(hi, a + b);
         }
 
         #[test]
         fn a_product_loses_nothing(a in 1_u64 << 52..1_u64 << 53, b in 1_u64 << 52..1_u64 << 53) {
-            let p = product(a as f64, b as f64);
-            prop_assert_eq!(p.hi as i128 + p.lo as i128, i128::from(a) * i128::from(b));
-            prop_assert!(p.lo.abs() <= p.hi * f64::EPSILON / 2.0);
+            let (hi, lo) = words(product(lane(a as f64), lane(b as f64)));
+            prop_assert_eq!(hi as i128 + lo as i128, i128::from(a) * i128::from(b));
+            prop_assert!(lo.abs() <= hi * f64::EPSILON / 2.0);
         }
     }
 
     #[test]
     fn two_words_multiply_to_more_than_a_hundred_bits() {
-        let third = TwoWord::new(1.0 / 3.0, 1.0 / 3.0 * 2.0_f64.powi(-54));
-        let one = third.times_word(3.0);
-        assert!(((one.hi - 1.0) + one.lo).abs() < 2.0_f64.powi(-103));
-        let ninth = third.times(third).times_word(9.0);
-        assert!(((ninth.hi - 1.0) + ninth.lo).abs() < 2.0_f64.powi(-102));
+        let third = TwoWord::new(lane(1.0 / 3.0), lane(1.0 / 3.0 * 2.0_f64.powi(-54)));
+        let (hi, lo) = words(third.times_word(lane(3.0)));
+        assert!(((hi - 1.0) + lo).abs() < 2.0_f64.powi(-103));
+        let (hi, lo) = words(third.times(third).times_word(lane(9.0)));
+        assert!(((hi - 1.0) + lo).abs() < 2.0_f64.powi(-102));
     }
 }
