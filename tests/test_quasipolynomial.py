@@ -273,3 +273,24 @@ def test_orders_of_derivatives():
 
 def test_public_names():
     assert {"QuasiPolynomial", "RootSet", "delay", "s"} <= set(dtm.__all__)
+
+
+@pytest.mark.parametrize("h", [s + 2.0 * delay(0.36), s + (2.0 + 0.3 * s) * delay(0.36)])
+def test_far_to_the_left_values_are_infinite_and_numbers(h):
+    # The modulus of 1e300 squares to infinity, so no term was seen to dominate: the value was nan.
+    value = h(-1e300)
+    assert math.isinf(value.real)
+    assert value.real > 0 if h.kind == "retarded" else value.real < 0
+    assert value.imag == 0
+
+
+def test_powers_that_overflow_leave_no_nan():
+    h = s**3 + s * delay(0.5)
+    assert h(1e200).real == math.inf
+    assert h(-1e200).real == -math.inf
+    assert h(1e200j).imag == -math.inf
+    # The power overflows, but not what it is multiplied by.
+    assert (s**2 * delay(1.0))(1e200) == 0
+    small = (s**3 * delay(1.0) * 1e-200)(1e103)
+    assert small == 0
+    assert (1e-300 * s**4)(1e110) == pytest.approx(1e140, rel=1e-12)

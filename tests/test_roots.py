@@ -4,6 +4,7 @@ import json
 import math
 from pathlib import Path
 
+import deadtime as dtm
 import mpmath as mp
 import numpy as np
 import pytest
@@ -475,3 +476,60 @@ def test_root_set_is_like_an_array():
     assert "6 roots" in repr(found)
     with pytest.raises(ValueError, match="read-only"):
         found.roots[0] = 0
+
+
+def test_bounds_that_overflow_prove_nothing():
+    # Far to the right exponentials underflow and the bound on what they grow to was not a number,
+    # which was taken for "no limit": the walk stepped over the root.
+    h = s + 2.0 * delay(0.36)
+    for far in (10.0, 2050.0, 2070.0, 6000.0, 1e5):
+        assert h.count(re=(-20.0, far), im=(2300.0, 2308.4)) == 1
+
+
+def test_two_thousand_rightmost_roots():
+    # A cell thousands of units wide hid a root from its count.
+    found = (s + 2.0 * delay(0.36)).rightmost(2000)
+    assert found.multiplicities.sum() == found.counted >= 2000
+    (line, _), _ = found.region
+    # All of them: Lambert W's branches right of the line.
+    k = np.arange(-3000, 3000)
+    exact = dtm.lambertw(-0.72, k) / 0.36
+    assert (exact.real > line).sum() == len(found)
+
+
+@pytest.mark.parametrize("omega", [1e6, 1e7, 1e9, 1e12])
+def test_the_rightmost_root_of_a_loop_with_a_fast_filter(omega):
+    # Chains that bend away only beyond omega cost more than a line was given: it came empty.
+    loop = dtm.ControlLoop(
+        dtm.Integrator(), dtm.PV(2.0, 0.3, filter=dtm.DerivativeFilter(omega)), delay=0.36
+    )
+    ideal = (s + (2.0 + 0.3 * s) * delay(0.36)).rightmost()[0]
+    root = loop.characteristic().rightmost()[0]
+    # The filter is late by 2/omega, and the root moves by 14 times as much.
+    assert abs(root - ideal) < 40 / omega
+
+
+@pytest.mark.parametrize(
+    ("kv", "tau"), [(0.3, 0.36), (-0.3, 0.36), (0.9, 0.36), (0.999, 1.0), (0.5, 2.0)]
+)
+def test_lines_close_to_the_chains_count_every_root(kv, tau):
+    """The bound along the chains against a count in a box far taller than it says."""
+    h = s**2 + 0.3 * s + 1.0 + (2.0 + 0.7 * s + kv * s**2) * delay(tau)
+    chain = h.chain_abscissa()
+    for distance in (1.0, 0.1, 0.01, 0.001):
+        sigma = chain + distance
+        assert h.count(re=(sigma, None)) == h.count(re=(sigma, None), im=(-3e3, 3e3))
+
+
+def test_lines_where_one_row_dominates_count_every_root():
+    """Long steps down a line against a count in a box, whose edges know nothing of them."""
+    rng = np.random.default_rng(7)
+    for _ in range(60):
+        m, d = rng.integers(2, 5), rng.integers(1, 5)
+        rows = rng.normal(size=(m, d + 1)) * 10.0 ** rng.uniform(-1, 1, size=(m, d + 1))
+        rows[1:, -1] = 0.0
+        # Roots with Re s > -0.8 stay well below 3e4: |s| < e^(0.8 * 9) times the moduli / 30.
+        rows[0, -1] = 30.0
+        h = QuasiPolynomial(rows, [0.0, *np.cumsum(rng.uniform(0.1, 3.0, size=m - 1))])
+        sigma = rng.uniform(-0.8, 0.3)
+        assert h.count(re=(sigma, None)) == h.count(re=(sigma, None), im=(-3e4, 3e4))

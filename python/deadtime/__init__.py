@@ -4,6 +4,8 @@ The delay of a recorded loop with its uncertainty, the characteristic roots of t
 maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
+from deadtime import gallery
+from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime._design import Design, design
 from deadtime._errors import (
@@ -32,6 +34,7 @@ from deadtime._recording import Recording, Step
 from deadtime._response import Response
 from deadtime._rootset import RootSet
 from deadtime._scalar_delay import dde_roots, rightmost_branches
+from deadtime._sensitivity import Sensitivity
 from deadtime._special import lambertw, lambertw0, lambertwm1
 from deadtime._special_forms import (
     OffsetW,
@@ -49,6 +52,7 @@ __all__ = [
     "PI",
     "PID",
     "PV",
+    "Chain",
     "ContourError",
     "ControlLoop",
     "Controller",
@@ -76,6 +80,7 @@ __all__ = [
     "RecordingError",
     "Response",
     "RootSet",
+    "Sensitivity",
     "StabilityMap",
     "Step",
     "TransferFunction",
@@ -86,6 +91,7 @@ __all__ = [
     "design",
     "estimate_delay",
     "feedback",
+    "gallery",
     "kit_plant",
     "lambertw",
     "lambertw0",

@@ -140,6 +140,62 @@ class ParametricQuasiPolynomial:
         point = [finite(name, values[name]) for name in self._names]
         return QuasiPolynomial(*self._family.at(point))
 
+    def sensitivity(self, root: complex, /, **values: SupportsFloat) -> dict[str, complex]:
+        """Derivatives of a simple root by the parameters, at a point.
+
+        Parameters
+        ----------
+        root : complex
+            A root of ``at(**values)``, in 1/s; its last digits do not matter.
+        **values : float
+            One for each of `names`.
+
+        Returns
+        -------
+        dict of str to complex
+            By the name of the parameter, in 1/s per unit of it.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As in `at` and as in `QuasiPolynomial.sensitivity`.
+
+        Examples
+        --------
+        The gain of an integrator with dead time at the edge of stability: the pair moves right.
+
+        >>> import math
+        >>> import deadtime as dtm
+        >>> K, T = dtm.parameters("K T")
+        >>> h = dtm.s + K * dtm.delay(T)
+        >>> move = h.sensitivity(0.5j * math.pi, K=0.5 * math.pi, T=1.0)
+        >>> move["K"].real > 0, move["T"].real > 0
+        (True, True)
+        """
+        h = self.at(**values)
+        point = {name: finite(name, values[name]) for name in self._names}
+        terms = list(self._terms.items())
+        times = [
+            max(0.0, constant + sum(slope * point[name] for name, slope in slopes))
+            for (_, _, (constant, slopes)), _ in terms
+        ]
+        found, by_coefficient = h._native.sensitivity(
+            complex(root), times, [power for (_, power, _), _ in terms]
+        )
+        moves = dict.fromkeys(self._names, 0j)
+        for ((powers, _, (_, slopes)), number), slope in zip(
+            terms, by_coefficient.tolist(), strict=True
+        ):
+            factors = [point[name] ** exponent for name, exponent in powers]
+            for index, (name, exponent) in enumerate(powers):
+                others = math.prod(factors[:index] + factors[index + 1 :])
+                change = number * exponent * point[name] ** (exponent - 1) * others
+                moves[name] += slope * change
+            for name, rate in slopes:
+                # A delay changes its term by -s times the term.
+                moves[name] -= found * slope * number * math.prod(factors) * rate
+        return moves
+
     @cached_property
     def _family(self) -> Family:
         """The same function as the native core holds it."""

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
+from deadtime._chains import Chain, chains_of
 from deadtime._rootset import RootSet
+from deadtime._sensitivity import Sensitivity
 
 if TYPE_CHECKING:
     from deadtime._parametric import ParametricQuasiPolynomial
@@ -405,6 +407,37 @@ class QuasiPolynomial:
         """
         return self._native.chain_abscissa()
 
+    def chains(self) -> tuple[Chain, ...]:
+        r"""Give the laws that the roots of large modulus follow.
+
+        Returns
+        -------
+        tuple of Chain
+            One for every sequence of roots in the upper half plane, from the least bend to the
+            largest; none for a polynomial.
+
+        Notes
+        -----
+        Each edge of the upper convex hull of the points (delay, degree of its row) makes chains
+        with :math:`\mathrm{Re}\, s \approx c - \mu \ln|s|`, the slope of the edge being
+        :math:`-\mu` [1]_. Asymptotic: nothing is proved about any single root.
+
+        References
+        ----------
+        .. [1] R. Bellman and K. L. Cooke, Differential-Difference Equations, Academic Press
+           (1963), chapter 12.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> (chain,) = (s + 2.0 * delay(0.36)).chains()
+        >>> chain.kind, round(chain.bend, 4), round(chain.spacing, 4)
+        ('retarded', 2.7778, 17.4533)
+        >>> [chain.kind for chain in (s + (2.0 + 0.3 * s) * delay(0.36)).chains()]
+        ['neutral']
+        """
+        return chains_of(self)
+
     def is_stable(self, strong: bool = True) -> bool:
         """Tell whether every root is proved to lie left of the imaginary axis.
 
@@ -438,6 +471,49 @@ class QuasiPolynomial:
         (True, False)
         """
         return self._native.is_stable(bool(strong))
+
+    def sensitivity(self, root: complex) -> Sensitivity:
+        r"""Derivatives of a simple root by every coefficient and every delay.
+
+        Parameters
+        ----------
+        root : complex
+            A root in 1/s, as `roots` or `rightmost` list it; its last digits do not matter.
+
+        Returns
+        -------
+        Sensitivity
+            ``coefficients``, shape (m, d+1), and ``delays``, shape (m,), arranged as those of the
+            quasi-polynomial.
+
+        Raises
+        ------
+        ValueError
+            If the place given is no root, or the root is multiple or in a cluster that double
+            precision does not tell apart: it has no derivative.
+
+        Notes
+        -----
+        :math:`ds/dp = -(\partial h/\partial p) / h'(s)` for :math:`h(s; p) = 0`, the exponential
+        of the dominating term cancelled beforehand so that nothing overflows.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> h = s + 4.0 * delay(0.36)
+        >>> move = h.sensitivity(h.rightmost()[0])
+        >>> bool(move.coefficients[1, 0].real > 0), bool(move.delays[1].real > 0)
+        (True, True)
+        """
+        place = complex(root)
+        rows, width = self._coefficients.shape
+        found, slopes = self._native.sensitivity(
+            place, np.repeat(self._delays, width).tolist(), list(range(width)) * rows
+        )
+        coefficients = slopes.reshape(rows, width)
+        # h depends on a delay through its row alone, d/dtau of which is -s times the row.
+        delays = -found * (coefficients * self._coefficients).sum(axis=1)
+        return Sensitivity(found, coefficients, delays)
 
 
 @overload

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._frozen import ReadOnlyArrays, read_only
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from deadtime._chains import Chain
 
 __all__ = ["RootSet"]
 
@@ -85,6 +90,26 @@ class RootSet(ReadOnlyArrays):
         # asarray knows `copy` since NumPy 2 only.
         array = np.asarray(self.roots, dtype=dtype)
         return array.copy() if copy else array
+
+    def plot(self, ax: Axes | None = None, chains: Sequence[Chain] = ()) -> Axes:
+        """Draw the roots in the complex plane; needs matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; default is a new figure.
+        chains : sequence of Chain, optional
+            Laws to draw as well, from `QuasiPolynomial.chains`.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from deadtime._plots import plot_root_set, shown_axes
+
+        axes = shown_axes(ax)
+        plot_root_set(axes, self, chains)
+        return axes
 
     def __repr__(self) -> str:
         (a, b), (c, d) = self.region

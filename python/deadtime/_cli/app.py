@@ -197,7 +197,8 @@ def roots(
     chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
     if plot is not None:
         figure, axes = new_figure(6.0, 4.5)
-        plot_root_set(axes, found)
+        chains = () if loop.is_sampled else loop.characteristic().chains()
+        plot_root_set(axes, found, chains)
         save_figure(figure, plot)
     if as_json:
         print_json(

@@ -146,6 +146,21 @@ impl QuasiPolynomial {
         run_here(py, |task| roots::spectral_abscissa(&self.core, task))
     }
 
+    /// A root, and its derivatives by the coefficients of s^power e^(-s delay).
+    fn sensitivity<'py>(
+        &self,
+        py: Python<'py>,
+        root: Complex64,
+        delays: Vec<f64>,
+        powers: Vec<u32>,
+    ) -> PyResult<(Complex64, Bound<'py, PyArray1<Complex64>>)> {
+        let terms: Vec<(f64, u32)> = delays.into_iter().zip(powers).collect();
+        let (root, slopes) = run(py, None, None, |task| {
+            roots::sensitivity(&self.core, root, &terms, task)
+        })?;
+        Ok((root, slopes.into_pyarray(py)))
+    }
+
     fn chain_abscissa(&self) -> f64 {
         roots::chain_abscissa(&self.core)
     }

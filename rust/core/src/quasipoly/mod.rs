@@ -7,6 +7,7 @@
 //! rounding error. The bound takes exp, sin and cos of the `libm` crate to be right within 2 ulp.
 
 mod algebra;
+mod beyond;
 mod kind;
 mod probe;
 mod value;

@@ -211,7 +211,8 @@ impl<'a> Probe<'a> {
             let most = if growth == 0.0 {
                 weight
             } else {
-                weight * libm::exp(growth)
+                // Not the product: a weight that has underflowed may be 0 here and 1 nearby.
+                libm::exp(growth - gap * self.x)
             };
             total += (2.0 * ddp + gap_size * (2.0 * dp + gap_size * p)) * most;
         }

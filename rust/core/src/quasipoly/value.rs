@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{Probe, QuasiPolynomial};
+use super::{Probe, QuasiPolynomial, beyond};
 use crate::{Error, Task};
 
 /// Points that one thread takes at a time.
@@ -46,6 +46,9 @@ impl QuasiPolynomial {
     /// ```
     pub fn value(&self, s: Complex64) -> Complex64 {
         let Scaled { value, delay, .. } = self.scaled_value(s);
+        if value.is_nan() && s.is_finite() {
+            return beyond::value(self, s);
+        }
         if delay == 0.0 {
             return value;
         }

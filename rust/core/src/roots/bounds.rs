@@ -6,7 +6,13 @@
 //!    all the others together. Both sides divided by |s|ⁿ, this holds beyond a radius if the
 //!    bracket is positive (Cauchy's bound with weights). For b = ∞ it is the condition that the
 //!    line Re s = a lies right of the chains; where it fails, nothing is said.
-//! 2. In a strip |Im s| ≤ H, the first row exceeds the others far to the right whatever the
+//! 2. Near the chains of a neutral equation bound 1 is wide: of the leading terms it compares
+//!    moduli, so that the next powers count with 1/|s| although, along the line, they turn p_j
+//!    and hardly stretch it. With p_j = b_jn sⁿ (1 + w_j), all |s| ≥ r and Re s = x ≥ σ,
+//!    |1 + w_j|² differs from 1 by at most 2 β_j1 |x|/r² + O(1/r²), β_jk = |b_j,n−k / b_jn|. As
+//!    long as r² d_j ≥ β_j1 + 2 β_01 the exponentials e^(−x d_j) outrun the growth of that with x,
+//!    and the sum of |p_j e^(−s d_j) / p_0| is bounded by its terms at x = |σ|.
+//! 3. In a strip |Im s| ≤ H, the first row exceeds the others far to the right whatever the
 //!    kind, since each of them carries an e^(−x d). Far to the left: the same for h(−s).
 //!
 //! Inequalities are tested with a relative margin that covers their rounding.
@@ -51,13 +57,90 @@ pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance
         let rest: f64 = others.pop().map_or(0.0, |sum| (sum - own) * (1.0 + MARGIN));
         let rest = rest.max(0.0) + MARGIN * own;
         if own > rest {
-            let radius = cauchy_radius(own - rest, &others);
+            let mut radius = cauchy_radius(own - rest, &others);
+            if index == 0 {
+                radius = along_the_chains(h, re.0, radius);
+            }
             if radius.is_finite() && best.is_none_or(|b| radius < b.radius) {
                 best = Some(Dominance { row: index, radius });
             }
         }
     }
     best
+}
+
+/// Bound 2: a radius at most `known`, one of bound 1, beyond which the first row exceeds the others
+/// where Re s ≥ `sigma`, and its leading term the rest of it.
+fn along_the_chains(h: &QuasiPolynomial, sigma: f64, known: f64) -> f64 {
+    let degree = h.degree();
+    let Some((first, own_delay)) = h.terms().next() else {
+        return known;
+    };
+    let neutral = h.terms().skip(1).any(|(row, _)| row.len() == first.len());
+    if !(neutral && known.is_finite() && sigma.is_finite()) {
+        return known;
+    }
+    let own = first.last().copied().unwrap_or(0.0).abs();
+    // Σ_{k ≥ from} |b_{n−k} / b_n| r^−k
+    let tail = |row: &[f64], top: f64, from: usize, r: f64| {
+        let size = |k: usize| row.get(k).map_or(0.0, |c| c.abs() / top);
+        let lower = 0..(degree + 1).saturating_sub(from);
+        lower.fold(0.0, |sum, k| (sum + size(k)) / r) / raised(r, from.saturating_sub(1))
+    };
+    let next = |row: &[f64], top: f64| {
+        let index = degree.checked_sub(1);
+        index
+            .and_then(|k| row.get(k))
+            .map_or(0.0, |c| c.abs() / top)
+    };
+    let own_next = next(first, own);
+    let holds = |r: f64| {
+        let square = r * r;
+        let lean = (sigma.abs() / square).min(1.0 / r);
+        let rest = 2.0 * tail(first, own, 2, r);
+        // |1 + w_0|² at x = |σ|, and wherever x ≥ σ.
+        let denominator = 1.0 - 2.0 * own_next * lean - rest;
+        if 2.0 * own_next / r + rest > 0.5 {
+            return false;
+        }
+        let mut sum = 0.0;
+        for (row, delay) in h.terms().skip(1) {
+            let gap = delay - own_delay;
+            let leads = row.len() == first.len();
+            let top = row.last().copied().unwrap_or(0.0).abs();
+            let slope = if leads { next(row, top) } else { 0.0 };
+            if square * gap < (slope + 2.0 * own_next) * (1.0 + MARGIN) {
+                return false;
+            }
+            let size = if leads {
+                let stretch = tail(row, top, 1, r);
+                let numerator =
+                    1.0 + 2.0 * slope * lean + 2.0 * tail(row, top, 2, r) + stretch * stretch;
+                top / own * numerator.sqrt()
+            } else {
+                tail(row, own, 1, r)
+            };
+            sum += size * libm::exp(-gap * sigma) / denominator.sqrt();
+        }
+        sum * (1.0 + MARGIN) < 1.0 - MARGIN
+    };
+    let mut high = known;
+    let mut ratio = 2.0;
+    for _ in 0..40 {
+        if holds(high / ratio) {
+            high /= ratio;
+        } else if ratio < 1.05 {
+            break;
+        } else {
+            ratio = ratio.sqrt();
+        }
+    }
+    high
+}
+
+/// rᵏ by repeated products, the same bits on every machine.
+fn raised(r: f64, k: usize) -> f64 {
+    (0..k).fold(1.0, |power, _| power * r)
 }
 
 /// A radius beyond which `top` rⁿ > Σ `lower`_k rᵏ, within a percent of the least one.
@@ -98,7 +181,7 @@ pub(super) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
     high
 }
 
-/// Bound 2: no root with |Im s| ≤ `height` has a real part of this or more.
+/// Bound 3: no root with |Im s| ≤ `height` has a real part of this or more.
 pub(super) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
     let mut terms = h.terms();
     let Some((first, own_delay)) = terms.next() else {
@@ -136,7 +219,7 @@ pub(super) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
     if x < 1e150 { x } else { f64::INFINITY }
 }
 
-/// Bound 2 on the other side: no root with |Im s| ≤ `height` has a real part of this or less.
+/// Bound 3 on the other side: no root with |Im s| ≤ `height` has a real part of this or less.
 pub(super) fn left_edge(h: &QuasiPolynomial, height: f64) -> f64 {
     let last = h.delays().last().copied().unwrap_or(0.0);
     let alternate = |row: &[f64]| {

@@ -3,7 +3,8 @@
 //! Half planes: with R such that one leading term a sⁿ e^(−sτ) exceeds all others together where
 //! Re s ≥ σ and |s| ≥ R, no root lies beyond R, and along the arc |s| = R arg h follows that of
 //! the leading term, up to the principal argument of their quotient. Only the chord Re s = σ is
-//! walked, and of that, coefficients being real, only the upper half.
+//! walked, and of that, coefficients being real, only the upper half: in long steps where the row
+//! of the leading term dominates (`dominated`).
 
 use std::f64::consts::PI;
 
@@ -11,6 +12,7 @@ use num_complex::Complex64;
 
 use super::bounds::{self, Dominance};
 use super::cell::Cell;
+use super::dominated::descend;
 use super::neutral::chain_abscissa;
 use super::real::count_real;
 use super::region::Region;
@@ -124,8 +126,9 @@ pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Close
         re = (re.0.max(-radius), re.1.min(radius));
     }
     let height = im.0.abs().max(im.1.abs());
-    if re.1.is_infinite() {
-        re.1 = bounds::right_edge(h, height);
+    if re.1.is_infinite() || region.re.1.is_infinite() {
+        // Mostly closer than the radius, which chains far up may make large.
+        re.1 = re.1.min(bounds::right_edge(h, height));
     }
     if re.0.is_infinite() {
         re.0 = bounds::left_edge(h, height);
@@ -272,9 +275,13 @@ pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
         slack: 1.58 * jet.value_error / modulus(jet.value)
             + 1e-15 * (4.0 * degree as f64 + walker.probe.delay() * top + 4.0),
     };
-    let chord = walker.walk(end, Complex64::new(sigma, 0.0))?;
-    arc.then(chord).revolutions(PI).ok_or(Error::Contour {
-        place: Complex64::new(sigma, 0.0),
-        distance: 1e-3 * radius,
-    })
+    let (place, skipped) = descend(walker, row, end);
+    let chord = walker.walk(place, Complex64::new(sigma, 0.0))?;
+    arc.then(skipped)
+        .then(chord)
+        .revolutions(PI)
+        .ok_or(Error::Contour {
+            place: Complex64::new(sigma, 0.0),
+            distance: 1e-3 * radius,
+        })
 }

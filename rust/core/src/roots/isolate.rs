@@ -32,12 +32,22 @@ pub(super) struct Search<'a, 'w> {
 
 impl<'a, 'w> Search<'a, 'w> {
     pub(super) fn new(walker: &'w mut Walker<'a>) -> Self {
+        Self::with(walker, Vec::new())
+    }
+
+    /// A search that knows some disjoint discs already.
+    pub(super) fn with(walker: &'w mut Walker<'a>, mut found: Vec<Disc>) -> Self {
+        found.sort_by(|a, b| a.center.im.total_cmp(&b.center.im));
+        let widest = found
+            .iter()
+            .map(|disc| disc.isolation.max(disc.radius))
+            .fold(0.0, f64::max);
         let delays = walker.probe.function().delays();
         let span = delays.last().copied().unwrap_or(0.0) - delays.first().copied().unwrap_or(0.0);
         Self {
             walker,
-            found: Vec::new(),
-            widest: 0.0,
+            found,
+            widest,
             spacing: TAU / span,
         }
     }
@@ -55,6 +65,12 @@ impl<'a, 'w> Search<'a, 'w> {
             }
         }
         Ok(())
+    }
+
+    /// Roots in the discs right of Re s = `sigma` and in their mirror images.
+    pub(super) fn weight_right_of(&self, sigma: f64) -> u64 {
+        let right = |disc: &&Disc| disc.center.re - disc.radius > sigma;
+        self.found.iter().filter(right).map(Disc::weight).sum()
     }
 
     /// The discs, ordered by the height of their centres.

@@ -2,16 +2,20 @@
 //! that holds them.
 //!
 //! A line Re s = σ is sought with at least the wanted number of roots to its right, but not many
-//! more: to the left with growing steps, for a neutral equation by halving the distance to the
-//! chains, and back by bisection. Newton's iteration starts from the points where the walk along
-//! the line came closest to a root; if its discs add up to the count, all is known, else the half
-//! plane is searched cell by cell. Right of the chains there may be fewer roots than wanted, or
-//! none at all: the chains themselves then lead, and the set holds what there is.
+//! more. Newton's iteration from the points where the walk along a line came closest to a root
+//! tells where the next line should be: just left of the roots wanted. Where it tells nothing,
+//! lines step to the left, by growing steps but never all the way to the chains of a neutral
+//! equation or to a line that could not be counted, and back by bisection. If the discs known add
+//! up to the count of a line, all is known, else the half plane is searched cell by cell. Right of
+//! the chains there may be fewer roots than wanted, or none at all: the chains themselves then
+//! lead, and the set holds what there is.
+
+use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
 use super::cell::Cell;
-use super::count::{Prepared, close, half_plane};
+use super::count::{Prepared, close, count_right_of, half_plane};
 use super::isolate::Search;
 use super::neutral::chain_abscissa;
 use super::newton::Disc;
@@ -34,7 +38,19 @@ const MAX_EVASIONS: u32 = 20;
 const CHAIN_MARGIN: f64 = 1e-4;
 
 /// Evaluations after which a line is given up: those that hug the chains cost without end.
-const EVALUATIONS_PER_LINE: u64 = 300_000;
+const EVALUATIONS_PER_LINE: u64 = 2_000_000;
+
+/// Lines given up before the search ends with what it has.
+const MAX_GIVEN_UP: u32 = 3;
+
+/// Newton iterations from a line, besides two for every root wanted.
+const MORE_STARTS: usize = 12;
+
+/// Share of the distance to the chains, or to a line given up, that the next line keeps.
+const APPROACH: f64 = 0.2;
+
+/// Share of the way from a root to the chains, or to its neighbour, at which a line is laid.
+const CLEARANCE: f64 = 0.3;
 
 /// The `n` rightmost roots, not counting those with Im < 0, together with their mirror images.
 ///
@@ -66,8 +82,50 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
              rightmost; the term with the highest power of s must not be delayed more than others",
         ));
     }
-    let Prepared { rest: h, zeros } = Prepared::new(h)?;
-    let chain = chain_abscissa(&h);
+    search(&Prepared::new(h)?, n, None, task)
+}
+
+/// The number of roots right of the imaginary axis and the rightmost root, the axis being walked
+/// once for both.
+///
+/// The first is that of [`count_right_of`](super::count_right_of) at 0, the second that of
+/// [`rightmost`] for one root.
+///
+/// # Errors
+/// As for these two: both in the pair, where the other may still be known.
+pub fn unstable_and_rightmost(
+    h: &QuasiPolynomial,
+    task: &Task,
+) -> (Result<u64, Error>, Result<RootSet, Error>) {
+    let prepared = match Prepared::new(h) {
+        Ok(prepared) if prepared.zeros == 0 && h.kind() != Kind::Advanced => prepared,
+        _ => return (count_right_of(h, 0.0, task), rightmost(h, 1, task)),
+    };
+    let mut walker = Walker::new(&prepared.rest, task);
+    match half_plane(&mut walker, 0.0) {
+        Ok(count) => {
+            let line = Line {
+                sigma: 0.0,
+                count,
+                hints: walker.hints,
+            };
+            (Ok(count), search(&prepared, 1, Some(line), task))
+        }
+        Err(Error::Interrupted) => (Err(Error::Interrupted), Err(Error::Interrupted)),
+        Err(error) => (Err(error), search(&prepared, 1, None, task)),
+    }
+}
+
+/// [`rightmost`], not advanced; `axis` is what is known of the right half plane.
+fn search(
+    prepared: &Prepared,
+    n: usize,
+    axis: Option<Line>,
+    task: &Task,
+) -> Result<RootSet, Error> {
+    let Prepared { rest: h, zeros } = prepared;
+    let zeros = *zeros;
+    let chain = chain_abscissa(h);
     let listed = |mut discs: Vec<Disc>, sigma: f64| {
         add_zeros(&mut discs, if sigma < 0.0 { zeros } else { 0 });
         discs
@@ -75,26 +133,26 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
     match h.kind() {
         Kind::Polynomial => {
             let everywhere = f64::NEG_INFINITY;
-            let discs = half_plane_discs(&h, everywhere, task)?;
+            let discs = half_plane_discs(h, everywhere, task)?;
             return Ok(first(listed(discs, everywhere), n, everywhere));
         }
         // Right of its chains a difference equation has no roots.
         Kind::Difference => return Ok(first(listed(Vec::new(), chain), n, chain)),
         Kind::Retarded | Kind::Neutral | Kind::Advanced => {}
     }
-    let mut lines = Lines::new(&h, chain, task);
+    let mut lines = Lines::new(h, chain, task);
+    if let Some(line) = axis {
+        lines.sort_in(line, n as u64);
+    }
     let mut wanted = n as u64;
-    let mut known: Vec<Complex64> = Vec::new();
     loop {
-        let (mut line, last) = lines.find(wanted)?;
-        line.hints.append(&mut known);
-        let discs = match discs_right_of(&h, &line, task) {
+        let (line, last) = lines.find(wanted)?;
+        let discs = match lines.discs_right_of(&line) {
             Ok(discs) => discs,
             // A cluster reaches across the line.
             Err(Error::Contour { distance, .. }) if lines.evade(&line, distance) => continue,
             Err(error) => return Err(error),
         };
-        known.extend(discs.iter().map(|disc| disc.center));
         let discs = listed(discs, line.sigma);
         if discs.len() >= n || last {
             return Ok(first(discs, n, line.sigma));
@@ -141,9 +199,16 @@ struct Line {
 struct Lines<'a> {
     h: &'a QuasiPolynomial,
     task: &'a Task,
+    /// Discs found from the hints of any line, by no order.
+    known: Vec<Disc>,
     chain: f64,
-    /// Least distance to the chains.
+    /// The chains, or the rightmost line that could not be counted.
+    barrier: f64,
+    given_up: u32,
+    /// Least distance to the barrier.
     margin: f64,
+    /// One over the longest delay.
+    first_step: f64,
     step: f64,
     start: f64,
     evasions: u32,
@@ -162,13 +227,25 @@ impl<'a> Lines<'a> {
         Self {
             h,
             task,
+            known: Vec::new(),
             chain,
+            barrier: chain,
+            given_up: 0,
             margin: CHAIN_MARGIN * step,
+            first_step: step,
             step,
             start,
             evasions: 0,
             few: None,
             enough: None,
+        }
+    }
+
+    fn sort_in(&mut self, line: Line, wanted: u64) {
+        if line.count < wanted {
+            self.few = Some(line);
+        } else {
+            self.enough = Some(line);
         }
     }
 
@@ -193,13 +270,22 @@ impl<'a> Lines<'a> {
             let sigma = match (&self.few, &self.enough) {
                 (None, None) => self.start,
                 (Some(few), None) => {
-                    if few.sigma - self.chain <= self.margin {
-                        return Ok((few.clone(), true));
+                    let few = few.clone();
+                    if few.sigma - self.barrier <= self.margin || self.given_up >= MAX_GIVEN_UP {
+                        return Ok((few, true));
                     }
                     let ahead = few.sigma - self.step;
-                    self.step *= 1.5;
-                    // Never onto the chains, only half the way.
-                    ahead.max(0.5 * (few.sigma + self.chain))
+                    match self.beyond_known_roots(&few, wanted)? {
+                        // Further left than that there may be many that no hint tells of.
+                        Some(sigma) if sigma >= ahead => sigma,
+                        _ => {
+                            self.step *= 1.5;
+                            // Never onto the barrier, only most of the way: a line costs as
+                            // much as its distance is small, so halving it would pay twice.
+                            let kept = APPROACH * (few.sigma - self.barrier);
+                            ahead.max(self.barrier + kept.max(0.99 * self.margin))
+                        }
+                    }
                 }
                 (few, Some(enough)) => {
                     let right = few.as_ref().map_or(f64::INFINITY, |few| few.sigma);
@@ -213,13 +299,16 @@ impl<'a> Lines<'a> {
                 }
             };
             match self.counted(sigma) {
-                Ok(line) if line.count < wanted => self.few = Some(line),
-                Ok(line) => self.enough = Some(line),
+                Ok(line) => self.sort_in(line, wanted),
                 // Too close to the chains, or too far left for double precision.
                 Err(error @ (Error::TooMuch { .. } | Error::Argument(_)))
                     if self.enough.is_none() =>
                 {
-                    return self.few.clone().map(|few| (few, true)).ok_or(error);
+                    if self.few.is_none() {
+                        return Err(error);
+                    }
+                    self.barrier = sigma;
+                    self.given_up += 1;
                 }
                 Err(error) => return Err(error),
             }
@@ -230,6 +319,81 @@ impl<'a> Lines<'a> {
             unit: "lines",
             advice: "ask for fewer roots, or for those in a region".into(),
         })
+    }
+
+    /// A line just left of the `wanted` rightmost roots, as far as the hints of a line tell: right
+    /// of the next one, of the barrier, and left of `line` itself.
+    fn beyond_known_roots(&mut self, line: &Line, wanted: u64) -> Result<Option<f64>, Error> {
+        let mut starts = line.hints.clone();
+        starts.sort_by(|a, b| b.re.total_cmp(&a.re));
+        starts.truncate(
+            usize::try_from(2 * wanted)
+                .unwrap_or(0)
+                .saturating_add(MORE_STARTS),
+        );
+        self.learn(&starts, u64::MAX, f64::NEG_INFINITY)?;
+        if self.given_up > 0 {
+            self.learn(&self.low_starts(line.sigma), u64::MAX, f64::NEG_INFINITY)?;
+        }
+        self.known
+            .sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
+        let mut total = 0;
+        let mut places = self.known.iter().skip_while(|disc| {
+            total += disc.weight();
+            total < wanted
+        });
+        let Some(last) = places.next() else {
+            return Ok(None);
+        };
+        let edge = last.center.re - last.radius;
+        // Those that tie with it, a pair that is listed twice among them, do not count as next.
+        let next = places
+            .map(|disc| disc.center.re + disc.radius)
+            .find(|right| *right < edge)
+            .unwrap_or(f64::NEG_INFINITY);
+        let free = edge - next.max(self.barrier);
+        // The closer to the root, the more lines have been given up.
+        let share = (0..self.given_up).fold(CLEARANCE, |share, _| 0.1 * share);
+        let sigma = edge - (share * free).min(self.step);
+        let further = line.sigma - sigma > 1e-3 * self.margin;
+        Ok((sigma > self.barrier && further).then_some(sigma))
+    }
+
+    /// Places near the lower end of a line, of which its hints may tell nothing: where one row
+    /// dominates it is not walked, and the hints kept are the first ones, from far up.
+    fn low_starts(&self, sigma: f64) -> Vec<Complex64> {
+        let spacing = 0.5 * PI * self.first_step;
+        (0..MORE_STARTS)
+            .map(|k| Complex64::new(sigma, k as f64 * spacing))
+            .collect()
+    }
+
+    /// Newton's iteration from the hints, until the discs right of `sigma` add up to `count`.
+    fn learn(&mut self, hints: &[Complex64], count: u64, sigma: f64) -> Result<(), Error> {
+        let mut walker = Walker::new(self.h, self.task);
+        let mut search = Search::with(&mut walker, std::mem::take(&mut self.known));
+        for hint in hints {
+            if search.weight_right_of(sigma) >= count {
+                break;
+            }
+            search.iterate_from(&[*hint], |s| s.is_finite())?;
+        }
+        self.known = search.found().to_vec();
+        Ok(())
+    }
+
+    /// Discs, Im ≥ 0, that hold all roots right of a line.
+    fn discs_right_of(&mut self, line: &Line) -> Result<Vec<Disc>, Error> {
+        self.learn(&line.hints, line.count, line.sigma)?;
+        self.learn(&self.low_starts(line.sigma), line.count, line.sigma)?;
+        let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
+        let discs: Vec<Disc> = self.known.iter().filter(right).copied().collect();
+        if discs.iter().map(Disc::weight).sum::<u64>() == line.count {
+            return Ok(discs);
+        }
+        let discs = half_plane_discs(self.h, line.sigma, self.task)?;
+        self.known.clone_from(&discs);
+        Ok(discs)
     }
 
     /// Count right of `sigma`, or of a line nearby where a root is in the way.
@@ -261,20 +425,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Discs, Im ≥ 0, that hold all roots right of a line.
-fn discs_right_of(h: &QuasiPolynomial, line: &Line, task: &Task) -> Result<Vec<Disc>, Error> {
-    let mut walker = Walker::new(h, task);
-    let mut search = Search::new(&mut walker);
-    search.iterate_from(&line.hints, |s| s.is_finite())?;
-    let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
-    let discs: Vec<Disc> = search.found().iter().filter(right).copied().collect();
-    if discs.iter().map(Disc::weight).sum::<u64>() == line.count {
-        return Ok(discs);
-    }
-    half_plane_discs(h, line.sigma, task)
-}
-
-/// The same, cell by cell.
+/// Discs, Im ≥ 0, that hold all roots right of a line, cell by cell.
 fn half_plane_discs(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<Vec<Disc>, Error> {
     let Some(closed) = close(h, &Region::right_of(sigma))? else {
         return Ok(Vec::new());

@@ -24,6 +24,9 @@ const CHECK_EVERY: u64 = 1024;
 /// Evaluations after which a computation is given up.
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
+/// Hints kept of a walk, the first ones.
+const MAX_HINTS: usize = 1000;
+
 /// Below this, underflow could matter and values prove nothing.
 const UNDERFLOW: f64 = 1e-250;
 
@@ -156,8 +159,10 @@ impl<'a> Walker<'a> {
         for _ in 0..40 {
             let bend = self.probe.curvature(size + span, along.re * span);
             let r = 2.0 * room / (slope + (slope * slope + 2.0 * bend * room).sqrt());
-            let r = r.min(span) * (1.0 - 1e-12);
-            best = if r.is_nan() { best } else { best.max(r) };
+            // Where the bound overflows nothing is known: `min` would take the span for it.
+            if !r.is_nan() {
+                best = best.max(r.min(span) * (1.0 - 1e-12));
+            }
             if best >= 0.25 * span {
                 break;
             }
@@ -203,7 +208,7 @@ impl<'a> Walker<'a> {
             turn.angle += libm::atan2(ratio.im, ratio.re) - self.probe.delay() * (next - here).im;
             turn.slack += 1e-15 + 1e-15 * (self.probe.delay() * (next - here).im).abs();
             let correction = modulus(jet.value) / modulus(jet.slope);
-            if before.1 < before.0 && before.1 < correction && self.hints.len() < 1000 {
+            if before.1 < before.0 && before.1 < correction && self.hints.len() < MAX_HINTS {
                 self.hints.push(here - newton_step(&jet));
             }
             before = (before.1, correction);

@@ -7,7 +7,7 @@
 //! chains. What double precision cannot tell is named, not guessed.
 
 use crate::quasipoly::{Kind, QuasiPolynomial};
-use crate::roots::{chain_abscissa, count_right_of, rightmost};
+use crate::roots::{chain_abscissa, count_right_of, rightmost, unstable_and_rightmost};
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
@@ -75,15 +75,27 @@ pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, E
         });
     }
     let chain = chain_abscissa(h);
-    let (unstable, status) = count(h, chain, task)?;
     if !abscissa {
+        let (unstable, status) = match by_chain(h, chain) {
+            Some(known) => known,
+            None => by_count(count_right_of(h, 0.0, task))?,
+        };
         return Ok(Cell {
             unstable,
             abscissa: f64::NAN,
             status,
         });
     }
-    let (abscissa, isolated) = match isolated_abscissa(h, task) {
+    let ((unstable, status), set) = match by_chain(h, chain) {
+        Some(known) => (known, rightmost(h, 1, task)),
+        None => {
+            let (number, set) = unstable_and_rightmost(h, task);
+            (by_count(number)?, set)
+        }
+    };
+    // −∞ where no root lies right of the chains.
+    let isolated = set.map(|set| set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re));
+    let (abscissa, isolated) = match isolated {
         Ok(isolated) => (isolated.max(chain), isolated),
         Err(Error::Interrupted) => return Err(Error::Interrupted),
         Err(_) => {
@@ -107,16 +119,18 @@ pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, E
     })
 }
 
-fn count(h: &QuasiPolynomial, chain: f64, task: &Task) -> Result<(i32, CellStatus), Error> {
+/// Count and status where the chains alone decide.
+fn by_chain(h: &QuasiPolynomial, chain: f64) -> Option<(i32, CellStatus)> {
     let longest = h.delays().last().zip(h.delays().first());
     let longest = longest.map_or(0.0, |(last, first)| last - first);
     if (chain * longest).abs() <= ON_THE_AXIS {
-        return Ok((UNKNOWN, CellStatus::Boundary));
+        return Some((UNKNOWN, CellStatus::Boundary));
     }
-    if chain > 0.0 {
-        return Ok((ENDLESS, CellStatus::Infinite));
-    }
-    match count_right_of(h, 0.0, task) {
+    (chain > 0.0).then_some((ENDLESS, CellStatus::Infinite))
+}
+
+fn by_count(number: Result<u64, Error>) -> Result<(i32, CellStatus), Error> {
+    match number {
         Ok(number) => Ok(match i32::try_from(number) {
             Ok(number) => (number, CellStatus::Ok),
             Err(_) => (UNKNOWN, CellStatus::Undecided),
@@ -125,10 +139,4 @@ fn count(h: &QuasiPolynomial, chain: f64, task: &Task) -> Result<(i32, CellStatu
         Err(Error::Contour { .. }) => Ok((UNKNOWN, CellStatus::Boundary)),
         Err(_) => Ok((UNKNOWN, CellStatus::Undecided)),
     }
-}
-
-/// Real part of the rightmost root; −∞ where no root lies right of the chains.
-fn isolated_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<f64, Error> {
-    let set = rightmost(h, 1, task)?;
-    Ok(set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re))
 }

@@ -146,7 +146,11 @@ fn cells_of_every_kind_are_told_apart() {
     assert_eq!(told(&make(&[s, &[2.0]], &[0.0, 0.36])), (0, CellStatus::Ok));
     assert_eq!(told(&make(&[s, &[5.0]], &[0.0, 0.36])), (2, CellStatus::Ok));
     assert_eq!(told(&make(&[s], &[0.0])), (UNKNOWN, CellStatus::Boundary));
-    let chain_leads = make(&[s, &[0.12, 0.984]], &[0.0, 0.36]);
+    // A root 7e-5 right of the chain was once taken for the chain.
+    let root_leads = make(&[s, &[0.12, 0.984]], &[0.0, 0.36]);
+    assert_eq!(told(&root_leads), (0, CellStatus::Ok));
+    // |s + 0.12| > |s|: every root of the chain lies left of its limit.
+    let chain_leads = make(&[&[0.12, 1.0], &[0.0, 0.984]], &[0.0, 0.36]);
     assert_eq!(told(&chain_leads), (0, CellStatus::Chain));
     let cell = judge(&chain_leads, true, &task).unwrap();
     assert!((cell.abscissa - 0.984f64.ln() / 0.36).abs() < 1e-14);
