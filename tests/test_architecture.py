@@ -15,8 +15,9 @@ PACKAGE = ROOT / "python" / "deadtime"
 FOUNDATION = {"error", "status", "task"}
 CORE_ARROWS = {
     "lambertw": set(),
-    "quasipoly": set(),
-    "roots": {"lambertw", "quasipoly"},
+    "elementary": set(),
+    "quasipoly": {"elementary"},
+    "roots": {"elementary", "lambertw", "quasipoly"},
     "stability": {"lambertw", "quasipoly", "roots"},
     "dde": {"quasipoly"},
 }

@@ -15,6 +15,7 @@ use super::neutral::chain_abscissa;
 use super::real::count_real;
 use super::region::Region;
 use super::winding::{Turn, Walker, is_clear};
+use crate::elementary::angle;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
@@ -51,6 +52,7 @@ impl Prepared {
                 "the zero function: every s is a root, there is nothing to count",
             ));
         }
+        // Exponents and powers of two are exact.
         let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
         // In two steps: 2^1074 itself overflows.
         let half = shift / 2;
@@ -267,10 +269,12 @@ pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
         .unwrap_or(1.0);
     let quotient = direction.conj() * jet.value * leading.signum();
     let arc = Turn {
-        angle: degree as f64 * libm::atan2(top, sigma) + libm::atan2(quotient.im, quotient.re)
+        angle: degree as f64 * angle(top, sigma) + angle(quotient.im, quotient.re)
             - walker.probe.delay() * top,
+        // A power of n factors loses 3.3 n u, n angles 8 n u, each of the three summands and the
+        // sums u: 36 u for each leaves room.
         slack: 1.58 * jet.value_error / modulus(jet.value)
-            + 1e-15 * (4.0 * degree as f64 + walker.probe.delay() * top + 4.0),
+            + 4e-15 * (1.0 + degree as f64 + walker.probe.delay() * top),
     };
     let chord = walker.walk(end, Complex64::new(sigma, 0.0))?;
     arc.then(chord).revolutions(PI).ok_or(Error::Contour {

@@ -4,8 +4,8 @@
 //! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
 //! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
 //! decides;
-//! `bounds` says where roots cannot be. All proofs take exp, sin and cos of the `libm` crate to
-//! be right within 2 ulp.
+//! `bounds` says where roots cannot be. Elementary functions are those of `crate::elementary`,
+//! with proved bounds; each file says what its inequalities leave for rounding.
 
 mod bounds;
 mod cell;

@@ -3,7 +3,8 @@
 //! On an interval of midpoint m and half-length r, Taylor's formula bounds g from below where it
 //! has no root, and g′ where it has at most one; the signs at the ends then decide. Otherwise the
 //! interval is divided. A double root, or two roots closer than double precision can tell, cannot
-//! be decided this way and are reported as a root on the contour.
+//! be decided this way and are reported as a root on the contour. Rounding: the half-length is
+//! enlarged by 1e-12, the bounds of values carry 2 per cent to spare, moduli are within 4u.
 
 use num_complex::Complex64;
 
@@ -17,8 +18,9 @@ pub(super) fn count_real(walker: &mut Walker<'_>, re: (f64, f64)) -> Result<u64,
     let mut parts = vec![re];
     while let Some((low, high)) = parts.pop() {
         walker.pause()?;
-        let r = 0.5 * (high - low);
-        let middle = Complex64::new(low + r, 0.0);
+        let middle = Complex64::new(low + 0.5 * (high - low), 0.0);
+        // The middle is rounded, so the halves differ.
+        let r = (high - middle.re).max(middle.re - low);
         walker.probe.refer_to_dominant(middle);
         let jet = walker.probe.jet(middle);
         let bend = walker.probe.curvature_around(modulus(middle) + r, r);
