@@ -4,9 +4,11 @@ The delay of a recorded loop with its uncertainty, the characteristic roots of t
 maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
+from deadtime._certificate import Certificate
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime._design import Design, design
 from deadtime._errors import (
+    CertificateError,
     ContourError,
     ConvergenceError,
     CountMismatchError,
@@ -37,6 +39,8 @@ __all__ = [
     "PI",
     "PID",
     "PV",
+    "Certificate",
+    "CertificateError",
     "ContourError",
     "ControlLoop",
     "Controller",

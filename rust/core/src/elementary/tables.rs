@@ -1,5 +1,7 @@
 //! Tables of `exp`, `sin_cos` and `angle`: every entry as a double and the double nearest to the
-//! rest, so that the sum is within 2^-106 of the number it stands for (relative to 1).
+//! rest, so that the sum is within 2⁻¹⁰⁶ of the number it stands for (relative to 1).
+
+#![allow(clippy::approx_constant)]
 
 /// 2^(j/32).
 pub(super) const POWERS: [(f64, f64); 32] = [

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 use super::bounds::{self, Dominance};
 use super::cell::Cell;
 use super::neutral::chain_abscissa;
-use super::real::count_real;
+use super::real::survey_real;
 use super::region::Region;
 use super::winding::{Turn, Walker, is_clear};
 use crate::elementary::angle;
@@ -31,6 +31,8 @@ const LOWEST_EXPONENT: i32 = -1000;
 pub(super) struct Prepared {
     pub(super) rest: QuasiPolynomial,
     pub(super) zeros: u32,
+    /// The power of two in the factor: `rest` = 2^`scale` h/sᵏ.
+    pub(super) scale: i32,
 }
 
 impl Prepared {
@@ -72,6 +74,7 @@ impl Prepared {
         Ok(Self {
             rest: QuasiPolynomial::new(rows, h.delays().to_vec())?,
             zeros: u32::try_from(common).unwrap_or(u32::MAX),
+            scale: shift,
         })
     }
 
@@ -109,13 +112,17 @@ pub(super) struct Closed {
     pub(super) mirrored: bool,
 }
 
-/// Close the open sides of `region`; `None` when it is empty of roots for sure.
+/// `region`, mirrored where it lies more below the real axis than above, with its open sides
+/// closed; it may turn out empty.
 ///
 /// # Errors
 /// [`Error::Argument`] for a region that cannot be shown to hold finitely many roots.
-pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Closed>, Error> {
-    let mirrored = region.im.1 + region.im.0 < 0.0;
-    let Region { mut re, mut im } = if mirrored { region.mirrored() } else { *region };
+pub(super) fn closed_sides(h: &QuasiPolynomial, region: &Region) -> Result<Region, Error> {
+    let Region { mut re, mut im } = if is_low(region) {
+        region.mirrored()
+    } else {
+        *region
+    };
     if im.0.is_infinite() || im.1.is_infinite() {
         let radius = bounds::dominance(h, re)
             .map(|d| d.radius)
@@ -138,6 +145,20 @@ pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Close
              the region",
         ));
     }
+    Ok(Region { re, im })
+}
+
+/// Does the region lie more below the real axis than above it?
+fn is_low(region: &Region) -> bool {
+    region.im.1 + region.im.0 < 0.0
+}
+
+/// Close the open sides of `region`; `None` when it is empty of roots for sure.
+///
+/// # Errors
+/// As [`closed_sides`].
+pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Closed>, Error> {
+    let Region { re, im } = closed_sides(h, region)?;
     if re.0 >= re.1 || im.0 >= im.1 {
         return Ok(None);
     }
@@ -151,8 +172,14 @@ pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Close
         symmetric,
         above,
         half: im.0 == 0.0,
-        mirrored,
+        mirrored: is_low(region),
     }))
+}
+
+/// Of `count` roots in a symmetric region, `real` of them real, those not below the axis: the
+/// others come in pairs.
+pub(super) fn upper_half(count: u64, real: u64) -> u64 {
+    real + count.saturating_sub(real) / 2
 }
 
 fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
@@ -206,9 +233,8 @@ pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, E
     if let Some(height) = closed.symmetric {
         let cell = Cell::new(&mut walker, closed.re, (0.0, height), true)?;
         total += if closed.half {
-            let real = count_real(&mut walker, closed.re)?;
-            // Those off the axis come in pairs.
-            real + cell.count.saturating_sub(real) / 2
+            let real = survey_real(&mut walker, closed.re, 0.5, |_| ())?;
+            upper_half(cell.count, real)
         } else {
             cell.count
         };

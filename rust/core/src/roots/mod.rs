@@ -4,11 +4,12 @@
 //! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
 //! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
 //! decides;
-//! `bounds` says where roots cannot be. Elementary functions are those of `crate::elementary`,
+//! `bounds` says where roots cannot be; `certificate` writes the proof of a count down. Elementary functions are those of `crate::elementary`,
 //! with proved bounds; each file says what its inequalities leave for rounding.
 
 mod bounds;
 mod cell;
+mod certificate;
 mod count;
 mod isolate;
 mod neutral;
@@ -20,8 +21,10 @@ mod set;
 mod stable;
 mod winding;
 
+pub use certificate::{Certificate, Contour, Segment, certify};
 pub use count::{count, count_right_of};
 pub use neutral::chain_abscissa;
+pub use real::RealPart;
 pub use region::Region;
 pub use rightmost::{rightmost, spectral_abscissa};
 pub use set::{RootSet, roots};

@@ -66,7 +66,7 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
              rightmost; the term with the highest power of s must not be delayed more than others",
         ));
     }
-    let Prepared { rest: h, zeros } = Prepared::new(h)?;
+    let Prepared { rest: h, zeros, .. } = Prepared::new(h)?;
     let chain = chain_abscissa(&h);
     let listed = |mut discs: Vec<Disc>, sigma: f64| {
         add_zeros(&mut discs, if sigma < 0.0 { zeros } else { 0 });

@@ -139,7 +139,7 @@ impl<'a> Walker<'a> {
     }
 
     /// The error of a line that cannot be proved to be clear of roots at `place`.
-    fn blocked(&mut self, place: Complex64) -> Error {
+    pub(super) fn blocked(&mut self, place: Complex64) -> Error {
         let mut distance =
             4.0 * f64::EPSILON * modulus(place).max(f64::MIN_POSITIVE / f64::EPSILON);
         for _ in 0..200 {
