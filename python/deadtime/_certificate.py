@@ -59,7 +59,7 @@ class Certificate:
     >>> from deadtime import Certificate, delay, s
     >>> proof = (s + 2.0 * delay(0.36)).certify(re=(0, None))
     >>> proof
-    <Certificate: 0 roots in re=(0, inf), im=(-inf, inf), proved on 10 segments>
+    <Certificate: 0 roots in re=(0, inf), im=(-inf, inf), proved on 3 segments>
     >>> proof.verify()
     0
     >>> Certificate.from_json(proof.to_json()) == proof

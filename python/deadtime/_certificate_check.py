@@ -261,23 +261,29 @@ class _Checker:
         error = high - low + ((high * 2) >> bits) + 2
         return (low * cosine) >> bits, -((low * sine) >> bits), error
 
-    def _bend(self, middle: complex, radius: Fraction, index: int, bits: int) -> int:
-        """Bound |g''| in a disc, times 2**bits: every rounding upwards."""
-        reach = _ceil(_above(abs(Fraction(middle.real)), abs(Fraction(middle.imag))) + radius, bits)
-        x = Fraction(middle.real)
-        total = 0
+    def _bend(self, middle: complex, radius: Fraction, index: int) -> Fraction:
+        """Bound |g''| in a disc by moduli of coefficients: exact but for |s| and exponentials."""
+        x, y = _pair(middle)
+        reach = _above(abs(x), abs(y)) + radius
+        # A hundred digits of the largest |s|, rounded up.
+        size = reach.numerator.bit_length() - reach.denominator.bit_length()
+        q = max(0, 100 - size)
+        n = _ceil(reach, q)
+        total = Fraction(0)
         for row, tau in zip(self.rows, self.delays, strict=True):
             p = dp = ddp = 0
-            for c in reversed(row):
-                ddp = ((ddp * reach) >> bits) + dp + 1
-                dp = ((dp * reach) >> bits) + p + 1
-                p = ((p * reach) >> bits) + shifted(abs(c), bits - self.q) + 2
-            gap = Fraction(tau - self.delays[index], 1 << self.t)
-            size = _ceil(abs(gap), bits)
-            curved = 2 * ddp + ((size * (2 * dp + ((size * p) >> bits) + 1)) >> bits) + 1
-            exponent = -gap * x + abs(gap) * radius
-            _, high, shift = exponential(*_binary(exponent), _FEW)
-            total += ((curved * high) >> shift) + 1 if shift >= 0 else (curved * high) << -shift
+            for power, c in enumerate(reversed(row)):
+                ddp = ddp * n + dp
+                dp = dp * n + p
+                p = p * n + (abs(c) << (q * power))
+            gap = abs(tau - self.delays[index])
+            # All three over 2^(q degree + 2 t), like the coefficients over 2^self.q besides.
+            curved = (ddp << (2 * q + 2 * self.t + 1)) + (gap * dp << (q + self.t + 1))
+            curved += gap * gap * p
+            exponent = Fraction(gap, 1 << self.t) * radius
+            exponent -= Fraction(tau - self.delays[index], 1 << self.t) * x
+            below = self.q + q * (len(row) - 1) + 2 * self.t
+            total += Fraction(curved, 1 << below) * _exponential_above(exponent)
         return total
 
     def _check_segment(self, segment: Segment) -> None:
@@ -292,11 +298,13 @@ class _Checker:
         spread = Fraction(segment.error) + Fraction(segment.slope) * radius
         if not spread**2 < value[0] ** 2 + value[1] ** 2:
             _fail(f"the function may vanish {where}")
-        found = self._enclose(segment.middle, segment.reference, abs(segment.value))
+        # More digits where the slope, times r, is compared with the value.
+        size = abs(segment.value) / max(1.0, float(radius))
+        found = self._enclose(segment.middle, segment.reference, size)
         if not found.is_within(value, Fraction(segment.error)):
             _fail(f"the value stated for {segment.middle}, {where}, is not the function's")
-        bend = self._bend(segment.middle, radius, segment.reference, found.bits)
-        steepest = found.slope_above() + Fraction(bend, 1 << found.bits) * radius
+        bend = self._bend(segment.middle, radius, segment.reference)
+        steepest = found.slope_above() + bend * radius
         if steepest > Fraction(segment.slope):
             _fail(f"the slope stated {where} can be exceeded")
 
@@ -378,7 +386,7 @@ class _Checker:
         unit = Fraction(1, 1 << found.bits)
         if abs(found.wr * unit - slope) + found.worse * unit > error:
             _fail(f"the slope stated at {part.middle} is not the function's")
-        if self._bend(complex(part.middle), radius, part.reference, found.bits) * unit > bend:
+        if self._bend(complex(part.middle), radius, part.reference) > bend:
             _fail(f"the curvature stated about {part.middle} can be exceeded")
         signs = set()
         for end_point in (part.start, part.end):
