@@ -108,7 +108,10 @@ def test_certificates_of_random_functions_verify(h, a, width, c, height):
         proof = h.certify(**region)
     except ContourError:
         assume(False)
-    assert proof.verify() == proof.count == h.count(**region) == ball_count(proof)
+    assert proof.verify() == proof.count == h.count(**region)
+    around = ball_count(proof)
+    # With the real axis for an edge the contour goes around both halves.
+    assert around == proof.count or (0 in region["im"] and around >= proof.count)
 
 
 @settings(deadline=None, max_examples=30)

@@ -89,8 +89,8 @@ class Certificate:
         """Check every claim again, without the code that made it.
 
         The checker is plain Python: polynomials in exact whole numbers, exponentials and angles
-        enclosed in fixed point to 120 binary digits below the value, inequalities between fractions.
-        It shares nothing with the native code, whose floating-point bounds it confirms or refutes.
+        enclosed in fixed point to 120 binary digits below the value, inequalities between
+        fractions. It shares nothing with the native code, whose bounds it confirms or refutes.
         Some tenths of a millisecond per segment.
 
         Returns
