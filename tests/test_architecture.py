@@ -15,15 +15,17 @@ PACKAGE = ROOT / "python" / "deadtime"
 FOUNDATION = {"error", "lanes", "status", "task"}
 CORE_ARROWS = {
     "lambertw": set(),
-    "quasipoly": set(),
-    "roots": {"lambertw", "quasipoly"},
+    "elementary": set(),
+    "quasipoly": {"elementary"},
+    "roots": {"elementary", "lambertw", "quasipoly"},
     "stability": {"lambertw", "quasipoly", "roots"},
     "dde": {"quasipoly"},
 }
 
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
 FLOORS = [
-    {"_errors", "_frozen", "_validation", "_deadtime"},
+    {"_errors", "_frozen", "_validation", "_deadtime", "_enclosures"},
+    {"_certificate_parts", "_certificate_check", "_certificate"},
     {
         "_ufunc",
         "_special",
@@ -58,7 +60,7 @@ FLOORS = [
     {"_report"},
     {"_cli"},
 ]
-NUMERICS = FLOORS[1]
+NUMERICS = FLOORS[2]
 
 
 def rust_sources(folder):

@@ -5,10 +5,12 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
 from deadtime import gallery
+from deadtime._certificate import Certificate
 from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime._design import Design, design
 from deadtime._errors import (
+    CertificateError,
     ContourError,
     ConvergenceError,
     CountMismatchError,
@@ -52,6 +54,8 @@ __all__ = [
     "PI",
     "PID",
     "PV",
+    "Certificate",
+    "CertificateError",
     "Chain",
     "ContourError",
     "ControlLoop",

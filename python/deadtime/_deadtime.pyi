@@ -39,6 +39,22 @@ _Listed: TypeAlias = tuple[
     tuple[float, float],
 ]
 
+_Pair: TypeAlias = tuple[float, float]
+# Start, end, middle, reference, value, error, slope.
+_Segment: TypeAlias = tuple[complex, complex, complex, int, complex, float, float]
+# Start, end, middle, reference, slope, error, bend.
+_Monotone: TypeAlias = tuple[float, float, float, int, float, float, float]
+# Count, scale, zeros, beyond, closed, contours, real.
+_Proof: TypeAlias = tuple[
+    int,
+    int,
+    int,
+    tuple[int, float] | None,
+    tuple[_Pair, _Pair],
+    list[tuple[_Pair, _Pair, bool, int, list[_Segment]]],
+    list[tuple[_Segment | None, _Monotone | None]],
+]
+
 @final
 class QuasiPolynomial:
     def __new__(
@@ -56,6 +72,7 @@ class QuasiPolynomial:
     def derivative(self, order: int) -> QuasiPolynomial: ...
     def values(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
     def count(self, re: tuple[float, float], im: tuple[float, float]) -> int: ...
+    def certify(self, re: tuple[float, float], im: tuple[float, float]) -> _Proof: ...
     def is_stable(self, strong: bool) -> bool: ...
     def roots(self, re: tuple[float, float], im: tuple[float, float]) -> _Listed: ...
     def rightmost(self, n: int) -> _Listed: ...

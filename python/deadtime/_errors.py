@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 __all__ = [
+    "CertificateError",
     "ContourError",
     "ConvergenceError",
     "CountMismatchError",
@@ -31,6 +32,10 @@ def _revived(kind: type[DeadtimeError], args: tuple[Any, ...], state: Any) -> De
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error
+
+
+class CertificateError(DeadtimeError):
+    """A certificate does not prove what it says: the message names the first false claim."""
 
 
 class ConvergenceError(DeadtimeError):

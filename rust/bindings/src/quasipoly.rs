@@ -25,6 +25,61 @@ type Listed<'py> = (
     (f64, f64),
 );
 
+type Range = (f64, f64);
+
+/// Start, end, middle, reference, value, error, slope.
+type Segment = (Complex64, Complex64, Complex64, usize, Complex64, f64, f64);
+
+/// Start, end, middle, reference, slope, error, bend.
+type Monotone = (f64, f64, f64, usize, f64, f64, f64);
+
+/// One of the two.
+type RealPart = (Option<Segment>, Option<Monotone>);
+
+/// Real parts, imaginary parts, symmetric, count, segments.
+type Contour = (Range, Range, bool, u64, Vec<Segment>);
+
+/// Count, scale, zeros, beyond, closed, contours, real.
+type Proof = (
+    u64,
+    i32,
+    u32,
+    Option<(usize, f64)>,
+    (Range, Range),
+    Vec<Contour>,
+    Vec<RealPart>,
+);
+
+fn segment(part: &roots::Segment) -> Segment {
+    (
+        part.start,
+        part.end,
+        part.middle,
+        part.reference,
+        part.value,
+        part.error,
+        part.slope,
+    )
+}
+
+fn real_part(part: &roots::RealPart) -> RealPart {
+    match *part {
+        roots::RealPart::Empty(ref empty) => (Some(segment(empty)), None),
+        roots::RealPart::Monotone {
+            start,
+            end,
+            middle,
+            reference,
+            slope,
+            error,
+            bend,
+        } => (
+            None,
+            Some((start, end, middle, reference, slope, error, bend)),
+        ),
+    }
+}
+
 /// A quasi-polynomial of the core.
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct QuasiPolynomial {
@@ -124,6 +179,31 @@ impl QuasiPolynomial {
         run_here(py, |task| {
             roots::count(&self.core, &Region { re, im }, task)
         })
+    }
+
+    fn certify(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<Proof> {
+        let proof = run(py, None, None, |task| {
+            roots::certify(&self.core, &Region { re, im }, task)
+        })?;
+        let contours = proof.contours.into_iter().map(|contour| {
+            let segments = contour.segments.iter().map(segment).collect();
+            (
+                contour.re,
+                contour.im,
+                contour.symmetric,
+                contour.count,
+                segments,
+            )
+        });
+        Ok((
+            proof.count,
+            proof.scale,
+            proof.zeros,
+            proof.beyond,
+            (proof.closed.re, proof.closed.im),
+            contours.collect(),
+            proof.real.iter().map(real_part).collect(),
+        ))
     }
 
     fn is_stable(&self, py: Python<'_>, strong: bool) -> PyResult<bool> {

@@ -2,10 +2,11 @@
 //! differential equations.
 //!
 //! Everything numerical of the `deadtime` Python package is here, and nothing of Python.
-//! Dependencies run one way: error, lanes ← lambertw; error ← quasipoly ← roots ← stability;
-//! quasipoly ← dde.
+//! Dependencies run one way: error, lanes ← lambertw; error ← elementary ← quasipoly ← roots ←
+//! stability; quasipoly ← dde.
 
 pub mod dde;
+pub mod elementary;
 pub mod error;
 pub mod lambertw;
 mod lanes;

@@ -4,6 +4,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::{Probe, QuasiPolynomial, beyond};
+use crate::elementary::{exp, sin_cos};
 use crate::{Error, Task};
 
 /// Points that one thread takes at a time.
@@ -52,10 +53,10 @@ impl QuasiPolynomial {
         if delay == 0.0 {
             return value;
         }
-        let (sine, cosine) = libm::sincos(delay * s.im);
+        let (sine, cosine) = sin_cos(delay * s.im);
         let turned = value * Complex64::new(cosine, -sine);
         // In two halves, so that the result overflows only where h itself does.
-        let half = libm::exp(-0.5 * delay * s.re);
+        let half = exp(-0.5 * delay * s.re);
         let grow = |part: f64| {
             if part == 0.0 {
                 part

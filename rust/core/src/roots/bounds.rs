@@ -15,9 +15,15 @@
 //! 3. In a strip |Im s| ≤ H, the first row exceeds the others far to the right whatever the
 //!    kind, since each of them carries an e^(−x d). Far to the left: the same for h(−s).
 //!
-//! Inequalities are tested with a relative margin that covers their rounding.
+//! Inequalities are tested with a relative margin of 1e-9. It covers their rounding: sums of
+//! non-negative numbers lose u per summand, weights are upper bounds (`exp_above`) of exponents that
+//! are wrong by 746 · 3 u at most, or by what `right_edge` adds to them. `cauchy_radius` starts from
+//! a guess but ends with a radius at which the inequality itself was tested.
 
-use crate::quasipoly::QuasiPolynomial;
+use num_complex::Complex64;
+
+use crate::elementary::{exp, exp_above, log};
+use crate::quasipoly::{QuasiPolynomial, modulus};
 
 /// What an inequality must be fulfilled by, relative to its larger side.
 const MARGIN: f64 = 1e-9;
@@ -31,8 +37,28 @@ pub(super) struct Dominance {
     pub(super) radius: f64,
 }
 
-/// Bound 1 on the strip `re`; `None` where no single term dominates.
+/// How a [`Dominance`] is found.
+pub(super) type Bound = fn(&QuasiPolynomial, (f64, f64)) -> Option<Dominance>;
+
+/// Bounds 1 and 2 on the strip `re`; `None` where no single term dominates.
 pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
+    nearest(h, re, |row, radius| match row {
+        0 => along_the_chains(h, re.0, radius),
+        _ => radius,
+    })
+}
+
+/// Bound 1 alone, which takes no more than a sum to check.
+pub(super) fn plain_dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
+    nearest(h, re, |_, radius| radius)
+}
+
+/// Bound 1 with the radius of each row `improved`, at its best.
+fn nearest(
+    h: &QuasiPolynomial,
+    re: (f64, f64),
+    improved: impl Fn(usize, f64) -> f64,
+) -> Option<Dominance> {
     let degree = h.degree();
     let leading = |row: &[f64]| row.get(degree).copied().unwrap_or(0.0).abs();
     let mut best: Option<Dominance> = None;
@@ -48,7 +74,7 @@ pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance
                 1.0
             } else {
                 let edge = if gap > 0.0 { re.0 } else { re.1 };
-                libm::exp(-gap * edge) * (1.0 + MARGIN)
+                exp_above(-gap * edge) * (1.0 + MARGIN)
             };
             for (total, c) in others.iter_mut().zip(row).filter(|(_, c)| **c != 0.0) {
                 *total += weight * c.abs();
@@ -57,10 +83,7 @@ pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance
         let rest: f64 = others.pop().map_or(0.0, |sum| (sum - own) * (1.0 + MARGIN));
         let rest = rest.max(0.0) + MARGIN * own;
         if own > rest {
-            let mut radius = cauchy_radius(own - rest, &others);
-            if index == 0 {
-                radius = along_the_chains(h, re.0, radius);
-            }
+            let radius = improved(index, cauchy_radius(own - rest, &others));
             if radius.is_finite() && best.is_none_or(|b| radius < b.radius) {
                 best = Some(Dominance { row: index, radius });
             }
@@ -120,7 +143,7 @@ fn along_the_chains(h: &QuasiPolynomial, sigma: f64, known: f64) -> f64 {
             } else {
                 tail(row, own, 1, r)
             };
-            sum += size * libm::exp(-gap * sigma) / denominator.sqrt();
+            sum += size * exp_above(-gap * sigma) / denominator.sqrt();
         }
         sum * (1.0 + MARGIN) < 1.0 - MARGIN
     };
@@ -151,7 +174,7 @@ pub(super) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
         .iter()
         .enumerate()
         .filter(|(_, c)| **c > 0.0)
-        .map(|(k, c)| 2.0 * libm::pow(c / top, 1.0 / (degree - k as f64)))
+        .map(|(k, c)| 2.0 * exp((log(*c) - log(top)) / (degree - k as f64)))
         .fold(0.0, f64::max);
     let exceeds = |r: f64| {
         let others = lower.iter().fold(0.0, |sum, c| (sum + c) / r);
@@ -168,7 +191,7 @@ pub(super) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
     }
     while high > 1.01 * low {
         // Not the root of the product, which leaves the range of double precision.
-        let middle = libm::sqrt(low) * libm::sqrt(high);
+        let middle = low.sqrt() * high.sqrt();
         if !(low < middle && middle < high) {
             break;
         }
@@ -196,23 +219,26 @@ pub(super) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
         .map(|(row, gap)| ((row.len() as f64 - 1.0 - own_degree) / gap).max(0.0))
         .fold(0.0, f64::max);
     let holds = |x: f64| {
-        let stretch = libm::sqrt(1.0 + (height / x) * (height / x));
-        let summand = |k: usize, c: f64, modulus: f64| {
-            // In logarithms, since high powers of x overflow where the exponential is small.
-            c.abs() * libm::exp(k as f64 * libm::log(modulus) - own_degree * libm::log(x))
+        let modulus = modulus(Complex64::new(x, height));
+        // In logarithms, since high powers of x overflow where the exponential is small.
+        let powers = own_degree * log(x);
+        let summand = |k: usize, c: f64, gap: f64| {
+            let (grown, decay) = (k as f64 * log(modulus), gap * x);
+            // Each part is within 1e-14 of 1 + itself, however much of them cancels.
+            let room = 1e-14 * (1.0 + k as f64 + own_degree + grown.abs() + powers.abs() + decay);
+            c.abs() * exp_above(grown - powers - decay + room)
         };
         let lower = first.iter().rev().skip(1).rev().enumerate();
-        let mut sum: f64 = lower.map(|(k, c)| summand(k, *c, x * stretch)).sum();
+        let mut sum: f64 = lower.map(|(k, c)| summand(k, *c, 0.0)).sum();
         for (row, gap) in &others {
             for (k, c) in row.iter().enumerate().filter(|(_, c)| **c != 0.0) {
-                let exponent =
-                    k as f64 * libm::log(x * stretch) - own_degree * libm::log(x) - gap * x;
-                sum += c.abs() * libm::exp(exponent);
+                sum += summand(k, *c, *gap);
             }
         }
         sum * (1.0 + MARGIN) < own
     };
-    let mut x = falling.max(1e-6);
+    // A little beyond, for the rounding of the quotient.
+    let mut x = (falling * (1.0 + MARGIN)).max(1e-6);
     while !holds(x) && x < 1e150 {
         x *= 2.0;
     }
@@ -238,7 +264,6 @@ pub(super) fn left_edge(h: &QuasiPolynomial, height: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_complex::Complex64;
 
     fn make(rows: &[&[f64]], delays: &[f64]) -> QuasiPolynomial {
         QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec())

@@ -10,13 +10,14 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::bounds::{self, Dominance};
+use super::bounds::{self, Bound, Dominance};
 use super::cell::Cell;
 use super::dominated::descend;
 use super::neutral::chain_abscissa;
-use super::real::count_real;
+use super::real::survey_real;
 use super::region::Region;
 use super::winding::{Turn, Walker, is_clear};
+use crate::elementary::angle;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
@@ -32,6 +33,8 @@ const LOWEST_EXPONENT: i32 = -1000;
 pub(super) struct Prepared {
     pub(super) rest: QuasiPolynomial,
     pub(super) zeros: u32,
+    /// The power of two in the factor: `rest` = 2^`scale` h/sᵏ.
+    pub(super) scale: i32,
 }
 
 impl Prepared {
@@ -53,6 +56,7 @@ impl Prepared {
                 "the zero function: every s is a root, there is nothing to count",
             ));
         }
+        // Exponents and powers of two are exact.
         let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
         // In two steps: 2^1074 itself overflows.
         let half = shift / 2;
@@ -72,6 +76,7 @@ impl Prepared {
         Ok(Self {
             rest: QuasiPolynomial::new(rows, h.delays().to_vec())?,
             zeros: u32::try_from(common).unwrap_or(u32::MAX),
+            scale: shift,
         })
     }
 
@@ -109,15 +114,23 @@ pub(super) struct Closed {
     pub(super) mirrored: bool,
 }
 
-/// Close the open sides of `region`; `None` when it is empty of roots for sure.
+/// `region`, mirrored where it lies more below the real axis than above, with its open sides
+/// closed; it may turn out empty.
 ///
 /// # Errors
 /// [`Error::Argument`] for a region that cannot be shown to hold finitely many roots.
-pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Closed>, Error> {
-    let mirrored = region.im.1 + region.im.0 < 0.0;
-    let Region { mut re, mut im } = if mirrored { region.mirrored() } else { *region };
+pub(super) fn closed_sides(
+    h: &QuasiPolynomial,
+    region: &Region,
+    bound: Bound,
+) -> Result<Region, Error> {
+    let Region { mut re, mut im } = if is_low(region) {
+        region.mirrored()
+    } else {
+        *region
+    };
     if im.0.is_infinite() || im.1.is_infinite() {
-        let radius = bounds::dominance(h, re)
+        let radius = bound(h, re)
             .map(|d| d.radius)
             .ok_or_else(|| endless(h, re))?;
         // A little beyond, so that the edge itself is clear.
@@ -139,6 +152,24 @@ pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Close
              the region",
         ));
     }
+    Ok(Region { re, im })
+}
+
+/// Does the region lie more below the real axis than above it?
+fn is_low(region: &Region) -> bool {
+    region.im.1 + region.im.0 < 0.0
+}
+
+/// Close the open sides of `region`; `None` when it is empty of roots for sure.
+///
+/// # Errors
+/// As [`closed_sides`].
+pub(super) fn close(
+    h: &QuasiPolynomial,
+    region: &Region,
+    bound: Bound,
+) -> Result<Option<Closed>, Error> {
+    let Region { re, im } = closed_sides(h, region, bound)?;
     if re.0 >= re.1 || im.0 >= im.1 {
         return Ok(None);
     }
@@ -152,8 +183,14 @@ pub(super) fn close(h: &QuasiPolynomial, region: &Region) -> Result<Option<Close
         symmetric,
         above,
         half: im.0 == 0.0,
-        mirrored,
+        mirrored: is_low(region),
     }))
+}
+
+/// Of `count` roots in a symmetric region, `real` of them real, those not below the axis: the
+/// others come in pairs.
+pub(super) fn upper_half(count: u64, real: u64) -> u64 {
+    real + count.saturating_sub(real) / 2
 }
 
 fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
@@ -200,16 +237,15 @@ pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, E
     let h = &prepared.rest;
     region.check()?;
     let mut total = u64::from(prepared.zeros_in(region)?);
-    let Some(closed) = close(h, region)? else {
+    let Some(closed) = close(h, region, bounds::dominance)? else {
         return Ok(total);
     };
     let mut walker = Walker::new(h, task);
     if let Some(height) = closed.symmetric {
         let cell = Cell::new(&mut walker, closed.re, (0.0, height), true)?;
         total += if closed.half {
-            let real = count_real(&mut walker, closed.re)?;
-            // Those off the axis come in pairs.
-            real + cell.count.saturating_sub(real) / 2
+            let real = survey_real(&mut walker, closed.re, 0.5, |_| ())?;
+            upper_half(cell.count, real)
         } else {
             cell.count
         };
@@ -270,10 +306,12 @@ pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
         .unwrap_or(1.0);
     let quotient = direction.conj() * jet.value * leading.signum();
     let arc = Turn {
-        angle: degree as f64 * libm::atan2(top, sigma) + libm::atan2(quotient.im, quotient.re)
+        angle: degree as f64 * angle(top, sigma) + angle(quotient.im, quotient.re)
             - walker.probe.delay() * top,
+        // A power of n factors loses 3.3 n u, n angles 8 n u, each of the three summands and the
+        // sums u: 36 u for each leaves room.
         slack: 1.58 * jet.value_error / modulus(jet.value)
-            + 1e-15 * (4.0 * degree as f64 + walker.probe.delay() * top + 4.0),
+            + 4e-15 * (1.0 + degree as f64 + walker.probe.delay() * top),
     };
     let (place, skipped) = descend(walker, row, end);
     let chord = walker.walk(place, Complex64::new(sigma, 0.0))?;

@@ -11,7 +11,8 @@
 
 use num_complex::Complex64;
 
-use super::winding::{Turn, Walker, is_clear};
+use super::winding::{STEP_ERROR, Turn, Walker, is_clear};
+use crate::elementary::{angle, exp_above};
 use crate::quasipoly::modulus;
 
 /// Share of what the bounds allow.
@@ -77,7 +78,9 @@ pub(super) fn descend(
     let weights: Vec<f64> = h
         .delays()
         .iter()
-        .map(|delay| libm::exp(-(delay - own_delay) * from.re) * (1.0 + 1e-9))
+        .map(|delay| exp_above(-(delay - own_delay) * from.re) * (1.0 + 1e-9))
+        // A weight lost in underflow is not none.
+        .map(|weight| weight.max(f64::MIN_POSITIVE))
         .collect();
     let span = h
         .delays()
@@ -85,7 +88,7 @@ pub(super) fn descend(
         .map(|delay| (delay - own_delay).abs())
         .fold(0.0, f64::max);
     let mut here = from;
-    let mut angle = 0.0;
+    let mut turned = 0.0;
     let mut slack = 0.0;
     let mut first: Option<Complex64> = None;
     let mut last = Complex64::ZERO;
@@ -97,8 +100,8 @@ pub(super) fn descend(
         let size = modulus(own.value);
         if first.is_some() {
             let ratio = own.value * last.conj() / (modulus(last) * size);
-            angle += libm::atan2(ratio.im, ratio.re);
-            slack += 1e-15;
+            turned += angle(ratio.im, ratio.re);
+            slack += STEP_ERROR + f64::EPSILON * turned.abs();
         } else {
             first = Some(own.value);
             slack += 1.58 * own.rounding / size;
@@ -116,18 +119,19 @@ pub(super) fn descend(
     };
     walker.probe.refer_to(leader);
     let (top, bottom) = (walker.probe.jet(from), walker.probe.jet(here));
-    if !(is_clear(&top) && is_clear(&bottom) && angle.is_finite()) {
+    if !(is_clear(&top) && is_clear(&bottom) && turned.is_finite()) {
         return nowhere;
     }
     let excess = |value: Complex64, leading: Complex64| {
         let ratio = (value / modulus(value)) * (leading / modulus(leading)).conj();
-        libm::atan2(ratio.im, ratio.re)
+        angle(ratio.im, ratio.re)
     };
-    angle += excess(bottom.value, last) - excess(top.value, first);
-    angle -= own_delay * (here.im - from.im);
+    turned += excess(bottom.value, last) - excess(top.value, first);
+    turned -= own_delay * (here.im - from.im);
     slack += 1.58 * top.value_error / modulus(top.value)
         + 1.58 * bottom.value_error / modulus(bottom.value)
-        + 1e-15 * (4.0 + own_delay * (from.im + here.im));
+        + STEP_ERROR * (4.0 + own_delay * (from.im + here.im));
+    let angle = turned;
     (here, Turn { angle, slack })
 }
 

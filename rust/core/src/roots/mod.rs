@@ -4,12 +4,13 @@
 //! outweighs the others; `cell` builds rectangles with counts from it,
 //! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
 //! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
-//! decides; `sensitivity` says how a root moves;
-//! `bounds` says where roots cannot be. All proofs take exp, sin and cos of the `libm` crate to
-//! be right within 2 ulp.
+//! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be; `certificate`
+//! writes the proof of a count down. Elementary functions are those of `crate::elementary`, with
+//! proved bounds; each file says what its inequalities leave for rounding.
 
 mod bounds;
 mod cell;
+mod certificate;
 mod count;
 mod dominated;
 mod isolate;
@@ -23,8 +24,10 @@ mod set;
 mod stable;
 mod winding;
 
+pub use certificate::{Certificate, Contour, Segment, certify};
 pub use count::{count, count_right_of};
 pub use neutral::chain_abscissa;
+pub use real::RealPart;
 pub use region::Region;
 pub use rightmost::{rightmost, spectral_abscissa, unstable_and_rightmost};
 pub use sensitivity::sensitivity;

@@ -8,7 +8,10 @@
 //! C_D < 0 is what strong stability asks for (Hale and Verduyn Lunel 2002). For commensurate
 //! delays taken as exact, as for every difference equation with one base, the chains may end
 //! further left; `chain_abscissa` does not use that, `is_stable` does where asked to.
+//! C_D is computed to rounding and no proof leans on it: where a line must lie right of the chains,
+//! `bounds::dominance` tests the inequality itself.
 
+use crate::elementary::{exp, log};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 
 /// C_D: −∞ where there is no chain (polynomial, retarded), +∞ for an advanced equation.
@@ -34,30 +37,30 @@ pub fn chain_abscissa(h: &QuasiPolynomial) -> f64 {
     };
     let chain: Vec<(f64, f64)> = leading
         .filter(|(size, _)| *size > 0.0)
-        .map(|(size, delay)| (libm::log(size) - libm::log(own), delay - first))
+        .map(|(size, delay)| (log(size) - log(own), delay - first))
         .collect();
     // log Σ e^(log|b_j/a| − c d_j) = 0: falling and convex in c. Each summand alone gives a lower
     // bound of the root; with m summands log m more, an upper one.
-    let spread = libm::log(chain.len() as f64);
+    let spread = log(chain.len() as f64);
     let bound = |extra: f64| {
         chain
             .iter()
-            .map(|(log, d)| (log + extra) / d)
+            .map(|(size, d)| (size + extra) / d)
             .fold(f64::NEG_INFINITY, f64::max)
     };
     let (mut low, mut high) = (bound(0.0), bound(spread));
     let excess = |c: f64| {
         let top = chain
             .iter()
-            .map(|(log, d)| log - c * d)
+            .map(|(size, d)| size - c * d)
             .fold(f64::NEG_INFINITY, f64::max);
         let (mut sum, mut slope) = (0.0, 0.0);
-        for (log, d) in &chain {
-            let part = libm::exp(log - c * d - top);
+        for (size, d) in &chain {
+            let part = exp(size - c * d - top);
             sum += part;
             slope += d * part;
         }
-        (top + libm::log(sum), slope / sum)
+        (top + log(sum), slope / sum)
     };
     // Newton from the left of the root of a convex falling function never oversteps it.
     let mut c = low;

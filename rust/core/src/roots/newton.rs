@@ -4,7 +4,7 @@
 //! bounds) and B a bound on |g″| in the disc of radius t. On a circle of radius r ≤ t with
 //! a + B r²/2 < b r, g differs from g′(z)(s − z) by less than the size of the latter: by Rouché's
 //! theorem g has exactly one root within r. The least such r is the radius claimed, the largest
-//! the radius of isolation.
+//! the radius of isolation; margins of 1e-9 cover the rounding of these few operations.
 //!
 //! Multiple roots and clusters that double precision does not tell apart: the winding number
 //! along the smallest square on which it can be proved, centred at the root of the (m−1)-st
@@ -18,6 +18,10 @@ use crate::Error;
 use crate::quasipoly::{Probe, modulus};
 
 const MAX_STEPS: u32 = 60;
+
+/// Squares of slopes outside these leave the range of double precision.
+const LEAST: f64 = 1e-150;
+const MOST: f64 = 1e150;
 
 /// A disc in which the number of roots is proved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,7 +100,7 @@ pub(super) fn simple_disc(probe: &mut Probe<'_>, z: Complex64) -> Option<Disc> {
     let jet = probe.jet(z);
     let a = modulus(jet.value) + jet.value_error;
     let b = modulus(jet.slope) - jet.slope_error;
-    if !(b > 0.0 && a.is_finite()) {
+    if !(b > LEAST && b < MOST && a < MOST) {
         return None;
     }
     let size = modulus(z);

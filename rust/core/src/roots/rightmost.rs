@@ -14,6 +14,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
+use super::bounds::dominance;
 use super::cell::Cell;
 use super::count::{Prepared, close, count_right_of, half_plane};
 use super::isolate::Search;
@@ -123,7 +124,7 @@ fn search(
     axis: Option<Line>,
     task: &Task,
 ) -> Result<RootSet, Error> {
-    let Prepared { rest: h, zeros } = prepared;
+    let Prepared { rest: h, zeros, .. } = prepared;
     let zeros = *zeros;
     let chain = chain_abscissa(h);
     let listed = |mut discs: Vec<Disc>, sigma: f64| {
@@ -427,7 +428,7 @@ impl<'a> Lines<'a> {
 
 /// Discs, Im ≥ 0, that hold all roots right of a line, cell by cell.
 fn half_plane_discs(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<Vec<Disc>, Error> {
-    let Some(closed) = close(h, &Region::right_of(sigma))? else {
+    let Some(closed) = close(h, &Region::right_of(sigma), dominance)? else {
         return Ok(Vec::new());
     };
     let mut walker = Walker::new(h, task);

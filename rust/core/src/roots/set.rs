@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::bounds::dominance;
 use super::cell::Cell;
 use super::count::{Closed, Prepared, close};
 use super::isolate::Search;
@@ -114,7 +115,7 @@ pub fn roots(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSe
     region.check()?;
     let zeros = prepared.zeros_in(region)?;
     let mut discs = Vec::new();
-    let Some(closed) = close(h, region)? else {
+    let Some(closed) = close(h, region, dominance)? else {
         add_zeros(&mut discs, zeros);
         return Ok(RootSet::new(discs, *region));
     };

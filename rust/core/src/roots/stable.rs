@@ -42,7 +42,7 @@ const MAX_SAMPLES: u32 = 1 << 20;
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn is_stable(h: &QuasiPolynomial, strong: bool, task: &Task) -> Result<bool, Error> {
-    let Prepared { rest: h, zeros } = Prepared::new(h)?;
+    let Prepared { rest: h, zeros, .. } = Prepared::new(h)?;
     if zeros > 0 || h.kind() == Kind::Advanced || strong && chain_abscissa(&h) >= 0.0 {
         return Ok(false);
     }
