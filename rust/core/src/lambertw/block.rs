@@ -124,24 +124,7 @@ impl Kernel<3, 3> for LambertWLog {
 /// `w[i] = W_k[i](e^log_z[i])`: the solution of w + log w = log z + 2 pi i k, also where
 /// |Im log z| exceeds pi.
 pub fn lambertw_log(log_z: &[Complex64], k: &[i64], w: &mut [Complex64]) {
-    let load = |i| {
-        let (log, k): (&Complex64, &i64) = (log_z.get(i)?, k.get(i)?);
-        Some([log.re, log.im, *k as f64])
-    };
-    let length = log_z.len().min(k.len()).min(w.len());
-    run(
-        &LambertWLog,
-        length,
-        load,
-        |i, [re, im, beyond]: [f64; 3]| {
-            *w.get_mut(i)? = if beyond == 0.0 {
-                Complex64::new(re, im)
-            } else {
-                log_form::far(*log_z.get(i)?, *k.get(i)?)
-            };
-            Some(())
-        },
-    );
+    by_branch(&LambertWLog, log_z, k, w, log_form::far);
 }
 
 /// `w[i]`, the Wright omega function of `z[i]`: the solution of w + log w = z.
@@ -193,24 +176,7 @@ impl Kernel<3, 3> for Derivative {
 
 /// `slope[i]`, the derivative of W_k[i] at `z[i]`.
 pub fn lambertw_derivative(z: &[Complex64], k: &[i64], slope: &mut [Complex64]) {
-    let load = |i| {
-        let (z, k): (&Complex64, &i64) = (z.get(i)?, k.get(i)?);
-        Some([z.re, z.im, *k as f64])
-    };
-    let length = z.len().min(k.len()).min(slope.len());
-    run(
-        &Derivative,
-        length,
-        load,
-        |i, [re, im, beyond]: [f64; 3]| {
-            *slope.get_mut(i)? = if beyond == 0.0 {
-                Complex64::new(re, im)
-            } else {
-                far_derivative(*z.get(i)?, *k.get(i)?)
-            };
-            Some(())
-        },
-    );
+    by_branch(&Derivative, z, k, slope, far_derivative);
 }
 
 /// The derivative where the kernel in lanes does not reach.
@@ -307,6 +273,29 @@ pub fn dde_root(a0: &[f64], a1: &[f64], delay: &[f64], k: &[i64], s: &mut [Compl
             Complex64::new(re, im)
         } else {
             delay::far_root(*a0.get(i)?, *a1.get(i)?, *delay.get(i)?, *k.get(i)?)
+        };
+        Some(())
+    });
+}
+
+/// `out[i] = kernel(z[i], k[i])`, by `far` where the kernel marks that it does not reach.
+fn by_branch<K: Kernel<3, 3>>(
+    kernel: &K,
+    z: &[Complex64],
+    k: &[i64],
+    out: &mut [Complex64],
+    far: impl Fn(Complex64, i64) -> Complex64,
+) {
+    let load = |i| {
+        let (z, k): (&Complex64, &i64) = (z.get(i)?, k.get(i)?);
+        Some([z.re, z.im, *k as f64])
+    };
+    let length = z.len().min(k.len()).min(out.len());
+    run(kernel, length, load, |i, [re, im, beyond]: [f64; 3]| {
+        *out.get_mut(i)? = if beyond == 0.0 {
+            Complex64::new(re, im)
+        } else {
+            far(*z.get(i)?, *k.get(i)?)
         };
         Some(())
     });
