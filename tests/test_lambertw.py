@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import scipy.special
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 EPS = 2.0**-52
@@ -473,6 +473,23 @@ def test_the_root_at_the_stability_boundary_has_the_right_sign(a0, power, above)
     assert s.imag == 0
     # The sum of two doubles in doubles is exact here or has the right sign anyway.
     assert np.sign(s.real) == np.sign(a0 + a1)
+
+
+@given(
+    st.floats(1e-3, 1e3),
+    st.sampled_from([-1, 1]),
+    st.floats(1e-3, 1e2),
+)
+@example(0.21565670435126938, 1, 1.0)
+@example(1.0000001, 1, 1.0)
+def test_terms_that_balance_have_the_root_zero(magnitude, sign, delay):
+    # s = a (1 - e^(-s T)): zero belongs to branch 0 while a T <= 1, to branch -1 from there on.
+    a0 = sign * magnitude
+    roots = dtm.dde_roots(a0, -a0, delay, [0, -1])
+    product = mpmath.mpf(a0) * mpmath.mpf(delay)
+    assert roots[0 if product <= 1 else 1] == 0
+    if abs(product - 1) > 1e-6:
+        assert roots[1 if product <= 1 else 0] != 0
 
 
 def test_the_loop_of_the_paper_turns_unstable_where_theory_says():

@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 import scipy.special
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 EPS = 2.0**-52
@@ -141,6 +141,23 @@ def test_log_form_and_plain_form_agree(modulus, angle, k):
     w, other = dtm.lambertw(z, k), dtm.lambertw_log(complex(modulus, angle), k)
     # z is rounded, and its logarithm may be large: the same as an error of log z.
     assert abs(w - other) <= 4 * EPS * (abs(modulus) + 10) * abs(w / (1 + w)) + EPS * abs(w)
+
+
+# Turns that cancel against Im log z leave an angle whose second word counts.
+cancelling = st.builds(
+    lambda re, rest, k: (complex(re, rest - math.tau * k), k),
+    st.floats(-50, 50),
+    st.floats(-1e7, 1e7) | st.floats(-4, 4),
+    st.integers(2**20, 2**45) | st.integers(-(2**45), -(2**20)),
+)
+
+
+@given(cancelling)
+@settings(max_examples=200)
+@example((37169030j, -5261527))
+def test_turns_that_cancel_in_the_log_form(case):
+    log_z, k = case
+    check_log_form(complex(dtm.lambertw_log(log_z, k)), log_z, k)
 
 
 @given(logs, st.integers(-(2**40), 2**40))

@@ -205,7 +205,25 @@ impl<S: Simd> Problem<S> {
         if near.any() {
             sigma = near.choose(self.near_zero(sigma), sigma);
         }
-        meeting.choose(met, sigma).folded()
+        sigma = meeting.choose(met, sigma);
+        // With beta = -alpha one root is zero, and W = -alpha: of the upper sheet up to alpha = 1,
+        // of the lower one from there on. The steps leave something like 1e-87 of it.
+        let balanced = self.alpha.hi.eq(-self.factor.hi * self.beta_power())
+            & self.alpha.lo.eq(-self.factor.lo * self.beta_power());
+        let upper_sheet = principal_branch & alpha.le(1.0);
+        let lower_sheet = joined & !principal_branch & alpha.ge(1.0);
+        let at_zero = balanced & (upper_sheet | lower_sheet);
+        at_zero.choose(Complex::new(zero, zero), sigma).folded()
+    }
+
+    /// 2^exponent, within the range in which beta and alpha can balance or a sigma be near zero:
+    /// beta is of the size of alpha there, or so small that it does not matter.
+    #[inline(always)]
+    fn beta_power(&self) -> Real<S> {
+        self.exponent
+            .larger(-1_000.0)
+            .smaller(1_000.0)
+            .power_of_two()
     }
 
     /// z = beta e^-alpha where `wanted`, zero where it underflows.
@@ -279,14 +297,8 @@ impl<S: Simd> Problem<S> {
     /// Newton's method on sigma - (alpha + beta) - beta (e^-sigma - 1) where its terms are small.
     #[inline(always)]
     fn near_zero(&self, sigma: Complex<S>) -> Complex<S> {
-        // beta is of the size of alpha there, or so small that it does not matter.
         let zero = sigma.re.constant(0.0);
-        let power = self
-            .exponent
-            .larger(-1_000.0)
-            .smaller(1_000.0)
-            .power_of_two();
-        let beta = self.factor.scaled(power);
+        let beta = self.factor.scaled(self.beta_power());
         let sum = self.alpha.plus(beta).rounded();
         let one = zero.constant(1.0);
         let one_plus_beta = TwoWord::from_word(one).plus(beta).rounded();

@@ -14,6 +14,7 @@ use num_complex::Complex64;
 use crate::lanes::{Complex, Mask, Real, Simd};
 
 use super::branch_point::one_plus_w as near_branch_point;
+use super::columns::{Kernel, SHORT, sweep};
 use super::guess::{behind, logarithmic_step, principal};
 use super::huge_branch::{HUGE_BRANCH, turns};
 use super::kernel::{SERIES_ANSWERS, SERIES_STARTS, reflected};
@@ -149,6 +150,28 @@ fn upper<S: Simd>(modulus: Real<S>, angle: TwoWord<S>) -> Complex<S> {
     w.folded()
 }
 
+/// W at an angle of two words.
+struct AtAngle;
+
+impl Kernel<3, 2> for AtAngle {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, [modulus, angle, low]: [Real<S>; 3]) -> [Real<S>; 2] {
+        let side = angle.sign();
+        let w = upper(modulus, TwoWord::new(angle, low).flipped(side));
+        let w = reflected(w, side);
+        [w.re, w.im]
+    }
+}
+
+/// W within reach of the kernel, as one element of it.
+fn at_angle(modulus: f64, angle: f64, low: f64) -> Complex64 {
+    let arguments = [modulus, angle, low].map(|argument| [argument; SHORT]);
+    let mut values = [[0.0; SHORT]; 2];
+    sweep(&AtAngle, &arguments, &mut values, 1);
+    let [[re, ..], [im, ..]] = values;
+    Complex64::new(re, im)
+}
+
 /// W where the kernel in lanes does not reach.
 pub(super) fn far(log: Complex64, k: i64) -> Complex64 {
     // The angle in two words.
@@ -158,9 +181,12 @@ pub(super) fn far(log: Complex64, k: i64) -> Complex64 {
     } else {
         (turn, turn_low)
     };
-    let angle = log.im + turn;
-    let from_turn = angle - log.im;
-    let low = (log.im - (angle - from_turn)) + (turn - from_turn) + turn_low;
+    let rounded = log.im + turn;
+    let from_turn = rounded - log.im;
+    let rest = (log.im - (rounded - from_turn)) + (turn - from_turn) + turn_low;
+    // Where turns cancel, the rest may be as large as what they leave.
+    let angle = rounded + rest;
+    let low = rest - (angle - rounded);
     if log.re.is_nan() || !angle.is_finite() {
         return Complex64::new(f64::NAN, f64::NAN);
     }
@@ -178,7 +204,7 @@ pub(super) fn far(log: Complex64, k: i64) -> Complex64 {
     }
     if log.re.abs() < FAR_MODULUS && angle.abs() < FAR_ANGLE {
         // Turns that cancel: what is left is within reach.
-        return super::lambertw_log(Complex64::new(log.re, angle), 0);
+        return at_angle(log.re, angle, low);
     }
     (0..4).fold(Complex64::new(log.re, angle), |w, _| {
         // A common factor keeps the hypotenuse in range.
