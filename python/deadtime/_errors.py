@@ -61,12 +61,25 @@ class ContourError(DeadtimeError):
         Where on the contour.
     distance : float
         How far to move the edge at least.
+    inside : int or None
+        The number of roots proved to lie inside and clear of the edge, where it is known.
+    on_edge : list of (complex, float, int)
+        Centre, radius and number of roots of each disc that meets the edge, where they are known.
     """
 
-    def __init__(self, message: str, place: complex, distance: float) -> None:
+    def __init__(
+        self,
+        message: str,
+        place: complex,
+        distance: float,
+        inside: int | None = None,
+        on_edge: Sequence[tuple[complex, float, int]] = (),
+    ) -> None:
         super().__init__(message)
         self.place = place
         self.distance = distance
+        self.inside = inside
+        self.on_edge = list(on_edge)
 
 
 class CountMismatchError(DeadtimeError):

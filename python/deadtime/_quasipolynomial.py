@@ -28,6 +28,8 @@ __all__ = ["QuasiPolynomial", "delay", "s"]
 
 Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "advanced"]
 Range: TypeAlias = tuple[float | None, float | None]
+#: What becomes of roots on the edge of a region.
+Edge: TypeAlias = Literal["error", "inside", "outside"]
 
 
 class QuasiPolynomial:
@@ -261,7 +263,9 @@ class QuasiPolynomial:
 
     # Roots
 
-    def count(self, re: Range | None = None, im: Range | None = None) -> int:
+    def count(
+        self, re: Range | None = None, im: Range | None = None, *, edge: Edge = "error"
+    ) -> int:
         """Count the roots in a region, with multiplicity, and prove the number.
 
         Parameters
@@ -269,6 +273,9 @@ class QuasiPolynomial:
         re, im : tuple of (float or None, float or None), optional
             Ranges of the real part (1/s) and of the imaginary part (rad/s); None is an open end.
             A root on the real axis belongs to a region that has the axis as its edge.
+        edge : {"error", "inside", "outside"}
+            What becomes of roots on the edge, or closer to it than their discs can tell: they are
+            refused, belong to the region, or do not.
 
         Returns
         -------
@@ -277,8 +284,9 @@ class QuasiPolynomial:
         Raises
         ------
         ContourError
-            If a root lies on the edge, or closer to it than double precision can tell. The edge
-            is never moved silently.
+            If a root lies on the edge, or closer to it than two words of double precision can
+            tell. Its ``on_edge`` has the places, its ``inside`` the number that is clear of the
+            edge. The edge is never moved silently.
         ValueError
             If a range is not increasing, or the region holds infinitely many roots.
 
@@ -296,8 +304,10 @@ class QuasiPolynomial:
         159
         >>> (s + 5.0 * delay(0.36)).count(re=(0, None))
         2
+        >>> (s**2 + 4).count(re=(0, 1), im=(0, 3), edge="inside")
+        1
         """
-        return self._native.count(_range("re", re), _range("im", im))
+        return self._native.count(_range("re", re), _range("im", im), edge)
 
     def certify(self, re: Range | None = None, im: Range | None = None) -> Certificate:
         """Count the roots in a region and write the proof down.
@@ -329,12 +339,16 @@ class QuasiPolynomial:
         rows, delays = self._coefficients.tolist(), self._delays.tolist()
         return Certificate._made(rows, delays, region, self._native.certify(*region))
 
-    def roots(self, re: Range | None = None, im: Range | None = None) -> RootSet:
+    def roots(
+        self, re: Range | None = None, im: Range | None = None, *, edge: Edge = "error"
+    ) -> RootSet:
         """Locate every root in a region, each with a disc proved to hold it.
 
         Parameters
         ----------
         re, im : tuple of (float or None, float or None), optional
+            As in `count`.
+        edge : {"error", "inside", "outside"}
             As in `count`.
 
         Returns
@@ -347,12 +361,13 @@ class QuasiPolynomial:
         ContourError, ValueError
             As in `count`.
         CountMismatchError
-            If double precision does not suffice to locate all roots that were counted.
+            If two words of double precision do not suffice to locate all roots that were counted.
 
         Notes
         -----
-        The region is divided into cells with proved counts; Newton's iteration in each; a disc
-        about every limit by Rouché's theorem, or by a winding number for clusters.
+        The region is divided into cells with proved counts; Newton's iteration in each, in two
+        words where double precision is lost; a disc about every limit by Rouché's theorem, or by
+        Pellet's for several roots that two words do not tell apart.
 
         Examples
         --------
@@ -360,7 +375,7 @@ class QuasiPolynomial:
         >>> ((s + delay(1.0)) ** 2).roots(re=(-1, 1), im=(0, 5)).multiplicities
         array([2])
         """
-        return _root_set(self._native.roots(_range("re", re), _range("im", im)))
+        return _root_set(self._native.roots(_range("re", re), _range("im", im), edge))
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost roots and prove that nothing else lies that far right.

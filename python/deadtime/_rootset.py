@@ -38,8 +38,8 @@ class RootSet(ReadOnlyArrays):
     radii : ndarray of float, shape (n,)
         Radii of the discs, in 1/s: every root is within the radius of its centre.
     resolved : ndarray of bool, shape (n,)
-        Is the disc proved to hold one single point? Not so for a multiple root, nor for a cluster
-        that double precision cannot tell from one.
+        Is the disc one point to working precision? A single root, or several within 1e-12 of
+        their distance from 0; not so a cluster that is wider and cannot be told apart.
     counted : int
         Number of roots in `region` by the argument principle; equal to the sum of the
         multiplicities.

@@ -17,6 +17,20 @@ pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
         Error::Contour {
             place, distance, ..
         } => own(py, "ContourError", (message, place, distance)),
+        Error::OnEdge { inside, roots } => {
+            let Some((place, radius, _)) = roots.first().copied() else {
+                return own(py, "DeadtimeError", (message,));
+            };
+            // What to move the edge by so that the first of them is clear of it.
+            let distance = (4.0 * radius)
+                .max(16.0 * f64::EPSILON * place.norm())
+                .max(f64::MIN_POSITIVE);
+            own(
+                py,
+                "ContourError",
+                (message, place, distance, inside, roots),
+            )
+        }
         Error::CountMismatch { counted, found, .. } => {
             own(py, "CountMismatchError", (message, counted, found))
         }

@@ -1,7 +1,7 @@
 //! Bindings of `deadtime::quasipoly` and `deadtime::roots`.
 
 use deadtime::quasipoly::QuasiPolynomial as Core;
-use deadtime::roots::{self, Region};
+use deadtime::roots::{self, Edge, Region};
 use deadtime::{Error, Task};
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
@@ -175,9 +175,10 @@ impl QuasiPolynomial {
         Ok(values.into_pyarray(py))
     }
 
-    fn count(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<u64> {
+    fn count(&self, py: Python<'_>, re: Range, im: Range, edge: &str) -> PyResult<u64> {
+        let edge = side(edge)?;
         run_here(py, |task| {
-            roots::count(&self.core, &Region { re, im }, task)
+            roots::count_with_edge(&self.core, &Region { re, im }, edge, task)
         })
     }
 
@@ -210,9 +211,16 @@ impl QuasiPolynomial {
         run_here(py, |task| roots::is_stable(&self.core, strong, task))
     }
 
-    fn roots<'py>(&self, py: Python<'py>, re: (f64, f64), im: (f64, f64)) -> PyResult<Listed<'py>> {
+    fn roots<'py>(
+        &self,
+        py: Python<'py>,
+        re: Range,
+        im: Range,
+        edge: &str,
+    ) -> PyResult<Listed<'py>> {
+        let edge = side(edge)?;
         let set = run_here(py, |task| {
-            roots::roots(&self.core, &Region { re, im }, task)
+            roots::roots_with_edge(&self.core, &Region { re, im }, edge, task)
         })?;
         Ok(listed(py, set))
     }
@@ -243,6 +251,18 @@ impl QuasiPolynomial {
 
     fn chain_abscissa(&self) -> f64 {
         roots::chain_abscissa(&self.core)
+    }
+}
+
+/// To which side roots on an edge belong.
+fn side(edge: &str) -> PyResult<Edge> {
+    match edge {
+        "error" => Ok(Edge::Refused),
+        "inside" => Ok(Edge::Inside),
+        "outside" => Ok(Edge::Outside),
+        other => Err(pyo3::exceptions::PyValueError::new_err(format!(
+            "edge={other:?}: choose \"error\", \"inside\" or \"outside\""
+        ))),
     }
 }
 

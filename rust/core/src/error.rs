@@ -24,7 +24,7 @@ pub enum Error {
         advice: String,
     },
 
-    /// A zero lies on the contour, or too close to it for double precision to tell.
+    /// A zero lies on the contour, or too close to it to tell.
     #[error(
         "a root lies on the contour near {:?}{:+?}i, or closer to it than double precision can \
          tell: move the edge of the region by more than {distance:.1e}",
@@ -35,6 +35,19 @@ pub enum Error {
         place: Complex64,
         /// Size of the segment on which the winding could not be proved.
         distance: f64,
+    },
+
+    /// Roots lie on the edge of a region, or closer to it than the discs that hold them tell.
+    #[error(
+        "the edge of the region meets {}; {inside} roots are clearly inside: move the edge, or say \
+         to which side roots on it belong (edge=\"inside\" or \"outside\")",
+        described(roots)
+    )]
+    OnEdge {
+        /// The number of roots clear of the edge and inside.
+        inside: u64,
+        /// Centre, radius and number of roots of each disc that meets the edge.
+        roots: Vec<(Complex64, f64, u32)>,
     },
 
     /// Roots found and roots counted disagree; both are given.
@@ -70,4 +83,20 @@ impl Error {
     pub fn argument(message: impl Into<String>) -> Self {
         Self::Argument(message.into())
     }
+}
+
+/// The places of roots on an edge, as a message names them.
+fn described(roots: &[(Complex64, f64, u32)]) -> String {
+    const FEW: usize = 3;
+    let place = |(root, radius, multiplicity): &(Complex64, f64, u32)| {
+        let times = if *multiplicity > 1 {
+            format!(" ({multiplicity} roots)")
+        } else {
+            String::new()
+        };
+        format!("{:?}{:+?}i within {radius:.1e}{times}", root.re, root.im)
+    };
+    let listed: Vec<String> = roots.iter().take(FEW).map(place).collect();
+    let more = if roots.len() > FEW { ", …" } else { "" };
+    listed.join(", ") + more
 }

@@ -10,17 +10,21 @@
 //! | [`sin_cos`] | u for each of the two, at every finite argument |
 //! | [`log`] | 4 u (1 + \|log x\|) |
 //! | [`angle`] | 8 u |
+//! | [`precise::exp`], [`precise::sin_cos`] of a [`DoubleDouble`] | 8 u² |
 //!
 //! No library function and no fused operation is used: the bits are the same on every machine.
 
 mod angle;
 mod circular;
+mod double_double;
 mod exponential;
 mod logarithm;
+pub mod precise;
 mod tables;
 
 pub use angle::angle;
 pub use circular::sin_cos;
+pub use double_double::DoubleDouble;
 pub use exponential::{exp, exp_above};
 pub use logarithm::log;
 

@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::{angle, exp, exp_above, log, sin_cos};
+use super::{DoubleDouble, angle, exp, exp_above, log, precise, sin_cos};
 
 /// Half an ulp of 1.
 const U: f64 = 0.5 * f64::EPSILON;
@@ -116,5 +116,64 @@ proptest! {
     fn angles_are_those_of_their_direction(t in -3.1..3.1f64, size in 1e-5..1e5f64) {
         let (sine, cosine) = sin_cos(t);
         prop_assert!((angle(size * sine, size * cosine) - t).abs() <= 14.0 * U);
+    }
+}
+
+#[test]
+fn two_words_stay_within_the_proved_bounds() {
+    let bound = 8.0 * U * U;
+    let mut worst = 0.0f64;
+    let mut count = 0;
+    for Row { name, numbers } in rows() {
+        let [x, high, low] = numbers[..] else {
+            continue;
+        };
+        let (ours, scale) = match name {
+            "sin" if x.abs() <= 1e12 => (precise::sin_cos(x.into()).0, 1.0),
+            "cos" if x.abs() <= 1e12 => (precise::sin_cos(x.into()).1, 1.0),
+            "exp" if x.abs() <= 600.0 => (precise::exp(x.into()), high),
+            _ => continue,
+        };
+        let reference = DoubleDouble::new(high, low);
+        // The reference is itself within u² of the value.
+        let error = (ours - reference).high.abs() / scale;
+        assert!(error <= bound + U * U, "{name} of {x:e}: {error:e}");
+        worst = worst.max(error / bound);
+        count += 1;
+    }
+    assert!(count > 700, "{count} rows");
+    assert!(worst > 0.1, "{worst}");
+}
+
+proptest! {
+    #[test]
+    fn two_word_arguments_obey_the_addition_theorems(
+        x in -300.0f64..300.0, y in -1e6f64..1e6, small in -1.0f64..1.0,
+    ) {
+        // e^(x + t) = e^x e^t, the small part being the second word of the sum.
+        let tiny = small * 1e-17 * x.abs().max(1e-3);
+        let both = DoubleDouble::difference(x, -tiny);
+        let product = precise::exp(x.into()) * precise::exp(tiny.into());
+        let difference = precise::exp(both) - product;
+        prop_assert!(difference.high.abs() <= 64.0 * U * U * product.high);
+        let (s, c) = precise::sin_cos(y.into());
+        let one = s * s + c * c;
+        prop_assert!((one - DoubleDouble::ONE).high.abs() <= 64.0 * U * U);
+        let double = precise::sin_cos(DoubleDouble::from(y) * 2.0).0;
+        prop_assert!((double - s * c * 2.0).high.abs() <= 96.0 * U * U);
+    }
+
+    #[test]
+    fn arithmetic_of_two_words_stays_within_its_bounds(
+        a in -1e3f64..1e3, b in -1e3f64..1e3, c in 1e-3f64..1e3,
+    ) {
+        // (a + b)² c = a² c + 2 a b c + b² c: every operation has its part.
+        let sum = DoubleDouble::difference(a, -b);
+        let left = sum * sum * c;
+        let right = DoubleDouble::product(a, a) * c
+            + DoubleDouble::product(a, b) * 2.0 * c
+            + DoubleDouble::product(b, b) * c;
+        let size = (a.abs() + b.abs()).powi(2) * c;
+        prop_assert!((left - right).high.abs() <= 40.0 * U * U * size);
     }
 }

@@ -8,13 +8,18 @@
 
 mod algebra;
 mod beyond;
+mod expansion;
 mod kind;
+mod order;
 mod probe;
+mod sharp;
 mod value;
 
+pub(crate) use expansion::{Expansion, expansion, remainder};
 pub use kind::Kind;
 pub(crate) use probe::modulus;
 pub use probe::{Jet, Probe};
+pub(crate) use sharp::relative_turn;
 pub use value::Scaled;
 
 use crate::Error;

@@ -14,17 +14,20 @@
 
 use num_complex::Complex64;
 
-use super::QuasiPolynomial;
+use super::{QuasiPolynomial, sharp};
 use crate::elementary::{exp, log, sin_cos};
 
 /// Half an ulp of 1, enlarged by what the bounds themselves lose in being computed.
 const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
 /// 2⁻¹⁰¹⁰: u times this is still far above what an underflow loses.
-const TINY: f64 = f64::MIN_POSITIVE * 4096.0;
+pub(super) const TINY: f64 = f64::MIN_POSITIVE * 4096.0;
 
 /// Above all that underflow can do to a sum of terms.
-const FLOOR: f64 = 1e-290;
+pub(super) const FLOOR: f64 = 1e-290;
+
+/// What an evaluation in two words counts for.
+const SHARP_COST: u64 = 20;
 
 /// |s| within 4u, wherever it is a normal number: two squares and their sum lose 2 u, of which the
 /// root, correctly rounded, keeps half. Where squares leave the range, of the quotient by the larger
@@ -198,6 +201,14 @@ impl<'a> Probe<'a> {
             slope_error: ROUNDING * slope_error + FLOOR * (1.0 + gaps),
             overtaken_by: (largest.0 > 16.0 * own_size).then_some(largest.1),
         }
+    }
+
+    /// As [`jet`](Self::jet), in two words: some twenty times the work, for places where rounding
+    /// hides what double precision could say.
+    pub fn sharp_jet(&mut self, s: Complex64) -> Jet {
+        self.evaluations += SHARP_COST;
+        self.weigh(s.re);
+        sharp::jet(self.h, self.reference, s)
     }
 
     /// Bound on |g″| at every s with |s| ≤ `modulus` whose real part lies between x and

@@ -137,7 +137,7 @@ pub fn certify(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<Cert
         let count = Cell::new(&mut walker, closed.re, im, symmetric)?.count;
         certificate.count += if symmetric && closed.half {
             let keep = |part| certificate.real.push(part);
-            let real = survey_real(&mut walker, closed.re, 1.0, keep)?;
+            let real = survey_real(&mut walker, closed.re, (1.0, u64::MAX), keep)?;
             upper_half(count, real)
         } else {
             count
@@ -222,10 +222,10 @@ fn segment(
     end: Complex64,
     radius: f64,
 ) -> Result<Segment, f64> {
-    let mut jet = walker.probe.jet(middle);
+    let mut jet = walker.jet(middle);
     if let Some(larger) = jet.overtaken_by {
         walker.probe.refer_to(larger);
-        jet = walker.probe.jet(middle);
+        jet = walker.jet(middle);
     }
     let bend = walker
         .probe

@@ -21,6 +21,9 @@ use crate::elementary::angle;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
+/// Evaluations spent on the real axis before the roots themselves are asked for.
+const SURVEY_LIMIT: u64 = 10_000;
+
 /// Coefficients are not scaled down to less than two to this power.
 const LOWEST_EXPONENT: i32 = -1000;
 
@@ -244,7 +247,7 @@ pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, E
     if let Some(height) = closed.symmetric {
         let cell = Cell::new(&mut walker, closed.re, (0.0, height), true)?;
         total += if closed.half {
-            let real = survey_real(&mut walker, closed.re, 0.5, |_| ())?;
+            let real = survey_real(&mut walker, closed.re, (0.5, SURVEY_LIMIT), |_| ())?;
             upper_half(cell.count, real)
         } else {
             cell.count
@@ -293,7 +296,7 @@ pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     let top = ((radius - sigma) * (radius + sigma)).sqrt() * (1.0 + 1e-9) + f64::MIN_POSITIVE;
     let end = Complex64::new(sigma, top);
     walker.probe.refer_to(row);
-    let jet = walker.probe.jet(end);
+    let jet = walker.jet(end);
     if !is_clear(&jet) {
         return Err(super::winding::overflow(end));
     }

@@ -12,7 +12,8 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::cell::Cell;
-use super::newton::{Disc, Outcome, cluster, newton};
+use super::cluster::cluster;
+use super::newton::{Disc, Outcome, newton};
 use super::winding::Walker;
 use crate::Error;
 
@@ -99,6 +100,7 @@ impl<'a, 'w> Search<'a, 'w> {
 
     /// Keep a disc unless its root is known; a cluster swallows the discs inside it.
     fn insert(&mut self, disc: Disc) -> bool {
+        let disc = disc.at_zero_if_exact(self.walker.probe.function());
         let reach = self.widest + disc.radius;
         let first = self
             .found
@@ -134,14 +136,14 @@ impl<'a, 'w> Search<'a, 'w> {
     /// # Errors
     /// [`Error::CountMismatch`] where double precision does not suffice; those of the walks.
     pub(super) fn locate_all(&mut self, cell: Cell) -> Result<(), Error> {
-        let mut cells = vec![cell];
-        while let Some(cell) = cells.pop() {
+        let mut cells = vec![(cell, false)];
+        while let Some((cell, crowded)) = cells.pop() {
             self.walker.pause()?;
             let missing = cell.count.saturating_sub(self.located(&cell));
             if missing == 0 {
                 continue;
             }
-            if missing <= PATIENCE && self.try_here(&cell)? {
+            if (missing <= PATIENCE || crowded) && self.try_here(&cell)? {
                 continue;
             }
             let tall = cell.height() > cell.width();
@@ -153,7 +155,11 @@ impl<'a, 'w> Search<'a, 'w> {
                 return Err(self.mismatch(cell.count, &cell));
             };
             match parts {
-                Ok((first, second)) => cells.extend([second, first]),
+                Ok((first, second)) => {
+                    // A cut that parts nothing has a cluster on one of its sides.
+                    let parted = first.count > 0 && second.count > 0;
+                    cells.extend([(second, !parted), (first, !parted)]);
+                }
                 Err(Error::Contour { .. }) => return Err(self.mismatch(cell.count, &cell)),
                 Err(other) => return Err(other),
             }
@@ -206,7 +212,7 @@ impl<'a, 'w> Search<'a, 'w> {
             {
                 continue;
             }
-            if let Some(disc) = cluster(self.walker, place, most)? {
+            if let Some(disc) = cluster(&mut self.walker.probe, place, most) {
                 self.insert(disc);
             }
         }

@@ -1,4 +1,4 @@
-//! One root: Newton's iteration, and a disc proved to hold exactly its multiplicity.
+//! One root: Newton's iteration, and a disc proved to hold it alone.
 //!
 //! Simple roots. At the last iterate z let a = |g(z)| + e, b = |g′(z)| − e′ (e, e′ the rounding
 //! bounds) and B a bound on |g″| in the disc of radius t. On a circle of radius r ≤ t with
@@ -6,18 +6,18 @@
 //! theorem g has exactly one root within r. The least such r is the radius claimed, the largest
 //! the radius of isolation; margins of 1e-9 cover the rounding of these few operations.
 //!
-//! Multiple roots and clusters that double precision does not tell apart: the winding number
-//! along the smallest square on which it can be proved, centred at the root of the (m−1)-st
-//! derivative, which is simple where the root is m-fold.
+//! Where double precision proves no disc, or only a wide one, jets in two words are tried.
+//! Roots that two words do not tell apart are a matter of `cluster`.
 
 use num_complex::Complex64;
 
-use super::cell::Cell;
-use super::winding::{Walker, is_clear, newton_step};
-use crate::Error;
-use crate::quasipoly::{Probe, modulus};
+use super::winding::newton_step;
+use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
 
 const MAX_STEPS: u32 = 60;
+
+/// Relative radius above which a disc is worth evaluations in two words.
+const SHARP_ENOUGH: f64 = 1e-12;
 
 /// Squares of slopes outside these leave the range of double precision.
 const LEAST: f64 = 1e-150;
@@ -45,7 +45,22 @@ impl Disc {
         u64::from(self.multiplicity) * if self.is_on_axis() { 1 } else { 2 }
     }
 
-    fn mirrored_up(mut self) -> Self {
+    /// A disc about 0 shrinks to it where all its roots are exactly there.
+    pub(super) fn at_zero_if_exact(self, h: &QuasiPolynomial) -> Self {
+        let about_zero = modulus(self.center) <= self.radius;
+        if about_zero && h.order_at_zero(self.multiplicity) == self.multiplicity {
+            Self {
+                center: Complex64::ZERO,
+                radius: 0.0,
+                isolation: (self.isolation - modulus(self.center)).max(0.0),
+                ..self
+            }
+        } else {
+            self
+        }
+    }
+
+    pub(super) fn mirrored_up(mut self) -> Self {
         self.center.im = self.center.im.abs();
         self
     }
@@ -84,8 +99,18 @@ pub(super) fn newton(
         if small || lost_in_rounding {
             // Next to a multiple root the slope is lost as well, and the step may lead anywhere.
             let end = if ahead { next } else { z };
-            let disc = simple_disc(probe, end).and_then(|disc| real_if_mirrored(probe, disc));
-            return disc.map_or(Outcome::Stalled(z), Outcome::Simple);
+            let disc = simple_disc(probe, end, Probe::jet);
+            return match disc {
+                Some(disc) if disc.radius <= SHARP_ENOUGH * modulus(end) => Outcome::Simple(disc),
+                // A root at 0 has no digits to win.
+                Some(disc)
+                    if disc.center.norm() <= disc.radius
+                        && probe.function().order_at_zero(1) == 1 =>
+                {
+                    Outcome::Simple(disc)
+                }
+                other => sharpened(probe, z, window, other),
+            };
         }
         if !ahead {
             return Outcome::Lost;
@@ -95,9 +120,71 @@ pub(super) fn newton(
     Outcome::Lost
 }
 
-/// The disc of a simple root next to `z`, if there is one that can be proved.
-pub(super) fn simple_disc(probe: &mut Probe<'_>, z: Complex64) -> Option<Disc> {
-    let jet = probe.jet(z);
+/// Newton's iteration in two words, from where double precision no longer leads anywhere; `known` is
+/// what it could prove.
+fn sharpened(
+    probe: &mut Probe<'_>,
+    start: Complex64,
+    window: impl Fn(Complex64) -> bool,
+    known: Option<Disc>,
+) -> Outcome {
+    let mut z = start;
+    let mut before = Complex64::ZERO;
+    for _ in 0..MAX_STEPS {
+        let jet = probe.sharp_jet(z);
+        let step = newton_step(&jet);
+        let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
+        let small = modulus(step) <= 2.0 * f64::EPSILON * modulus(z);
+        let next = z - step * multiple(step, before);
+        let ahead = next.is_finite() && window(next);
+        if small || lost_in_rounding || !ahead {
+            break;
+        }
+        before = step;
+        z = next;
+    }
+    simple_disc(probe, z, Probe::sharp_jet)
+        .or(known)
+        .map_or(Outcome::Stalled(z), Outcome::Simple)
+}
+
+/// How many times a step of Newton's iteration is taken: at an m-fold root, and for some while near
+/// m roots, each is (m − 1)/m of the one before, and m of them lead there.
+fn multiple(step: Complex64, before: Complex64) -> f64 {
+    let ratio = step * before.conj() / before.norm_sqr();
+    let steady = (0.45..0.95).contains(&ratio.re) && ratio.im.abs() < 0.05;
+    if steady {
+        (1.0 / (1.0 - ratio.re)).round()
+    } else {
+        1.0
+    }
+}
+
+/// The disc of a simple root next to `z`, if one can be proved from values `at` places; one that meets
+/// the real axis is centred there.
+fn simple_disc<'a>(
+    probe: &mut Probe<'a>,
+    z: Complex64,
+    at: fn(&mut Probe<'a>, Complex64) -> Jet,
+) -> Option<Disc> {
+    let jet = at(probe, z);
+    let disc = disc_from(probe, z, &jet)?;
+    if !disc.is_on_axis() {
+        return Some(disc.mirrored_up());
+    }
+    let foot = Complex64::new(disc.center.re, 0.0);
+    if disc.center == foot {
+        return Some(disc);
+    }
+    // The disc about the axis shows the same root: it is then the only one and its own mirror image.
+    let jet = at(probe, foot);
+    let real = disc_from(probe, foot, &jet)?;
+    let same = (disc.center - foot).norm() + disc.radius <= real.isolation;
+    same.then_some(real)
+}
+
+/// The disc of a simple root next to `z`, if one can be proved from the `jet` there.
+fn disc_from(probe: &Probe<'_>, z: Complex64, jet: &Jet) -> Option<Disc> {
     let a = modulus(jet.value) + jet.value_error;
     let b = modulus(jet.slope) - jet.slope_error;
     if !(b > LEAST && b < MOST && a < MOST) {
@@ -140,99 +227,4 @@ pub(super) fn simple_disc(probe: &mut Probe<'_>, z: Complex64) -> Option<Disc> {
         isolation,
         multiplicity: 1,
     })
-}
-
-/// A disc that meets the real axis holds a real root, if the disc about the axis shows the same
-/// root: it is then the only one and its own mirror image. `None` where that fails.
-fn real_if_mirrored(probe: &mut Probe<'_>, disc: Disc) -> Option<Disc> {
-    if !disc.is_on_axis() {
-        return Some(disc.mirrored_up());
-    }
-    let foot = Complex64::new(disc.center.re, 0.0);
-    if disc.center == foot {
-        return Some(disc);
-    }
-    let real = simple_disc(probe, foot)?;
-    let same = (disc.center - foot).norm() + disc.radius <= real.isolation;
-    same.then_some(real)
-}
-
-/// The smallest disc about the cluster at `z` in which the number of roots can be proved.
-///
-/// # Errors
-/// Those of [`Walker::walk`] except [`Error::Contour`]: `Ok(None)` when no square up to
-/// half-side `most` can be walked.
-pub(super) fn cluster(
-    walker: &mut Walker<'_>,
-    z: Complex64,
-    most: f64,
-) -> Result<Option<Disc>, Error> {
-    let Some(first) = smallest_square(walker, z, most)? else {
-        return Ok(None);
-    };
-    if first.multiplicity == 0 {
-        return Ok(None);
-    }
-    let Ok(derivative) = walker.probe.function().derivative(first.multiplicity - 1) else {
-        return Ok(Some(first));
-    };
-    let near = |s: Complex64| (s - first.center).norm() <= 2.0 * first.radius;
-    let Outcome::Simple(disc) = newton(&mut Probe::new(&derivative), first.center, near) else {
-        return Ok(Some(first));
-    };
-    let side = if first.center.im < 0.0 {
-        disc.center.conj()
-    } else {
-        disc.center
-    };
-    let second = smallest_square(walker, side, most)?;
-    // The better centre is worth a disc that is one step of the search for its size larger.
-    let as_good = |second: &Disc| {
-        second.multiplicity == first.multiplicity && second.radius <= 1.6 * first.radius
-    };
-    Ok(Some(second.filter(as_good).unwrap_or(first)))
-}
-
-fn smallest_square(
-    walker: &mut Walker<'_>,
-    z: Complex64,
-    most: f64,
-) -> Result<Option<Disc>, Error> {
-    let mut half = 8.0 * f64::EPSILON * modulus(z).max(most * 1e-9);
-    walker.probe.refer_to_dominant(z);
-    while half < most {
-        let corners = [(1.0, 1.0), (-1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)];
-        let clear = corners
-            .iter()
-            .all(|(x, y)| is_clear(&walker.probe.jet(z + Complex64::new(x * half, y * half))));
-        if clear {
-            // A square that would meet the real axis is made symmetric about it.
-            let symmetric = z.im.abs() <= 1.5 * half;
-            let (center, im) = if symmetric {
-                (Complex64::new(z.re, 0.0), (0.0, half))
-            } else {
-                (z, (z.im - half, z.im + half))
-            };
-            let re = (center.re - half, center.re + half);
-            match Cell::new(walker, re, im, symmetric) {
-                Ok(cell) => {
-                    return Ok(u32::try_from(cell.count).ok().map(|multiplicity| {
-                        // The half-diagonal, with the rounding of the corners.
-                        let radius = half * 1.4143 + 2.0 * f64::EPSILON * modulus(center);
-                        Disc {
-                            center,
-                            radius,
-                            isolation: half,
-                            multiplicity,
-                        }
-                        .mirrored_up()
-                    }));
-                }
-                Err(Error::Contour { .. }) => {}
-                Err(other) => return Err(other),
-            }
-        }
-        half *= 1.5;
-    }
-    Ok(None)
 }

@@ -2,7 +2,7 @@
 //!
 //! On an interval of midpoint m and half-length r, Taylor's formula bounds g from below where it
 //! has no root, and g′ where it has at most one; the signs at the ends then decide. Otherwise the
-//! interval is divided. A double root, or two roots closer than double precision can tell, cannot
+//! interval is divided. A double root, or two roots closer than two words can tell, cannot
 //! be decided this way and are reported as a root on the contour. Rounding: SHARE leaves a
 //! thousandth of every value, where moduli, products and sums lose 12 u.
 
@@ -42,23 +42,31 @@ const SHARE: f64 = 0.999;
 
 /// Roots of h on the real interval `re`, at whose ends h is known not to be zero; `visit` gets the
 /// parts in ascending order. `curved` is the share of the bound on |g″| r that counts as slope: a
-/// half by Taylor's formula; all of it where the parts are to state the slope in their disc.
+/// half by Taylor's formula; all of it where the parts are to state the slope in their disc. After `limit` evaluations the interval is
+/// given up: next to a multiple root there is no end of parts.
 pub(super) fn survey_real(
     walker: &mut Walker<'_>,
     re: (f64, f64),
-    curved: f64,
+    (curved, limit): (f64, u64),
     mut visit: impl FnMut(RealPart),
 ) -> Result<u64, Error> {
     let mut total = 0;
     let mut parts = vec![re];
+    let begun = walker.probe.evaluations();
     while let Some((low, high)) = parts.pop() {
         walker.pause()?;
         let middle = Complex64::new(low + 0.5 * (high - low), 0.0);
+        if walker.probe.evaluations() - begun > limit {
+            return Err(Error::Contour {
+                place: middle,
+                distance: high - low,
+            });
+        }
         // The middle is rounded, so the halves differ.
         let r = (high - middle.re).max(middle.re - low);
         walker.probe.refer_to_dominant(middle);
         let reference = walker.probe.reference();
-        let jet = walker.probe.jet(middle);
+        let jet = walker.jet(middle);
         let bend = walker.probe.curvature_around(modulus(middle) + r, r);
         let slope = modulus(jet.slope);
         let trifle = TRIFLE * modulus(jet.value) / r;
@@ -106,7 +114,7 @@ fn sign(walker: &mut Walker<'_>, x: f64) -> Option<bool> {
     let s = Complex64::new(x, 0.0);
     // e^(x τ) is positive: the sign of g is that of h, whatever the reference.
     walker.probe.refer_to_dominant(s);
-    let jet = walker.probe.jet(s);
+    let jet = walker.jet(s);
     is_clear(&jet).then_some(jet.value.re > 0.0)
 }
 

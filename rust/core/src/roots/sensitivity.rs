@@ -9,10 +9,11 @@
 
 use num_complex::Complex64;
 
+use super::cluster::cluster;
 use super::count::Prepared;
-use super::newton::{Disc, Outcome, cluster, newton};
+use super::newton::{Disc, Outcome, newton};
 use super::winding::Walker;
-use crate::quasipoly::{Probe, QuasiPolynomial, modulus};
+use crate::quasipoly::{Probe, QuasiPolynomial, modulus, relative_turn};
 use crate::{Error, Task};
 
 /// A cluster of roots is sought within this of the given place, relative to the place or to one
@@ -49,13 +50,12 @@ pub fn sensitivity(
     let root = simple_root(h, near, task)?;
     let mut probe = Probe::new(h);
     probe.refer_to_dominant(root);
-    let slope = probe.jet(root).slope;
+    // Near another root the slope is small, and its terms are not.
+    let slope = probe.sharp_jet(root).slope;
     let size = modulus(slope);
     let per_slope = |value: Complex64| -(value / size) * (slope.conj() / size);
     let slopes = terms.iter().map(|(delay, power)| {
-        let gap = delay - probe.delay();
-        let (sine, cosine) = libm::sincos(gap * root.im);
-        let turn = Complex64::new(cosine, -sine) * libm::exp(-gap * root.re);
+        let turn = relative_turn(*delay, probe.delay(), root);
         per_slope((0..*power).fold(turn, |value, _| value * root))
     });
     Ok((root, slopes.collect()))
@@ -84,9 +84,9 @@ fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Comp
             Ok(if near.im < 0.0 { center.conj() } else { center })
         }
         Outcome::Stalled(place) => {
-            let many = match cluster(&mut walker, place, reach)? {
+            let many = match cluster(&mut walker.probe, place, reach) {
                 Some(disc) => format!(
-                    "{} roots lie within {:.1e} of {}, not told apart in double precision",
+                    "{} roots lie within {:.1e} of {}, not told apart in two words of double precision",
                     disc.multiplicity, disc.radius, disc.center
                 ),
                 None => format!("the function is lost in rounding near {place}"),

@@ -12,6 +12,9 @@ use super::winding::Walker;
 use crate::quasipoly::QuasiPolynomial;
 use crate::{Error, Task};
 
+/// Relative radius of a disc with several roots that agree to twelve digits.
+const RESOLVED: f64 = 1e-12;
+
 /// More roots than anyone can have meant to list.
 const MAX_ROOTS: u64 = 1_000_000;
 
@@ -26,8 +29,8 @@ pub struct RootSet {
     pub multiplicities: Vec<u32>,
     /// Radii of the discs, 1/s.
     pub radii: Vec<f64>,
-    /// Is the disc proved to hold a single point? `false` for a multiple root (other than an exact
-    /// one at 0) or a cluster that double precision does not tell apart.
+    /// Is the disc one point to working precision? `false` for a multiple root or cluster whose disc
+    /// is wider than 1e-12 of its distance from 0.
     pub resolved: Vec<bool>,
     /// Number of roots in `region`, with multiplicity, by the argument principle; equal to the
     /// sum of the multiplicities.
@@ -50,9 +53,29 @@ impl RootSet {
             radii: discs.iter().map(|d| d.radius).collect(),
             resolved: discs
                 .iter()
-                .map(|d| d.multiplicity == 1 || d.radius == 0.0)
+                .map(|d| d.multiplicity == 1 || d.radius <= RESOLVED * d.center.norm())
                 .collect(),
             counted: discs.iter().map(|d| u64::from(d.multiplicity)).sum(),
+            region,
+        }
+    }
+
+    /// The roots that are `kept`, by their index, as those of `region`.
+    pub(super) fn part(&self, region: Region, kept: impl Fn(usize) -> bool) -> Self {
+        fn chosen<T: Copy>(list: &[T], kept: impl Fn(usize) -> bool) -> Vec<T> {
+            let numbered = list.iter().enumerate();
+            numbered
+                .filter(|(i, _)| kept(*i))
+                .map(|(_, item)| *item)
+                .collect()
+        }
+        let multiplicities = chosen(&self.multiplicities, &kept);
+        Self {
+            roots: chosen(&self.roots, &kept),
+            radii: chosen(&self.radii, &kept),
+            resolved: chosen(&self.resolved, &kept),
+            counted: multiplicities.iter().map(|m| u64::from(*m)).sum(),
+            multiplicities,
             region,
         }
     }

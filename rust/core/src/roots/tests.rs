@@ -109,9 +109,9 @@ fn multiple_roots_become_discs_with_their_multiplicity() {
     assert!(set.is_ok_and(|set| {
         set.counted == 20
             && set.multiplicities.first() == Some(&4)
-            && set.resolved.first() == Some(&false)
-            && set.roots.first().is_some_and(|root| root.norm() < 1e-12)
-            && set.radii.first().is_some_and(|radius| *radius < 0.1)
+            && set.resolved.first() == Some(&true)
+            && set.roots.first() == Some(&Complex64::ZERO)
+            && set.radii.first() == Some(&0.0)
     }));
 }
 

@@ -12,7 +12,8 @@
 //! SHARE and the factors next to 1 leave far more room than the rounding of the test itself takes:
 //! that is 20 u at most, and e is known to carry 2 per cent to spare.
 //!
-//! Where |v| < 4e a root cannot be told from none: an error with the place, never a guess.
+//! Where |v| < 4e in double precision the point is evaluated in two words; where that does not tell
+//! a root from none either: an error with the place, never a guess.
 
 use num_complex::Complex64;
 
@@ -25,6 +26,10 @@ const SHARE: f64 = 0.95;
 
 /// Evaluations between two looks at the task.
 const CHECK_EVERY: u64 = 1024;
+
+/// Evaluations in two words that a walker spends before it takes a place for a root: past a multiple one
+/// the steps become as short as a power of its distance.
+const MAX_SHARP: u32 = 500;
 
 /// Evaluations after which a computation is given up.
 const MAX_EVALUATIONS: u64 = 20_000_000;
@@ -87,6 +92,7 @@ pub(super) struct Walker<'a> {
     pub(super) hints: Vec<Complex64>,
     checked: u64,
     limit: u64,
+    sharp: u32,
 }
 
 impl<'a> Walker<'a> {
@@ -102,6 +108,7 @@ impl<'a> Walker<'a> {
             hints: Vec::new(),
             checked: 0,
             limit,
+            sharp: 0,
         }
     }
 
@@ -124,12 +131,25 @@ impl<'a> Walker<'a> {
         Ok(())
     }
 
+    /// The jet at `s`, in two words where double precision does not tell the value from zero.
+    pub(super) fn jet(&mut self, s: Complex64) -> Jet {
+        let jet = self.probe.jet(s);
+        if is_clear(&jet) || !is_finite(&jet) || self.sharp >= MAX_SHARP {
+            return jet;
+        }
+        self.sharp += 1;
+        Jet {
+            overtaken_by: jet.overtaken_by,
+            ..self.probe.sharp_jet(s)
+        }
+    }
+
     /// The jet at `s`, its value proved to be at least four times its error.
     fn clear_jet(&mut self, s: Complex64) -> Result<Jet, Error> {
-        let mut jet = self.probe.jet(s);
+        let mut jet = self.jet(s);
         if !is_finite(&jet) {
             self.probe.refer_to_dominant(s);
-            jet = self.probe.jet(s);
+            jet = self.jet(s);
         }
         if !is_finite(&jet) {
             return Err(overflow(s));
@@ -151,7 +171,7 @@ impl<'a> Walker<'a> {
             if [aside, up]
                 .concat()
                 .iter()
-                .all(|step| is_clear(&self.probe.jet(place + step)))
+                .all(|step| is_clear(&self.jet(place + step)))
             {
                 break;
             }
@@ -256,7 +276,7 @@ impl<'a> Walker<'a> {
             if next == here {
                 break;
             }
-            let ahead = self.probe.jet(next);
+            let ahead = self.jet(next);
             if !is_finite(&ahead) {
                 length *= 0.25;
                 continue;
