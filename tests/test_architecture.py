@@ -30,6 +30,8 @@ FLOORS = [
         "_ufunc",
         "_special",
         "_chains",
+        "_characteristic",
+        "_expansion",
         "_special_forms",
         "_scalar_delay",
         "_low_level",

@@ -584,3 +584,26 @@ def test_lines_where_one_row_dominates_count_every_root():
         h = QuasiPolynomial(rows, [0.0, *np.cumsum(rng.uniform(0.1, 3.0, size=m - 1))])
         sigma = rng.uniform(-0.8, 0.3)
         assert h.count(re=(sigma, None)) == h.count(re=(sigma, None), im=(-3e4, 3e4))
+
+
+def test_exact_delays_have_chains_of_their_own():
+    """Michiels and Niculescu: delays 1 and 2 are stable while exact, not beside that."""
+    h = s - 0.25 + (1 / 3 - 0.75 * s) * delay(1.0) + 0.5 * s * delay(2.0)
+    assert h.base_delay == 1.0
+    # z^2 / 2 - 3 z / 4 + 1 has |z| = sqrt 2; 3 x / 4 + x^2 / 2 = 1 for free delays.
+    assert abs(h.chain_abscissa(strong=False) + math.log(2) / 2) < 1e-12
+    free = (-0.75 + math.sqrt(0.75**2 + 2)) / 1.0
+    assert abs(h.chain_abscissa() + math.log(free)) < 1e-14
+    assert h.spectral_abscissa() == h.chain_abscissa() > 0
+    exact = h.spectral_abscissa(strong=False)
+    # Every root of a tall box right of the chains of the exact delays, in long walks around it.
+    box = h.roots(re=(-0.3, 3), im=(-2000, 2000))
+    assert abs(exact - box[0].real) < 1e-14
+    moved = s - 0.25 + (1 / 3 - 0.75 * s) * delay(1.0) + 0.5 * s * delay(math.sqrt(4.1))
+    assert moved.base_delay is None
+    assert moved.spectral_abscissa(strong=False) == moved.chain_abscissa() > 0
+    golden = 1 - delay(1.0) - delay(2.0)
+    assert abs(golden.chain_abscissa(strong=False) - golden.chain_abscissa()) < 1e-12
+    three = 1 - 0.3 * delay(0.1) + 0.4 * delay(0.2) - 0.2 * delay(0.3)
+    slowest = max(-np.log(np.abs(np.roots([-0.2, 0.4, -0.3, 1]))) / 0.1)
+    assert abs(three.chain_abscissa(strong=False) - slowest) < 1e-11

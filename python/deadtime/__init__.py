@@ -25,6 +25,7 @@ from deadtime._estimation import (
     damping_ratio,
     estimate_delay,
 )
+from deadtime._expansion import Expansion
 from deadtime._loop import ControlLoop
 from deadtime._low_level import low_level_callable
 from deadtime._margins import Margins
@@ -68,6 +69,7 @@ __all__ = [
     "DelaySystem",
     "DerivativeFilter",
     "Design",
+    "Expansion",
     "FirstOrder",
     "Integrator",
     "MapStatus",

@@ -1,11 +1,8 @@
-"""Quasi-polynomials: characteristic functions of linear systems with delays.
-
-One class, kept whole: most of the file is its documentation.
-"""
+"""Quasi-polynomials: characteristic functions of linear systems with delays."""
 
 from __future__ import annotations
 
-import math
+import cmath
 import operator
 from collections.abc import Sequence
 from numbers import Real
@@ -15,10 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
-from deadtime._certificate import Certificate
-from deadtime._chains import Chain, chains_of
-from deadtime._rootset import RootSet
-from deadtime._sensitivity import Sensitivity
+from deadtime._characteristic import Characteristic
+from deadtime._expansion import Expansion
 
 if TYPE_CHECKING:
     from deadtime._parametric import ParametricQuasiPolynomial
@@ -27,12 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
 Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "advanced"]
-Range: TypeAlias = tuple[float | None, float | None]
-#: What becomes of roots on the edge of a region.
-Edge: TypeAlias = Literal["error", "inside", "outside"]
 
 
-class QuasiPolynomial:
+class QuasiPolynomial(Characteristic):
     r"""A quasi-polynomial :math:`h(s) = \sum_j p_j(s)\, e^{-s\tau_j}` with real coefficients.
 
     Usually built by algebra with `deadtime.s`, `deadtime.delay` and numbers. Immutable; equal
@@ -232,10 +224,8 @@ class QuasiPolynomial:
 
         Where the value exceeds the range of double precision it is infinite.
         """
-        points = np.asarray(s)
-        if points.dtype.kind not in "biufc":
-            raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
-        values = self._native.values(points.astype(np.complex128, copy=False))
+        points = _places(s)
+        values = self._native.values(points)
         return values.reshape(points.shape) if points.ndim else complex(values[0])
 
     def derivative(self, n: int = 1) -> QuasiPolynomial:
@@ -261,305 +251,70 @@ class QuasiPolynomial:
             raise ValueError(f"n={n}: the order of a derivative is a whole number from 0 up")
         return self._wrap(self._native.derivative(order))
 
-    # Roots
-
-    def count(
-        self, re: Range | None = None, im: Range | None = None, *, edge: Edge = "error"
-    ) -> int:
-        """Count the roots in a region, with multiplicity, and prove the number.
+    def logarithmic_derivative(self, s: ArrayLike) -> Any:
+        r"""Logarithmic derivative :math:`h'(s)/h(s)`, which no exponential makes overflow.
 
         Parameters
         ----------
-        re, im : tuple of (float or None, float or None), optional
-            Ranges of the real part (1/s) and of the imaginary part (rad/s); None is an open end.
-            A root on the real axis belongs to a region that has the axis as its edge.
-        edge : {"error", "inside", "outside"}
-            What becomes of roots on the edge, or closer to it than their discs can tell: they are
-            refused, belong to the region, or do not.
+        s : array_like of complex
+            Places in 1/s.
 
         Returns
         -------
-        int
-
-        Raises
-        ------
-        ContourError
-            If a root lies on the edge, or closer to it than two words of double precision can
-            tell. Its ``on_edge`` has the places, its ``inside`` the number that is clear of the
-            edge. The edge is never moved silently.
-        ValueError
-            If a range is not increasing, or the region holds infinitely many roots.
-
-        Notes
-        -----
-        Argument principle: on every segment of the contour a bound on the second derivative and
-        on the rounding error shows that the function keeps its half plane (Taylor's formula), so
-        the change of its argument is the principal one. Exponentials, sines and angles are the
-        package's own, with derived error bounds. `certify` gives the same number with its proof.
+        complex, or ndarray of complex of the shape of `s`
+            NaN at a root.
 
         Examples
         --------
         >>> from deadtime import delay, s
-        >>> (s + delay(1.0)).count(re=(-12, 2), im=(0, 1000))
-        159
-        >>> (s + 5.0 * delay(0.36)).count(re=(0, None))
-        2
-        >>> (s**2 + 4).count(re=(0, 1), im=(0, 3), edge="inside")
-        1
+        >>> h = s + 2.0 * delay(0.36)
+        >>> h.logarithmic_derivative(-1e5)
+        (-0.36+0j)
         """
-        return self._native.count(_range("re", re), _range("im", im), edge)
+        points = _places(s)
+        values = self._native.logarithmic_derivatives(points)
+        return values.reshape(points.shape) if points.ndim else complex(values[0])
 
-    def certify(self, re: Range | None = None, im: Range | None = None) -> Certificate:
-        """Count the roots in a region and write the proof down.
+    def expansion(self, s: complex, order: int = 1) -> Expansion:
+        r"""Taylor coefficients at a place, with bounds on their errors.
 
         Parameters
         ----------
-        re, im : tuple of (float or None, float or None), optional
-            As in `count`.
+        s : complex
+            Place in 1/s.
+        order : int, default 1
+            Highest power, from 0 to 60.
 
         Returns
         -------
-        Certificate
-            Its ``count`` is that of `count`; its ``verify()`` proves it again with exact numbers
-            and none of the code that made it.
-
-        Raises
-        ------
-        ContourError, ValueError
-            As in `count`.
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> proof = (s + delay(1.0)).certify(re=(-12, 2), im=(0, 100))
-        >>> proof.count, proof.verify()
-        (16, 16)
-        """
-        region = _range("re", re), _range("im", im)
-        rows, delays = self._coefficients.tolist(), self._delays.tolist()
-        return Certificate._made(rows, delays, region, self._native.certify(*region))
-
-    def roots(
-        self, re: Range | None = None, im: Range | None = None, *, edge: Edge = "error"
-    ) -> RootSet:
-        """Locate every root in a region, each with a disc proved to hold it.
-
-        Parameters
-        ----------
-        re, im : tuple of (float or None, float or None), optional
-            As in `count`.
-        edge : {"error", "inside", "outside"}
-            As in `count`.
-
-        Returns
-        -------
-        RootSet
-            Its multiplicities add up to the number counted.
-
-        Raises
-        ------
-        ContourError, ValueError
-            As in `count`.
-        CountMismatchError
-            If two words of double precision do not suffice to locate all roots that were counted.
-
-        Notes
-        -----
-        The region is divided into cells with proved counts; Newton's iteration in each, in two
-        words where double precision is lost; a disc about every limit by Rouché's theorem, or by
-        Pellet's for several roots that two words do not tell apart.
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> ((s + delay(1.0)) ** 2).roots(re=(-1, 1), im=(0, 5)).multiplicities
-        array([2])
-        """
-        return _root_set(self._native.roots(_range("re", re), _range("im", im), edge))
-
-    def rightmost(self, n: int = 1) -> RootSet:
-        """Locate the rightmost roots and prove that nothing else lies that far right.
-
-        Parameters
-        ----------
-        n : int, default 1
-            How many, not counting those with a negative imaginary part, which are listed as well.
-
-        Returns
-        -------
-        RootSet
-            More than `n` if the real parts of the next ones cannot be told apart. Fewer if there
-            are no more, or for a neutral equation no more clearly right of its chains of roots
-            (see `chain_abscissa`). ``region`` is the half plane in which these are all.
+        Expansion
+            Of :math:`h(s)\,e^{s\tau}` with the delay :math:`\tau` of the term that dominates at the
+            place, so that nothing overflows; computed in two words, about 32 digits.
 
         Raises
         ------
         ValueError
-            If `n` is less than 1, or the equation is advanced.
-        CountMismatchError
-            If double precision does not tell the roots apart.
+            If `s` is not finite, the order is out of range, or a power of s leaves the range of
+            double precision.
 
         Examples
         --------
         >>> from deadtime import delay, s
-        >>> h = s + (2.0 + 0.7 * s) * delay(0.36)
-        >>> [complex(round(root.real, 3), round(root.imag, 3)) for root in h.rightmost()]
-        [(-0.926+7.713j), (-0.926-7.713j)]
+        >>> near = (s - 1 + delay(1.0)).expansion(0.0, order=2)
+        >>> print(near.coefficients.real.round(12), near.errors[0] < 1e-29)
+        [0.  0.  0.5] True
         """
-        number = operator.index(n)
-        if number < 1:
-            raise ValueError(f"n={n}: ask for at least 1 rightmost root")
-        return _root_set(self._native.rightmost(number))
-
-    def spectral_abscissa(self) -> float:
-        """Give the largest real part of a root, or `chain_abscissa` if that is larger.
-
-        For a neutral equation, roots closer to the chains than the search comes to them are not
-        told from them: ``rightmost().region`` shows how close, usually within 1e-4 of one over
-        the longest delay.
-
-        Returns
-        -------
-        float
-            In 1/s; infinite for an advanced equation.
-        """
-        if self.kind == "advanced":
-            return math.inf
-        return self._native.spectral_abscissa()
-
-    def chain_abscissa(self) -> float:
-        r"""Give the real part that the chains of roots of a neutral equation can come to.
-
-        The solution c of :math:`\sum_j |b_j| e^{-c d_j} = |a|` with a the coefficient of the
-        highest power of s without delay, b_j those with the delays d_j [1]_: the supremum over
-        arbitrarily small changes of the delays. If the delays have a common divisor and are
-        exact, the chains may lie further left.
-
-        Returns
-        -------
-        float
-            In 1/s; -inf where there are no chains (polynomial, retarded), inf if advanced.
-
-        References
-        ----------
-        .. [1] C. E. Avellar and J. K. Hale, "On the zeros of exponential polynomials", Journal of
-           Mathematical Analysis and Applications 73 (1980).
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> round((s + (2.0 + 0.3 * s) * delay(0.36)).chain_abscissa(), 4)
-        -3.3444
-        """
-        return self._native.chain_abscissa()
-
-    def chains(self) -> tuple[Chain, ...]:
-        r"""Give the laws that the roots of large modulus follow.
-
-        Returns
-        -------
-        tuple of Chain
-            One for every sequence of roots in the upper half plane, from the least bend to the
-            largest; none for a polynomial.
-
-        Notes
-        -----
-        Each edge of the upper convex hull of the points (delay, degree of its row) makes chains
-        with :math:`\mathrm{Re}\, s \approx c - \mu \ln|s|`, the slope of the edge being
-        :math:`-\mu` [1]_. Asymptotic: nothing is proved about any single root.
-
-        References
-        ----------
-        .. [1] R. Bellman and K. L. Cooke, Differential-Difference Equations, Academic Press
-           (1963), chapter 12.
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> (chain,) = (s + 2.0 * delay(0.36)).chains()
-        >>> chain.kind, round(chain.bend, 4), round(chain.spacing, 4)
-        ('retarded', 2.7778, 17.4533)
-        >>> [chain.kind for chain in (s + (2.0 + 0.3 * s) * delay(0.36)).chains()]
-        ['neutral']
-        """
-        return chains_of(self)
-
-    def is_stable(self, strong: bool = True) -> bool:
-        """Tell whether every root is proved to lie left of the imaginary axis.
-
-        Parameters
-        ----------
-        strong : bool, default True
-            Ask for strong stability [1]_: also under arbitrarily small changes of the delays,
-            which matters for neutral equations. With False, delays that are whole multiples of a
-            common one (to rounding) are taken as exactly that.
-
-        Returns
-        -------
-        bool
-            False also where a root lies on the axis or too close to it to tell, and for an
-            advanced equation.
-
-        Raises
-        ------
-        ValueError
-            For the zero function.
-
-        References
-        ----------
-        .. [1] J. K. Hale and S. M. Verduyn Lunel, "Strong stabilization of neutral functional
-           differential equations", IMA Journal of Mathematical Control and Information 19 (2002).
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> (s + 4.0 * delay(0.36)).is_stable(), (s + 5.0 * delay(0.36)).is_stable()
-        (True, False)
-        """
-        return self._native.is_stable(bool(strong))
-
-    def sensitivity(self, root: complex) -> Sensitivity:
-        r"""Derivatives of a simple root by every coefficient and every delay.
-
-        Parameters
-        ----------
-        root : complex
-            A root in 1/s, as `roots` or `rightmost` list it; its last digits do not matter.
-
-        Returns
-        -------
-        Sensitivity
-            ``coefficients``, shape (m, d+1), and ``delays``, shape (m,), arranged as those of the
-            quasi-polynomial.
-
-        Raises
-        ------
-        ValueError
-            If the place given is no root, or the root is multiple or in a cluster that double
-            precision does not tell apart: it has no derivative.
-
-        Notes
-        -----
-        :math:`ds/dp = -(\partial h/\partial p) / h'(s)` for :math:`h(s; p) = 0`, the exponential
-        of the dominating term cancelled beforehand so that nothing overflows.
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> h = s + 4.0 * delay(0.36)
-        >>> move = h.sensitivity(h.rightmost()[0])
-        >>> bool(move.coefficients[1, 0].real > 0), bool(move.delays[1].real > 0)
-        (True, True)
-        """
-        place = complex(root)
-        rows, width = self._coefficients.shape
-        found, slopes = self._native.sensitivity(
-            place, np.repeat(self._delays, width).tolist(), list(range(width)) * rows
-        )
-        coefficients = slopes.reshape(rows, width)
-        # h depends on a delay through its row alone, d/dtau of which is -s times the row.
-        delays = -found * (coefficients * self._coefficients).sum(axis=1)
-        return Sensitivity(found, coefficients, delays)
+        place, highest = complex(s), operator.index(order)
+        if not 0 <= highest <= 60:
+            raise ValueError(f"order={order}: from 0 to 60")
+        if not cmath.isfinite(place):
+            raise ValueError(f"s={place}: give a finite number")
+        coefficients, errors, tau = self._native.expansion(place, highest)
+        if not np.isfinite(errors).all():
+            raise ValueError(
+                f"s={place}: a power of s or an exponential leaves the range of double precision"
+            )
+        return Expansion(coefficients, errors, tau)
 
 
 @overload
@@ -617,6 +372,13 @@ def is_number(value: object) -> bool:
     return isinstance(value, Real | np.bool_) or scalar
 
 
+def _places(s: Any) -> NDArray[np.complex128]:
+    points = np.asarray(s)
+    if points.dtype.kind not in "biufc":
+        raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
+    return points.astype(np.complex128, copy=False)
+
+
 def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
     array.flags.writeable = False
     return array
@@ -632,27 +394,6 @@ def _real_array(name: str, values: ArrayLike, ndim: int) -> NDArray[np.float64]:
     if array.ndim != ndim or array.size == 0:
         raise ValueError(f"{name} of shape {array.shape}: give {ndim} dimensions, none empty")
     return array.astype(np.float64, copy=False)
-
-
-def _range(name: str, ends: Range | None) -> tuple[float, float]:
-    if ends is None:
-        return (-math.inf, math.inf)
-    try:
-        low, high = ends
-        pair = (
-            -math.inf if low is None else float(low),
-            math.inf if high is None else float(high),
-        )
-    except (TypeError, ValueError) as error:
-        raise TypeError(
-            f"{name}={ends!r}: give a pair (low, high), None for an open end"
-        ) from error
-    return pair
-
-
-def _root_set(listed: _deadtime._Listed) -> RootSet:
-    roots, multiplicities, radii, resolved, counted, re, im = listed
-    return RootSet(roots, multiplicities, radii, resolved, counted, (re, im))
 
 
 def _term(row: NDArray[np.float64], tau: float) -> str:

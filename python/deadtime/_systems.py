@@ -17,8 +17,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._characteristic import Range
 from deadtime._determinant import expanded
-from deadtime._quasipolynomial import QuasiPolynomial, Range
+from deadtime._quasipolynomial import QuasiPolynomial
 from deadtime._rootset import RootSet
 from deadtime._transfer import TransferFunction
 from deadtime._validation import non_negative, real_array

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._characteristic import Range
 from deadtime._frequency import argument, powers_of_s, without_powers
 from deadtime._interchange import (
     control_package,
@@ -21,7 +22,7 @@ from deadtime._interchange import (
     rational,
 )
 from deadtime._margins import Margins, margins
-from deadtime._quasipolynomial import QuasiPolynomial, Range, delay, is_number
+from deadtime._quasipolynomial import QuasiPolynomial, delay, is_number
 from deadtime._ratio import first_term, ratio
 from deadtime._rootset import RootSet
 from deadtime._validation import non_negative, real_array

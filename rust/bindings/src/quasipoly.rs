@@ -230,8 +230,10 @@ impl QuasiPolynomial {
         Ok(listed(py, set))
     }
 
-    fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {
-        run_here(py, |task| roots::spectral_abscissa(&self.core, task))
+    fn spectral_abscissa(&self, py: Python<'_>, strong: bool) -> PyResult<f64> {
+        run_here(py, |task| {
+            roots::spectral_abscissa(&self.core, strong, task)
+        })
     }
 
     /// A root, and its derivatives by the coefficients of s^power e^(-s delay).
@@ -251,6 +253,50 @@ impl QuasiPolynomial {
 
     fn chain_abscissa(&self) -> f64 {
         roots::chain_abscissa(&self.core)
+    }
+
+    /// That of exact delays, if they have a common base.
+    fn exact_chain_abscissa(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        run_here(py, |task| roots::exact_chain_abscissa(&self.core, task))
+    }
+
+    fn base_delay(&self) -> Option<f64> {
+        roots::base_delay(&self.core)
+    }
+
+    /// Taylor coefficients of h e^(s delay) at `s`, bounds on their errors, and the delay.
+    fn expansion<'py>(
+        &self,
+        py: Python<'py>,
+        s: Complex64,
+        order: usize,
+    ) -> (
+        Bound<'py, PyArray1<Complex64>>,
+        Bound<'py, PyArray1<f64>>,
+        f64,
+    ) {
+        let found = self.core.expansion(s, order);
+        (
+            found.coefficients.into_pyarray(py),
+            found.errors.into_pyarray(py),
+            found.delay,
+        )
+    }
+
+    /// h'/h at all points, in C order.
+    fn logarithmic_derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArrayDyn<'py, Complex64>,
+    ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
+        let points = in_order(&points);
+        let work = |task: &Task| self.core.logarithmic_derivatives(&points, task);
+        let values = if points.len() < FEW_VALUES {
+            run_here(py, work)?
+        } else {
+            run(py, None, None, work)?
+        };
+        Ok(values.into_pyarray(py))
     }
 }
 

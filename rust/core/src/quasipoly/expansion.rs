@@ -10,17 +10,42 @@
 
 use num_complex::Complex64;
 
-use super::QuasiPolynomial;
 use super::probe::{FLOOR, TINY, modulus};
 use super::sharp::{Complex, LAST_ROUNDING, ROUNDING, Turn, turn};
+use super::{Probe, QuasiPolynomial};
 use crate::elementary::{DoubleDouble, exp_above};
 
-/// Taylor coefficients of g at a point, lowest first.
+/// Taylor coefficients of g(s) = h(s) e^(s τ) at a point, lowest first.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Expansion {
-    pub(crate) coefficients: Vec<Complex64>,
+pub struct Expansion {
+    /// g⁽ᵏ⁾/k!.
+    pub coefficients: Vec<Complex64>,
     /// Bounds on their errors.
-    pub(crate) errors: Vec<f64>,
+    pub errors: Vec<f64>,
+    /// τ, the delay of the term that dominates there, in seconds.
+    pub delay: f64,
+}
+
+impl QuasiPolynomial {
+    /// h around `s` without its largest exponential: h(s + t) = e^(−(s + t) τ) Σ a_k tᵏ, in two words.
+    ///
+    /// The error bounds are infinite or NaN where an exponential of the others leaves double precision.
+    ///
+    /// ```
+    /// # use deadtime::quasipoly::QuasiPolynomial;
+    /// # use num_complex::Complex64;
+    /// // s − 1 + e^(−s) = s²/2 − s³/6 + …
+    /// let h = QuasiPolynomial::new(vec![vec![-1.0, 1.0], vec![1.0]], vec![0.0, 1.0])?;
+    /// let near = h.expansion(Complex64::ZERO, 2);
+    /// assert!(near.coefficients[0].norm() <= near.errors[0] && near.errors[0] < 1e-29);
+    /// assert_eq!(near.coefficients[2], Complex64::new(0.5, 0.0));
+    /// # Ok::<(), deadtime::Error>(())
+    /// ```
+    pub fn expansion(&self, s: Complex64, order: usize) -> Expansion {
+        let mut probe = Probe::new(self);
+        probe.refer_to_dominant(s);
+        expansion(self, probe.reference(), s, order)
+    }
 }
 
 /// p(s + t) as a polynomial in t, by powers up to `order`, and the same with moduli.
@@ -92,6 +117,7 @@ pub(crate) fn expansion(
     Expansion {
         coefficients,
         errors,
+        delay: own,
     }
 }
 

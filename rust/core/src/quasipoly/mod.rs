@@ -15,7 +15,8 @@ mod probe;
 mod sharp;
 mod value;
 
-pub(crate) use expansion::{Expansion, expansion, remainder};
+pub use expansion::Expansion;
+pub(crate) use expansion::{expansion, remainder};
 pub use kind::Kind;
 pub(crate) use probe::modulus;
 pub use probe::{Jet, Probe};

@@ -3,12 +3,15 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{Probe, QuasiPolynomial, beyond};
+use super::{Probe, QuasiPolynomial, beyond, modulus};
 use crate::elementary::{exp, sin_cos};
 use crate::{Error, Task};
 
 /// Points that one thread takes at a time.
 const CHUNK: usize = 1024;
+
+/// A value less than this many times its error bound is computed anew.
+const DROWNED: f64 = 1e6;
 
 /// A value of h without its largest exponential: h(s) = `value` · e^(−s `delay`).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,20 +70,63 @@ impl QuasiPolynomial {
         Complex64::new(grow(turned.re), grow(turned.im))
     }
 
+    /// h′(s)/h(s), the exponential of the dominating term cancelled: g′/g − τ. Where double
+    /// precision does not tell h from zero it is computed in two words.
+    ///
+    /// ```
+    /// # use deadtime::quasipoly::QuasiPolynomial;
+    /// # use num_complex::Complex64;
+    /// // (s² + 1)′/(s² + 1) = 2s/(s² + 1)
+    /// let h = QuasiPolynomial::new(vec![vec![1.0, 0.0, 1.0]], vec![0.0])?;
+    /// assert_eq!(h.logarithmic_derivative(Complex64::ONE), Complex64::ONE);
+    /// # Ok::<(), deadtime::Error>(())
+    /// ```
+    pub fn logarithmic_derivative(&self, s: Complex64) -> Complex64 {
+        let mut probe = Probe::new(self);
+        probe.refer_to_dominant(s);
+        let mut jet = probe.jet(s);
+        let drowned = |value, error| modulus(value) < DROWNED * error;
+        if drowned(jet.value, jet.value_error) || drowned(jet.slope, jet.slope_error) {
+            jet = probe.sharp_jet(s);
+        }
+        let size = modulus(jet.value);
+        (jet.slope / size) * (jet.value.conj() / size) - probe.delay()
+    }
+
     /// h at every point.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
     pub fn values(&self, points: &[Complex64], task: &Task) -> Result<Vec<Complex64>, Error> {
-        let chunks: Result<Vec<Vec<Complex64>>, Error> = points
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                task.check()?;
-                let values = chunk.iter().map(|s| self.value(*s)).collect();
-                task.advance(chunk.len() as u64);
-                Ok(values)
-            })
-            .collect();
-        Ok(chunks?.concat())
+        at_all(points, task, |s| self.value(s))
     }
+
+    /// h′/h at every point.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub fn logarithmic_derivatives(
+        &self,
+        points: &[Complex64],
+        task: &Task,
+    ) -> Result<Vec<Complex64>, Error> {
+        at_all(points, task, |s| self.logarithmic_derivative(s))
+    }
+}
+
+fn at_all(
+    points: &[Complex64],
+    task: &Task,
+    value: impl Fn(Complex64) -> Complex64 + Sync,
+) -> Result<Vec<Complex64>, Error> {
+    let chunks: Result<Vec<Vec<Complex64>>, Error> = points
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            task.check()?;
+            let values = chunk.iter().map(|s| value(*s)).collect();
+            task.advance(chunk.len() as u64);
+            Ok(values)
+        })
+        .collect();
+    Ok(chunks?.concat())
 }

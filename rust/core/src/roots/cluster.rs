@@ -63,6 +63,7 @@ fn proved(probe: &Probe<'_>, center: Complex64, m: usize, most: f64) -> Option<D
     let Expansion {
         coefficients,
         errors,
+        ..
     } = expansion(h, reference, center, m);
     let sizes: Vec<f64> = coefficients.iter().copied().map(modulus).collect();
     let (own, lower) = sizes.split_last()?;

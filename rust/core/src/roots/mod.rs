@@ -3,7 +3,8 @@
 //! `winding` proves how arg h turns along a line, `dominated` the same in long steps where one row
 //! outweighs the others; `cell` builds rectangles with counts from it,
 //! `count` half planes; `newton` proves discs around single roots, `cluster` around several; `isolate` finds
-//! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
+//! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability; `neutral` knows the chains, `commensurate`
+//! those of exact delays, `stable`
 //! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be; `certificate`
 //! writes the proof of a count down. Elementary functions are those of `crate::elementary`, with
 //! proved bounds; each file says what its inequalities leave for rounding.
@@ -12,6 +13,7 @@ mod bounds;
 mod cell;
 mod certificate;
 mod cluster;
+mod commensurate;
 mod contour;
 mod count;
 mod dominated;
@@ -27,6 +29,7 @@ mod stable;
 mod winding;
 
 pub use certificate::{Certificate, Contour, Segment, certify};
+pub use commensurate::{base_delay, exact_chain_abscissa};
 pub use contour::{Edge, count_with_edge, roots_with_edge};
 pub use count::{count, count_right_of};
 pub use neutral::chain_abscissa;

@@ -7,7 +7,7 @@
 //! independent, and is in any case the supremum over arbitrarily small changes of the delays:
 //! C_D < 0 is what strong stability asks for (Hale and Verduyn Lunel 2002). For commensurate
 //! delays taken as exact, as for every difference equation with one base, the chains may end
-//! further left; `chain_abscissa` does not use that, `is_stable` does where asked to.
+//! further left: that is `commensurate`.
 //! C_D is computed to rounding and no proof leans on it: where a line must lie right of the chains,
 //! `bounds::dominance` tests the inequality itself.
 

@@ -16,6 +16,7 @@ use num_complex::Complex64;
 
 use super::bounds::dominance;
 use super::cell::Cell;
+use super::commensurate::exact_abscissa;
 use super::count::{Prepared, close, count_right_of, half_plane};
 use super::isolate::Search;
 use super::neutral::chain_abscissa;
@@ -166,14 +167,26 @@ fn search(
 /// The largest real part of a root, or the abscissa of the chains if that is larger.
 ///
 /// Roots between the chains and the last line that could be counted (the `region` of
-/// [`rightmost`]) are not told from the chains.
+/// [`rightmost`]) are not told from the chains. With `strong` the chains are those that arbitrarily
+/// small changes of the delays can bring about; without, delays with a common base are taken as exact.
 ///
 /// # Errors
 /// As [`rightmost`]; [`Error::Argument`] where there is no root.
-pub fn spectral_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<f64, Error> {
+pub fn spectral_abscissa(h: &QuasiPolynomial, strong: bool, task: &Task) -> Result<f64, Error> {
     let set = rightmost(h, 1, task)?;
     let isolated = set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re);
-    let abscissa = isolated.max(chain_abscissa(h));
+    let chain = chain_abscissa(h);
+    if !strong && isolated < chain {
+        let Prepared { rest, zeros, .. } = Prepared::new(h)?;
+        if let Some(abscissa) = exact_abscissa(&rest, task)? {
+            return Ok(if zeros > 0 {
+                abscissa.max(0.0)
+            } else {
+                abscissa
+            });
+        }
+    }
+    let abscissa = isolated.max(chain);
     if abscissa == f64::NEG_INFINITY {
         return Err(if h.degree() == 0 && h.delays().len() < 2 {
             Error::argument("a constant has no roots, hence no spectral abscissa")

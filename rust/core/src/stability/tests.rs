@@ -351,7 +351,7 @@ proptest! {
         let chart = map(&velocity(), &[0.0, 0.0], axes, true, &task).unwrap();
         let h = velocity().at(&[kp, kv]).unwrap();
         prop_assert_eq!(chart.unstable[0] as u64, count_right_of(&h, 0.0, &task).unwrap());
-        prop_assert_eq!(chart.abscissa[0], spectral_abscissa(&h, &task).unwrap());
+        prop_assert_eq!(chart.abscissa[0], spectral_abscissa(&h, true, &task).unwrap());
         // Both proved, hence never at odds.
         prop_assert_eq!(chart.unstable[0] > 0, chart.abscissa[0] > 0.0);
     }
