@@ -21,7 +21,7 @@ from trouble import trouble
 NEAR = 1e-9
 
 # Tests in the survey below, in the order of the table.
-QUESTIONS = ("count", "half plane", "sum of roots", "discs", "rightmost")
+QUESTIONS = ("count", "half plane", "sum of roots", "discs", "beside a root", "rightmost")
 
 
 class Package:
@@ -88,6 +88,18 @@ def discs_right(counter, found):
     return None
 
 
+def beside_a_root(case, found):
+    """The region with one edge at a root, 0.1 to 1e4 radii beside it."""
+    rng = np.random.default_rng(case.number)
+    k = rng.integers(len(found))
+    away = max(found.radii[k], 1e-300) * 10.0 ** rng.uniform(-1, 4) * rng.choice([-1.0, 1.0])
+    z = found[k]
+    (a, b), (c, d) = case.re, (-case.im[1] if case.im[0] == 0.0 else case.im[0], case.im[1])
+    if rng.random() < 0.5 and z.imag + away > c:
+        return (a, b), (c, z.imag + away)
+    return ((z.real + away, b) if rng.random() < 0.5 and z.real + away < b else (a, b)), (c, d)
+
+
 def examine(case, ask_package):
     """Verdict per question: 'equal', 'refused …', 'wrong: …' or 'unknown' where balls give up."""
     h = dtm.QuasiPolynomial(case.coefficients, case.delays)
@@ -141,6 +153,13 @@ def examine(case, ask_package):
                 "equal" if fault is None else fault if fault == "unknown" else f"wrong: {fault}"
             )
             counter.max_pieces = 40_000
+            if len(found):
+                re, im = beside_a_root(case, found)
+                wanted = fresh(lambda: counter.rectangle(re, im))
+                given = ask_package(lambda: h.count(re=re, im=im))
+                counter.pieces = 0
+                if not isinstance(wanted, str):
+                    judge("beside a root", given, wanted)
     if case.line is not None:
         wanted = fresh(lambda: counter.right_of(case.line))
         if not isinstance(wanted, str):
