@@ -283,7 +283,15 @@ class BallCounter:
         raise ValueError("no radius within the range of doubles")
 
     def real(self, re):
-        """Real roots in an open interval whose ends are none; simple ones, else an error."""
+        """Real roots in an open interval whose ends are none; an error at multiple ones.
+
+        But for one at 0 that stands in the coefficients, as a power of s that all have in common.
+        """
+        zeros = min(k for row in self.rows for k, x in enumerate(row) if x)
+        if zeros:
+            rest = BallCounter([row[zeros:] for row in self.rows], self.delays, self.max_pieces)
+            low, high = map(exact, re)
+            return rest.real(re) + (zeros if low < 0 < high else 0)
         start, end = (acb(exact(x)) for x in re)
         number = 0
         waiting = [(start, end, 0)]

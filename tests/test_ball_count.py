@@ -86,6 +86,15 @@ def test_planted_roots_and_their_neighbourhood():
         counter.rectangle((0.5, 1.0), (-1.0, 1.0))
 
 
+def test_powers_of_s_on_the_real_axis():
+    """s³ (s + e^(−s/3)): roots of two sizes, one of them exact and threefold."""
+    counter = BallCounter([[0, 0, 0, 0, 1.0], [0, 0, 0, 1.0, 0]], [0.0, 1 / 3])
+    roots = sum(z.imag == 0 and -9 < z.real < 1 for z in branches(1.0, 1 / 3))
+    assert counter.real((-9.0, 1.0)) == 3 + roots
+    assert counter.real((-9.0, -1e-9)) == roots
+    assert counter.upper_rectangle((-9.0, 1.0), 0.5) == 3 + roots
+
+
 def test_the_counter_does_not_overflow():
     big = BallCounter([[0.0, 1e200], [1e-190, 0.0]], [0.0, 1e-3])
     assert big.rectangle((-2e6, 1.0), (-1e4, 1e4)) == 4
