@@ -192,6 +192,10 @@ def examine(case, ask_package):
                 held = fresh(lambda: discs_right(counter, first))
                 if held is not None:
                     verdicts["rightmost"] = held if held == "unknown" else f"wrong: {held}"
+        elif h.kind == "retarded":
+            # There are infinitely many, and one is rightmost.
+            verdicts["rightmost"] = "refused: empty"
+            places["rightmost"] = str(first.region[0])
         else:
             verdicts["rightmost"] = "none"
     return verdicts, places
