@@ -4,9 +4,9 @@ Each peer runs in a process of its own that is ended after a time limit; ours an
 turns. A peer is right when it finds every certified root of the upper half plane and no other:
 `miss` counts certified roots further than 1e-6 (of their modulus) from any it returned, `extra`
 what it returned further than that from any certified one. An m-fold root, or m within 1 per cent,
-need only be met to the m-th root of 1e-10, by one number or by several. All get the upper half of the
-region; cxroots, which refuses a contour through a root, gets an edge 2 per cent of the height below
-the real axis, where ours and qpmr know what to do with roots on it. Times are medians, with
+need only be met to the m-th root of 1e-10, by one number or by several. All get the upper half of
+the region; cxroots, which refuses a contour through a root, gets an edge 2 per cent of the height
+below the real axis, where ours and qpmr know what to do with roots on it. Times are medians, with
 whatever turns the coefficients into what the program takes; ratios are those of cases that both
 get right.
 Run ``python benches/peers/roots.py [--quick] [--only CASE …] [--limit SECONDS]``.
