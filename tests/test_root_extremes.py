@@ -328,3 +328,20 @@ def test_degree_8_in_a_unit_of_time_of_1e24():
     c = 2.0**80
     root = in_other_time(h, c).rightmost()[0] * c
     assert abs(root - h.rightmost()[0]) < 1e-11
+
+
+@pytest.mark.xfail(raises=AssertionError, strict=True, reason="no line left of 0 is counted")
+def test_a_lag_of_a_microsecond_beside_a_delay_of_a_minute():
+    """A retarded equation has a rightmost root; its set comes empty.
+
+    W₀ of −4e4 · 65 e^(65 · 6e5) by w + log w = log of that: real part −0.0417.
+    """
+    h = s + 6e5 + 4e4 * delay(65.0)
+    with mp.workdps(30):
+        log = mp.log(mp.mpf(4e4) * 65) + 65 * mp.mpf(6e5) + mp.pi * 1j
+        w = mp.findroot(lambda w: w + mp.log(w) - log, log - mp.log(log))
+        root = complex(w / 65 - mp.mpf(6e5))
+    assert root == pytest.approx(-0.04166 + 0.04833j, abs=1e-5)
+    found = h.rightmost()
+    assert len(found) == 2
+    assert abs(found[0] - root) < 1e-9
