@@ -73,7 +73,30 @@ pub struct Probe<'a> {
     /// e^(−x d_j) at the last x.
     weights: Vec<f64>,
     x: f64,
+    /// What the terms are where the last jet was taken, if they are known there.
+    parts: Vec<Part>,
+    parts_at: Option<Complex64>,
     evaluations: u64,
+}
+
+/// One term of g at a point.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    /// Its derivative.
+    slope: Complex64,
+    /// Bound on its modulus.
+    size: f64,
+}
+
+/// How fast g can change from a point on, terms that are small and fast being counted by their size.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Calm {
+    /// Slope of the other terms.
+    pub(crate) slope: Complex64,
+    /// Bound on their second derivative nearby.
+    pub(crate) bend: f64,
+    /// What the small ones can change g by, at most.
+    pub(crate) ripple: f64,
 }
 
 impl<'a> Probe<'a> {
@@ -87,6 +110,8 @@ impl<'a> Probe<'a> {
             gaps: vec![0.0; count],
             weights: vec![1.0; count],
             x: f64::NAN,
+            parts: vec![Part::default(); count],
+            parts_at: None,
             evaluations: 0,
         };
         probe.refer_to(0);
@@ -121,6 +146,7 @@ impl<'a> Probe<'a> {
             *gap = delay - self.delay;
         }
         self.x = f64::NAN;
+        self.parts_at = None;
     }
 
     /// Make the term that is largest at `s` the reference.
@@ -161,8 +187,9 @@ impl<'a> Probe<'a> {
             .coefficients()
             .iter()
             .zip(&self.gaps)
-            .zip(&self.weights);
-        for (index, ((row, &gap), &weight)) in terms.enumerate() {
+            .zip(&self.weights)
+            .zip(&mut self.parts);
+        for (index, (((row, &gap), &weight), part)) in terms.enumerate() {
             let (mut p, mut dp) = (Complex64::ZERO, Complex64::ZERO);
             let (mut bound, mut slope_bound) = (0.0, 0.0);
             for c in row.iter().rev() {
@@ -178,12 +205,17 @@ impl<'a> Probe<'a> {
                 Complex64::new(weight * cosine, -weight * sine)
             };
             let term = p * turn;
+            let own_slope = dp * turn - term * gap;
             value += term;
-            slope += dp * turn - term * gap;
+            slope += own_slope;
             let length = row.len() as f64;
             let shared = count + 8.0 + 4.0 * gap.abs() * reach;
             let weight = weight + TINY;
             gaps += gap.abs();
+            *part = Part {
+                slope: own_slope,
+                size: bound * weight,
+            };
             value_error += (4.0 * length + shared) * bound * weight;
             slope_error += (8.0 * length + shared) * (slope_bound + gap.abs() * bound) * weight;
             let size = term.norm_sqr();
@@ -194,6 +226,7 @@ impl<'a> Probe<'a> {
                 largest = (size, index);
             }
         }
+        self.parts_at = Some(s);
         Jet {
             value,
             slope,
@@ -208,48 +241,100 @@ impl<'a> Probe<'a> {
     pub fn sharp_jet(&mut self, s: Complex64) -> Jet {
         self.evaluations += SHARP_COST;
         self.weigh(s.re);
+        self.parts_at = None;
         sharp::jet(self.h, self.reference, s)
     }
 
     /// Bound on |g″| at every s with |s| ≤ `modulus` whose real part lies between x and
     /// x + `shift`, x being the real part of the last point.
     pub fn curvature(&self, modulus: f64, shift: f64) -> f64 {
-        self.bound(modulus, |gap| (-gap * shift).max(0.0))
+        let far = self.x + shift;
+        self.bound(modulus, |gap, weight| heavier(gap, weight, far, shift))
     }
 
     /// Bound on |g″| at every s with |s| ≤ `modulus` whose real part is within `radius` of that
     /// of the last point.
     pub fn curvature_around(&self, modulus: f64, radius: f64) -> f64 {
-        self.bound(modulus, |gap| gap.abs() * radius)
+        self.bound(modulus, |gap, weight| {
+            let shift = if gap > 0.0 { -radius } else { radius };
+            heavier(gap, weight, self.x + shift, shift)
+        })
     }
 
-    fn bound(&self, modulus: f64, growth: impl Fn(f64) -> f64) -> f64 {
+    fn bound(&self, modulus: f64, heaviest: impl Fn(f64, f64) -> f64) -> f64 {
         let mut total = 0.0;
-        let terms = self
-            .h
-            .coefficients()
-            .iter()
-            .zip(&self.gaps)
-            .zip(&self.weights);
-        for ((row, &gap), &weight) in terms {
-            let (mut p, mut dp, mut ddp) = (0.0, 0.0, 0.0);
-            for c in row.iter().rev() {
-                ddp = ddp * modulus + dp;
-                dp = dp * modulus + p;
-                p = p * modulus + (c.abs() + TINY);
-            }
+        for ((row, &gap), &weight) in self.terms() {
+            let (p, dp, ddp) = sizes(row, modulus);
             let gap_size = gap.abs();
-            let growth = growth(gap);
-            let most = if growth == 0.0 {
-                weight
-            } else {
-                // A weight lost in underflow must not hide what it grows to.
-                weight.max(FLOOR) * exp(growth)
-            };
-            total += (2.0 * ddp + gap_size * (2.0 * dp + gap_size * p)) * most;
+            total += (2.0 * ddp + gap_size * (2.0 * dp + gap_size * p)) * heaviest(gap, weight);
         }
         // Exponents, below 746 in modulus or the weight is 0 or infinite, are wrong by 2e-13 at
         // most; this, the rounding of the sums and of `modulus` together are far below 1e-9.
         (total + FLOOR) * (1.0 + 1e-9)
+    }
+
+    fn terms(&self) -> impl Iterator<Item = ((&Vec<f64>, &f64), &f64)> {
+        let rows = self.h.coefficients().iter();
+        rows.zip(&self.gaps).zip(&self.weights)
+    }
+
+    /// What [`curvature`](Self::curvature) says, without the terms that together can change g by no more
+    /// than `most` on the way to Re s = x + `shift`; `None` where there are none or nothing else, or the
+    /// last jet was not taken at `s`.
+    pub(crate) fn calm(
+        &self,
+        s: Complex64,
+        (modulus, shift): (f64, f64),
+        most: f64,
+    ) -> Option<Calm> {
+        if self.parts_at != Some(s) {
+            return None;
+        }
+        let far = self.x + shift;
+        let share = most / self.parts.len() as f64;
+        let (mut slope, mut bend, mut ripple) = (Complex64::ZERO, FLOOR, 0.0);
+        let (mut small, mut other) = (false, false);
+        for (((row, &gap), &weight), part) in self.terms().zip(&self.parts) {
+            let (p, dp, ddp) = sizes(row, modulus);
+            let heaviest = heavier(gap, weight, far, shift);
+            let change = part.size + p * heaviest;
+            if gap != 0.0 && change < share {
+                small = true;
+                ripple += change;
+            } else {
+                other = true;
+                let gap = gap.abs();
+                slope += part.slope;
+                bend += (2.0 * ddp + gap * (2.0 * dp + gap * p)) * heaviest;
+            }
+        }
+        (small && other).then_some(Calm {
+            slope,
+            bend: bend * (1.0 + 1e-9),
+            ripple: (ripple + FLOOR) * (1.0 + 1e-9),
+        })
+    }
+}
+
+/// P, P′ and P″/2 at `modulus`.
+#[inline(always)]
+fn sizes(row: &[f64], modulus: f64) -> (f64, f64, f64) {
+    let (mut p, mut dp, mut ddp) = (0.0, 0.0, 0.0);
+    for c in row.iter().rev() {
+        ddp = ddp * modulus + dp;
+        dp = dp * modulus + p;
+        p = p * modulus + (c.abs() + TINY);
+    }
+    (p, dp, ddp)
+}
+
+/// The largest e^(−x′ `gap`) for x′ between x, where it is `weight`, and `far` = x + `shift`.
+#[inline(always)]
+fn heavier(gap: f64, weight: f64, far: f64, shift: f64) -> f64 {
+    if gap * shift < 0.0 {
+        // Not the product of the weight with what it grows by: either may be out of range.
+        exp(-gap * far).max(weight) + TINY
+    } else {
+        weight + TINY
     }
 }

@@ -131,7 +131,7 @@ fn a_stopped_task_ends_the_count() {
         re: (-14.0, 2.0),
         im: (0.0, 1e5),
     };
-    assert_eq!(count(&h, &region, &task), Err(Error::Interrupted));
+    assert_eq!(roots(&h, &region, &task), Err(Error::Interrupted));
 }
 
 proptest! {

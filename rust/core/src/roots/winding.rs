@@ -9,6 +9,8 @@
 //! their errors cancel in the sum but at the two ends and where c changes; `slack` adds those up,
 //! and what computing a difference costs: with u = 2⁻⁵³, the two directions u each, their product
 //! √5 u, `angle` 8 u (together below 13 u), τ_c Δy 3 u of itself, the sum u of itself.
+//! Terms that are small on the way need no Taylor formula: what they change g by is at most their moduli at
+//! both places, and the formula holds for the others.
 //! SHARE and the factors next to 1 leave far more room than the rounding of the test itself takes:
 //! that is 20 u at most, and e is known to carry 2 per cent to spare.
 //!
@@ -43,8 +45,17 @@ const USABLE: std::ops::Range<f64> = 1e-250..1e150;
 /// Error of one computed difference of arguments: 16 u and more than 3 u of τ_c Δy.
 pub(super) const STEP_ERROR: f64 = 8.0 * f64::EPSILON;
 
-/// Slopes count as at least this, so that their squares do not vanish.
+/// Slopes count as at least this of the value, so that their squares do not vanish.
 const LEAST_SLOPE: f64 = 1e-140;
+
+/// Share of the value that terms may have which are counted by their size alone.
+const RIPPLE: f64 = 0.3;
+
+/// Evaluations along a line before such terms are looked for: short steps find the hints.
+const PATIENCE: u64 = 500;
+
+/// How many times further these may let a step go.
+const CALM: f64 = 64.0;
 
 /// Change of arg h along a line, in rad, and a bound on its error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -93,6 +104,8 @@ pub(super) struct Walker<'a> {
     checked: u64,
     limit: u64,
     sharp: u32,
+    /// Evaluations from which on a line is walked in the longest steps that can be proved.
+    patient_until: u64,
 }
 
 impl<'a> Walker<'a> {
@@ -109,6 +122,7 @@ impl<'a> Walker<'a> {
             checked: 0,
             limit,
             sharp: 0,
+            patient_until: PATIENCE,
         }
     }
 
@@ -182,14 +196,16 @@ impl<'a> Walker<'a> {
 
     /// How far from `s` along the line (unit vector `along`), up to `most`, g keeps its sense.
     fn reach(&self, jet: &Jet, s: Complex64, along: Complex64, most: f64) -> f64 {
-        let room = SHARE * modulus(jet.value) - jet.value_error;
-        let slope = (modulus(jet.slope) + jet.slope_error).max(LEAST_SLOPE);
+        // Relative to the value, so that no square leaves the range.
+        let unit = modulus(jet.value);
+        let room = SHARE - jet.value_error / unit;
+        let slope = ((modulus(jet.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
         let size = modulus(s);
         let mut span = most.min(room / slope);
         let mut best = 0.0f64;
         for _ in 0..40 {
-            let bend = self.probe.curvature(size + span, along.re * span);
-            let r = 2.0 * room / (slope + (slope * slope + 2.0 * bend * room).sqrt());
+            let bend = self.probe.curvature(size + span, along.re * span) / unit;
+            let r = within(room, slope, bend);
             // Where the bound overflows nothing is known: `min` would take the span for it.
             if !r.is_nan() {
                 best = best.max(r.min(span) * (1.0 - 1e-12));
@@ -200,7 +216,31 @@ impl<'a> Walker<'a> {
             // The bound grows exponentially with the span: come down in steps, not at once.
             span = (3.0 * best).max(0.125 * span);
         }
-        best
+        if self.probe.evaluations() < self.patient_until {
+            return best;
+        }
+        best.max(self.calm_reach(jet, s, along, most.min(CALM * best)))
+    }
+
+    /// The same where fast terms are so small that their size is bound enough.
+    fn calm_reach(&self, jet: &Jet, s: Complex64, along: Complex64, most: f64) -> f64 {
+        let unit = modulus(jet.value);
+        let size = modulus(s);
+        let mut span = most;
+        for _ in 0..4 {
+            let place = (size + span, along.re * span);
+            let Some(calm) = self.probe.calm(s, place, RIPPLE * unit) else {
+                return 0.0;
+            };
+            let room = SHARE - (jet.value_error + calm.ripple) / unit;
+            let slope = ((modulus(calm.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
+            let r = within(room, slope, calm.bend / unit);
+            if r >= 0.25 * span {
+                return r.min(span) * (1.0 - 1e-12);
+            }
+            span *= 0.25;
+        }
+        0.0
     }
 
     /// Change of arg h along the line parallel to an axis from `from` to `to`.
@@ -214,6 +254,7 @@ impl<'a> Walker<'a> {
             return Ok(Turn::default());
         }
         let along = (to - from) / whole;
+        self.patient_until = self.probe.evaluations() + PATIENCE;
         self.probe.refer_to_dominant(from);
         let mut here = from;
         let mut jet = self.clear_jet(here)?;
@@ -298,6 +339,11 @@ impl<'a> Walker<'a> {
         }
         Err(self.blocked(here))
     }
+}
+
+/// The largest r with `slope` r + `bend` r²/2 at most `room`.
+fn within(room: f64, slope: f64, bend: f64) -> f64 {
+    2.0 * room / (slope + (slope * slope + 2.0 * bend * room).sqrt())
 }
 
 fn is_finite(jet: &Jet) -> bool {
