@@ -16,6 +16,7 @@
 
 use num_complex::Complex64;
 
+use super::cell::Walk;
 use crate::elementary::angle;
 use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
 use crate::{Error, Task};
@@ -277,6 +278,12 @@ impl<'a> Walker<'a> {
             length = (0.999 * reach).min(length * 0.999);
         }
         Err(self.blocked(here))
+    }
+}
+
+impl Walk for Walker<'_> {
+    fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error> {
+        Walker::walk(self, from, to)
     }
 }
 
