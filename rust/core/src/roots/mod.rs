@@ -5,7 +5,7 @@
 //! `count` half planes; `newton` proves discs around single roots and clusters; `isolate` finds
 //! all roots of a region; `rightmost` those that decide stability; `neutral` knows the chains, `stable`
 //! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be; `certificate`
-//! writes the proof of a count down. Elementary functions are those of `crate::elementary`, with
+//! writes the proof of a count down. `matrix` does the same for det M(s), not expanded. Elementary functions are those of `crate::elementary`, with
 //! proved bounds; each file says what its inequalities leave for rounding.
 
 mod bounds;
@@ -14,6 +14,7 @@ mod certificate;
 mod count;
 mod dominated;
 mod isolate;
+pub mod matrix;
 mod neutral;
 mod newton;
 mod real;

@@ -28,7 +28,7 @@ const SHARE: f64 = 0.95;
 const CHECK_EVERY: u64 = 1024;
 
 /// Evaluations after which a computation is given up.
-const MAX_EVALUATIONS: u64 = 20_000_000;
+pub(super) const MAX_EVALUATIONS: u64 = 20_000_000;
 
 /// Hints kept of a walk, the first ones.
 const MAX_HINTS: usize = 1000;
