@@ -46,6 +46,7 @@ FLOORS = [
         "_loop_stability",
         "_stability",
         "_determinant",
+        "_matrix_roots",
         "_frequency",
         "_interchange",
         "_margins",

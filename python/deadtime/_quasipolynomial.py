@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime import _deadtime
 from deadtime._certificate import Certificate
 from deadtime._chains import Chain, chains_of
-from deadtime._rootset import RootSet
+from deadtime._rootset import Range, RootSet, ends, root_set
 from deadtime._sensitivity import Sensitivity
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
 Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "advanced"]
-Range: TypeAlias = tuple[float | None, float | None]
 
 
 class QuasiPolynomial:
@@ -297,7 +296,7 @@ class QuasiPolynomial:
         >>> (s + 5.0 * delay(0.36)).count(re=(0, None))
         2
         """
-        return self._native.count(_range("re", re), _range("im", im))
+        return self._native.count(ends("re", re), ends("im", im))
 
     def certify(self, re: Range | None = None, im: Range | None = None) -> Certificate:
         """Count the roots in a region and write the proof down.
@@ -325,7 +324,7 @@ class QuasiPolynomial:
         >>> proof.count, proof.verify()
         (16, 16)
         """
-        region = _range("re", re), _range("im", im)
+        region = ends("re", re), ends("im", im)
         rows, delays = self._coefficients.tolist(), self._delays.tolist()
         return Certificate._made(rows, delays, region, self._native.certify(*region))
 
@@ -360,7 +359,7 @@ class QuasiPolynomial:
         >>> ((s + delay(1.0)) ** 2).roots(re=(-1, 1), im=(0, 5)).multiplicities
         array([2])
         """
-        return _root_set(self._native.roots(_range("re", re), _range("im", im)))
+        return root_set(self._native.roots(ends("re", re), ends("im", im)))
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost roots and prove that nothing else lies that far right.
@@ -394,7 +393,7 @@ class QuasiPolynomial:
         number = operator.index(n)
         if number < 1:
             raise ValueError(f"n={n}: ask for at least 1 rightmost root")
-        return _root_set(self._native.rightmost(number))
+        return root_set(self._native.rightmost(number))
 
     def spectral_abscissa(self) -> float:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.
@@ -617,27 +616,6 @@ def _real_array(name: str, values: ArrayLike, ndim: int) -> NDArray[np.float64]:
     if array.ndim != ndim or array.size == 0:
         raise ValueError(f"{name} of shape {array.shape}: give {ndim} dimensions, none empty")
     return array.astype(np.float64, copy=False)
-
-
-def _range(name: str, ends: Range | None) -> tuple[float, float]:
-    if ends is None:
-        return (-math.inf, math.inf)
-    try:
-        low, high = ends
-        pair = (
-            -math.inf if low is None else float(low),
-            math.inf if high is None else float(high),
-        )
-    except (TypeError, ValueError) as error:
-        raise TypeError(
-            f"{name}={ends!r}: give a pair (low, high), None for an open end"
-        ) from error
-    return pair
-
-
-def _root_set(listed: _deadtime._Listed) -> RootSet:
-    roots, multiplicities, radii, resolved, counted, re, im = listed
-    return RootSet(roots, multiplicities, radii, resolved, counted, (re, im))
 
 
 def _term(row: NDArray[np.float64], tau: float) -> str:

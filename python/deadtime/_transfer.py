@@ -21,9 +21,9 @@ from deadtime._interchange import (
     rational,
 )
 from deadtime._margins import Margins, margins
-from deadtime._quasipolynomial import QuasiPolynomial, Range, delay, is_number
+from deadtime._quasipolynomial import QuasiPolynomial, delay, is_number
 from deadtime._ratio import first_term, ratio
-from deadtime._rootset import RootSet
+from deadtime._rootset import Range, RootSet
 from deadtime._validation import non_negative, real_array
 
 if TYPE_CHECKING:

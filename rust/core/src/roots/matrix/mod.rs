@@ -302,6 +302,11 @@ pub fn chain_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<(f64
     Leading::new(system)?.difference.enclosure(task)
 }
 
+/// Can the inverse of E be verified? Half planes and chains need it.
+pub fn is_invertible(system: &CharacteristicMatrix) -> bool {
+    Leading::new(system).is_ok()
+}
+
 /// Is every root proved to lie left of the imaginary axis, and stay there when delays change by
 /// arbitrarily little? `false` also where a root lies on the axis or too close to it to tell.
 ///

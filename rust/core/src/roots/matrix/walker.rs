@@ -96,8 +96,14 @@ impl<'a> MatrixWalker<'a> {
 
     /// The error of a line that cannot be proved to be clear of roots at `place`.
     fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
-        let mut distance =
-            4.0 * f64::EPSILON * modulus(place).max(f64::MIN_POSITIVE / f64::EPSILON);
+        let mut distance = 4.0 * f64::EPSILON * modulus(place).max(1e-3 * self.system.rate());
+        // The place may be clear itself, and the root as far as Newton's step leads.
+        if let Some(here) = Place::tried(self.system, place) {
+            let correction = modulus(here.correction);
+            if correction.is_finite() {
+                distance = distance.max(2.0 * correction);
+            }
+        }
         for _ in 0..40 {
             let mut clear = true;
             for step in [Complex64::ONE, -Complex64::ONE, Complex64::I] {
