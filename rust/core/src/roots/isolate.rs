@@ -183,7 +183,7 @@ impl<'w, W: Seek> Search<'w, W> {
             if missing == 0 {
                 continue;
             }
-            if missing <= PATIENCE && self.try_here(&cell)? {
+            if (missing <= PATIENCE || is_tiny(&cell)) && self.try_here(&cell)? {
                 continue;
             }
             let tall = cell.height() > cell.width();
@@ -293,6 +293,12 @@ impl<'w, W: Seek> Search<'w, W> {
             ),
         }
     }
+}
+
+/// Is the cell so small that many roots in it may well be one of high multiplicity?
+fn is_tiny(cell: &Cell) -> bool {
+    let size = cell.im.1.abs().max(cell.re.0.abs()).max(cell.re.1.abs());
+    cell.width().max(cell.height()) < 1e-4 * size
 }
 
 /// The k-th of points that fill the cell evenly.

@@ -24,14 +24,14 @@ const MARGIN: f64 = 1.0 + 1e-9;
 const MAX_ANGLES: usize = 3;
 
 /// Squarings at which a box is given up and halved, and those for a single matrix.
-const SQUARINGS: u32 = 9;
+const SQUARINGS: u32 = 16;
 const MANY_SQUARINGS: u32 = 24;
 
 /// Squarings at which a spectral radius is only compared.
 const SAMPLE_SQUARINGS: u32 = 13;
 
 /// Operations spent on one line.
-const MAX_WORK: f64 = 2e9;
+const MAX_WORK: f64 = 1e9;
 
 /// Samples of each angle, by the number of angles.
 const SAMPLES: [usize; 4] = [1, 48, 14, 8];
@@ -147,7 +147,7 @@ impl Difference {
             let off: Vec<f64> = norms.iter().skip(1).zip(&one.half).map(moved).collect();
             let (bound, spent) =
                 inverse_bound(matrix, lost + off.iter().sum::<f64>() * MARGIN, squarings);
-            work -= f64::from(spent + 1) * 8.0 * n * n * n;
+            work -= f64::from(spent + 1) * (8.0 * n * n * n + 3000.0);
             match bound {
                 Some(bound) => most = most.max(bound),
                 None if free == 0 || work < 0.0 => return Ok(None),
@@ -406,7 +406,7 @@ fn inverse_bound(mut matrix: Rows, mut off: f64, squarings: u32) -> (Option<f64>
         if whole < 0.999_999 {
             return (Some(product / (1.0 - whole) * MARGIN), step);
         }
-        if !(whole < 1e60 && product < 1e60) || step == squarings {
+        if !(whole < 1e60 && product < 1e60 && off < 4.0) || step == squarings {
             return (None, step);
         }
         product *= (1.0 + whole) * MARGIN;

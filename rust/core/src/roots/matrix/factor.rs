@@ -40,6 +40,7 @@ impl Rows {
         }
     }
 
+    #[inline(always)]
     pub(super) fn get(&self, row: usize, column: usize) -> Complex64 {
         let at = row * self.size + column;
         match (self.re.get(at), self.im.get(at)) {
@@ -141,7 +142,13 @@ pub(super) struct Factored {
 }
 
 /// Factor and invert; `None` where a pivot vanishes or leaves the usable range.
-pub(super) fn factor(mut g: Rows) -> Option<Factored> {
+pub(super) fn factor(g: Rows) -> Option<Factored> {
+    // The same operations in the same order, in wider registers where the machine has them.
+    pulp::Arch::new().dispatch(|| eliminated(g))
+}
+
+#[inline(always)]
+fn eliminated(mut g: Rows) -> Option<Factored> {
     let n = g.size;
     let mut order: Vec<usize> = (0..n).collect();
     let mut direction = Complex64::ONE;
@@ -193,6 +200,7 @@ pub(super) fn factor(mut g: Rows) -> Option<Factored> {
 }
 
 /// R with L U R = P, the permuted identity.
+#[inline(always)]
 fn solve(lu: &Rows, order: &[usize], reciprocals: &[Complex64]) -> Rows {
     let n = lu.size;
     let mut r = Rows::zeros(n);

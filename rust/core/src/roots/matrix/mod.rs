@@ -1,6 +1,6 @@
 //! Roots of det M(s), M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), without expanding the determinant.
 //!
-//! `system` holds the matrices, `factor` their factors and inverses with rounding bounds, `place`
+//! `system` holds the matrices, `balance` scales them at a point, `factor` their factors and inverses with rounding bounds, `place`
 //! what is proved about det M around a point; `walker` makes walks and Newton's iteration of that,
 //! with which rectangles are counted, divided and searched as for one function (`roots::cell`,
 //! `roots::isolate`). `outer` bounds roots of half planes by norms, `difference` knows the chains of
@@ -8,6 +8,7 @@
 //! matrices as given. A root is as well determined as M is regular next to it; where rounding hides
 //! which side of a line it is on, there is an error, never a guess.
 
+mod balance;
 mod difference;
 mod factor;
 mod outer;

@@ -1,6 +1,6 @@
 //! What is proved about det M around one point s.
 //!
-//! Row i of M is multiplied by e^(s τ_c(i)), c(i) the delay whose terms are largest in it, so that
+//! Row i of M is multiplied by e^(s τ_c(i)), rows and columns by powers of two (`balance`), so that
 //! nothing overflows: arg det M = arg det G − T Im s with T = Σ τ_c(i). Let R be the computed inverse
 //! of G(s), G(s) R = I − Y, |Y| ≤ α in the Frobenius norm, K a matrix and κ a number. With
 //!     G(s + δ) R = (1 + κ δ)(I + Z),  Z = (−Y + δ (K − κ I) + (rest))/(1 + κ δ),
@@ -16,9 +16,10 @@
 
 use num_complex::Complex64;
 
+use super::balance::{Balanced, balance};
 use super::factor::{Factored, ROUNDING, Rows, factor, norm};
 use super::system::{CharacteristicMatrix, Term};
-use crate::elementary::{angle, exp, log, sin_cos};
+use crate::elementary::{angle, exp, sin_cos};
 use crate::quasipoly::modulus;
 
 /// Bound on |Z| along a step.
@@ -105,10 +106,13 @@ impl Place {
     /// The same without the demand that anything be proved: for Newton's iteration.
     pub(super) fn tried(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
         let n = system.size();
-        let references = references(system, s);
+        let Balanced {
+            references,
+            rows: scaled,
+        } = balance(system, s)?;
         let mut weights = Weights::new(system, s);
         let mut g = Rows::zeros(n);
-        for (i, (terms, reference)) in system.rows().iter().zip(&references).enumerate() {
+        for (i, (terms, reference)) in scaled.iter().zip(&references).enumerate() {
             for term in terms {
                 let (_, _, factor) = weights.get(term.delay, *reference);
                 for entry in &term.entries {
@@ -124,7 +128,7 @@ impl Place {
         } = factor(g)?;
         let mut sums = Sums::new(n);
         let mut rows = Vec::with_capacity(n);
-        for (i, (terms, reference)) in system.rows().iter().zip(&references).enumerate() {
+        for (i, (terms, reference)) in scaled.iter().zip(&references).enumerate() {
             let mut parts = Vec::with_capacity(terms.len());
             sums.start_row();
             for term in terms {
@@ -262,31 +266,6 @@ impl Place {
         let trace = self.size.sqrt() * self.residual + length * expansion.trace + trace + rounding;
         whole * MARGIN <= MOST * least && trace * MARGIN <= MOST_TRACE * least
     }
-}
-
-/// For each row the delay whose terms are largest in it.
-fn references(system: &CharacteristicMatrix, s: Complex64) -> Vec<usize> {
-    let distance = modulus(s);
-    let size = |term: &Term| {
-        let sum: f64 = term
-            .entries
-            .iter()
-            .map(|entry| distance * entry.slope.abs() + entry.value.abs())
-            .sum();
-        let delay = system.delays().get(term.delay).copied().unwrap_or(0.0);
-        log(sum) - s.re * delay
-    };
-    let largest = |terms: &Vec<Term>| {
-        let mut best = (f64::NEG_INFINITY, 0);
-        for term in terms {
-            let size = size(term);
-            if size > best.0 {
-                best = (size, term.delay);
-            }
-        }
-        best.1
-    };
-    system.rows().iter().map(largest).collect()
 }
 
 /// Gap, e^(−x d) and e^(−s d) for pairs of delays, each computed once.
