@@ -47,8 +47,8 @@ def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> Quas
     """Determinant of a matrix of quasi-polynomials; NotExpandedError where that is not safe.
 
     With `bordered` one row and column belong to an output and an input, and the determinant may
-    be zero. This is the one place at which expansion is decided on: what is refused here is searched
-    for roots by factorising the matrix itself.
+    be zero. This is the one place at which expansion is decided on: what is refused here is
+    searched for roots by factorising the matrix itself.
     """
     size = len(entries)
     states = size - int(bordered)

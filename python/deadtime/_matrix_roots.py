@@ -27,19 +27,15 @@ class MatrixDeterminant:
 
     _native: _deadtime.CharacteristicMatrix
 
-    def __init__(
-        self, E: _Matrix, N: Mapping[float, _Matrix], A: Mapping[float, _Matrix]
-    ) -> None:
+    def __init__(self, E: _Matrix, N: Mapping[float, _Matrix], A: Mapping[float, _Matrix]) -> None:
         def listed(group: Mapping[float, _Matrix]) -> list[tuple[float, _Matrix]]:
             return [(tau, np.ascontiguousarray(matrix)) for tau, matrix in group.items()]
 
-        self._native = _deadtime.CharacteristicMatrix(
-            np.ascontiguousarray(E), listed(N), listed(A)
-        )
+        self._native = _deadtime.CharacteristicMatrix(np.ascontiguousarray(E), listed(N), listed(A))
 
     @property
     def is_invertible(self) -> bool:
-        """Can the inverse of E be verified?"""
+        """Whether the inverse of E can be verified."""
         return self._native.is_invertible()
 
     def count(self, re: Range | None = None, im: Range | None = None) -> int:

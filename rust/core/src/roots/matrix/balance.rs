@@ -18,14 +18,17 @@ use crate::quasipoly::modulus;
 /// Stands for the cost of an entry that is zero.
 const FORBIDDEN: f64 = 1e12;
 
-/// Exponents within this make normal numbers of normal numbers.
-const MOST_EXPONENT: f64 = 900.0;
+/// The power of two next to e^(−d x): taken out of the exponential, so that neither it nor the
+/// entries it belongs to leave the range of double precision unless their product does.
+pub(super) fn exponent(gap: f64, x: f64) -> f64 {
+    (-gap * x / LN_2).round().clamp(-1e9, 1e9)
+}
 
 /// The rows of a scaled matrix.
 pub(super) struct Balanced {
     /// c(i).
     pub(super) references: Vec<usize>,
-    /// Terms with entries scaled; exponentials relative to those of c(i).
+    /// Terms with entries scaled, and multiplied by two to the power of [`exponent`].
     pub(super) rows: Vec<Vec<Term>>,
 }
 
@@ -35,7 +38,8 @@ pub(super) fn balance(system: &CharacteristicMatrix, s: Complex64) -> Option<Bal
     let distance = modulus(s);
     let mut costs = vec![FORBIDDEN; n * n];
     let mut largest = vec![0; n * n];
-    let lag = |index: usize| system.delays().get(index).copied().unwrap_or(0.0) * s.re / LN_2;
+    let delay = |index: usize| system.delays().get(index).copied().unwrap_or(0.0);
+    let lag = |index: usize| delay(index) * s.re / LN_2;
     for (i, terms) in system.rows().iter().enumerate() {
         for term in terms {
             let lag = lag(term.delay);
@@ -65,9 +69,11 @@ pub(super) fn balance(system: &CharacteristicMatrix, s: Complex64) -> Option<Bal
         references.push(reference);
         let own = (u - lag(reference)).round();
         let scaled = terms.iter().map(|term| {
+            let gap = delay(term.delay) - delay(reference);
+            let own = own + exponent(gap, s.re);
             let entries = term.entries.iter().map(|entry| {
                 let across = v.get(entry.column).copied().unwrap_or(0.0).round();
-                let exponent = (own + across).clamp(-MOST_EXPONENT, MOST_EXPONENT) as i32;
+                let exponent = (own + across) as i32;
                 let mut scaled = *entry;
                 scaled.slope = libm::ldexp(entry.slope, exponent);
                 scaled.value = libm::ldexp(entry.value, exponent);

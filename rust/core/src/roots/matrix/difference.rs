@@ -5,8 +5,9 @@
 //! free to vary that is attained or approached. It falls with σ, and a common angle does not
 //! matter. *Upper end*: the spectral radius is below 1 if ‖C(θ)^k‖ < 1 for k = 2^q. On a box of angles
 //! with centre θ₀, C differs by at most e = Σ ‖C_j‖ w_j h_j; squaring makes of (N, e) at most
-//! (‖C(θ₀)^2k‖, 2 N e + e²) and of rounding (n + 4) u N² more; boxes are halved until each is proved.
-//! *Lower end*: |tr C^k| ≤ n ρ^k at any one θ. Norms are Frobenius norms. The spectral radius is
+//! (‖C(θ₀)^2k‖, 2 N e + e²) and of rounding (n + 4) u |C|² more, |C| the Frobenius norm; boxes are halved until each is proved.
+//! *Lower end*: |tr C^k| ≤ n ρ^k at any one θ. ‖·‖ is the spectral norm, bounded by the Frobenius
+//! norm and by √(‖·‖₁ ‖·‖_∞). The spectral radius is
 //! plurisubharmonic (Vesentini 1968), as is ‖C^k‖: what holds on the torus holds for all smaller
 //! moduli, hence right of σ, and ‖(I + C)⁻¹‖ ≤ Π (1 + N_2^i)/(1 − N_k).
 
@@ -40,7 +41,7 @@ const SAMPLES: [usize; 4] = [1, 48, 14, 8];
 #[derive(Debug, Clone)]
 pub(super) struct Difference {
     size: usize,
-    /// Delay, C_j, its Frobenius norm.
+    /// Delay, C_j, a bound on its norm.
     terms: Vec<(f64, Rows, f64)>,
     /// Bounds on the errors of C_j, and of the identity.
     losses: Vec<f64>,
@@ -118,7 +119,7 @@ impl Difference {
         let norms: Vec<f64> = self
             .terms
             .iter()
-            .map(|(delay, _, norm)| norm * exp_above(-sigma * delay * (1.0 + 1e-15)) * MARGIN)
+            .map(|(delay, _, norm)| norm * exp_above(-sigma * delay) * MARGIN)
             .collect();
         let (free, squarings) = match self.angles() {
             0 => (0, MANY_SQUARINGS),
@@ -368,9 +369,29 @@ impl Difference {
     }
 }
 
-fn norm(matrix: &Rows) -> f64 {
+fn frobenius(matrix: &Rows) -> f64 {
     let squares: f64 = matrix.re.iter().chain(&matrix.im).map(|x| x * x).sum();
     squares.sqrt() * MARGIN
+}
+
+/// A bound on the spectral norm.
+fn norm(matrix: &Rows) -> f64 {
+    let n = matrix.size;
+    let mut columns = vec![0.0; n];
+    let mut largest = 0.0f64;
+    for i in 0..n {
+        let (re, im) = matrix.row(i);
+        let mut row = 0.0;
+        for ((x, y), column) in re.iter().zip(im).zip(&mut columns) {
+            let size = (x * x + y * y).sqrt();
+            row += size;
+            *column += size;
+        }
+        largest = largest.max(row);
+    }
+    let tallest = columns.iter().fold(0.0f64, |a, b| a.max(*b));
+    // What squares lose in underflow is made up for by the last summand.
+    ((largest * tallest).sqrt() * MARGIN).min(frobenius(matrix)) + 1e-150
 }
 
 fn square(matrix: &Rows) -> Rows {
@@ -410,7 +431,8 @@ fn inverse_bound(mut matrix: Rows, mut off: f64, squarings: u32) -> (Option<f64>
             return (None, step);
         }
         product *= (1.0 + whole) * MARGIN;
-        off = (2.0 * size * off + off * off + rounding * size * size) * MARGIN;
+        let whole = frobenius(&matrix);
+        off = (2.0 * size * off + off * off + rounding * whole * whole) * MARGIN;
         matrix = square(&matrix);
     }
     (None, squarings)
@@ -436,8 +458,8 @@ fn powers(matrix: Rows, lost: f64, squarings: u32, mut visit: impl FnMut(f64, f6
         off *= factor;
         exponent -= f64::from(shift);
         visit(power, exponent, &matrix, off);
-        let size = size * factor;
-        off = (2.0 * size * off + off * off + rounding * size * size) * MARGIN;
+        let (size, whole) = (size * factor, frobenius(&matrix));
+        off = (2.0 * size * off + off * off + rounding * whole * whole) * MARGIN;
         matrix = square(&matrix);
         exponent *= 2.0;
         power *= 2.0;
@@ -463,8 +485,8 @@ fn log_radius_below(matrix: Rows, lost: f64) -> f64 {
         MANY_SQUARINGS,
         |power, exponent, matrix, off| {
             let trace: Complex64 = (0..matrix.size).map(|i| matrix.get(i, i)).sum();
-            // A trace changes by √n times the norm of a change.
-            let least = (trace.norm() - n.sqrt() * off * MARGIN) * (1.0 - 1e-9) - 1e-15 * n;
+            // A trace changes by n times the spectral norm of a change.
+            let least = (trace.norm() - n * off * MARGIN) * (1.0 - 1e-9) - 1e-15 * n;
             if least > 0.0 {
                 let value = (exponent * LN_2 + log(least / n)) / power;
                 best = best.max(value - 1e-15 * (1.0 + value.abs()));

@@ -126,7 +126,7 @@ impl Leading {
                 if *delay == 0.0 {
                     1.0
                 } else {
-                    exp_above(-sigma * delay * (1.0 + 1e-15))
+                    exp_above(-sigma * delay)
                 }
             })
             .collect();

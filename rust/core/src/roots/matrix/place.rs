@@ -11,12 +11,14 @@
 //! or only the part of G′ R that is free of exponentials, |e^z − 1| ≤ min(|z|, 2) g: where sE dominates
 //! that reaches far. κ = tr K/n takes out what all of G has in common.
 //!
-//! Rounding: an entry of G carries u (16 + m + 4 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d), derived as in
-//! `quasipoly::probe`; a row of products with R at most as many u more as it has entries. Both are in `loss`.
+//! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d), derived as in
+//! `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x| in the exponent); a row of products with R at most as many u more as it has entries. Both are in `loss`.
+
+use std::f64::consts::LN_2;
 
 use num_complex::Complex64;
 
-use super::balance::{Balanced, balance};
+use super::balance::{Balanced, balance, exponent};
 use super::factor::{Factored, ROUNDING, Rows, factor, norm};
 use super::system::{CharacteristicMatrix, Term};
 use crate::elementary::{angle, exp, sin_cos};
@@ -36,6 +38,9 @@ const MARGIN: f64 = 1.0 + 1e-9;
 
 /// Above what underflow can do to a row.
 const FLOOR: f64 = 1e-150;
+
+/// What a size lost in underflow counts for: it must not hide what it grows to.
+const LEAST: f64 = 1e-150;
 
 /// One delay's part of one row of G, times R.
 #[derive(Debug, Clone, Copy)]
@@ -268,7 +273,7 @@ impl Place {
     }
 }
 
-/// Gap, e^(−x d) and e^(−s d) for pairs of delays, each computed once.
+/// Gap, e^(−x d) and e^(−s d) less their power of two for pairs of delays, each computed once.
 struct Weights<'a> {
     delays: &'a [f64],
     s: Complex64,
@@ -295,7 +300,8 @@ impl<'a> Weights<'a> {
         let found = if gap == 0.0 {
             (0.0, 1.0, Complex64::ONE)
         } else {
-            let weight = exp(-gap * self.s.re);
+            // What is left of e^(−x d) without its power of two, which is in the entries.
+            let weight = exp(-gap * self.s.re - exponent(gap, self.s.re) * LN_2);
             let (sine, cosine) = sin_cos(gap * self.s.im);
             (gap, weight, Complex64::new(weight * cosine, -weight * sine))
         };
@@ -308,7 +314,7 @@ impl<'a> Weights<'a> {
     /// What rounding costs the products of a term with R, relative to the sum of moduli.
     fn loss(&self, term: &Term, terms: usize, gap: f64) -> f64 {
         let reach = self.s.re.abs() + self.s.im.abs();
-        ROUNDING * ((16 + terms + term.entries.len()) as f64 + 4.0 * gap.abs() * reach)
+        ROUNDING * ((16 + terms + term.entries.len()) as f64 + 8.0 * gap.abs() * reach)
     }
 }
 
@@ -458,14 +464,12 @@ impl Sums {
                 (&self.on_slope.0, &self.on_slope.1),
             );
         }
-        // A weight lost in underflow must not hide what it grows to.
-        let weight = weight.max(1e-290);
         Part {
             gap,
-            size: weight * squares.sqrt() * MARGIN + lost,
-            slope: weight * slope_norm * MARGIN + lost_slope,
-            own_size: weight * modulus(own_size) * MARGIN + lost,
-            own_slope: weight * modulus(own_slope) * MARGIN + lost_slope,
+            size: weight * squares.sqrt() * MARGIN + lost + LEAST,
+            slope: weight * slope_norm * MARGIN + lost_slope + LEAST,
+            own_size: weight * modulus(own_size) * MARGIN + lost + LEAST,
+            own_slope: weight * modulus(own_slope) * MARGIN + lost_slope + LEAST,
         }
     }
 }
