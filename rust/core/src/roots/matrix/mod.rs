@@ -50,11 +50,15 @@ impl<'s> Prepared<'s> {
         })
     }
 
-    /// A rectangle with all roots right of `sigma`; `None` where there is none.
-    fn rectangle(&self, sigma: f64, task: &Task) -> Result<Option<((f64, f64), f64)>, Error> {
+    /// The upper half of a rectangle with all roots right of `sigma`; `None` where there is none.
+    fn cell(&self, walker: &mut MatrixWalker<'_>, sigma: f64) -> Result<Option<Cell>, Error> {
         // A little beyond, so that the edge itself is clear.
-        let radius = 1.01 * self.leading.radius(sigma, task)?;
-        Ok((sigma < radius).then(|| ((sigma.max(-radius), radius), radius)))
+        let radius = 1.01 * self.leading.radius(sigma, walker.task())?;
+        if sigma >= radius {
+            return Ok(None);
+        }
+        let re = (sigma.max(-radius), radius);
+        Cell::new(walker, re, (0.0, radius), true).map(Some)
     }
 }
 
@@ -70,10 +74,7 @@ impl Spectrum for Prepared<'_> {
 
     fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error> {
         let mut walker = self.walker(task, EVALUATIONS_PER_LINE);
-        let cell = match self.rectangle(sigma, task)? {
-            Some((re, height)) => Some(Cell::new(&mut walker, re, (0.0, height), true)?),
-            None => None,
-        };
+        let cell = self.cell(&mut walker, sigma)?;
         Ok((cell.map_or(0, |cell| cell.count), walker.hints))
     }
 
@@ -82,10 +83,7 @@ impl Spectrum for Prepared<'_> {
         walker: &mut MatrixWalker<'a>,
         sigma: f64,
     ) -> Result<Option<Cell>, Error> {
-        match self.rectangle(sigma, walker.task())? {
-            Some((re, height)) => Cell::new(walker, re, (0.0, height), true).map(Some),
-            None => Ok(None),
-        }
+        self.cell(walker, sigma)
     }
 }
 

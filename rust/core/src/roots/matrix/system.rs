@@ -77,19 +77,22 @@ impl CharacteristicMatrix {
             )));
         }
         let mut delays = vec![0.0];
-        for (delay, _) in n.iter().chain(&a) {
+        for (delay, matrix) in n.iter().chain(&a) {
             if !(delay.is_finite() && *delay >= 0.0) {
                 return Err(Error::argument(format!(
                     "a delay of {delay} s: give finite ones, not below 0"
                 )));
             }
-            delays.push(delay + 0.0);
+            // A matrix of zeros delays nothing.
+            if matrix.iter().flatten().any(|x| *x != 0.0) {
+                delays.push(delay + 0.0);
+            }
         }
         delays.sort_by(f64::total_cmp);
         delays.dedup();
         let mut slopes = vec![vec![vec![0.0; size]; size]; delays.len()];
         let mut values = slopes.clone();
-        let place = |delay: f64| delays.iter().position(|d| *d == delay).unwrap_or(0);
+        let place = |delay: f64| delays.iter().position(|d| *d == delay);
         let all = std::iter::once((0.0, &e, true))
             .chain(n.iter().map(|(delay, m)| (*delay, m, true)))
             .chain(a.iter().map(|(delay, m)| (*delay, m, false)));
@@ -100,7 +103,7 @@ impl CharacteristicMatrix {
                 )));
             }
             let group = if is_slope { &mut slopes } else { &mut values };
-            let Some(target) = group.get_mut(place(delay)) else {
+            let Some(target) = place(delay).and_then(|place| group.get_mut(place)) else {
                 continue;
             };
             for (sums, row) in target.iter_mut().zip(matrix) {
@@ -115,7 +118,10 @@ impl CharacteristicMatrix {
                 }
             }
         }
-        let rate = scale(&mut slopes, &mut values);
+        let rate = match scale(&mut slopes, &mut values) {
+            0.0 => delays.last().filter(|d| **d > 0.0).map_or(1.0, |d| 1.0 / d),
+            rate => rate,
+        };
         let mut rows = vec![Vec::new(); size];
         for (delay, (slope, value)) in slopes.iter().zip(&values).enumerate() {
             for (terms, (slopes, values)) in rows.iter_mut().zip(slope.iter().zip(value)) {
@@ -214,7 +220,7 @@ impl CharacteristicMatrix {
     /// # Errors
     /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
     pub(super) fn check_regular(&self) -> Result<(), Error> {
-        let rate = if self.rate > 0.0 { self.rate } else { 1.0 };
+        let rate = self.rate;
         let regular =
             |(x, y): &(f64, f64)| Place::new(self, Complex64::new(x * rate, y * rate)).is_some();
         if POINTS.iter().any(regular) {

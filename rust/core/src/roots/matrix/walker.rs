@@ -36,6 +36,9 @@ const MAX_STEPS: usize = 40;
 /// Error of one step's arithmetic, in units of the angles that come up in it.
 const STEP_ERROR: f64 = 16.0 * f64::EPSILON;
 
+/// Places next to a root that are tried before a line counts as blocked.
+const MOST_UNCLEAR: u32 = 5;
+
 /// How much longer than the own reach steps are tried, at most.
 const STRETCH: f64 = 1.9;
 
@@ -131,6 +134,7 @@ impl<'a> MatrixWalker<'a> {
         } else {
             rest.min(*stretch * reach.length)
         };
+        let mut unclear = 0;
         for _ in 0..60 {
             let next = if length >= rest {
                 to
@@ -152,6 +156,11 @@ impl<'a> MatrixWalker<'a> {
                 *stretch = (0.9 * *stretch).max(1.2);
                 length = (0.999 * reach.length).max(0.5 * length.min(reach.length));
             } else {
+                // Clear places can be had ever closer to a root, each a little less so.
+                unclear += 1;
+                if unclear > MOST_UNCLEAR {
+                    break;
+                }
                 length *= 0.5;
             }
         }
