@@ -330,6 +330,15 @@ def test_multiple_roots_are_held_by_one_disc():
     assert found.radii[0] < 1e-6
 
 
+def test_defective_roots_are_held_by_one_disc():
+    # A Jordan block: bounds by norms shrink with the square of the distance.
+    system = matrix_of(DelaySystem([[-1.0, -0.08, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]))
+    found = system.rightmost()
+    assert found.counted == 3
+    assert abs(found.roots[0] + 1) <= found.radii[0] < 0.01
+    assert matrix_of(DelaySystem({0.0: 0.0, 1.0: 0.0})).rightmost().roots.tolist() == [0]
+
+
 def test_far_to_the_left_nothing_overflows():
     n = 11
     system = DelaySystem({0.0: -np.eye(n), 1.0: 0.5 * np.roll(np.eye(n), 1, axis=1)})

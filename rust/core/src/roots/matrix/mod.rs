@@ -36,6 +36,9 @@ const MAX_WANTED: usize = 1000;
 /// Factorisations after which a line is given up.
 const EVALUATIONS_PER_LINE: u64 = 100_000;
 
+/// Radii of half planes are at least this times the rate of the system: roots at 0 need room.
+const LEAST_RADIUS: f64 = 1e-6;
+
 /// A system with its bounds, ready to be searched.
 struct Prepared<'s> {
     system: &'s CharacteristicMatrix,
@@ -53,7 +56,8 @@ impl<'s> Prepared<'s> {
     /// The upper half of a rectangle with all roots right of `sigma`; `None` where there is none.
     fn cell(&self, walker: &mut MatrixWalker<'_>, sigma: f64) -> Result<Option<Cell>, Error> {
         // A little beyond, so that the edge itself is clear.
-        let radius = 1.01 * self.leading.radius(sigma, walker.task())?;
+        let least = LEAST_RADIUS * self.system.rate();
+        let radius = 1.01 * self.leading.radius(sigma, walker.task())?.max(least);
         if sigma >= radius {
             return Ok(None);
         }
@@ -116,7 +120,8 @@ fn close(
                  infinitely many roots",
             ));
         }
-        let radius = 1.01 * Leading::new(system)?.radius(re.0, task)?;
+        let least = LEAST_RADIUS * system.rate();
+        let radius = 1.01 * Leading::new(system)?.radius(re.0, task)?.max(least);
         re = (re.0.max(-radius), re.1.min(radius));
         im = (im.0.max(-radius), im.1.min(radius));
     }

@@ -36,6 +36,9 @@ const MAX_STEPS: usize = 40;
 /// Error of one step's arithmetic, in units of the angles that come up in it.
 const STEP_ERROR: f64 = 16.0 * f64::EPSILON;
 
+/// Evaluations for the walk around a small square.
+const PATIENCE: u64 = 1000;
+
 /// Places next to a root that are tried before a line counts as blocked.
 const MOST_UNCLEAR: u32 = 5;
 
@@ -49,6 +52,10 @@ pub(in crate::roots) struct MatrixWalker<'a> {
     /// Where Newton's step from the points closest to a root leads to.
     pub(in crate::roots) hints: Vec<Complex64>,
     known: Vec<Disc>,
+    /// Where no single root could be proved.
+    stalled: Vec<Complex64>,
+    /// Evaluations at which a small square is given up for a larger one.
+    patience: u64,
     evaluations: u64,
     work: u64,
     limit: u64,
@@ -61,6 +68,8 @@ impl<'a> MatrixWalker<'a> {
             task,
             hints: Vec::new(),
             known: Vec::new(),
+            stalled: Vec::new(),
+            patience: u64::MAX,
             evaluations: 0,
             work: 0,
             limit: limit.min(MAX_EVALUATIONS),
@@ -76,6 +85,12 @@ impl<'a> MatrixWalker<'a> {
         let size = self.system.size() as u64;
         self.evaluations += 1;
         self.work += 20 * size * size * size + 1000;
+        if self.evaluations > self.patience {
+            return Err(Error::Contour {
+                place: Complex64::ZERO,
+                distance: 0.0,
+            });
+        }
         if self.work < CHECK_EVERY {
             return Ok(());
         }
@@ -171,6 +186,7 @@ impl<'a> MatrixWalker<'a> {
     fn square(&mut self, z: Complex64, most: f64) -> Result<Option<Disc>, Error> {
         let size = self.system.size() as f64;
         let mut half = 4.0 * f64::EPSILON * size.sqrt() * modulus(z).max(1e-3 * self.system.rate());
+        let mut growth = 3.0;
         while half < most {
             if self.place(z + half)?.is_some() {
                 // A square that would meet the real axis is made symmetric about it.
@@ -180,7 +196,16 @@ impl<'a> MatrixWalker<'a> {
                 } else {
                     (z, (z.im - half, z.im + half))
                 };
-                match Cell::new(self, (center.re - half, center.re + half), im, symmetric) {
+                // Next to a defective root steps are as short as the square of the distance.
+                self.patience = self.evaluations + PATIENCE;
+                let cell = Cell::new(self, (center.re - half, center.re + half), im, symmetric);
+                growth = if self.evaluations > self.patience {
+                    9.0
+                } else {
+                    3.0
+                };
+                self.patience = u64::MAX;
+                match cell {
                     Ok(cell) if cell.count > 0 => {
                         return Ok(u32::try_from(cell.count).ok().map(|multiplicity| Disc {
                             center: Complex64::new(center.re, center.im.abs()),
@@ -194,7 +219,7 @@ impl<'a> MatrixWalker<'a> {
                     Err(other) => return Err(other),
                 }
             }
-            half *= 3.0;
+            half *= growth;
         }
         Ok(None)
     }
@@ -206,13 +231,19 @@ impl<'a> MatrixWalker<'a> {
         if let Some(disc) = self.known.iter().find(holds) {
             return Ok(Outcome::Simple(*disc));
         }
-        let most = 1e-6 * modulus(z).max(1e-3 * self.system.rate()).max(1e-100);
+        let most = 1e-6 * modulus(z).max(1e-3 * self.system.rate());
+        if self.stalled.iter().any(|place| (place - up).norm() < most) {
+            return Ok(Outcome::Stalled(z));
+        }
         Ok(match self.square(up, most)? {
             Some(disc) if disc.multiplicity == 1 => {
                 self.known.push(disc);
                 Outcome::Simple(disc)
             }
-            _ => Outcome::Stalled(z),
+            _ => {
+                self.stalled.push(up);
+                Outcome::Stalled(z)
+            }
         })
     }
 }
