@@ -91,7 +91,7 @@ class DelaySystem:
     ...     }
     ... )
     >>> cars.count(re=(-1, 0.5), im=(0.01, 1))
-    20
+    19
     """
 
     __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N", "_expansion")
