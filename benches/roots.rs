@@ -7,6 +7,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use deadtime::Task;
 use deadtime::quasipoly::QuasiPolynomial;
+use deadtime::roots::matrix::{self, CharacteristicMatrix};
 use deadtime::roots::{Region, count, count_right_of, rightmost, roots};
 
 struct Case {
@@ -92,5 +93,44 @@ fn characteristic_roots(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, characteristic_roots);
+/// `n` states in a ring, dense coupling now and coupling to the next one later.
+fn ring(n: usize) -> Option<CharacteristicMatrix> {
+    let filled = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+        (0..n)
+            .map(|i| (0..n).map(|j| entry(i, j)).collect())
+            .collect()
+    };
+    let unit = filled(&|i, j| f64::from(u8::from(i == j)));
+    let now = filled(&|i, j| {
+        let wave = ((3 * i + 7 * j) as f64).sin() / (n as f64).sqrt();
+        wave - if i == j { 1.0 } else { 0.0 }
+    });
+    let late = filled(&|i, j| if (i + 1) % n == j { 0.8 } else { 0.0 });
+    CharacteristicMatrix::new(unit, vec![], vec![(0.0, now), (0.5, late)]).ok()
+}
+
+fn matrix_roots(c: &mut Criterion) {
+    let task = Task::new();
+    let mut group = c.benchmark_group("matrix");
+    group.sample_size(10);
+    for n in [10, 20, 40] {
+        let Some(system) = ring(n) else { continue };
+        let region = Region {
+            re: (-3.0, 2.0),
+            im: (-20.0, 20.0),
+        };
+        group.bench_function(format!("count/{n}"), |b| {
+            b.iter(|| matrix::count(black_box(&system), &region, &task));
+        });
+        group.bench_function(format!("count_right_of_0/{n}"), |b| {
+            b.iter(|| matrix::count_right_of(black_box(&system), 0.0, &task));
+        });
+        group.bench_function(format!("rightmost/{n}"), |b| {
+            b.iter(|| matrix::rightmost(black_box(&system), 1, &task));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, characteristic_roots, matrix_roots);
 criterion_main!(benches);

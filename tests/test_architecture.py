@@ -48,6 +48,7 @@ FLOORS = [
         "_loop_stability",
         "_stability",
         "_determinant",
+        "_matrix_roots",
         "_frequency",
         "_interchange",
         "_margins",

@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 from deadtime import _deadtime
 from deadtime._certificate import Certificate
 from deadtime._chains import Chain, chains_of
-from deadtime._rootset import RootSet
+from deadtime._rootset import Range, RootSet, ends, root_set
 from deadtime._sensitivity import Sensitivity
 
 if TYPE_CHECKING:
     from deadtime._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Characteristic", "Edge", "Range"]
+__all__ = ["Characteristic", "Edge"]
 
-Range: TypeAlias = tuple[float | None, float | None]
 #: What becomes of roots on the edge of a region.
 Edge: TypeAlias = Literal["error", "inside", "outside"]
 
@@ -78,7 +77,7 @@ class Characteristic:
         >>> (s**2 + 4).count(re=(0, 1), im=(0, 3), edge="inside")
         1
         """
-        return self._native.count(_range("re", re), _range("im", im), edge)
+        return self._native.count(ends("re", re), ends("im", im), edge)
 
     def certify(self, re: Range | None = None, im: Range | None = None) -> Certificate:
         """Count the roots in a region and write the proof down.
@@ -106,7 +105,7 @@ class Characteristic:
         >>> proof.count, proof.verify()
         (16, 16)
         """
-        region = _range("re", re), _range("im", im)
+        region = ends("re", re), ends("im", im)
         rows, delays = self._coefficients.tolist(), self._delays.tolist()
         return Certificate._made(rows, delays, region, self._native.certify(*region))
 
@@ -146,7 +145,7 @@ class Characteristic:
         >>> ((s + delay(1.0)) ** 2).roots(re=(-1, 1), im=(0, 5)).multiplicities
         array([2])
         """
-        return _root_set(self._native.roots(_range("re", re), _range("im", im), edge))
+        return root_set(self._native.roots(ends("re", re), ends("im", im), edge))
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost roots and prove that nothing else lies that far right.
@@ -180,7 +179,7 @@ class Characteristic:
         number = operator.index(n)
         if number < 1:
             raise ValueError(f"n={n}: ask for at least 1 rightmost root")
-        return _root_set(self._native.rightmost(number))
+        return root_set(self._native.rightmost(number))
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.
@@ -376,24 +375,3 @@ class Characteristic:
         # h depends on a delay through its row alone, d/dtau of which is -s times the row.
         delays = -found * (coefficients * self._coefficients).sum(axis=1)
         return Sensitivity(found, coefficients, delays)
-
-
-def _range(name: str, ends: Range | None) -> tuple[float, float]:
-    if ends is None:
-        return (-math.inf, math.inf)
-    try:
-        low, high = ends
-        pair = (
-            -math.inf if low is None else float(low),
-            math.inf if high is None else float(high),
-        )
-    except (TypeError, ValueError) as error:
-        raise TypeError(
-            f"{name}={ends!r}: give a pair (low, high), None for an open end"
-        ) from error
-    return pair
-
-
-def _root_set(listed: _deadtime._Listed) -> RootSet:
-    roots, multiplicities, radii, resolved, counted, re, im = listed
-    return RootSet(roots, multiplicities, radii, resolved, counted, (re, im))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "CharacteristicMatrix",
     "Family",
     "LinearLoop",
     "QuasiPolynomial",
@@ -54,6 +55,22 @@ _Proof: TypeAlias = tuple[
     list[tuple[_Pair, _Pair, bool, int, list[_Segment]]],
     list[tuple[_Segment | None, _Monotone | None]],
 ]
+
+@final
+class CharacteristicMatrix:
+    def __new__(
+        cls,
+        e: NDArray[np.float64],
+        n: list[tuple[float, NDArray[np.float64]]],
+        a: list[tuple[float, NDArray[np.float64]]],
+    ) -> CharacteristicMatrix: ...
+    def is_invertible(self) -> bool: ...
+    def count(self, re: tuple[float, float], im: tuple[float, float]) -> int: ...
+    def roots(self, re: tuple[float, float], im: tuple[float, float]) -> _Listed: ...
+    def rightmost(self, n: int) -> _Listed: ...
+    def spectral_abscissa(self) -> float: ...
+    def chain_abscissa(self) -> tuple[float, float]: ...
+    def is_stable(self) -> bool: ...
 
 @final
 class QuasiPolynomial:

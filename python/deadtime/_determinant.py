@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from deadtime._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Entry", "expanded"]
+__all__ = ["Entry", "NotExpandedError", "expanded"]
 
 #: A quasi-polynomial by power of s and delay.
 Entry: TypeAlias = Mapping[tuple[int, float], float]
@@ -39,20 +39,24 @@ _CANDIDATES = 4001
 _SAMPLES = 64
 
 
+class NotExpandedError(ValueError):
+    """The determinant is there, but its coefficients would not say where its roots are."""
+
+
 def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> QuasiPolynomial:
-    """Determinant of a matrix of quasi-polynomials, or a ValueError where that is not safe.
+    """Determinant of a matrix of quasi-polynomials; NotExpandedError where that is not safe.
 
     With `bordered` one row and column belong to an output and an input, and the determinant may
-    be zero. This is the one place at which expansion is decided on: what is refused here needs the
-    roots of the matrix itself, by its factorisation.
+    be zero. This is the one place at which expansion is decided on: what is refused here is
+    searched for roots by factorising the matrix itself.
     """
     size = len(entries)
     states = size - int(bordered)
     if states > _LARGEST:
-        raise ValueError(
+        raise NotExpandedError(
             f"the determinant of {states} states is not expanded, only up to {_LARGEST}: its "
-            "coefficients would no longer say where its roots are; frequency_response() and "
-            "characteristic_matrix() work for any number"
+            "coefficients would no longer say where its roots are; poles(), rightmost(), "
+            "is_stable() and frequency_response() work for any number"
         )
     # One power of two makes integers of all entries.
     shift = max(
@@ -73,11 +77,11 @@ def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> Quas
     h = _rounded(exact, shift**size)
     growth = _growth(entries, h)
     if growth > _MOST_GROWTH:
-        raise ValueError(
+        raise NotExpandedError(
             f"expanding the determinant of these {states} states could move its roots {growth:.1e} "
             f"times as far as rounding the entries does, above {_MOST_GROWTH:.0e}: scale time or "
-            "the states so that the entries are of similar size, or work with "
-            "frequency_response() and characteristic_matrix()"
+            "the states so that the entries are of similar size, or ask for poles(), rightmost() "
+            "and frequency_response(), which do without"
         )
     return h
 
@@ -98,9 +102,9 @@ def _determinant(rows: Sequence[Sequence[_Exact]]) -> _Exact:
                         key = (k + m, t + u)
                         target[key] = target.get(key, 0) + sign * a * b
                 if len(target) > _MOST_TERMS:
-                    raise ValueError(
+                    raise NotExpandedError(
                         f"the determinant has more than {_MOST_TERMS} terms: it is not expanded, "
-                        "work with frequency_response() and characteristic_matrix()"
+                        "ask for poles(), rightmost() and frequency_response(), which do without"
                     )
         minors = following
     full = minors.get((1 << len(rows)) - 1, {})
@@ -119,7 +123,7 @@ def _rounded(exact: _Exact, scale: int) -> QuasiPolynomial:
         try:
             coefficients[delays.index(tau), k] = float(Fraction(value, scale))
         except OverflowError as error:
-            raise ValueError(
+            raise NotExpandedError(
                 "a coefficient of the determinant is beyond 1e308: scale time or the equations"
             ) from error
     return QuasiPolynomial(coefficients, delays)

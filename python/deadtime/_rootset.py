@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,13 @@ from deadtime._frozen import ReadOnlyArrays, read_only
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from deadtime import _deadtime
     from deadtime._chains import Chain
 
-__all__ = ["RootSet"]
+__all__ = ["Range", "RootSet", "ends", "root_set"]
+
+#: Ends of a range, None for open ones.
+Range: TypeAlias = tuple[float | None, float | None]
 
 _SHOWN = 12
 
@@ -124,3 +129,26 @@ class RootSet(ReadOnlyArrays):
         if len(self) > _SHOWN:
             lines.append(f"  and {len(self) - _SHOWN} more")
         return "\n".join(lines)
+
+
+def ends(name: str, given: Range | None) -> tuple[float, float]:
+    """Ends of a range, infinite where open."""
+    if given is None:
+        return (-math.inf, math.inf)
+    try:
+        low, high = given
+        pair = (
+            -math.inf if low is None else float(low),
+            math.inf if high is None else float(high),
+        )
+    except (TypeError, ValueError) as error:
+        raise TypeError(
+            f"{name}={given!r}: give a pair (low, high), None for an open end"
+        ) from error
+    return pair
+
+
+def root_set(listed: _deadtime._Listed) -> RootSet:
+    """Roots as the native part lists them."""
+    roots, multiplicities, radii, resolved, counted, re, im = listed
+    return RootSet(roots, multiplicities, radii, resolved, counted, (re, im))

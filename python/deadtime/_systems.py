@@ -5,7 +5,8 @@ r"""Linear systems with delays in state, input and output, of any order.
 
 With the characteristic matrix M(s) = s E + sum (s N_j - A_j) e^{-s tau_j}, the poles are the
 roots of det M, and C M^{-1} B + D = det [[M, B], [-C, D]] / det M. Values are taken from the
-matrices, for any order; roots, for now, from the expanded determinant, while that is safe.
+matrices, for any order; roots from the expanded determinant while that is safe, and otherwise
+from factorisations of M along contours.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._characteristic import Range
-from deadtime._determinant import expanded
+from deadtime._determinant import NotExpandedError, expanded
+from deadtime._matrix_roots import MatrixDeterminant
 from deadtime._quasipolynomial import QuasiPolynomial
-from deadtime._rootset import RootSet
+from deadtime._rootset import Range, RootSet
 from deadtime._transfer import TransferFunction
 from deadtime._validation import non_negative, real_array
 
@@ -77,9 +78,23 @@ class DelaySystem:
     <DelaySystem: 2 states, 0 inputs, 2 outputs, delays 0.5 s>
     >>> system.is_stable()
     True
+
+    Twenty cars on a ring road, each driver reacting 0.4 s late to the gap ahead:
+
+    >>> import numpy as np
+    >>> ahead = np.roll(np.eye(20), 1, axis=1)
+    >>> zero, one = np.zeros((20, 20)), np.eye(20)
+    >>> cars = dtm.DelaySystem(
+    ...     {
+    ...         0.0: np.block([[zero, ahead - one], [zero, -0.9 * one]]),
+    ...         0.4: np.block([[zero, zero], [0.2 * one, zero]]),
+    ...     }
+    ... )
+    >>> cars.count(re=(-1, 0.5), im=(0.01, 1))
+    19
     """
 
-    __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N")
+    __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N", "_expansion")
 
     _A: dict[float, Matrix]
     _B: dict[float, Matrix]
@@ -87,6 +102,8 @@ class DelaySystem:
     _D: dict[float, Matrix]
     _E: Matrix
     _N: dict[float, Matrix]
+    #: The expanded determinant, or why there is none; None until asked for.
+    _expansion: QuasiPolynomial | ValueError | None
 
     def __init__(
         self,
@@ -132,7 +149,7 @@ class DelaySystem:
                     )
         put = object.__setattr__
         for name, value in zip(
-            self.__slots__, (state, inputs, outputs, direct, derivative, late), strict=True
+            self.__slots__, (state, inputs, outputs, direct, derivative, late, None), strict=True
         ):
             put(self, name, value)
 
@@ -296,7 +313,18 @@ class DelaySystem:
         >>> dtm.DelaySystem({0.0: [[0, 1], [-4, -0.4]], 0.5: [[0, 0], [1.5, 0]]}).characteristic()
         4 + 0.4 s + s^2 - 1.5 exp(-0.5 s)
         """
-        return expanded([[self._entry(i, j) for j in self._states] for i in self._states])
+        if self._expansion is None:
+            try:
+                found: QuasiPolynomial | ValueError = expanded(
+                    [[self._entry(i, j) for j in self._states] for i in self._states]
+                )
+            except ValueError as error:
+                found = error.with_traceback(None)
+            object.__setattr__(self, "_expansion", found)
+        if isinstance(self._expansion, QuasiPolynomial):
+            return self._expansion
+        assert self._expansion is not None
+        raise type(self._expansion)(*self._expansion.args)
 
     def transfer_function(self, output: int = 0, input: int = 0) -> TransferFunction:  # noqa: A002
         """Transfer function from one input to one output, while that is numerically safe.
@@ -326,10 +354,7 @@ class DelaySystem:
         >>> dtm.DelaySystem(A, {0.1: B}, C).transfer_function()
         exp(-0.1 s) / (4 + 0.4 s + s^2)
         """
-        i, j = operator.index(output), operator.index(input)
-        for name, index, size in (("output", i, self.n_outputs), ("input", j, self.n_inputs)):
-            if not 0 <= index < size:
-                raise IndexError(f"{name}={index}: the system has {size} of them, from 0")
+        i, j = self._pair(output, input)
         states = self._states
         bordered = [
             *([*(self._entry(k, m) for m in states), _part(self._B, k, j)] for k in states),
@@ -337,8 +362,45 @@ class DelaySystem:
         ]
         return TransferFunction(expanded(bordered, bordered=True), self.characteristic())
 
+    # Poles, however many states there are
+
+    def count(self, re: Range | None = None, im: Range | None = None) -> int:
+        """Count the poles in a region, with multiplicity, and prove the number.
+
+        Parameters
+        ----------
+        re, im : tuple of (float or None, float or None), optional
+            As in `QuasiPolynomial.count`.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ContourError
+            If a pole lies on the edge, or closer to it than double precision can tell.
+        ValueError
+            If the region holds infinitely many poles, if a side is open and E cannot be inverted,
+            or if the determinant is zero for every s.
+
+        Notes
+        -----
+        While `characteristic` is safe, roots are counted in it. Otherwise the matrix is factorised
+        at points along the contour, so close to one another that bounds on its change and on all
+        rounding prove how far the argument of the determinant turns between them.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> import numpy as np
+        >>> dtm.DelaySystem({1.0: -np.eye(12)}).count(re=(-3, 1), im=(0, 20))
+        36
+        """
+        return self._determinant().count(re, im)
+
     def poles(self, re: Range | None = None, im: Range | None = None) -> RootSet:
-        """Locate every root of det M(s) in a region, each with a disc proved to hold it.
+        """Locate every pole in a region, each in a disc proved to hold it.
 
         Parameters
         ----------
@@ -348,16 +410,87 @@ class DelaySystem:
         Returns
         -------
         RootSet
-            Roots of `characteristic`, which the discs refer to.
+            Roots of det M; of `characteristic` while that is safe.
 
         Raises
         ------
-        ValueError
-            As in `characteristic`, and if the region holds infinitely many.
-        ContourError, CountMismatchError
-            As in `QuasiPolynomial.roots`.
+        ValueError, ContourError
+            As in `count`.
+        CountMismatchError
+            If double precision does not suffice to locate what was counted.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> import numpy as np
+        >>> chain = np.diag(np.ones(11), 1) - np.eye(12)
+        >>> chain[11, 0] = 0.5
+        >>> dtm.DelaySystem(chain).poles(re=(-0.1, 1)).roots.round(4).tolist()
+        [(-0.0561+0j)]
         """
-        return self.characteristic().roots(re, im)
+        return self._determinant().roots(re, im)
+
+    def zeros(
+        self,
+        re: Range | None = None,
+        im: Range | None = None,
+        *,
+        output: int = 0,
+        input: int = 0,  # noqa: A002
+    ) -> RootSet:
+        """Locate the zeros from one input to one output in a region with four closed sides.
+
+        Parameters
+        ----------
+        re, im : tuple of (float, float)
+            Ranges of the real part (1/s) and of the imaginary part (rad/s).
+        output, input : int, default 0
+            Which ones, from zero.
+
+        Returns
+        -------
+        RootSet
+            Roots of det [[M, B], [-C, D]]; modes that do not show between these two are among
+            them, and among the poles.
+
+        Raises
+        ------
+        ValueError, ContourError, CountMismatchError
+            As in `poles`.
+        IndexError
+            If there is no such input or output.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> system = dtm.DelaySystem([[0, 1], [-4, -1]], [[0], [1]], [[3, 1]])
+        >>> system.zeros(re=(-9, 9), im=(-9, 9)).roots.round(6).tolist()
+        [(-3+0j)]
+        """
+        i, j = self._pair(output, input)
+        n = self.n_states
+
+        def bordered(corner: Matrix | None, groups: Any, tau: float) -> Matrix:
+            matrix = np.zeros((n + 1, n + 1))
+            if corner is not None:
+                matrix[:n, :n] = corner
+            inputs, outputs, direct = groups
+            if tau in inputs:
+                matrix[:n, n] = -inputs[tau][:, j]
+            if tau in outputs:
+                matrix[n, :n] = outputs[tau][i]
+            if tau in direct:
+                matrix[n, n] = -direct[tau][i, j]
+            return matrix
+
+        ports = (self._B, self._C, self._D)
+        state = {
+            tau: bordered(self._A.get(tau), ports, tau)
+            for tau in sorted({0.0, *self._A, *self._B, *self._C, *self._D})
+        }
+        none: Any = ({}, {}, {})
+        late = {tau: bordered(matrix, none, tau) for tau, matrix in self._N.items()}
+        return MatrixDeterminant(bordered(self._E, none, 0.0), late, state).roots(re, im)
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost poles, as `QuasiPolynomial.rightmost` does.
@@ -370,16 +503,17 @@ class DelaySystem:
         Returns
         -------
         RootSet
+            Those right of the chains of a neutral system.
 
         Raises
         ------
         ValueError
-            As in `characteristic`, and if the system is advanced.
+            As in `count`, and if the system is advanced.
         """
-        return self.characteristic().rightmost(n)
+        return self._leading().rightmost(n)
 
     def spectral_abscissa(self) -> float:
-        """Give the largest real part of a pole in 1/s, or of the chains of a neutral system.
+        """Give the largest real part of a pole in 1/s, or `chain_abscissa` if that is larger.
 
         Returns
         -------
@@ -388,9 +522,60 @@ class DelaySystem:
         Raises
         ------
         ValueError
-            As in `characteristic`.
+            As in `rightmost`.
         """
-        return self.characteristic().spectral_abscissa()
+        return self._leading().spectral_abscissa()
+
+    def chain_enclosure(self) -> tuple[float, float]:
+        r"""Enclose the real part that the chains of a neutral system can come to.
+
+        The sigma at which the largest spectral radius of
+        :math:`\sum_j E^{-1} N_j e^{-\sigma \tau_j + i \theta_j}` over all angles
+        :math:`\theta_j` is one: the supremum over arbitrarily small changes of the delays [1]_.
+
+        Returns
+        -------
+        low, high : float
+            In 1/s, both proved; -inf for a system without delayed derivatives. With more than four
+            different delays of derivatives `high` is only what norms say.
+
+        Raises
+        ------
+        ValueError
+            If E cannot be inverted.
+
+        References
+        ----------
+        .. [1] J. K. Hale and S. M. Verduyn Lunel, "Strong stabilization of neutral functional
+           differential equations", IMA Journal of Mathematical Control and Information 19 (2002).
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> system = dtm.DelaySystem(-1.0, N={0.5: 0.25})
+        >>> low, high = system.chain_enclosure()
+        >>> round(low, 6), round(high, 6)
+        (-2.772589, -2.772589)
+        """
+        return self._matrix().chain_enclosure()
+
+    def chain_abscissa(self) -> float:
+        """Give the upper end of `chain_enclosure`; of `characteristic`, where E is singular.
+
+        Returns
+        -------
+        float
+            In 1/s; -inf for a system without delayed derivatives.
+
+        Raises
+        ------
+        ValueError
+            If E cannot be inverted and the determinant not be expanded.
+        """
+        matrix = self._matrix()
+        if matrix.is_invertible:
+            return matrix.chain_enclosure()[1]
+        return self.characteristic().chain_abscissa()
 
     def is_stable(self, strong: bool = True) -> bool:
         """Tell whether every pole is proved to lie left of the imaginary axis.
@@ -407,9 +592,41 @@ class DelaySystem:
         Raises
         ------
         ValueError
-            As in `characteristic`.
+            As in `rightmost`; for `strong=False` also where only the expanded determinant could
+            tell, and there is none.
         """
-        return self.characteristic().is_stable(strong)
+        if not strong and self._determinant().is_stable(strong=False):
+            return True
+        return self._leading().is_stable()
+
+    def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
+        """Give det M, expanded if that is safe."""
+        try:
+            return self.characteristic()
+        except NotExpandedError:
+            return self._matrix()
+
+    def _leading(self) -> QuasiPolynomial | MatrixDeterminant:
+        """Give det M in the form that knows better where the chains of a neutral system end.
+
+        The coefficients of an expansion do not tell that tau_1 + tau_2 is no delay of its own.
+        """
+        determinant = self._determinant()
+        if isinstance(determinant, MatrixDeterminant) or not self._N or self.n_states == 1:
+            return determinant
+        matrix = self._matrix()
+        return matrix if matrix.is_invertible else determinant
+
+    def _matrix(self) -> MatrixDeterminant:
+        return MatrixDeterminant(self._E, self._N, self._A)
+
+    def _pair(self, output: int, input: int) -> tuple[int, int]:  # noqa: A002
+        """Check an output and an input."""
+        i, j = operator.index(output), operator.index(input)
+        for name, index, size in (("output", i, self.n_outputs), ("input", j, self.n_inputs)):
+            if not 0 <= index < size:
+                raise IndexError(f"{name}={index}: the system has {size} of them, from 0")
+        return i, j
 
     @property
     def _states(self) -> range:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._characteristic import Range
 from deadtime._frequency import argument, powers_of_s, without_powers
 from deadtime._interchange import (
     control_package,
@@ -24,7 +23,7 @@ from deadtime._interchange import (
 from deadtime._margins import Margins, margins
 from deadtime._quasipolynomial import QuasiPolynomial, delay, is_number
 from deadtime._ratio import first_term, ratio
-from deadtime._rootset import RootSet
+from deadtime._rootset import Range, RootSet
 from deadtime._validation import non_negative, real_array
 
 if TYPE_CHECKING:

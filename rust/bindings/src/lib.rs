@@ -3,6 +3,7 @@
 mod arrays;
 mod dde;
 mod errors;
+mod matrix;
 mod pointers;
 mod quasipoly;
 mod runtime;
@@ -17,6 +18,8 @@ use pyo3::prelude::*;
 mod _deadtime {
     #[pymodule_export]
     use super::dde::{PyLinearLoop, sampled_abscissa_grid};
+    #[pymodule_export]
+    use super::matrix::CharacteristicMatrix;
     #[pymodule_export]
     use super::quasipoly::QuasiPolynomial;
     #[pymodule_export]

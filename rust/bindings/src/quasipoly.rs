@@ -15,7 +15,7 @@ use crate::runtime::{run, run_here};
 const FEW_VALUES: usize = 2048;
 
 /// Roots, multiplicities, radii, resolved, counted, re, im.
-type Listed<'py> = (
+pub(crate) type Listed<'py> = (
     Bound<'py, PyArray1<Complex64>>,
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<f64>>,
@@ -312,7 +312,7 @@ fn side(edge: &str) -> PyResult<Edge> {
     }
 }
 
-fn listed(py: Python<'_>, set: roots::RootSet) -> Listed<'_> {
+pub(crate) fn listed(py: Python<'_>, set: roots::RootSet) -> Listed<'_> {
     (
         set.roots.into_pyarray(py),
         set.multiplicities

@@ -9,13 +9,23 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::winding::{Turn, Walker};
+use super::winding::Turn;
 use crate::Error;
 
 /// Shares of a side at which a cut is tried, the next one where a root is in the way.
 const CUTS: [f64; 9] = [
     0.4871, 0.5417, 0.4393, 0.5823, 0.3911, 0.6307, 0.3301, 0.6907, 0.2703,
 ];
+
+/// Who knows how far arg h turns along a line parallel to an axis.
+pub(super) trait Walk {
+    /// Change of arg h from `from` to `to`.
+    ///
+    /// # Errors
+    /// [`Error::Contour`] where a root lies on the line or too close to it, [`Error::TooMuch`],
+    /// [`Error::Interrupted`].
+    fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error>;
+}
 
 /// A rectangle and the number of roots in it.
 #[derive(Debug, Clone, Copy)]
@@ -35,9 +45,9 @@ impl Cell {
     /// Walk around a rectangle.
     ///
     /// # Errors
-    /// Those of [`Walker::walk`].
+    /// Those of [`Walk::walk`].
     pub(super) fn new(
-        walker: &mut Walker<'_>,
+        walker: &mut impl Walk,
         re: (f64, f64),
         im: (f64, f64),
         symmetric: bool,
@@ -93,8 +103,8 @@ impl Cell {
     /// Cut across the longer side.
     ///
     /// # Errors
-    /// Those of [`Walker::walk`]; [`Error::Contour`] when every cut meets a root.
-    pub(super) fn halves(&self, walker: &mut Walker<'_>) -> Result<(Self, Self), Error> {
+    /// Those of [`Walk::walk`]; [`Error::Contour`] when every cut meets a root.
+    pub(super) fn halves(&self, walker: &mut impl Walk) -> Result<(Self, Self), Error> {
         let level = self.height() > self.width();
         self.first_cut(walker, CUTS.into_iter(), level)
     }
@@ -103,13 +113,13 @@ impl Cell {
     ///
     /// # Errors
     /// As [`Cell::halves`].
-    pub(super) fn slice(&self, walker: &mut Walker<'_>, share: f64) -> Result<(Self, Self), Error> {
+    pub(super) fn slice(&self, walker: &mut impl Walk, share: f64) -> Result<(Self, Self), Error> {
         self.first_cut(walker, CUTS.into_iter().map(|cut| 2.0 * cut * share), true)
     }
 
     fn first_cut(
         &self,
-        walker: &mut Walker<'_>,
+        walker: &mut impl Walk,
         shares: impl Iterator<Item = f64>,
         level: bool,
     ) -> Result<(Self, Self), Error> {
@@ -129,7 +139,7 @@ impl Cell {
     }
 
     /// The parts below and above Im s = `y`.
-    fn cut_level(&self, walker: &mut Walker<'_>, y: f64) -> Result<(Self, Self), Error> {
+    fn cut_level(&self, walker: &mut impl Walk, y: f64) -> Result<(Self, Self), Error> {
         let corner = Complex64::new;
         let (re, im) = (self.re, self.im);
         let [lower, right, upper, left] = self.edges;
@@ -157,7 +167,7 @@ impl Cell {
     }
 
     /// The parts left and right of Re s = `x`.
-    fn cut_upright(&self, walker: &mut Walker<'_>, x: f64) -> Result<(Self, Self), Error> {
+    fn cut_upright(&self, walker: &mut impl Walk, x: f64) -> Result<(Self, Self), Error> {
         let corner = Complex64::new;
         let (re, im) = (self.re, self.im);
         let [lower, right, upper, left] = self.edges;

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::cell::Cell;
+use super::cell::{Cell, Walk};
 use super::cluster::cluster;
 use super::newton::{Disc, Outcome, newton};
 use super::winding::Walker;
@@ -23,33 +23,82 @@ const PATIENCE: u64 = 8;
 /// Fractional parts of multiples of these fill a square evenly: powers of the plastic number.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
+/// Who can iterate towards a root, besides walking along lines.
+pub(super) trait Seek: Walk {
+    /// Look at the task and at the budget now and then.
+    fn pause(&mut self) -> Result<(), Error>;
+
+    /// Newton's iteration from `start` as long as it stays in `window`.
+    fn newton(
+        &mut self,
+        start: Complex64,
+        window: &dyn Fn(Complex64) -> bool,
+    ) -> Result<Outcome, Error>;
+
+    /// The smallest disc about the cluster at `place`, not wider than `most`, in which the number
+    /// of roots can be proved.
+    fn cluster(&mut self, place: Complex64, most: f64) -> Result<Option<Disc>, Error>;
+
+    /// The largest delay less the smallest, in s.
+    fn delay_span(&self) -> f64;
+
+    /// The disc, shrunk to 0 where all its roots are known to be exactly there.
+    fn at_zero_if_exact(&self, disc: Disc) -> Disc;
+}
+
+impl Seek for Walker<'_> {
+    fn pause(&mut self) -> Result<(), Error> {
+        Walker::pause(self)
+    }
+
+    fn newton(
+        &mut self,
+        start: Complex64,
+        window: &dyn Fn(Complex64) -> bool,
+    ) -> Result<Outcome, Error> {
+        Ok(newton(&mut self.probe, start, window))
+    }
+
+    fn cluster(&mut self, place: Complex64, most: f64) -> Result<Option<Disc>, Error> {
+        Ok(cluster(&mut self.probe, place, most))
+    }
+
+    fn delay_span(&self) -> f64 {
+        let delays = self.probe.function().delays();
+        delays.last().copied().unwrap_or(0.0) - delays.first().copied().unwrap_or(0.0)
+    }
+
+    fn at_zero_if_exact(&self, disc: Disc) -> Disc {
+        disc.at_zero_if_exact(self.probe.function())
+    }
+}
+
 /// Discs found so far, by height of their centre.
-pub(super) struct Search<'a, 'w> {
-    walker: &'w mut Walker<'a>,
+pub(super) struct Search<'w, W: Seek> {
+    walker: &'w mut W,
     found: Vec<Disc>,
     widest: f64,
     spacing: f64,
 }
 
-impl<'a, 'w> Search<'a, 'w> {
-    pub(super) fn new(walker: &'w mut Walker<'a>) -> Self {
+impl<'w, W: Seek> Search<'w, W> {
+    pub(super) fn new(walker: &'w mut W) -> Self {
         Self::with(walker, Vec::new())
     }
 
     /// A search that knows some disjoint discs already.
-    pub(super) fn with(walker: &'w mut Walker<'a>, mut found: Vec<Disc>) -> Self {
+    pub(super) fn with(walker: &'w mut W, mut found: Vec<Disc>) -> Self {
         found.sort_by(|a, b| a.center.im.total_cmp(&b.center.im));
         let widest = found
             .iter()
             .map(|disc| disc.isolation.max(disc.radius))
             .fold(0.0, f64::max);
-        let delays = walker.probe.function().delays();
-        let span = delays.last().copied().unwrap_or(0.0) - delays.first().copied().unwrap_or(0.0);
+        let spacing = TAU / walker.delay_span();
         Self {
             walker,
             found,
             widest,
-            spacing: TAU / span,
+            spacing,
         }
     }
 
@@ -61,7 +110,7 @@ impl<'a, 'w> Search<'a, 'w> {
     ) -> Result<(), Error> {
         for start in starts {
             self.walker.pause()?;
-            if let Outcome::Simple(disc) = newton(&mut self.walker.probe, *start, &window) {
+            if let Outcome::Simple(disc) = self.walker.newton(*start, &window)? {
                 self.insert(disc);
             }
         }
@@ -100,7 +149,7 @@ impl<'a, 'w> Search<'a, 'w> {
 
     /// Keep a disc unless its root is known; a cluster swallows the discs inside it.
     fn insert(&mut self, disc: Disc) -> bool {
-        let disc = disc.at_zero_if_exact(self.walker.probe.function());
+        let disc = self.walker.at_zero_if_exact(disc);
         let reach = self.widest + disc.radius;
         let first = self
             .found
@@ -187,7 +236,7 @@ impl<'a, 'w> Search<'a, 'w> {
             .chain((0..tries).map(|k| even(cell, k)));
         for start in starts {
             self.walker.pause()?;
-            match newton(&mut self.walker.probe, start, window) {
+            match self.walker.newton(start, &window)? {
                 Outcome::Simple(disc) => {
                     if self.insert(disc) && self.located(cell) >= cell.count {
                         return Ok(self.located(cell) == cell.count);
@@ -212,7 +261,7 @@ impl<'a, 'w> Search<'a, 'w> {
             {
                 continue;
             }
-            if let Some(disc) = cluster(&mut self.walker.probe, place, most) {
+            if let Some(disc) = self.walker.cluster(place, most)? {
                 self.insert(disc);
             }
         }

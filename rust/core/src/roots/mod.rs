@@ -6,7 +6,7 @@
 //! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability; `neutral` knows the chains, `commensurate`
 //! those of exact delays, `stable`
 //! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be; `certificate`
-//! writes the proof of a count down. Elementary functions are those of `crate::elementary`, with
+//! writes the proof of a count down. `matrix` does the same for det M(s), not expanded. Elementary functions are those of `crate::elementary`, with
 //! proved bounds; each file says what its inequalities leave for rounding.
 
 mod bounds;
@@ -18,6 +18,7 @@ mod contour;
 mod count;
 mod dominated;
 mod isolate;
+pub mod matrix;
 mod neutral;
 mod newton;
 mod real;

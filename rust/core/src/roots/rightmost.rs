@@ -18,12 +18,12 @@ use super::bounds::dominance;
 use super::cell::Cell;
 use super::commensurate::exact_abscissa;
 use super::count::{Prepared, close, count_right_of, half_plane};
-use super::isolate::Search;
+use super::isolate::{Search, Seek};
 use super::neutral::chain_abscissa;
 use super::newton::Disc;
 use super::region::Region;
 use super::set::{RootSet, add_zeros, locate, with_mirror_image};
-use super::winding::Walker;
+use super::winding::{MAX_EVALUATIONS, Walker};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::{Error, Task};
 
@@ -142,7 +142,19 @@ fn search(
         Kind::Difference => return Ok(first(listed(Vec::new(), chain), n, chain)),
         Kind::Retarded | Kind::Neutral | Kind::Advanced => {}
     }
-    let mut lines = Lines::new(h, chain, task);
+    leading(h, n, axis, chain, task, listed)
+}
+
+/// The `n` rightmost roots right of the chains; `listed` completes the discs right of a line.
+pub(super) fn leading<S: Spectrum>(
+    spectrum: &S,
+    n: usize,
+    axis: Option<Line>,
+    chain: f64,
+    task: &Task,
+    listed: impl Fn(Vec<Disc>, f64) -> Vec<Disc>,
+) -> Result<RootSet, Error> {
+    let mut lines = Lines::new(spectrum, chain, task);
     if let Some(line) = axis {
         lines.sort_in(line, n as u64);
     }
@@ -161,6 +173,52 @@ fn search(
         }
         // A pair counts twice in the half plane but once in the list.
         wanted = line.count + n as u64 - discs.len() as u64;
+    }
+}
+
+/// What the search for rightmost roots has to know of a function.
+pub(super) trait Spectrum {
+    type Walker<'a>: Seek
+    where
+        Self: 'a;
+
+    /// A walker that gives up after `limit` evaluations.
+    fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> Self::Walker<'a>;
+
+    /// The number of roots right of Re s = `sigma`, and where walking there hinted at roots.
+    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error>;
+
+    /// The upper half of a rectangle with all roots right of Re s = `sigma`, if there are any.
+    fn cell_right_of<'a>(
+        &'a self,
+        walker: &mut Self::Walker<'a>,
+        sigma: f64,
+    ) -> Result<Option<Cell>, Error>;
+}
+
+impl Spectrum for QuasiPolynomial {
+    type Walker<'a> = Walker<'a>;
+
+    fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> Walker<'a> {
+        Walker::with_limit(self, task, limit)
+    }
+
+    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error> {
+        let mut walker = self.walker(task, EVALUATIONS_PER_LINE);
+        let count = half_plane(&mut walker, sigma)?;
+        Ok((count, walker.hints))
+    }
+
+    fn cell_right_of<'a>(
+        &'a self,
+        walker: &mut Walker<'a>,
+        sigma: f64,
+    ) -> Result<Option<Cell>, Error> {
+        let Some(closed) = close(self, &Region::right_of(sigma), dominance)? else {
+            return Ok(None);
+        };
+        let height = closed.symmetric.unwrap_or(0.0);
+        Cell::new(walker, closed.re, (0.0, height), true).map(Some)
     }
 }
 
@@ -203,15 +261,15 @@ pub fn spectral_abscissa(h: &QuasiPolynomial, strong: bool, task: &Task) -> Resu
 
 /// A line, and what is known of the half plane to its right.
 #[derive(Debug, Clone)]
-struct Line {
+pub(super) struct Line {
     sigma: f64,
     count: u64,
     hints: Vec<Complex64>,
 }
 
 /// Lines for which the count is known.
-struct Lines<'a> {
-    h: &'a QuasiPolynomial,
+struct Lines<'a, S: Spectrum> {
+    spectrum: &'a S,
     task: &'a Task,
     /// Discs found from the hints of any line, by no order.
     known: Vec<Disc>,
@@ -232,14 +290,12 @@ struct Lines<'a> {
     enough: Option<Line>,
 }
 
-impl<'a> Lines<'a> {
-    fn new(h: &'a QuasiPolynomial, chain: f64, task: &'a Task) -> Self {
-        let delays = h.delays();
-        let span = delays.last().copied().unwrap_or(1.0) - delays.first().copied().unwrap_or(0.0);
-        let step = 1.0 / span;
+impl<'a, S: Spectrum> Lines<'a, S> {
+    fn new(spectrum: &'a S, chain: f64, task: &'a Task) -> Self {
+        let step = 1.0 / spectrum.walker(task, MAX_EVALUATIONS).delay_span();
         let start = if chain < 0.0 { 0.0 } else { chain + step };
         Self {
-            h,
+            spectrum,
             task,
             known: Vec::new(),
             chain,
@@ -384,7 +440,7 @@ impl<'a> Lines<'a> {
 
     /// Newton's iteration from the hints, until the discs right of `sigma` add up to `count`.
     fn learn(&mut self, hints: &[Complex64], count: u64, sigma: f64) -> Result<(), Error> {
-        let mut walker = Walker::new(self.h, self.task);
+        let mut walker = self.spectrum.walker(self.task, MAX_EVALUATIONS);
         let mut search = Search::with(&mut walker, std::mem::take(&mut self.known));
         for hint in hints {
             if search.weight_right_of(sigma) >= count {
@@ -405,7 +461,7 @@ impl<'a> Lines<'a> {
         if discs.iter().map(Disc::weight).sum::<u64>() == line.count {
             return Ok(discs);
         }
-        let discs = half_plane_discs(self.h, line.sigma, self.task)?;
+        let discs = half_plane_discs(self.spectrum, line.sigma, self.task)?;
         self.known.clone_from(&discs);
         Ok(discs)
     }
@@ -415,13 +471,12 @@ impl<'a> Lines<'a> {
         let mut at = sigma;
         let mut aside = 1.0;
         loop {
-            let mut walker = Walker::with_limit(self.h, self.task, EVALUATIONS_PER_LINE);
-            match half_plane(&mut walker, at) {
-                Ok(count) => {
+            match self.spectrum.line(at, self.task) {
+                Ok((count, hints)) => {
                     return Ok(Line {
                         sigma: at,
                         count,
-                        hints: walker.hints,
+                        hints,
                     });
                 }
                 Err(Error::Contour { distance, .. }) if f64::abs(aside) < 1e9 => {
@@ -440,18 +495,20 @@ impl<'a> Lines<'a> {
 }
 
 /// Discs, Im ≥ 0, that hold all roots right of a line, cell by cell.
-fn half_plane_discs(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<Vec<Disc>, Error> {
-    let Some(closed) = close(h, &Region::right_of(sigma), dominance)? else {
-        return Ok(Vec::new());
-    };
-    let mut walker = Walker::new(h, task);
-    let height = closed.symmetric.unwrap_or(0.0);
-    let cell = Cell::new(&mut walker, closed.re, (0.0, height), true)?;
-    locate(&mut walker, cell)
+pub(super) fn half_plane_discs<S: Spectrum>(
+    spectrum: &S,
+    sigma: f64,
+    task: &Task,
+) -> Result<Vec<Disc>, Error> {
+    let mut walker = spectrum.walker(task, MAX_EVALUATIONS);
+    match spectrum.cell_right_of(&mut walker, sigma)? {
+        Some(cell) => locate(&mut walker, cell),
+        None => Ok(Vec::new()),
+    }
 }
 
 /// The first `n` of all discs right of `sigma`, more where the next ones tie with them.
-fn first(mut discs: Vec<Disc>, n: usize, sigma: f64) -> RootSet {
+pub(super) fn first(mut discs: Vec<Disc>, n: usize, sigma: f64) -> RootSet {
     discs.sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
     let left = |disc: &Disc| disc.center.re - disc.radius;
     let right = |disc: &Disc| disc.center.re + disc.radius;

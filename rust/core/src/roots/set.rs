@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use super::bounds::dominance;
 use super::cell::Cell;
 use super::count::{Closed, Prepared, close};
-use super::isolate::Search;
+use super::isolate::{Search, Seek};
 use super::newton::Disc;
 use super::region::Region;
 use super::winding::Walker;
@@ -168,7 +168,7 @@ pub fn roots(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSe
 }
 
 /// Discs, Im ≥ 0, that hold the roots of a cell: disjoint, inside, and adding up to its count.
-pub(super) fn locate(walker: &mut Walker<'_>, cell: Cell) -> Result<Vec<Disc>, Error> {
+pub(super) fn locate(walker: &mut impl Seek, cell: Cell) -> Result<Vec<Disc>, Error> {
     if cell.count > MAX_ROOTS {
         return Err(Error::TooMuch {
             what: "the list of all roots",

@@ -19,6 +19,7 @@
 
 use num_complex::Complex64;
 
+use super::cell::Walk;
 use crate::elementary::angle;
 use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
 use crate::{Error, Task};
@@ -34,7 +35,7 @@ const CHECK_EVERY: u64 = 1024;
 const MAX_SHARP: u32 = 500;
 
 /// Evaluations after which a computation is given up.
-const MAX_EVALUATIONS: u64 = 20_000_000;
+pub(super) const MAX_EVALUATIONS: u64 = 20_000_000;
 
 /// Hints kept of a walk, the first ones.
 const MAX_HINTS: usize = 1000;
@@ -344,6 +345,12 @@ impl<'a> Walker<'a> {
 /// The largest r with `slope` r + `bend` r²/2 at most `room`.
 fn within(room: f64, slope: f64, bend: f64) -> f64 {
     2.0 * room / (slope + (slope * slope + 2.0 * bend * room).sqrt())
+}
+
+impl Walk for Walker<'_> {
+    fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error> {
+        Walker::walk(self, from, to)
+    }
 }
 
 fn is_finite(jet: &Jet) -> bool {

@@ -1,0 +1,89 @@
+//! Bindings of `deadtime::roots::matrix`.
+
+use deadtime::Task;
+use deadtime::roots::Region;
+use deadtime::roots::matrix::{self, CharacteristicMatrix as Core};
+use numpy::PyReadonlyArray2;
+use pyo3::prelude::*;
+
+use crate::errors::to_python;
+use crate::quasipoly::{Listed, listed};
+use crate::runtime::run;
+
+type ByDelay<'py> = Vec<(f64, PyReadonlyArray2<'py, f64>)>;
+
+/// A characteristic matrix of the core.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct CharacteristicMatrix {
+    core: Core,
+}
+
+fn rows(matrix: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
+    let rows = matrix.as_array();
+    rows.rows().into_iter().map(|row| row.to_vec()).collect()
+}
+
+fn by_delay(group: &ByDelay<'_>) -> Vec<(f64, Vec<Vec<f64>>)> {
+    group
+        .iter()
+        .map(|(delay, matrix)| (*delay, rows(matrix)))
+        .collect()
+}
+
+#[pymethods]
+impl CharacteristicMatrix {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        e: PyReadonlyArray2<'_, f64>,
+        n: ByDelay<'_>,
+        a: ByDelay<'_>,
+    ) -> PyResult<Self> {
+        Core::new(rows(&e), by_delay(&n), by_delay(&a))
+            .map(|core| Self { core })
+            .map_err(|error| to_python(py, error))
+    }
+
+    fn is_invertible(&self) -> bool {
+        matrix::is_invertible(&self.core)
+    }
+
+    fn count(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<u64> {
+        run(py, None, None, |task: &Task| {
+            matrix::count(&self.core, &Region { re, im }, task)
+        })
+    }
+
+    fn roots<'py>(&self, py: Python<'py>, re: (f64, f64), im: (f64, f64)) -> PyResult<Listed<'py>> {
+        let set = run(py, None, None, |task: &Task| {
+            matrix::roots(&self.core, &Region { re, im }, task)
+        })?;
+        Ok(listed(py, set))
+    }
+
+    fn rightmost<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Listed<'py>> {
+        let set = run(py, None, None, |task: &Task| {
+            matrix::rightmost(&self.core, n, task)
+        })?;
+        Ok(listed(py, set))
+    }
+
+    fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {
+        run(py, None, None, |task: &Task| {
+            matrix::spectral_abscissa(&self.core, task)
+        })
+    }
+
+    /// Lower and upper bound.
+    fn chain_abscissa(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
+        run(py, None, None, |task: &Task| {
+            matrix::chain_abscissa(&self.core, task)
+        })
+    }
+
+    fn is_stable(&self, py: Python<'_>) -> PyResult<bool> {
+        run(py, None, None, |task: &Task| {
+            matrix::is_stable(&self.core, task)
+        })
+    }
+}

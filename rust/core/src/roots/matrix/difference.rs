@@ -1,0 +1,497 @@
+//! Chains of neutral matrix systems: the difference part I + Σ C_j e^(−s τ_j), C_j = E⁻¹ N_j.
+//!
+//! Roots of large modulus lie near or left of Re s = C_D, where the largest spectral radius of
+//! C(θ) = Σ C_j e^(−σ τ_j + i θ_j) over all angles θ is 1 (Hale and Verduyn Lunel 2002); with delays
+//! free to vary that is attained or approached. It falls with σ, and a common angle does not
+//! matter. *Upper end*: the spectral radius is below 1 if ‖C(θ)^k‖ < 1 for k = 2^q. On a box of angles
+//! with centre θ₀, C differs by at most e = Σ ‖C_j‖ w_j h_j; squaring makes of (N, e) at most
+//! (‖C(θ₀)^2k‖, 2 N e + e²) and of rounding (n + 4) u |C|² more, |C| the Frobenius norm; boxes are halved until each is proved.
+//! *Lower end*: |tr C^k| ≤ n ρ^k at any one θ. ‖·‖ is the spectral norm, bounded by the Frobenius
+//! norm and by √(‖·‖₁ ‖·‖_∞). The spectral radius is
+//! plurisubharmonic (Vesentini 1968), as is ‖C^k‖: what holds on the torus holds for all smaller
+//! moduli, hence right of σ, and ‖(I + C)⁻¹‖ ≤ Π (1 + N_2^i)/(1 − N_k).
+
+use std::f64::consts::{LN_2, PI, TAU};
+
+use num_complex::Complex64;
+
+use super::factor::{ROUNDING, Rows};
+use crate::elementary::{exp, exp_above, log, sin_cos};
+use crate::{Error, Task};
+
+const MARGIN: f64 = 1.0 + 1e-9;
+
+/// Free angles that are searched; beyond, only norms are compared.
+const MAX_ANGLES: usize = 3;
+
+/// Squarings at which a box is given up and halved, and those for a single matrix.
+const SQUARINGS: u32 = 16;
+const MANY_SQUARINGS: u32 = 24;
+
+/// Squarings at which a spectral radius is only compared.
+const SAMPLE_SQUARINGS: u32 = 13;
+
+/// Operations spent on one line.
+const MAX_WORK: f64 = 1e9;
+
+/// Samples of each angle, by the number of angles.
+const SAMPLES: [usize; 4] = [1, 48, 14, 8];
+
+/// The difference part of a neutral system.
+#[derive(Debug, Clone)]
+pub(super) struct Difference {
+    size: usize,
+    /// Delay, C_j, a bound on its norm.
+    terms: Vec<(f64, Rows, f64)>,
+    /// Bounds on the errors of C_j, and of the identity.
+    losses: Vec<f64>,
+    loss: f64,
+}
+
+/// A box of angles.
+#[derive(Debug, Clone)]
+struct Box {
+    center: Vec<f64>,
+    half: Vec<f64>,
+}
+
+impl Difference {
+    pub(super) fn new(size: usize, late: Vec<(f64, Vec<Vec<f64>>, f64)>, loss: f64) -> Self {
+        let mut terms = Vec::new();
+        let mut losses = Vec::new();
+        for (delay, matrix, lost) in late {
+            let mut rows = Rows::zeros(size);
+            for (i, row) in matrix.iter().enumerate() {
+                for (j, x) in row.iter().enumerate() {
+                    rows.add(i, j, Complex64::new(*x, 0.0));
+                }
+            }
+            let norm = norm(&rows);
+            terms.push((delay, rows, norm));
+            losses.push(lost);
+        }
+        Self {
+            size,
+            terms,
+            losses,
+            loss,
+        }
+    }
+
+    /// Are there no delayed derivatives?
+    pub(super) fn is_trivial(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    fn angles(&self) -> usize {
+        self.terms.len().saturating_sub(1)
+    }
+
+    /// C at the angles of all terms but the first, on Re s = `sigma`, and what rounding costs.
+    fn at(&self, sigma: f64, angles: &[f64]) -> (Rows, f64) {
+        let mut sum = Rows::zeros(self.size);
+        let mut lost = self.loss;
+        let angles = std::iter::once(&0.0).chain(angles);
+        for (((delay, matrix, norm), loss), angle) in
+            self.terms.iter().zip(&self.losses).zip(angles)
+        {
+            let weight = exp(-sigma * delay);
+            let (sine, cosine) = sin_cos(*angle);
+            let (re, im) = (weight * cosine, weight * sine);
+            for (target, x) in sum.re.iter_mut().zip(&matrix.re) {
+                *target += re * x;
+            }
+            for (target, x) in sum.im.iter_mut().zip(&matrix.re) {
+                *target += im * x;
+            }
+            let rounding = 8.0 + self.terms.len() as f64 + 4.0 * (sigma * delay).abs();
+            lost += weight * (loss + rounding * ROUNDING * norm) * MARGIN;
+        }
+        (sum, lost)
+    }
+
+    /// A bound on ‖(I + C)⁻¹‖ on Re s ≥ `sigma` for all angles; `None` where it cannot be had,
+    /// which is so left of the chains.
+    pub(super) fn inverse_bound(&self, sigma: f64, task: &Task) -> Result<Option<f64>, Error> {
+        if self.is_trivial() {
+            return Ok(Some(1.0 / (1.0 - self.loss)));
+        }
+        let norms: Vec<f64> = self
+            .terms
+            .iter()
+            .map(|(delay, _, norm)| norm * exp_above(-sigma * delay) * MARGIN)
+            .collect();
+        let (free, squarings) = match self.angles() {
+            0 => (0, MANY_SQUARINGS),
+            free if free <= MAX_ANGLES => (free, SQUARINGS),
+            _ => {
+                let sum = norms.iter().sum::<f64>() + self.loss + self.losses.iter().sum::<f64>();
+                return Ok((sum * MARGIN < 1.0).then(|| 1.0 / (1.0 - sum * MARGIN)));
+            }
+        };
+        let n = self.size as f64;
+        let mut work = MAX_WORK;
+        // A change of all signs of the angles conjugates C: the first of them need not be negative.
+        let mut boxes = vec![Box {
+            center: (0..free)
+                .map(|k| if k == 0 { 0.5 * PI } else { 0.0 })
+                .collect(),
+            half: (0..free)
+                .map(|k| if k == 0 { 0.5 * PI } else { PI })
+                .collect(),
+        }];
+        let mut most = 0.0f64;
+        while let Some(one) = boxes.pop() {
+            task.check()?;
+            let (matrix, lost) = self.at(sigma, &one.center);
+            let moved = |(norm, half): (&f64, &f64)| norm * half.min(2.0);
+            let off: Vec<f64> = norms.iter().skip(1).zip(&one.half).map(moved).collect();
+            let (bound, spent) =
+                inverse_bound(matrix, lost + off.iter().sum::<f64>() * MARGIN, squarings);
+            work -= f64::from(spent + 1) * (8.0 * n * n * n + 3000.0);
+            match bound {
+                Some(bound) => most = most.max(bound),
+                None if free == 0 || work < 0.0 => return Ok(None),
+                None => {
+                    let widest = off
+                        .iter()
+                        .enumerate()
+                        .fold((0, 0.0), |a, (k, x)| if *x > a.1 { (k, *x) } else { a })
+                        .0;
+                    for sign in [-1.0, 1.0] {
+                        let mut part = one.clone();
+                        if let (Some(center), Some(half)) =
+                            (part.center.get_mut(widest), part.half.get_mut(widest))
+                        {
+                            *half *= 0.5 * MARGIN;
+                            *center += sign * *half / MARGIN;
+                        }
+                        boxes.push(part);
+                    }
+                }
+            }
+        }
+        Ok(Some(most))
+    }
+
+    /// Where norms alone say that the chains end: Σ ‖C_j‖ e^(−σ τ_j) = 1 − (errors).
+    fn norm_bound(&self) -> f64 {
+        let room = 1.0 - self.loss;
+        let count = self.terms.len() as f64;
+        let parts: Vec<(f64, f64)> = self
+            .terms
+            .iter()
+            .zip(&self.losses)
+            .map(|((delay, _, norm), loss)| (log((norm + loss) * count / room * MARGIN), *delay))
+            .collect();
+        let bound = |extra: f64| {
+            parts
+                .iter()
+                .map(|(size, delay)| (size + extra) / delay)
+                .fold(f64::NEG_INFINITY, f64::max)
+        };
+        let sum = |sigma: f64| -> f64 {
+            parts
+                .iter()
+                .map(|(size, delay)| exp_above(size - sigma * delay))
+                .sum::<f64>()
+                / count
+        };
+        let (mut low, mut high) = (bound(-log(count)), bound(0.0));
+        high += 1e-9 * high.abs().max(1e-9);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if sum(middle) * MARGIN < 1.0 {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        high
+    }
+
+    /// Lower and upper bound of C_D in 1/s; −∞ without chains.
+    pub(super) fn enclosure(&self, task: &Task) -> Result<(f64, f64), Error> {
+        if self.is_trivial() {
+            return Ok((f64::NEG_INFINITY, f64::NEG_INFINITY));
+        }
+        let top = self.norm_bound();
+        let Some((guess, angles)) = self.estimate(top, task)? else {
+            // Nilpotent for every angle, as far as can be told: no chain is known to exist.
+            return Ok((f64::NEG_INFINITY, self.least_proved(top, task)?));
+        };
+        let rate = 1.0 / self.longest();
+        let mut lower = f64::NEG_INFINITY;
+        let mut gap = 1e-13 * (rate + guess.abs());
+        while gap < 10.0 * (rate + guess.abs()) {
+            let (matrix, lost) = self.at(guess - gap, &angles);
+            if log_radius_below(matrix, lost) >= 0.0 {
+                lower = guess - gap;
+                break;
+            }
+            gap *= 4.0;
+        }
+        if self.angles() > MAX_ANGLES {
+            return Ok((lower, top));
+        }
+        let mut gap = [1e-10, 1e-5, 1e-3, 1e-2]
+            .get(self.angles())
+            .copied()
+            .unwrap_or(0.1)
+            * rate;
+        while guess + gap < top {
+            if self.inverse_bound(guess + gap, task)?.is_some() {
+                return Ok((lower, guess + gap));
+            }
+            gap *= 4.0;
+        }
+        Ok((lower, top))
+    }
+
+    /// An upper bound where the chains cannot be estimated.
+    fn least_proved(&self, top: f64, task: &Task) -> Result<f64, Error> {
+        let rate = 1.0 / self.longest();
+        let mut best = top;
+        let mut step = rate;
+        while step < 1e3 * rate {
+            if self.inverse_bound(best - step, task)?.is_none() {
+                break;
+            }
+            best -= step;
+            step *= 2.0;
+        }
+        Ok(best)
+    }
+
+    fn longest(&self) -> f64 {
+        self.terms
+            .iter()
+            .map(|(delay, _, _)| *delay)
+            .fold(0.0, f64::max)
+    }
+
+    /// About where the largest spectral radius is 1, and at which angles; `None` where there is none.
+    fn estimate(&self, top: f64, task: &Task) -> Result<Option<(f64, Vec<f64>)>, Error> {
+        let rate = 1.0 / self.longest();
+        let mut sigma = top;
+        let mut best: Option<Vec<f64>> = None;
+        for _ in 0..30 {
+            let (height, angles) = self.highest(sigma, best.as_deref(), task)?;
+            // The slope of log ρ lies between the delays: a step by the longest never goes too far
+            // to the left, where ρ may grow faster than linearly in the logarithm.
+            if !(height.is_finite() && sigma > top - 1e3 * rate) {
+                return Ok(None);
+            }
+            let (ahead, _) = self.highest_from(sigma - 1e-4 * rate, &angles);
+            let slope =
+                ((ahead - height) / (1e-4 * rate)).clamp(0.2 * self.shortest(), self.longest());
+            sigma += height / slope;
+            best = Some(angles);
+            if height.abs() < 1e-13 {
+                break;
+            }
+        }
+        Ok(best.map(|angles| (sigma, angles)))
+    }
+
+    fn shortest(&self) -> f64 {
+        self.terms
+            .iter()
+            .map(|(delay, _, _)| *delay)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    fn log_radius(&self, sigma: f64, angles: &[f64]) -> f64 {
+        let squarings = if angles.is_empty() {
+            MANY_SQUARINGS
+        } else {
+            SAMPLE_SQUARINGS
+        };
+        log_radius(self.at(sigma, angles).0, squarings)
+    }
+
+    /// The largest log of the spectral radius among sampled angles, refined.
+    fn highest(
+        &self,
+        sigma: f64,
+        known: Option<&[f64]>,
+        task: &Task,
+    ) -> Result<(f64, Vec<f64>), Error> {
+        if let Some(known) = known {
+            return Ok(self.highest_from(sigma, known));
+        }
+        let free = self.angles();
+        let samples = SAMPLES.get(free).copied().unwrap_or(2);
+        let total = samples.pow(free.min(6) as u32);
+        let mut best = (f64::NEG_INFINITY, vec![0.0; free]);
+        for index in 0..total {
+            task.check()?;
+            let mut rest = index;
+            let angles: Vec<f64> = (0..free)
+                .map(|_| {
+                    let k = rest % samples;
+                    rest /= samples;
+                    TAU * k as f64 / samples as f64
+                })
+                .collect();
+            let height = self.log_radius(sigma, &angles);
+            if height > best.0 {
+                best = (height, angles);
+            }
+        }
+        Ok(self.highest_from(sigma, &best.1))
+    }
+
+    /// Improve angles one at a time.
+    fn highest_from(&self, sigma: f64, angles: &[f64]) -> (f64, Vec<f64>) {
+        let mut best = (self.log_radius(sigma, angles), angles.to_vec());
+        let mut step = 0.1;
+        while step > 1e-7 && !angles.is_empty() {
+            let mut improved = false;
+            for k in 0..angles.len() {
+                for sign in [-1.0, 1.0] {
+                    let mut tried = best.1.clone();
+                    if let Some(angle) = tried.get_mut(k) {
+                        *angle += sign * step;
+                    }
+                    let height = self.log_radius(sigma, &tried);
+                    if height > best.0 {
+                        best = (height, tried);
+                        improved = true;
+                    }
+                }
+            }
+            if !improved {
+                step *= 0.25;
+            }
+        }
+        best
+    }
+}
+
+fn frobenius(matrix: &Rows) -> f64 {
+    let squares: f64 = matrix.re.iter().chain(&matrix.im).map(|x| x * x).sum();
+    squares.sqrt() * MARGIN
+}
+
+/// A bound on the spectral norm.
+fn norm(matrix: &Rows) -> f64 {
+    let n = matrix.size;
+    let mut columns = vec![0.0; n];
+    let mut largest = 0.0f64;
+    for i in 0..n {
+        let (re, im) = matrix.row(i);
+        let mut row = 0.0;
+        for ((x, y), column) in re.iter().zip(im).zip(&mut columns) {
+            let size = (x * x + y * y).sqrt();
+            row += size;
+            *column += size;
+        }
+        largest = largest.max(row);
+    }
+    let tallest = columns.iter().fold(0.0f64, |a, b| a.max(*b));
+    // What squares lose in underflow is made up for by the last summand.
+    ((largest * tallest).sqrt() * MARGIN).min(frobenius(matrix)) + 1e-150
+}
+
+fn square(matrix: &Rows) -> Rows {
+    let n = matrix.size;
+    let mut found = Rows::zeros(n);
+    let rows = found
+        .re
+        .chunks_exact_mut(n)
+        .zip(found.im.chunks_exact_mut(n));
+    for (i, (re, im)) in rows.enumerate() {
+        let (own_re, own_im) = matrix.row(i);
+        for (k, (a, b)) in own_re.iter().zip(own_im).enumerate() {
+            if *a == 0.0 && *b == 0.0 {
+                continue;
+            }
+            let (from_re, from_im) = matrix.row(k);
+            for (((re, im), x), y) in re.iter_mut().zip(im.iter_mut()).zip(from_re).zip(from_im) {
+                *re += a * x - b * y;
+                *im += a * y + b * x;
+            }
+        }
+    }
+    found
+}
+
+/// A bound on ‖(I + C + any change of norm `off`)⁻¹‖ and the squarings done for it.
+fn inverse_bound(mut matrix: Rows, mut off: f64, squarings: u32) -> (Option<f64>, u32) {
+    let rounding = (matrix.size as f64 + 4.0) * ROUNDING;
+    let mut product = 1.0;
+    for step in 0..=squarings {
+        let size = norm(&matrix);
+        let whole = (size + off) * MARGIN;
+        if whole < 0.999_999 {
+            return (Some(product / (1.0 - whole) * MARGIN), step);
+        }
+        if !(whole < 1e60 && product < 1e60 && off < 4.0) || step == squarings {
+            return (None, step);
+        }
+        product *= (1.0 + whole) * MARGIN;
+        let whole = frobenius(&matrix);
+        off = (2.0 * size * off + off * off + rounding * whole * whole) * MARGIN;
+        matrix = square(&matrix);
+    }
+    (None, squarings)
+}
+
+/// Powers of a matrix scaled to norm 1 to 2, each the square of the one before: the logarithm of
+/// the factor taken out, the matrix, and what is lost.
+fn powers(matrix: Rows, lost: f64, squarings: u32, mut visit: impl FnMut(f64, f64, &Rows, f64)) {
+    let rounding = (matrix.size as f64 + 4.0) * ROUNDING;
+    let (mut matrix, mut off) = (matrix, lost);
+    let (mut exponent, mut power) = (0.0f64, 1.0f64);
+    for _ in 0..squarings {
+        let size = norm(&matrix);
+        if !(size > 0.0 && size.is_finite()) {
+            visit(power, f64::NEG_INFINITY, &matrix, off);
+            return;
+        }
+        let shift = -libm::ilogb(size);
+        let factor = libm::ldexp(1.0, shift);
+        for x in matrix.re.iter_mut().chain(&mut matrix.im) {
+            *x *= factor;
+        }
+        off *= factor;
+        exponent -= f64::from(shift);
+        visit(power, exponent, &matrix, off);
+        let (size, whole) = (size * factor, frobenius(&matrix));
+        off = (2.0 * size * off + off * off + rounding * whole * whole) * MARGIN;
+        matrix = square(&matrix);
+        exponent *= 2.0;
+        power *= 2.0;
+    }
+}
+
+/// About log ρ, from norms of powers; −∞ for a nilpotent matrix.
+fn log_radius(matrix: Rows, squarings: u32) -> f64 {
+    let mut found = f64::NEG_INFINITY;
+    powers(matrix, 0.0, squarings, |power, exponent, matrix, _| {
+        found = (exponent * LN_2 + log(norm(matrix))) / power;
+    });
+    found
+}
+
+/// A lower bound of log ρ, from traces of powers, for every matrix within `lost`.
+fn log_radius_below(matrix: Rows, lost: f64) -> f64 {
+    let n = matrix.size as f64;
+    let mut best = f64::NEG_INFINITY;
+    powers(
+        matrix,
+        lost,
+        MANY_SQUARINGS,
+        |power, exponent, matrix, off| {
+            let trace: Complex64 = (0..matrix.size).map(|i| matrix.get(i, i)).sum();
+            // A trace changes by n times the spectral norm of a change.
+            let least = (trace.norm() - n * off * MARGIN) * (1.0 - 1e-9) - 1e-15 * n;
+            if least > 0.0 {
+                let value = (exponent * LN_2 + log(least / n)) / power;
+                best = best.max(value - 1e-15 * (1.0 + value.abs()));
+            }
+        },
+    );
+    best
+}

@@ -1,0 +1,329 @@
+//! Roots of det M(s), M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), without expanding the determinant.
+//!
+//! `system` holds the matrices, `balance` scales them at a point, `factor` their factors and inverses with rounding bounds, `place`
+//! what is proved about det M around a point; `walker` makes walks and Newton's iteration of that,
+//! with which rectangles are counted, divided and searched as for one function (`roots::cell`,
+//! `roots::isolate`). `outer` bounds roots of half planes by norms, `difference` knows the chains of
+//! neutral systems. Nothing is lost to the size of coefficients: what is proved is proved for the
+//! matrices as given. A root is as well determined as M is regular next to it; where rounding hides
+//! which side of a line it is on, there is an error, never a guess.
+
+mod balance;
+mod difference;
+mod factor;
+mod outer;
+mod place;
+mod system;
+#[cfg(test)]
+mod tests;
+mod walker;
+
+pub use system::CharacteristicMatrix;
+
+use num_complex::Complex64;
+
+use self::outer::Leading;
+use self::walker::{MAX_EVALUATIONS, MatrixWalker};
+use super::cell::Cell;
+use super::region::Region;
+use super::rightmost::{Spectrum, first, half_plane_discs, leading};
+use super::set::{RootSet, locate, with_mirror_image};
+use crate::{Error, Task};
+
+/// Most roots that can be asked for.
+const MAX_WANTED: usize = 1000;
+
+/// Factorisations after which a line is given up.
+const EVALUATIONS_PER_LINE: u64 = 100_000;
+
+/// Radii of half planes are at least this times the rate of the system: roots at 0 need room.
+const LEAST_RADIUS: f64 = 1e-6;
+
+/// A system with its bounds, ready to be searched.
+struct Prepared<'s> {
+    system: &'s CharacteristicMatrix,
+    leading: Leading,
+}
+
+impl<'s> Prepared<'s> {
+    fn new(system: &'s CharacteristicMatrix) -> Result<Self, Error> {
+        Ok(Self {
+            system,
+            leading: Leading::new(system)?,
+        })
+    }
+
+    /// The upper half of a rectangle with all roots right of `sigma`; `None` where there is none.
+    fn cell(&self, walker: &mut MatrixWalker<'_>, sigma: f64) -> Result<Option<Cell>, Error> {
+        // A little beyond, so that the edge itself is clear.
+        let least = LEAST_RADIUS * self.system.rate();
+        let radius = 1.01 * self.leading.radius(sigma, walker.task())?.max(least);
+        if sigma >= radius {
+            return Ok(None);
+        }
+        let re = (sigma.max(-radius), radius);
+        Cell::new(walker, re, (0.0, radius), true).map(Some)
+    }
+}
+
+impl Spectrum for Prepared<'_> {
+    type Walker<'a>
+        = MatrixWalker<'a>
+    where
+        Self: 'a;
+
+    fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> MatrixWalker<'a> {
+        MatrixWalker::new(self.system, task, limit)
+    }
+
+    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error> {
+        let mut walker = self.walker(task, EVALUATIONS_PER_LINE);
+        let cell = self.cell(&mut walker, sigma)?;
+        Ok((cell.map_or(0, |cell| cell.count), walker.hints))
+    }
+
+    fn cell_right_of<'a>(
+        &'a self,
+        walker: &mut MatrixWalker<'a>,
+        sigma: f64,
+    ) -> Result<Option<Cell>, Error> {
+        self.cell(walker, sigma)
+    }
+}
+
+/// A region in the upper half plane, as far as symmetry allows, its open sides closed.
+struct Closed {
+    re: (f64, f64),
+    symmetric: Option<f64>,
+    above: Option<(f64, f64)>,
+    /// Is the lower edge the real axis?
+    half: bool,
+    mirrored: bool,
+}
+
+/// # Errors
+/// [`Error::Argument`] where an open side cannot be closed, or the determinant is zero.
+fn close(
+    system: &CharacteristicMatrix,
+    region: &Region,
+    task: &Task,
+) -> Result<Option<Closed>, Error> {
+    region.check()?;
+    system.check_regular()?;
+    let mirrored = region.im.1 + region.im.0 < 0.0;
+    let Region { mut re, mut im } = if mirrored { region.mirrored() } else { *region };
+    let open = [re.0, re.1, im.0, im.1].iter().any(|x| x.is_infinite());
+    if open {
+        if re.0.is_infinite() && system.longest() > 0.0 {
+            return Err(Error::argument(
+                "the real part is open to the left: close it, far enough left delays make \
+                 infinitely many roots",
+            ));
+        }
+        let least = LEAST_RADIUS * system.rate();
+        let radius = 1.01 * Leading::new(system)?.radius(re.0, task)?.max(least);
+        re = (re.0.max(-radius), re.1.min(radius));
+        im = (im.0.max(-radius), im.1.min(radius));
+    }
+    if re.0 >= re.1 || im.0 >= im.1 {
+        return Ok(None);
+    }
+    let symmetric = (im.0 <= 0.0).then_some(if im.0 == 0.0 { im.1 } else { -im.0 });
+    let above = match symmetric {
+        None => Some(im),
+        Some(height) => (height < im.1).then_some((height, im.1)),
+    };
+    Ok(Some(Closed {
+        re,
+        symmetric,
+        above,
+        half: im.0 == 0.0,
+        mirrored,
+    }))
+}
+
+/// The number of roots of det M in a region, with multiplicity.
+///
+/// Open sides are closed by norms, which takes an invertible E. Roots on the real axis belong to a
+/// region whose lower (or upper) edge it is.
+///
+/// # Errors
+/// [`Error::Argument`] for a bad region, one that cannot be shown to hold finitely many roots, or
+/// a determinant that is zero everywhere; [`Error::Contour`] where a root lies on the edge or too
+/// close to it to tell the side; [`Error::TooMuch`]; [`Error::Interrupted`].
+///
+/// ```
+/// use deadtime::{Task, roots::{Region, matrix::{CharacteristicMatrix, count}}};
+/// let unit = vec![vec![1.0, 0.0], vec![0.0, 1.0]];
+/// let late = vec![(1.0, vec![vec![-1.0, 0.0], vec![0.0, -1.0]])];
+/// let system = CharacteristicMatrix::new(unit, vec![], late)?;
+/// let region = Region::new((-12.0, 2.0), (0.0, 100.0))?;
+/// assert_eq!(count(&system, &region, &Task::new())?, 2 * 16);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn count(system: &CharacteristicMatrix, region: &Region, task: &Task) -> Result<u64, Error> {
+    let Some(closed) = close(system, region, task)? else {
+        return Ok(0);
+    };
+    if closed.half {
+        // Which roots are real is known from where they are.
+        return Ok(roots(system, region, task)?.counted);
+    }
+    let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
+    let mut total = 0;
+    if let Some(height) = closed.symmetric {
+        total += Cell::new(&mut walker, closed.re, (0.0, height), true)?.count;
+    }
+    if let Some(im) = closed.above {
+        total += Cell::new(&mut walker, closed.re, im, false)?.count;
+    }
+    Ok(total)
+}
+
+/// Every root of det M in a region, each in a disc proved to hold its multiplicity.
+///
+/// # Errors
+/// As [`count`]; [`Error::CountMismatch`] where double precision does not suffice to locate what
+/// was counted.
+///
+/// ```
+/// use deadtime::{Task, roots::{Region, matrix::{CharacteristicMatrix, roots}}};
+/// let system = CharacteristicMatrix::new(
+///     vec![vec![1.0]], vec![], vec![(1.0, vec![vec![-1.0]])],
+/// )?;
+/// let set = roots(&system, &Region::new((-3.0, 2.0), (0.0, 20.0))?, &Task::new())?;
+/// assert_eq!(set.counted, 3);
+/// assert!((set.roots[0].re + 0.318_131_505_204_764_1).abs() <= set.radii[0]);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn roots(
+    system: &CharacteristicMatrix,
+    region: &Region,
+    task: &Task,
+) -> Result<RootSet, Error> {
+    let mut discs = Vec::new();
+    let Some(closed) = close(system, region, task)? else {
+        return Ok(RootSet::new(discs, *region));
+    };
+    let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
+    let re = closed.re;
+    let lower = closed.symmetric.map(|height| ((0.0, height), true));
+    let upper = closed.above.map(|im| (im, false));
+    for (im, symmetric) in [lower, upper].into_iter().flatten() {
+        let cell = Cell::new(&mut walker, re, im, symmetric)?;
+        for disc in locate(&mut walker, cell)? {
+            if symmetric && !closed.half {
+                discs.extend(with_mirror_image(disc));
+            } else {
+                discs.push(disc);
+            }
+        }
+    }
+    if closed.mirrored {
+        for disc in &mut discs {
+            disc.center = disc.center.conj();
+        }
+    }
+    Ok(RootSet::new(discs, *region))
+}
+
+/// The number of roots of det M right of the line Re s = `sigma`.
+///
+/// # Errors
+/// As [`count`].
+pub fn count_right_of(
+    system: &CharacteristicMatrix,
+    sigma: f64,
+    task: &Task,
+) -> Result<u64, Error> {
+    count(system, &Region::right_of(sigma), task)
+}
+
+/// The `n` rightmost roots, not counting those with Im < 0, together with their mirror images.
+///
+/// As [`rightmost`](super::rightmost) of one function; right of the chains only.
+///
+/// # Errors
+/// [`Error::Argument`] for n = 0 or an E that cannot be inverted; those of [`roots`].
+pub fn rightmost(system: &CharacteristicMatrix, n: usize, task: &Task) -> Result<RootSet, Error> {
+    if n == 0 || n > MAX_WANTED {
+        return Err(Error::argument(format!(
+            "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots of a matrix"
+        )));
+    }
+    system.check_regular()?;
+    let prepared = Prepared::new(system)?;
+    if system.longest() == 0.0 {
+        let everywhere = f64::NEG_INFINITY;
+        return Ok(first(
+            half_plane_discs(&prepared, everywhere, task)?,
+            n,
+            everywhere,
+        ));
+    }
+    let (_, chain) = prepared.leading.difference.enclosure(task)?;
+    leading(&prepared, n, None, chain, task, |discs, _| discs)
+}
+
+/// The largest real part of a root, or the upper bound of the chains if that is larger.
+///
+/// # Errors
+/// As [`rightmost`]; [`Error::Argument`] where no root was found.
+pub fn spectral_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<f64, Error> {
+    let set = rightmost(system, 1, task)?;
+    let isolated = set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re);
+    let abscissa = isolated.max(chain_abscissa(system, task)?.1);
+    if abscissa == f64::NEG_INFINITY {
+        return Err(Error::argument(
+            "no line that could be counted has a root to its right: the numbers of this system \
+             differ too much in size for double precision; choose another unit of time",
+        ));
+    }
+    Ok(abscissa)
+}
+
+/// Lower and upper bound of C_D in 1/s, the supremum of the real parts of chains with delays free
+/// to vary; −∞ for both without delayed derivatives.
+///
+/// With more than four delayed derivatives the upper bound is that of their norms.
+///
+/// # Errors
+/// [`Error::Argument`] for an E that cannot be inverted; [`Error::Interrupted`].
+///
+/// ```
+/// use deadtime::{Task, roots::matrix::{CharacteristicMatrix, chain_abscissa}};
+/// let one = || vec![vec![1.0]];
+/// let system = CharacteristicMatrix::new(one(), vec![(0.36, vec![vec![0.3]])], vec![(0.0, one())])?;
+/// let (low, high) = chain_abscissa(&system, &Task::new())?;
+/// let exact = 0.3f64.ln() / 0.36;
+/// assert!(low <= exact && exact <= high && high - low < 1e-6);
+/// # Ok::<(), deadtime::Error>(())
+/// ```
+pub fn chain_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<(f64, f64), Error> {
+    if !system.is_neutral() {
+        return Ok((f64::NEG_INFINITY, f64::NEG_INFINITY));
+    }
+    Leading::new(system)?.difference.enclosure(task)
+}
+
+/// Can the inverse of E be verified? Half planes and chains need it.
+pub fn is_invertible(system: &CharacteristicMatrix) -> bool {
+    Leading::new(system).is_ok()
+}
+
+/// Is every root proved to lie left of the imaginary axis, and stay there when delays change by
+/// arbitrarily little? `false` also where a root lies on the axis or too close to it to tell.
+///
+/// # Errors
+/// [`Error::Argument`] for an E that cannot be inverted; [`Error::TooMuch`];
+/// [`Error::Interrupted`].
+pub fn is_stable(system: &CharacteristicMatrix, task: &Task) -> Result<bool, Error> {
+    if chain_abscissa(system, task)?.1 >= 0.0 {
+        return Ok(false);
+    }
+    match count_right_of(system, 0.0, task) {
+        Ok(number) => Ok(number == 0),
+        Err(Error::Contour { .. }) => Ok(false),
+        Err(error) => Err(error),
+    }
+}

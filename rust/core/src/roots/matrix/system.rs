@@ -1,0 +1,332 @@
+//! The characteristic matrix M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), checked once.
+//!
+//! Rows and columns are scaled by powers of two before anything else: each row by the largest
+//! entry of E and N in it, then row i by 1/f_i and column i by f_i as balancing does (Parlett and
+//! Reinsch 1969; Osborne 1960). That is exact and moves no root, and the inequalities of the
+//! proofs, which compare norms, hold over longer steps.
+
+use num_complex::Complex64;
+
+use super::place::Place;
+use crate::Error;
+
+/// Sweeps of balancing; it converges in few.
+const SWEEPS: usize = 12;
+
+/// Exponents of the scaling stay within this, so that nothing over- or underflows.
+const MOST_EXPONENT: i32 = 200;
+
+/// Sizes of entries that leave room for products in double precision.
+const USABLE: std::ops::Range<f64> = 1e-100..1e100;
+
+/// More states than anyone can wait for.
+const MAX_STATES: usize = 200;
+
+/// What one delay contributes to one row of M: `(s · slope + value) e^(−s τ)` in each column.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Term {
+    /// Index of the delay.
+    pub(super) delay: usize,
+    pub(super) entries: Vec<Entry>,
+}
+
+/// Column, factor on s, and the rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Entry {
+    pub(super) column: usize,
+    pub(super) slope: f64,
+    pub(super) value: f64,
+}
+
+/// A square matrix of quasi-polynomials of first degree, real, scaled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CharacteristicMatrix {
+    rows: Vec<Vec<Term>>,
+    /// Sorted, distinct, ≥ 0, the first one 0.
+    delays: Vec<f64>,
+    /// Largest row sum of A, rows scaled to E and N: a rate that is typical, 1/s.
+    rate: f64,
+}
+
+impl CharacteristicMatrix {
+    /// From E, and N and A with their delays in s: all matrices square, by rows.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where shapes differ, a number is not finite or far from 1 in size, a
+    /// delay is negative, or a row or column of all matrices is zero.
+    ///
+    /// ```
+    /// use deadtime::roots::matrix::CharacteristicMatrix;
+    /// let oscillator = CharacteristicMatrix::new(
+    ///     vec![vec![1.0, 0.0], vec![0.0, 1.0]],
+    ///     vec![],
+    ///     vec![(0.0, vec![vec![0.0, 1.0], vec![-4.0, -0.4]])],
+    /// )?;
+    /// assert_eq!(oscillator.size(), 2);
+    /// # Ok::<(), deadtime::Error>(())
+    /// ```
+    pub fn new(
+        e: Vec<Vec<f64>>,
+        n: Vec<(f64, Vec<Vec<f64>>)>,
+        a: Vec<(f64, Vec<Vec<f64>>)>,
+    ) -> Result<Self, Error> {
+        let size = e.len();
+        if size == 0 || size > MAX_STATES {
+            return Err(Error::argument(format!(
+                "{size} states: give at least 1 and at most {MAX_STATES}"
+            )));
+        }
+        let mut delays = vec![0.0];
+        for (delay, matrix) in n.iter().chain(&a) {
+            if !(delay.is_finite() && *delay >= 0.0) {
+                return Err(Error::argument(format!(
+                    "a delay of {delay} s: give finite ones, not below 0"
+                )));
+            }
+            // A matrix of zeros delays nothing.
+            if matrix.iter().flatten().any(|x| *x != 0.0) {
+                delays.push(delay + 0.0);
+            }
+        }
+        delays.sort_by(f64::total_cmp);
+        delays.dedup();
+        let mut slopes = vec![vec![vec![0.0; size]; size]; delays.len()];
+        let mut values = slopes.clone();
+        let place = |delay: f64| delays.iter().position(|d| *d == delay);
+        let all = std::iter::once((0.0, &e, true))
+            .chain(n.iter().map(|(delay, m)| (*delay, m, true)))
+            .chain(a.iter().map(|(delay, m)| (*delay, m, false)));
+        for (delay, matrix, is_slope) in all {
+            if matrix.len() != size || matrix.iter().any(|row| row.len() != size) {
+                return Err(Error::argument(format!(
+                    "a matrix is not {size} by {size}, as E is"
+                )));
+            }
+            let group = if is_slope { &mut slopes } else { &mut values };
+            let Some(target) = place(delay).and_then(|place| group.get_mut(place)) else {
+                continue;
+            };
+            for (sums, row) in target.iter_mut().zip(matrix) {
+                for (sum, x) in sums.iter_mut().zip(row) {
+                    if *x != 0.0 && !USABLE.contains(&x.abs()) {
+                        return Err(Error::argument(format!(
+                            "an entry of {x:e}: entries other than zero must lie between 1e-100 \
+                             and 1e100 in modulus; choose other units"
+                        )));
+                    }
+                    *sum += if is_slope { *x } else { -x };
+                }
+            }
+        }
+        let rate = match scale(&mut slopes, &mut values) {
+            0.0 => delays.last().filter(|d| **d > 0.0).map_or(1.0, |d| 1.0 / d),
+            rate => rate,
+        };
+        let mut rows = vec![Vec::new(); size];
+        for (delay, (slope, value)) in slopes.iter().zip(&values).enumerate() {
+            for (terms, (slopes, values)) in rows.iter_mut().zip(slope.iter().zip(value)) {
+                let entries: Vec<Entry> = slopes
+                    .iter()
+                    .zip(values)
+                    .enumerate()
+                    .filter(|(_, (slope, value))| **slope != 0.0 || **value != 0.0)
+                    .map(|(column, (slope, value))| Entry {
+                        column,
+                        slope: *slope,
+                        value: *value,
+                    })
+                    .collect();
+                if !entries.is_empty() {
+                    terms.push(Term { delay, entries });
+                }
+            }
+        }
+        let used = |column: usize| {
+            let entries = rows.iter().flatten().flat_map(|term| &term.entries);
+            entries.into_iter().any(|entry| entry.column == column)
+        };
+        if rows.iter().any(Vec::is_empty) || !(0..size).all(used) {
+            return Err(Error::argument(
+                "the determinant of the characteristic matrix is zero for every s: a row or a \
+                 column of E, N and A together is zero",
+            ));
+        }
+        Ok(Self { rows, delays, rate })
+    }
+
+    /// The number of states.
+    pub fn size(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Delays in s, ascending, the first one 0.
+    pub fn delays(&self) -> &[f64] {
+        &self.delays
+    }
+
+    /// A rate that is typical of the system, in 1/s.
+    pub(super) fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    pub(super) fn rows(&self) -> &[Vec<Term>] {
+        &self.rows
+    }
+
+    /// The longest delay.
+    pub(super) fn longest(&self) -> f64 {
+        self.delays.last().copied().unwrap_or(0.0)
+    }
+
+    /// Factors on s and what is left, after scaling: dense, by rows, for one delay.
+    pub(super) fn dense(&self, delay: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        let size = self.size();
+        let mut slopes = vec![vec![0.0; size]; size];
+        let mut values = slopes.clone();
+        for (terms, (slopes, values)) in self.rows.iter().zip(slopes.iter_mut().zip(&mut values)) {
+            for entry in terms
+                .iter()
+                .filter(|term| term.delay == delay)
+                .flat_map(|term| &term.entries)
+            {
+                if let (Some(slope), Some(value)) =
+                    (slopes.get_mut(entry.column), values.get_mut(entry.column))
+                {
+                    *slope = entry.slope;
+                    *value = entry.value;
+                }
+            }
+        }
+        (slopes, values)
+    }
+
+    /// Is there a delayed derivative?
+    pub(super) fn is_neutral(&self) -> bool {
+        let late = |term: &&Term| self.delays.get(term.delay).is_some_and(|d| *d > 0.0);
+        self.rows
+            .iter()
+            .flatten()
+            .filter(late)
+            .flat_map(|term| &term.entries)
+            .any(|entry| entry.slope != 0.0)
+    }
+}
+
+/// Points, in units of the rate, at one of which a matrix that is regular at all is so in double
+/// precision.
+const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
+
+impl CharacteristicMatrix {
+    /// # Errors
+    /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
+    pub(super) fn check_regular(&self) -> Result<(), Error> {
+        let rate = self.rate;
+        let regular =
+            |(x, y): &(f64, f64)| Place::new(self, Complex64::new(x * rate, y * rate)).is_some();
+        if POINTS.iter().any(regular) {
+            return Ok(());
+        }
+        Err(Error::argument(
+            "the determinant of the characteristic matrix is zero for every s, or cannot be told \
+             from it: the equations do not determine the state, look for rows of E, N and A that \
+             depend on one another, or for entries that differ too much in size",
+        ))
+    }
+}
+
+type Matrices = [Vec<Vec<f64>>];
+
+/// Scale rows and columns of all matrices by powers of two; the rate of the scaled system.
+fn scale(slopes: &mut Matrices, values: &mut Matrices) -> f64 {
+    let size = slopes.first().map_or(0, Vec::len);
+    let sum = |group: &Matrices| {
+        let mut total = vec![vec![0.0f64; size]; size];
+        for matrix in group {
+            for (sums, row) in total.iter_mut().zip(matrix) {
+                for (sum, x) in sums.iter_mut().zip(row) {
+                    *sum += x.abs();
+                }
+            }
+        }
+        total
+    };
+    let (mut on_s, mut rest) = (sum(slopes), sum(values));
+    let mut rows: Vec<i32> = on_s
+        .iter()
+        .zip(&rest)
+        .map(|(on_s, rest)| {
+            let largest = |row: &[f64]| row.iter().fold(0.0f64, |a, b| a.max(*b));
+            let size = if largest(on_s) > 0.0 {
+                largest(on_s)
+            } else {
+                largest(rest)
+            };
+            if size > 0.0 { -libm::ilogb(size) } else { 0 }
+        })
+        .map(|exponent| exponent.clamp(-MOST_EXPONENT, MOST_EXPONENT))
+        .collect();
+    let mut columns = vec![0; size];
+    apply(&mut on_s, &rows, &columns);
+    apply(&mut rest, &rows, &columns);
+    let norm = |m: &[Vec<f64>]| {
+        m.iter()
+            .map(|row| row.iter().sum::<f64>())
+            .fold(0.0f64, f64::max)
+    };
+    let rate = norm(&rest);
+    let mut weight = rest;
+    for (row, other) in weight.iter_mut().zip(&on_s) {
+        for (x, y) in row.iter_mut().zip(other) {
+            *x += rate * y;
+        }
+    }
+    for _ in 0..SWEEPS {
+        let mut changed = false;
+        for i in 0..size {
+            let off = |k: &usize| *k != i;
+            let entry = |r: usize, c: usize| {
+                weight
+                    .get(r)
+                    .and_then(|row| row.get(c))
+                    .copied()
+                    .unwrap_or(0.0)
+            };
+            let across: f64 = (0..size).filter(off).map(|k| entry(i, k)).sum();
+            let down: f64 = (0..size).filter(off).map(|k| entry(k, i)).sum();
+            if across == 0.0 || down == 0.0 {
+                continue;
+            }
+            let step = (libm::ilogb(across) - libm::ilogb(down)) / 2;
+            let (Some(row), Some(column)) = (rows.get_mut(i), columns.get_mut(i)) else {
+                continue;
+            };
+            if step == 0 || (*row - step).abs().max((*column + step).abs()) > MOST_EXPONENT {
+                continue;
+            }
+            *row -= step;
+            *column += step;
+            changed = true;
+            for (r, line) in weight.iter_mut().enumerate() {
+                for (c, x) in line.iter_mut().enumerate() {
+                    let exponent = i32::from(c == i) * step - i32::from(r == i) * step;
+                    *x = libm::ldexp(*x, exponent);
+                }
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    for matrix in slopes.iter_mut().chain(&mut *values) {
+        apply(matrix, &rows, &columns);
+    }
+    norm(&sum(values))
+}
+
+fn apply(matrix: &mut [Vec<f64>], rows: &[i32], columns: &[i32]) {
+    for (line, row) in matrix.iter_mut().zip(rows) {
+        for (x, column) in line.iter_mut().zip(columns) {
+            *x = libm::ldexp(*x, row + column);
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! How far arg det M turns along a line, and Newton's iteration on det M: walks on matrices.
+//!
+//! Two neighbours reach to a point between them (`place`): the true change of arg det M is that
+//! expected from both, up to less than 2.5, and computed arguments are wrong by 0.1 at most. So the
+//! difference of the computed ones that is next to the expected change is the true one up to their
+//! errors, which cancel in the sum but at the two ends of the line.
+//!
+//! Newton's step is −1/tr(M⁻¹ M′). Where M is too close to singular for anything to be proved, a
+//! square about the iterate, as small as can be walked around, counts what it holds.
+
+use num_complex::Complex64;
+
+use super::place::{Place, Reach};
+use super::system::CharacteristicMatrix;
+use crate::quasipoly::modulus;
+use crate::roots::cell::{Cell, Walk};
+use crate::roots::isolate::Seek;
+use crate::roots::newton::{Disc, Outcome};
+use crate::roots::winding::Turn;
+use crate::{Error, Task};
+
+use std::f64::consts::{PI, TAU};
+
+/// Factorisations after which a computation is given up.
+pub(super) const MAX_EVALUATIONS: u64 = 1_000_000;
+
+/// Operations between two looks at the task, about.
+const CHECK_EVERY: u64 = 1_000_000;
+
+/// Hints kept of a walk, the first ones.
+const MAX_HINTS: usize = 1000;
+
+/// Newton's steps from one start.
+const MAX_STEPS: usize = 40;
+
+/// Error of one step's arithmetic, in units of the angles that come up in it.
+const STEP_ERROR: f64 = 16.0 * f64::EPSILON;
+
+/// Evaluations for the walk around a small square.
+const PATIENCE: u64 = 1000;
+
+/// Places next to a root that are tried before a line counts as blocked.
+const MOST_UNCLEAR: u32 = 5;
+
+/// How much longer than the own reach steps are tried, at most.
+const STRETCH: f64 = 1.9;
+
+/// Walks along lines; keeps the budget, the hints of roots and the discs already proved.
+pub(in crate::roots) struct MatrixWalker<'a> {
+    system: &'a CharacteristicMatrix,
+    task: &'a Task,
+    /// Where Newton's step from the points closest to a root leads to.
+    pub(in crate::roots) hints: Vec<Complex64>,
+    known: Vec<Disc>,
+    /// Where no single root could be proved.
+    stalled: Vec<Complex64>,
+    /// Evaluations at which a small square is given up for a larger one.
+    patience: u64,
+    evaluations: u64,
+    work: u64,
+    limit: u64,
+}
+
+impl<'a> MatrixWalker<'a> {
+    pub(super) fn new(system: &'a CharacteristicMatrix, task: &'a Task, limit: u64) -> Self {
+        Self {
+            system,
+            task,
+            hints: Vec::new(),
+            known: Vec::new(),
+            stalled: Vec::new(),
+            patience: u64::MAX,
+            evaluations: 0,
+            work: 0,
+            limit: limit.min(MAX_EVALUATIONS),
+        }
+    }
+
+    pub(super) fn task(&self) -> &'a Task {
+        self.task
+    }
+
+    /// Count an evaluation, look at the task and at the budget now and then.
+    fn spend(&mut self) -> Result<(), Error> {
+        let size = self.system.size() as u64;
+        self.evaluations += 1;
+        self.work += 20 * size * size * size + 1000;
+        if self.evaluations > self.patience {
+            return Err(Error::Contour {
+                place: Complex64::ZERO,
+                distance: 0.0,
+            });
+        }
+        if self.work < CHECK_EVERY {
+            return Ok(());
+        }
+        self.work = 0;
+        self.task.check()?;
+        if self.evaluations > self.limit {
+            return Err(Error::TooMuch {
+                what: "the search for roots of a matrix",
+                limit: self.limit,
+                unit: "factorisations",
+                advice: "take a smaller region, or keep its edges clear of chains of roots".into(),
+            });
+        }
+        Ok(())
+    }
+
+    fn place(&mut self, s: Complex64) -> Result<Option<Place>, Error> {
+        self.spend()?;
+        Ok(Place::new(self.system, s))
+    }
+
+    /// The error of a line that cannot be proved to be clear of roots at `place`.
+    fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
+        let mut distance = 4.0 * f64::EPSILON * modulus(place).max(1e-3 * self.system.rate());
+        // The place may be clear itself, and the root as far as Newton's step leads.
+        if let Some(here) = Place::tried(self.system, place) {
+            let correction = modulus(here.correction);
+            if correction.is_finite() {
+                distance = distance.max(2.0 * correction);
+            }
+        }
+        for _ in 0..40 {
+            let mut clear = true;
+            for step in [Complex64::ONE, -Complex64::ONE, Complex64::I] {
+                clear &= self.place(place + step * distance)?.is_some();
+            }
+            if clear {
+                break;
+            }
+            distance *= 4.0;
+        }
+        Ok(Error::Contour { place, distance })
+    }
+
+    /// The next place, with the point between where both reaches meet: its distance from `here`.
+    fn step(
+        &mut self,
+        here: &Place,
+        to: Complex64,
+        (along, rest): (Complex64, f64),
+        stretch: &mut f64,
+    ) -> Result<(Place, Reach, f64, Reach), Error> {
+        let reach = here.reach(along, rest);
+        let mut length = if reach.length >= rest {
+            rest
+        } else {
+            rest.min(*stretch * reach.length)
+        };
+        let mut unclear = 0;
+        for _ in 0..60 {
+            let next = if length >= rest {
+                to
+            } else {
+                here.s + along * length
+            };
+            if next == here.s {
+                break;
+            }
+            if let Some(ahead) = self.place(next)? {
+                let gone = modulus(next - here.s) * (1.0 + 1e-12);
+                let back = ahead.reach(-along, gone);
+                if back.length + reach.length >= gone * (1.0 + 1e-9) || reach.length >= gone {
+                    *stretch = (1.05 * *stretch).min(STRETCH);
+                    // As far from the end of either reach as can be.
+                    let part = reach.length / (reach.length + back.length);
+                    return Ok((ahead, reach, part * gone, back));
+                }
+                *stretch = (0.9 * *stretch).max(1.2);
+                length = (0.999 * reach.length).max(0.5 * length.min(reach.length));
+            } else {
+                // Clear places can be had ever closer to a root, each a little less so.
+                unclear += 1;
+                if unclear > MOST_UNCLEAR {
+                    break;
+                }
+                length *= 0.5;
+            }
+        }
+        Err(self.blocked(here.s)?)
+    }
+
+    /// The smallest square about `z` in which the number of roots can be proved, not 0.
+    fn square(&mut self, z: Complex64, most: f64) -> Result<Option<Disc>, Error> {
+        let size = self.system.size() as f64;
+        let mut half = 4.0 * f64::EPSILON * size.sqrt() * modulus(z).max(1e-3 * self.system.rate());
+        let mut growth = 3.0;
+        while half < most {
+            if self.place(z + half)?.is_some() {
+                // A square that would meet the real axis is made symmetric about it.
+                let symmetric = z.im.abs() <= 1.5 * half;
+                let (center, im) = if symmetric {
+                    (Complex64::new(z.re, 0.0), (0.0, half))
+                } else {
+                    (z, (z.im - half, z.im + half))
+                };
+                // Next to a defective root steps are as short as the square of the distance.
+                self.patience = self.evaluations + PATIENCE;
+                let cell = Cell::new(self, (center.re - half, center.re + half), im, symmetric);
+                growth = if self.evaluations > self.patience {
+                    9.0
+                } else {
+                    3.0
+                };
+                self.patience = u64::MAX;
+                match cell {
+                    Ok(cell) if cell.count > 0 => {
+                        return Ok(u32::try_from(cell.count).ok().map(|multiplicity| Disc {
+                            center: Complex64::new(center.re, center.im.abs()),
+                            // The half-diagonal, with the rounding of the corners.
+                            radius: half * 1.4143 + 2.0 * f64::EPSILON * modulus(center),
+                            isolation: half,
+                            multiplicity,
+                        }));
+                    }
+                    Ok(_) | Err(Error::Contour { .. }) => {}
+                    Err(other) => return Err(other),
+                }
+            }
+            half *= growth;
+        }
+        Ok(None)
+    }
+
+    /// The disc of a single root next to `z`, or of those next to it.
+    fn proved(&mut self, z: Complex64) -> Result<Outcome, Error> {
+        let up = Complex64::new(z.re, z.im.abs());
+        let holds = |disc: &&Disc| (disc.center - up).norm() <= disc.isolation;
+        if let Some(disc) = self.known.iter().find(holds) {
+            return Ok(Outcome::Simple(*disc));
+        }
+        let most = 1e-6 * modulus(z).max(1e-3 * self.system.rate());
+        if self.stalled.iter().any(|place| (place - up).norm() < most) {
+            return Ok(Outcome::Stalled(z));
+        }
+        Ok(match self.square(up, most)? {
+            Some(disc) if disc.multiplicity == 1 => {
+                self.known.push(disc);
+                Outcome::Simple(disc)
+            }
+            _ => {
+                self.stalled.push(up);
+                Outcome::Stalled(z)
+            }
+        })
+    }
+}
+
+impl Walk for MatrixWalker<'_> {
+    fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error> {
+        let whole = modulus(to - from);
+        if whole == 0.0 {
+            return Ok(Turn::default());
+        }
+        let along = (to - from) / ((to - from).re.abs() + (to - from).im.abs());
+        let Some(mut here) = self.place(from)? else {
+            return Err(self.blocked(from)?);
+        };
+        let mut turn = Turn {
+            angle: 0.0,
+            slack: here.error,
+        };
+        let summands = self.system.size() as f64 + 8.0;
+        let mut stretch = STRETCH;
+        // Newton's corrections at the last two points: a local minimum hints at a root.
+        let mut before = (f64::INFINITY, f64::INFINITY);
+        while here.s != to {
+            let rest = (to - here.s).re.abs() + (to - here.s).im.abs();
+            let (ahead, reach, gone, back) = self.step(&here, to, (along, rest), &mut stretch)?;
+            let middle = here.s + along * gone;
+            let (first, second) = (middle - here.s, middle - ahead.s);
+            let expected = here.expected(reach, first) - ahead.expected(back, second);
+            let shift = (here.delay - ahead.delay) * middle.im;
+            let off = ahead.angle - here.angle - expected + shift;
+            let delays = (ahead.delay * second.im, here.delay * first.im);
+            turn.angle += expected + principal(off) + delays.0 - delays.1;
+            turn.slack += STEP_ERROR
+                * summands
+                * (1.0 + expected.abs() + shift.abs() + delays.0.abs() + delays.1.abs())
+                + f64::EPSILON * turn.angle.abs();
+            if here.delay != ahead.delay {
+                turn.slack += STEP_ERROR * summands * here.delay.max(ahead.delay) * middle.im.abs();
+            }
+            let correction = modulus(here.correction);
+            if before.1 < before.0 && before.1 < correction && self.hints.len() < MAX_HINTS {
+                self.hints.push(here.s - here.correction);
+            }
+            before = (before.1, correction);
+            here = ahead;
+        }
+        turn.slack += here.error;
+        Ok(turn)
+    }
+}
+
+/// The angle less whole turns, in [−π, π].
+fn principal(angle: f64) -> f64 {
+    let rest = angle - (angle / TAU).round() * TAU;
+    rest.clamp(-PI, PI)
+}
+
+impl Seek for MatrixWalker<'_> {
+    fn pause(&mut self) -> Result<(), Error> {
+        self.spend()
+    }
+
+    fn newton(
+        &mut self,
+        start: Complex64,
+        window: &dyn Fn(Complex64) -> bool,
+    ) -> Result<Outcome, Error> {
+        let mut z = start;
+        let mut last = Complex64::ZERO;
+        let mut slow = 0.0;
+        for _ in 0..MAX_STEPS {
+            self.spend()?;
+            let Some(here) = Place::tried(self.system, z) else {
+                return self.proved(z);
+            };
+            let step = here.correction;
+            if !step.is_finite() {
+                return Ok(Outcome::Lost);
+            }
+            // Next to an m-fold root steps shrink by 1 − 1/m only: take m of them at once.
+            let ratio = modulus(step) / modulus(last);
+            let settled = (0.4..0.97).contains(&ratio) && (ratio - slow).abs() < 0.05 * ratio;
+            let fold = if settled {
+                (1.0 / (1.0 - ratio)).round()
+            } else {
+                1.0
+            };
+            slow = if fold > 1.0 { 0.0 } else { ratio };
+            last = step;
+            let next = z - step * fold;
+            let small = modulus(step) <= 4.0 * f64::EPSILON * modulus(z);
+            if small || !here.is_resolved() {
+                let end = if window(next) && modulus(step) < 1e-3 * modulus(z) {
+                    next
+                } else {
+                    z
+                };
+                return self.proved(end);
+            }
+            if !window(next) {
+                return Ok(Outcome::Lost);
+            }
+            z = next;
+        }
+        Ok(Outcome::Lost)
+    }
+
+    fn cluster(&mut self, place: Complex64, most: f64) -> Result<Option<Disc>, Error> {
+        self.square(Complex64::new(place.re, place.im.abs()), most)
+    }
+
+    fn delay_span(&self) -> f64 {
+        self.system.longest()
+    }
+
+    fn at_zero_if_exact(&self, disc: Disc) -> Disc {
+        // No sum of products is formed here that could be found to be exactly zero.
+        disc
+    }
+}
