@@ -278,6 +278,13 @@ impl<'a> Probe<'a> {
         rows.zip(&self.gaps).zip(&self.weights)
     }
 
+    /// The largest bound on a term at the last jet.
+    pub(crate) fn largest_term(&self) -> f64 {
+        self.parts
+            .iter()
+            .fold(0.0, |most, part| part.size.max(most))
+    }
+
     /// What [`curvature`](Self::curvature) says, without the terms that together can change g by no more
     /// than `most` on the way to Re s = x + `shift`; `None` where there are none or nothing else, or the
     /// last jet was not taken at `s`.

@@ -16,6 +16,7 @@ use super::dominated::descend;
 use super::neutral::chain_abscissa;
 use super::real::survey_real;
 use super::region::Region;
+use super::unit::OwnTime;
 use super::winding::{Turn, Walker, is_clear};
 use crate::elementary::angle;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
@@ -199,6 +200,9 @@ pub(super) fn upper_half(count: u64, real: u64) -> u64 {
 fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
     let reason = match h.kind() {
         Kind::Polynomial => "its coefficients span more than double precision holds".to_owned(),
+        Kind::Retarded if re.0 >= 0.0 => {
+            "its coefficients span more than double precision holds".to_owned()
+        }
         Kind::Retarded => format!(
             "the real part is open to the left or reaches far left ({})",
             re.0
@@ -236,6 +240,15 @@ fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, Error> {
+    match OwnTime::within(h, region) {
+        None => count_as_given(h, region, task),
+        Some(own) => {
+            count_as_given(&own.h, &own.region(region), task).map_err(|error| own.explained(error))
+        }
+    }
+}
+
+fn count_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, Error> {
     let prepared = Prepared::new(h)?;
     let h = &prepared.rest;
     region.check()?;
@@ -272,6 +285,14 @@ pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, E
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn count_right_of(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<u64, Error> {
+    match OwnTime::within(h, &Region::right_of(sigma)) {
+        None => count_right_of_as_given(h, sigma, task),
+        Some(own) => count_right_of_as_given(&own.h, own.scaled(sigma), task)
+            .map_err(|error| own.explained(error)),
+    }
+}
+
+fn count_right_of_as_given(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<u64, Error> {
     let region = Region::right_of(sigma);
     region.check()?;
     let prepared = Prepared::new(h)?;

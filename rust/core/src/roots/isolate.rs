@@ -18,7 +18,10 @@ use super::winding::Walker;
 use crate::Error;
 
 /// Cells with more roots missing are cut before anything is tried.
-const PATIENCE: u64 = 8;
+const PATIENCE: u64 = 10;
+
+/// After so many cuts in a row that part nothing, a cluster is tried for.
+const CROWDED: u32 = 8;
 
 /// Fractional parts of multiples of these fill a square evenly: powers of the plastic number.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
@@ -185,14 +188,14 @@ impl<'w, W: Seek> Search<'w, W> {
     /// # Errors
     /// [`Error::CountMismatch`] where double precision does not suffice; those of the walks.
     pub(super) fn locate_all(&mut self, cell: Cell) -> Result<(), Error> {
-        let mut cells = vec![(cell, false)];
-        while let Some((cell, crowded)) = cells.pop() {
+        let mut cells = vec![(cell, 0)];
+        while let Some((cell, idle)) = cells.pop() {
             self.walker.pause()?;
             let missing = cell.count.saturating_sub(self.located(&cell));
             if missing == 0 {
                 continue;
             }
-            if (missing <= PATIENCE || crowded) && self.try_here(&cell)? {
+            if (missing <= PATIENCE || idle >= CROWDED) && self.try_here(&cell)? {
                 continue;
             }
             let tall = cell.height() > cell.width();
@@ -205,9 +208,9 @@ impl<'w, W: Seek> Search<'w, W> {
             };
             match parts {
                 Ok((first, second)) => {
-                    // A cut that parts nothing has a cluster on one of its sides.
                     let parted = first.count > 0 && second.count > 0;
-                    cells.extend([(second, !parted), (first, !parted)]);
+                    let idle = if parted { 0 } else { idle + 1 };
+                    cells.extend([(second, idle), (first, idle)]);
                 }
                 Err(Error::Contour { .. }) => return Err(self.mismatch(cell.count, &cell)),
                 Err(other) => return Err(other),

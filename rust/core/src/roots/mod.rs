@@ -5,7 +5,8 @@
 //! `count` half planes; `newton` proves discs around single roots, `cluster` around several; `isolate` finds
 //! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability; `neutral` knows the chains, `commensurate`
 //! those of exact delays, `stable`
-//! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be; `certificate`
+//! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be;
+//! `unit` chooses the unit of time; `certificate`
 //! writes the proof of a count down. `matrix` does the same for det M(s), not expanded. Elementary functions are those of `crate::elementary`, with
 //! proved bounds; each file says what its inequalities leave for rounding.
 
@@ -27,6 +28,7 @@ mod rightmost;
 mod sensitivity;
 mod set;
 mod stable;
+mod unit;
 mod winding;
 
 pub use certificate::{Certificate, Contour, Segment, certify};

@@ -23,6 +23,7 @@ use super::neutral::chain_abscissa;
 use super::newton::Disc;
 use super::region::Region;
 use super::set::{RootSet, add_zeros, locate, with_mirror_image};
+use super::unit::OwnTime;
 use super::winding::{MAX_EVALUATIONS, Walker};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::{Error, Task};
@@ -42,14 +43,21 @@ const CHAIN_MARGIN: f64 = 1e-4;
 /// Evaluations after which a line is given up: those that hug the chains cost without end.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
 
-/// Lines given up before the search ends with what it has.
-const MAX_GIVEN_UP: u32 = 3;
+/// Lines given up before the search ends with what it has: next to the chains that is all there is to know,
+/// where there are none a root is still to be found.
+const MAX_GIVEN_UP: [u32; 2] = [3, 8];
+
+/// Times that the first line, where it cannot be counted, is moved to the right.
+const MAX_MOVES: u32 = 6;
 
 /// Newton iterations from a line, besides two for every root wanted.
 const MORE_STARTS: usize = 12;
 
 /// Share of the distance to the chains, or to a line given up, that the next line keeps.
 const APPROACH: f64 = 0.2;
+
+/// The same where it is not the chains, and a root may be anywhere between.
+const SLOW_APPROACH: f64 = 0.7;
 
 /// Share of the way from a root to the chains, or to its neighbour, at which a line is laid.
 const CLEARANCE: f64 = 0.3;
@@ -84,7 +92,12 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
              rightmost; the term with the highest power of s must not be delayed more than others",
         ));
     }
-    search(&Prepared::new(h)?, n, None, task)
+    match OwnTime::of(h) {
+        None => search(&Prepared::new(h)?, n, None, task),
+        Some(own) => search(&Prepared::new(&own.h)?, n, None, task)
+            .map(|set| own.returned(set, None))
+            .map_err(|error| own.explained(error)),
+    }
 }
 
 /// The number of roots right of the imaginary axis and the rightmost root, the axis being walked
@@ -100,7 +113,11 @@ pub fn unstable_and_rightmost(
     task: &Task,
 ) -> (Result<u64, Error>, Result<RootSet, Error>) {
     let prepared = match Prepared::new(h) {
-        Ok(prepared) if prepared.zeros == 0 && h.kind() != Kind::Advanced => prepared,
+        Ok(prepared)
+            if prepared.zeros == 0 && h.kind() != Kind::Advanced && OwnTime::of(h).is_none() =>
+        {
+            prepared
+        }
         _ => return (count_right_of(h, 0.0, task), rightmost(h, 1, task)),
     };
     let mut walker = Walker::new(&prepared.rest, task);
@@ -169,7 +186,12 @@ pub(super) fn leading<S: Spectrum>(
         };
         let discs = listed(discs, line.sigma);
         if discs.len() >= n || last {
-            return Ok(first(discs, n, line.sigma));
+            // Right of its chains a neutral equation may have none, a retarded one always has.
+            return if discs.is_empty() && chain == f64::NEG_INFINITY {
+                Err(beyond_reach())
+            } else {
+                Ok(first(discs, n, line.sigma))
+            };
         }
         // A pair counts twice in the half plane but once in the list.
         wanted = line.count + n as u64 - discs.len() as u64;
@@ -249,14 +271,19 @@ pub fn spectral_abscissa(h: &QuasiPolynomial, strong: bool, task: &Task) -> Resu
         return Err(if h.degree() == 0 && h.delays().len() < 2 {
             Error::argument("a constant has no roots, hence no spectral abscissa")
         } else {
-            Error::argument(
-                "no line that could be counted has a root to its right: the numbers of this \
-                 equation differ too much in size for double precision; leave out time constants \
-                 of almost nothing, or choose another unit of time",
-            )
+            beyond_reach()
         });
     }
     Ok(abscissa)
+}
+
+/// There is a rightmost root, but none was met.
+fn beyond_reach() -> Error {
+    Error::argument(
+        "no line that could be counted has a root to its right: the numbers of this equation \
+         differ too much in size for double precision; leave out time constants of almost \
+         nothing, or choose another unit of time",
+    )
 }
 
 /// A line, and what is known of the half plane to its right.
@@ -277,6 +304,8 @@ struct Lines<'a, S: Spectrum> {
     /// The chains, or the rightmost line that could not be counted.
     barrier: f64,
     given_up: u32,
+    /// Times that the first line was moved to the right.
+    moved: u32,
     /// Least distance to the barrier.
     margin: f64,
     /// One over the longest delay.
@@ -301,6 +330,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             chain,
             barrier: chain,
             given_up: 0,
+            moved: 0,
             margin: CHAIN_MARGIN * step,
             first_step: step,
             step,
@@ -341,7 +371,10 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 (None, None) => self.start,
                 (Some(few), None) => {
                     let few = few.clone();
-                    if few.sigma - self.barrier <= self.margin || self.given_up >= MAX_GIVEN_UP {
+                    let [beside_chains, without] = MAX_GIVEN_UP;
+                    let free = self.chain == f64::NEG_INFINITY;
+                    let most = if free { without } else { beside_chains };
+                    if few.sigma - self.barrier <= self.margin || self.given_up >= most {
                         return Ok((few, true));
                     }
                     let ahead = few.sigma - self.step;
@@ -352,7 +385,8 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                             self.step *= 1.5;
                             // Never onto the barrier, only most of the way: a line costs as
                             // much as its distance is small, so halving it would pay twice.
-                            let kept = APPROACH * (few.sigma - self.barrier);
+                            let share = if free { SLOW_APPROACH } else { APPROACH };
+                            let kept = share * (few.sigma - self.barrier);
                             ahead.max(self.barrier + kept.max(0.99 * self.margin))
                         }
                     }
@@ -374,11 +408,16 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 Err(error @ (Error::TooMuch { .. } | Error::Argument(_)))
                     if self.enough.is_none() =>
                 {
-                    if self.few.is_none() {
+                    if self.few.is_some() {
+                        self.given_up += 1;
+                    } else if self.moved < MAX_MOVES {
+                        // Further right the delayed terms are smaller.
+                        self.start = sigma + self.first_step * f64::from(1u32 << (2 * self.moved));
+                        self.moved += 1;
+                    } else {
                         return Err(error);
                     }
-                    self.barrier = sigma;
-                    self.given_up += 1;
+                    self.barrier = self.barrier.max(sigma);
                 }
                 Err(error) => return Err(error),
             }

@@ -8,6 +8,7 @@ use super::count::{Closed, Prepared, close};
 use super::isolate::{Search, Seek};
 use super::newton::Disc;
 use super::region::Region;
+use super::unit::OwnTime;
 use super::winding::Walker;
 use crate::quasipoly::QuasiPolynomial;
 use crate::{Error, Task};
@@ -133,6 +134,15 @@ pub(super) fn with_mirror_image(disc: Disc) -> impl Iterator<Item = Disc> {
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn roots(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSet, Error> {
+    match OwnTime::within(h, region) {
+        None => roots_as_given(h, region, task),
+        Some(own) => roots_as_given(&own.h, &own.region(region), task)
+            .map(|set| own.returned(set, Some(*region)))
+            .map_err(|error| own.explained(error)),
+    }
+}
+
+fn roots_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSet, Error> {
     let prepared = Prepared::new(h)?;
     let h = &prepared.rest;
     region.check()?;

@@ -41,13 +41,13 @@ pub(super) const MAX_EVALUATIONS: u64 = 20_000_000;
 const MAX_HINTS: usize = 1000;
 
 /// Outside these, underflow or overflow could matter and values prove nothing.
-const USABLE: std::ops::Range<f64> = 1e-250..1e150;
+const USABLE: std::ops::Range<f64> = 1e-270..1e290;
 
 /// Error of one computed difference of arguments: 16 u and more than 3 u of τ_c Δy.
 pub(super) const STEP_ERROR: f64 = 8.0 * f64::EPSILON;
 
-/// Slopes count as at least this of the value, so that their squares do not vanish.
-const LEAST_SLOPE: f64 = 1e-140;
+/// Slopes count as at least this of the value, so that one can divide by them.
+const LEAST_SLOPE: f64 = 1e-100;
 
 /// Share of the value that terms may have which are counted by their size alone.
 const RIPPLE: f64 = 0.3;
@@ -178,6 +178,10 @@ impl<'a> Walker<'a> {
 
     /// The error of a line that cannot be proved to be clear of roots at `place`.
     pub(super) fn blocked(&mut self, place: Complex64) -> Error {
+        self.probe.jet(place);
+        if self.probe.largest_term() < USABLE.start {
+            return overflow(place);
+        }
         let mut distance =
             4.0 * f64::EPSILON * modulus(place).max(f64::MIN_POSITIVE / f64::EPSILON);
         for _ in 0..200 {
@@ -309,6 +313,7 @@ impl<'a> Walker<'a> {
         } else {
             rest.min(1.9 * reach)
         };
+        let mut overflows = false;
         for attempt in 0..8 {
             let next = if length >= rest {
                 to
@@ -318,8 +323,10 @@ impl<'a> Walker<'a> {
             if next == here {
                 break;
             }
+            overflows = false;
             let ahead = self.jet(next);
             if !is_finite(&ahead) {
+                overflows = true;
                 length *= 0.25;
                 continue;
             }
@@ -338,13 +345,19 @@ impl<'a> Walker<'a> {
             }
             length = (0.999 * reach).min(length * 0.999);
         }
-        Err(self.blocked(here))
+        Err(if overflows {
+            overflow(here)
+        } else {
+            self.blocked(here)
+        })
     }
 }
 
 /// The largest r with `slope` r + `bend` r²/2 at most `room`.
 fn within(room: f64, slope: f64, bend: f64) -> f64 {
-    2.0 * room / (slope + (slope * slope + 2.0 * bend * room).sqrt())
+    // By the slope, whose square may leave the range.
+    let bent = 2.0 * (bend / slope) * (room / slope);
+    2.0 * (room / slope) / (1.0 + (1.0 + bent).sqrt())
 }
 
 impl Walk for Walker<'_> {
