@@ -304,8 +304,9 @@ struct Lines<'a, S: Spectrum> {
     /// The chains, or the rightmost line that could not be counted.
     barrier: f64,
     given_up: u32,
-    /// Times that the first line was moved to the right.
+    /// Times that the first line was moved to the right, and why at first.
     moved: u32,
+    refused: Option<Error>,
     /// Least distance to the barrier.
     margin: f64,
     /// One over the longest delay.
@@ -331,6 +332,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             barrier: chain,
             given_up: 0,
             moved: 0,
+            refused: None,
             margin: CHAIN_MARGIN * step,
             first_step: step,
             step,
@@ -414,6 +416,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                         // Further right the delayed terms are smaller.
                         self.start = sigma + self.first_step * f64::from(1u32 << (2 * self.moved));
                         self.moved += 1;
+                        self.refused.get_or_insert(error);
                     } else {
                         return Err(error);
                     }
@@ -422,12 +425,13 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 Err(error) => return Err(error),
             }
         }
-        Err(Error::TooMuch {
+        // What kept from the first line says more than that no other one served.
+        Err(self.refused.take().unwrap_or(Error::TooMuch {
             what: "the search for a line right of which the rightmost roots lie",
             limit: MAX_LINES as u64,
             unit: "lines",
             advice: "ask for fewer roots, or for those in a region".into(),
-        })
+        }))
     }
 
     /// A line just left of the `wanted` rightmost roots, as far as the hints of a line tell: right

@@ -21,7 +21,7 @@ use num_complex::Complex64;
 
 use super::cell::Walk;
 use crate::elementary::angle;
-use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
+use crate::quasipoly::{Jet, Probe, QuasiPolynomial, expansion, modulus, remainder};
 use crate::{Error, Task};
 
 /// Share of |v| that g may move by.
@@ -48,6 +48,9 @@ pub(super) const STEP_ERROR: f64 = 8.0 * f64::EPSILON;
 
 /// Slopes count as at least this of the value, so that one can divide by them.
 const LEAST_SLOPE: f64 = 1e-100;
+
+/// Order of the Taylor polynomial next to several roots.
+const CROWD: usize = 8;
 
 /// Share of the value that terms may have which are counted by their size alone.
 const RIPPLE: f64 = 0.3;
@@ -105,6 +108,8 @@ pub(super) struct Walker<'a> {
     checked: u64,
     limit: u64,
     sharp: u32,
+    /// The last place where that was needed.
+    sharp_at: Option<Complex64>,
     /// Evaluations from which on a line is walked in the longest steps that can be proved.
     patient_until: u64,
 }
@@ -123,6 +128,7 @@ impl<'a> Walker<'a> {
             checked: 0,
             limit,
             sharp: 0,
+            sharp_at: None,
             patient_until: PATIENCE,
         }
     }
@@ -153,6 +159,7 @@ impl<'a> Walker<'a> {
             return jet;
         }
         self.sharp += 1;
+        self.sharp_at = Some(s);
         Jet {
             overtaken_by: jet.overtaken_by,
             ..self.probe.sharp_jet(s)
@@ -221,10 +228,44 @@ impl<'a> Walker<'a> {
             // The bound grows exponentially with the span: come down in steps, not at once.
             span = (3.0 * best).max(0.125 * span);
         }
+        if self.sharp_at == Some(s) {
+            best = best.max(self.crowded_reach(s, most));
+        }
         if self.probe.evaluations() < self.patient_until {
             return best;
         }
         best.max(self.calm_reach(jet, s, along, most.min(CALM * best)))
+    }
+
+    /// The same by the Taylor polynomial of g in two words, next to several roots: there the second
+    /// derivative is as small as a power of the distance to them, which no bound of moduli sees.
+    fn crowded_reach(&self, s: Complex64, most: f64) -> f64 {
+        let (h, reference) = (self.probe.function(), self.probe.reference());
+        let near = expansion(h, reference, s, CROWD);
+        let sizes: Vec<f64> = near.coefficients.iter().copied().map(modulus).collect();
+        let Some((own, higher)) = sizes.split_first() else {
+            return 0.0;
+        };
+        let room = SHARE * own - near.errors.first().copied().unwrap_or(f64::INFINITY);
+        let errors = near.errors.iter().skip(1);
+        let known: Vec<f64> = higher
+            .iter()
+            .zip(errors)
+            .map(|(size, error)| size + error)
+            .collect();
+        let mut r = known
+            .first()
+            .map_or(0.0, |slope| (room / slope).min(most))
+            .max(0.0);
+        for _ in 0..60 {
+            let rest = remainder(h, reference, s, r, CROWD + 1);
+            let change = known.iter().rev().fold(rest, |sum, size| sum * r + size) * r;
+            if change * (1.0 + 1e-9) < room {
+                return r * (1.0 - 1e-12);
+            }
+            r *= 0.7;
+        }
+        0.0
     }
 
     /// The same where fast terms are so small that their size is bound enough.
