@@ -1,11 +1,11 @@
 //! Roots so close together that no Newton iteration tells them apart: one disc for all of them.
 //!
-//! With the Taylor coefficients a_k of g at z, in two words and with their errors e_k, and a bound R on
-//! the (m + 1)-st one in the disc of radius t, g has exactly m roots within every r ≤ t for which
-//!     (|a_m| − e_m) rᵐ > Σ_{k<m} (|a_k| + e_k) rᵏ + R rᵐ⁺¹
+//! With the Taylor coefficients a_k of g at z up to the n-th, in two words and with their errors e_k, and a
+//! bound R on the next one in the disc of radius t, g has exactly m roots within every r ≤ t for which
+//!     (|a_m| − e_m) rᵐ > Σ_{k≤n, k≠m} (|a_k| + e_k) rᵏ + R rⁿ⁺¹
 //! (Pellet 1881, by Rouché's theorem against a_m (s − z)ᵐ). It is tested at radii a factor of two apart,
 //! about the zero of the (m − 1)-st derivative next to z: where the m roots coincide it is theirs. The
-//! smallest m for which a radius is found is taken. Divided by rᵐ, the sums lose (2m + 6) u of themselves; a
+//! smallest m for which a radius is found is taken. Divided by rᵐ, the sums lose (2n + 6) u of themselves; a
 //! margin of 1e-9 covers that.
 
 use num_complex::Complex64;
@@ -15,6 +15,10 @@ use crate::quasipoly::{Expansion, Probe, expansion, modulus, remainder};
 
 /// Most roots in one disc.
 const MOST: usize = 20;
+
+/// Taylor coefficients beyond the m-th: the bound of the one after them, a sum of moduli, may be far
+/// above what cancellation leaves of it.
+const BEYOND: usize = 6;
 
 /// Relative radius at which the search for the least one begins.
 const LEAST: f64 = 4.0 * f64::EPSILON;
@@ -60,22 +64,21 @@ fn centre(near: &Expansion, z: Complex64, m: usize) -> Option<Complex64> {
 /// A disc about `center` with exactly `m` roots.
 fn proved(probe: &Probe<'_>, center: Complex64, m: usize, most: f64) -> Option<Disc> {
     let (h, reference) = (probe.function(), probe.reference());
-    let Expansion {
-        coefficients,
-        errors,
-        ..
-    } = expansion(h, reference, center, m);
-    let sizes: Vec<f64> = coefficients.iter().copied().map(modulus).collect();
-    let (own, lower) = sizes.split_last()?;
-    let own = own - errors.last()?;
+    let near = expansion(h, reference, center, m + BEYOND);
+    let bounds: Vec<f64> = near
+        .coefficients
+        .iter()
+        .zip(&near.errors)
+        .map(|(value, error)| modulus(*value) + error)
+        .collect();
+    let own = modulus(*near.coefficients.get(m)?) - near.errors.get(m)?;
+    let (lower, higher) = (bounds.get(..m)?, bounds.get(m + 1..)?);
     let holds = |r: f64| {
-        // Σ (|a_k| + e_k) r^(k − m)
-        let sum = lower
-            .iter()
-            .zip(&errors)
-            .fold(0.0, |sum, (size, error)| (sum + size + error) / r);
-        let rest = remainder(h, reference, center, r, m + 1) * r;
-        (sum + rest) * (1.0 + MARGIN) < own
+        // Σ (|a_k| + e_k) r^(k − m), below m and above.
+        let below = lower.iter().fold(0.0, |sum, size| (sum + size) / r);
+        let rest = remainder(h, reference, center, r, m + BEYOND + 1);
+        let above = higher.iter().rev().fold(rest, |sum, size| sum * r + size) * r;
+        (below + above) * (1.0 + MARGIN) < own
     };
     let mut radius = LEAST * modulus(center).max(1e-9 * most);
     while !holds(radius) {

@@ -23,6 +23,9 @@ const PATIENCE: u64 = 10;
 /// After so many cuts in a row that part nothing, a cluster is tried for.
 const CROWDED: u32 = 8;
 
+/// Relative radius of a disc whose roots are one point to twelve digits.
+pub(super) const RESOLVED: f64 = 1e-12;
+
 /// Fractional parts of multiples of these fill a square evenly: powers of the plastic number.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
@@ -264,11 +267,54 @@ impl<'w, W: Seek> Search<'w, W> {
             {
                 continue;
             }
-            if let Some(disc) = self.walker.cluster(place, most)? {
+            if let Some(disc) = self.walker.cluster(place, most)?
+                && !self.parted(&disc)?
+            {
                 self.insert(disc);
             }
         }
         Ok(self.located(cell) == cell.count)
+    }
+
+    /// Iterate from around a cluster; are its roots found one by one?
+    fn parted(&mut self, cluster: &Disc) -> Result<bool, Error> {
+        let Disc {
+            center,
+            radius,
+            multiplicity,
+            ..
+        } = *cluster;
+        if radius <= RESOLVED * center.norm() {
+            return Ok(false);
+        }
+        let window = move |s: Complex64| (s - center).norm() <= 4.0 * radius;
+        let inside = |found: &[Disc]| {
+            let near = found
+                .iter()
+                .filter(|disc| (disc.center - center).norm() + disc.radius <= radius);
+            // Those off the axis stand for their mirror images, if these are inside as well.
+            let weight = |disc: &Disc| {
+                if cluster.is_on_axis() {
+                    disc.weight()
+                } else {
+                    disc.multiplicity.into()
+                }
+            };
+            near.map(weight).sum::<u64>()
+        };
+        let starts = 3 * multiplicity;
+        for k in 0..starts {
+            self.walker.pause()?;
+            let angle = 0.3 + TAU * f64::from(k) / f64::from(starts);
+            let start = center + Complex64::from_polar(0.7 * radius, angle);
+            if let Outcome::Simple(disc) = self.walker.newton(start, &window)? {
+                self.insert(disc);
+            }
+            if inside(&self.found) == u64::from(multiplicity) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Roots just below the cell, shifted into it.

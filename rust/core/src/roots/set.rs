@@ -5,16 +5,13 @@ use num_complex::Complex64;
 use super::bounds::dominance;
 use super::cell::Cell;
 use super::count::{Closed, Prepared, close};
-use super::isolate::{Search, Seek};
+use super::isolate::{RESOLVED, Search, Seek};
 use super::newton::Disc;
 use super::region::Region;
 use super::unit::OwnTime;
 use super::winding::Walker;
 use crate::quasipoly::QuasiPolynomial;
 use crate::{Error, Task};
-
-/// Relative radius of a disc with several roots that agree to twelve digits.
-const RESOLVED: f64 = 1e-12;
 
 /// More roots than anyone can have meant to list.
 const MAX_ROOTS: u64 = 1_000_000;
