@@ -145,7 +145,8 @@ def judge(found: Any, case: dict[str, Any]) -> tuple[int, int]:
     """How many certified roots were missed, and how many of the others are none."""
     certified = np.array([complex(re, im) for re, im, _ in case["roots"]])
     a, b, _, d = case["region"]
-    upper = found[(found.imag > -NEAR) & (found.imag <= d) & (found.real >= a) & (found.real <= b)]
+    near = (found.real >= a - NEAR) & (found.real <= b + NEAR)
+    upper = found[near & (found.imag > -NEAR) & (found.imag <= d + NEAR)]
     if not len(certified):
         return 0, len(upper)
     if not len(upper):
@@ -155,8 +156,8 @@ def judge(found: Any, case: dict[str, Any]) -> tuple[int, int]:
     members = np.concatenate([certified, certified[certified.imag > 0].conj()])
     weights = np.concatenate([weights, weights[certified.imag > 0]])
     together = np.abs(certified[:, None] - members[None, :]) <= 1e-2 * size
-    near = np.maximum(NEAR, 1e-10 ** (1.0 / (together @ weights)))[:, None]
-    met = np.abs(certified[:, None] - upper[None, :]) <= near * size
+    room = np.maximum(NEAR, 1e-10 ** (1.0 / (together @ weights)))[:, None]
+    met = np.abs(certified[:, None] - upper[None, :]) <= room * size
     return int((~met.any(axis=1)).sum()), int((~met.any(axis=0)).sum())
 
 

@@ -208,17 +208,19 @@ fn disc_from(probe: &Probe<'_>, z: Complex64, jet: &Jet) -> Option<Disc> {
     if radius > isolation {
         return None;
     }
-    let mut t = first.max(f64::MIN_POSITIVE);
-    for _ in 0..60 {
-        t *= 4.0;
+    // The linear part wins up to 2 b over the curvature, and that is known where the disc is small.
+    let mut t = b / probe.curvature_around(size, 0.0);
+    for _ in 0..12 {
         match radii(t) {
             Some((least, most)) if least < most && least <= isolation => {
-                isolation = isolation.max(most)
+                isolation = isolation.max(most);
+                if most < 0.99 * t {
+                    break;
+                }
+                t *= 2.0;
             }
+            _ if t > isolation => t *= 0.25,
             _ => break,
-        }
-        if isolation < 0.5 * t {
-            break;
         }
     }
     Some(Disc {
