@@ -11,6 +11,7 @@ from pathlib import Path
 import deadtime
 import flint
 import mpmath as mp
+import numpy as np
 import pytest
 from deadtime import Certificate, CertificateError, ContourError, QuasiPolynomial, delay, s
 from deadtime._certificate_parts import Monotone, Segment
@@ -465,3 +466,16 @@ def ball_count(proof):
 def test_reference_cases_verify_in_ball_arithmetic(name):
     proof = certify(name)
     assert ball_count(proof) == CASES[name]["certified_winding_count"]
+
+
+def test_a_picture_of_the_contour_turns_once_for_every_root():
+    figures = pytest.importorskip("matplotlib.figure")
+    proof = (s + delay(1.0)).certify(re=(-3, 1), im=(-30, 30))
+    axes = proof.plot(figures.Figure().subplots())
+    upper, lower = axes.collections
+    turns = upper.get_array()
+    # Upper half: half the turns, of one sign in sum.
+    around = np.angle(np.exp(1j * np.diff(turns))).sum()
+    assert abs(around / math.pi - proof.count) < 1
+    assert len(upper.get_segments()) == len(lower.get_segments()) == len(turns)
+    assert axes.get_title() == f"{proof.count} roots, proved on {len(turns)} segments"

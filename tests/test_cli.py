@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from deadtime import Certificate
 from flights import flight_path
 
 DEADTIME = [sys.executable, "-m", "deadtime"]
@@ -295,3 +296,14 @@ def test_every_command_explains_itself(command):
     result = run(command, "--help")
     assert result.returncode == 0
     assert "--json" in result.stdout
+
+
+def test_the_proof_of_the_roots_is_filed(tmp_path):
+    proof, picture = tmp_path / "proof.json", tmp_path / "roots.png"
+    out = found(
+        "roots", "--kp", 2, "--kv", 0.3, "--delay", 0.36, "--re", -6, 2, "--im", -60, 60,
+        "--certificate", proof, "--plot", picture,
+    )  # fmt: skip
+    read = Certificate.from_json(proof.read_text(encoding="utf-8"))
+    assert read.verify() == out["counted"] == 7
+    assert picture.stat().st_size > 5000

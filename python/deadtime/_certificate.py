@@ -6,10 +6,13 @@ import dataclasses
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, get_type_hints
 
 from deadtime._certificate_check import check
 from deadtime._certificate_parts import Contour, Monotone, Segment
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["Certificate"]
 
@@ -122,6 +125,26 @@ class Certificate:
         deadtime._errors.CertificateError: the certificate is false: 2 roots are proved, not 0
         """
         return check(self)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the contour in its segments, coloured by the argument of h; needs matplotlib.
+
+        The colours run through their circle once for every root inside.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; default is a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from deadtime._plots import plot_certificate, shown_axes
+
+        axes = shown_axes(ax)
+        plot_certificate(axes, self)
+        return axes
 
     def to_json(self, indent: int | None = None) -> str:
         """Write the certificate as JSON, numbers in hexadecimal so that none is rounded.

@@ -32,6 +32,7 @@ from deadtime._experiment import demo_flight, study
 from deadtime._loop import ControlLoop
 from deadtime._plots import (
     new_figure,
+    plot_certificate,
     plot_estimate,
     plot_fits,
     plot_responses,
@@ -182,6 +183,10 @@ def roots(
     im: Annotated[Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
     rightmost: Annotated[int, typer.Option(min=1, help="How many, without a region.")] = 3,
     plot: opt.Plot = None,
+    certificate: Annotated[
+        Path | None,
+        typer.Option(help="File the proof of their number as JSON; with --plot, draw it, too."),
+    ] = None,
     as_json: opt.As_json = False,
 ) -> None:
     """Characteristic roots of a loop: the rightmost ones, or all in a region."""
@@ -195,8 +200,16 @@ def roots(
     else:
         found = loop.characteristic().roots(re=re, im=im)
     chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
+    proof = None
+    if certificate is not None:
+        # Of a sampled loop there is no contour: `characteristic` says so.
+        reals, heights = found.region
+        proof = loop.characteristic().certify(reals, heights)
+        certificate.write_text(proof.to_json(indent=1), encoding="utf-8")
     if plot is not None:
         figure, axes = new_figure(6.0, 4.5)
+        if proof is not None:
+            plot_certificate(axes, proof)
         chains = () if loop.is_sampled else loop.characteristic().chains()
         plot_root_set(axes, found, chains)
         save_figure(figure, plot)
