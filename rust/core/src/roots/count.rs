@@ -118,6 +118,27 @@ pub(super) struct Closed {
     pub(super) mirrored: bool,
 }
 
+impl Closed {
+    /// The ranges in parts; `None` when they are empty.
+    pub(super) fn of(re: (f64, f64), im: (f64, f64), mirrored: bool) -> Option<Self> {
+        if re.0 >= re.1 || im.0 >= im.1 {
+            return None;
+        }
+        let symmetric = (im.0 <= 0.0).then_some(if im.0 == 0.0 { im.1 } else { -im.0 });
+        let above = match symmetric {
+            None => Some(im),
+            Some(height) => (height < im.1).then_some((height, im.1)),
+        };
+        Some(Self {
+            re,
+            symmetric,
+            above,
+            half: im.0 == 0.0,
+            mirrored,
+        })
+    }
+}
+
 /// `region`, mirrored where it lies more below the real axis than above, with its open sides
 /// closed; it may turn out empty.
 ///
@@ -174,21 +195,7 @@ pub(super) fn close(
     bound: Bound,
 ) -> Result<Option<Closed>, Error> {
     let Region { re, im } = closed_sides(h, region, bound)?;
-    if re.0 >= re.1 || im.0 >= im.1 {
-        return Ok(None);
-    }
-    let symmetric = (im.0 <= 0.0).then_some(if im.0 == 0.0 { im.1 } else { -im.0 });
-    let above = match symmetric {
-        None => Some(im),
-        Some(height) => (height < im.1).then_some((height, im.1)),
-    };
-    Ok(Some(Closed {
-        re,
-        symmetric,
-        above,
-        half: im.0 == 0.0,
-        mirrored: is_low(region),
-    }))
+    Ok(Closed::of(re, im, is_low(region)))
 }
 
 /// Of `count` roots in a symmetric region, `real` of them real, those not below the axis: the

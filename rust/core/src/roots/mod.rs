@@ -3,7 +3,7 @@
 //! `winding` proves how arg h turns along a line, `dominated` the same in long steps where one row
 //! outweighs the others; `cell` builds rectangles with counts from it,
 //! `count` half planes; `newton` proves discs around single roots, `cluster` around several; `isolate` finds
-//! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability; `neutral` knows the chains, `commensurate`
+//! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability, along `lines`; `neutral` knows the chains, `commensurate`
 //! those of exact delays, `stable`
 //! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be;
 //! `unit` chooses the unit of time; `certificate`
@@ -19,6 +19,7 @@ mod contour;
 mod count;
 mod dominated;
 mod isolate;
+mod lines;
 pub mod matrix;
 mod neutral;
 mod newton;

@@ -149,15 +149,22 @@ fn roots_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<R
         add_zeros(&mut discs, zeros);
         return Ok(RootSet::new(discs, *region));
     };
-    let mut walker = Walker::new(h, task);
-    let Closed { re, .. } = closed;
+    discs = all_discs(&mut Walker::new(h, task), &closed)?;
+    add_zeros(&mut discs, zeros);
+    Ok(RootSet::new(discs, *region))
+}
+
+/// Discs that hold all roots of a closed region.
+pub(super) fn all_discs(walker: &mut impl Seek, closed: &Closed) -> Result<Vec<Disc>, Error> {
+    let mut discs = Vec::new();
+    let Closed { re, .. } = *closed;
     let lower = closed
         .symmetric
-        .map(|height| Cell::new(&mut walker, re, (0.0, height), true));
-    let upper = closed.above.map(|im| Cell::new(&mut walker, re, im, false));
+        .map(|height| Cell::new(walker, re, (0.0, height), true));
+    let upper = closed.above.map(|im| Cell::new(walker, re, im, false));
     let (lower, upper) = (lower.transpose()?, upper.transpose()?);
     for cell in [lower, upper].into_iter().flatten() {
-        for disc in locate(&mut walker, cell)? {
+        for disc in locate(walker, cell)? {
             if cell.symmetric && !closed.half {
                 discs.extend(with_mirror_image(disc));
             } else {
@@ -170,8 +177,7 @@ fn roots_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<R
             disc.center = disc.center.conj();
         }
     }
-    add_zeros(&mut discs, zeros);
-    Ok(RootSet::new(discs, *region))
+    Ok(discs)
 }
 
 /// Discs, Im ≥ 0, that hold the roots of a cell: disjoint, inside, and adding up to its count.

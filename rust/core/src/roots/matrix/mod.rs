@@ -25,9 +25,11 @@ use num_complex::Complex64;
 use self::outer::Leading;
 use self::walker::{MAX_EVALUATIONS, MatrixWalker};
 use super::cell::Cell;
+use super::count::Closed;
+use super::lines::{Spectrum, half_plane_discs};
 use super::region::Region;
-use super::rightmost::{Spectrum, first, half_plane_discs, leading};
-use super::set::{RootSet, locate, with_mirror_image};
+use super::rightmost::{first, leading};
+use super::set::{RootSet, all_discs};
 use crate::{Error, Task};
 
 /// Most roots that can be asked for.
@@ -91,16 +93,8 @@ impl Spectrum for Prepared<'_> {
     }
 }
 
-/// A region in the upper half plane, as far as symmetry allows, its open sides closed.
-struct Closed {
-    re: (f64, f64),
-    symmetric: Option<f64>,
-    above: Option<(f64, f64)>,
-    /// Is the lower edge the real axis?
-    half: bool,
-    mirrored: bool,
-}
-
+/// The region in the upper half plane, as far as symmetry allows, its open sides closed.
+///
 /// # Errors
 /// [`Error::Argument`] where an open side cannot be closed, or the determinant is zero.
 fn close(
@@ -125,21 +119,7 @@ fn close(
         re = (re.0.max(-radius), re.1.min(radius));
         im = (im.0.max(-radius), im.1.min(radius));
     }
-    if re.0 >= re.1 || im.0 >= im.1 {
-        return Ok(None);
-    }
-    let symmetric = (im.0 <= 0.0).then_some(if im.0 == 0.0 { im.1 } else { -im.0 });
-    let above = match symmetric {
-        None => Some(im),
-        Some(height) => (height < im.1).then_some((height, im.1)),
-    };
-    Ok(Some(Closed {
-        re,
-        symmetric,
-        above,
-        half: im.0 == 0.0,
-        mirrored,
-    }))
+    Ok(Closed::of(re, im, mirrored))
 }
 
 /// The number of roots of det M in a region, with multiplicity.
@@ -201,29 +181,13 @@ pub fn roots(
     region: &Region,
     task: &Task,
 ) -> Result<RootSet, Error> {
-    let mut discs = Vec::new();
-    let Some(closed) = close(system, region, task)? else {
-        return Ok(RootSet::new(discs, *region));
+    let discs = match close(system, region, task)? {
+        Some(closed) => all_discs(
+            &mut MatrixWalker::new(system, task, MAX_EVALUATIONS),
+            &closed,
+        )?,
+        None => Vec::new(),
     };
-    let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
-    let re = closed.re;
-    let lower = closed.symmetric.map(|height| ((0.0, height), true));
-    let upper = closed.above.map(|im| (im, false));
-    for (im, symmetric) in [lower, upper].into_iter().flatten() {
-        let cell = Cell::new(&mut walker, re, im, symmetric)?;
-        for disc in locate(&mut walker, cell)? {
-            if symmetric && !closed.half {
-                discs.extend(with_mirror_image(disc));
-            } else {
-                discs.push(disc);
-            }
-        }
-    }
-    if closed.mirrored {
-        for disc in &mut discs {
-            disc.center = disc.center.conj();
-        }
-    }
     Ok(RootSet::new(discs, *region))
 }
 

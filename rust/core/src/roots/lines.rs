@@ -1,0 +1,362 @@
+//! Vertical lines with a known number of roots to their right, in search of the rightmost roots.
+//!
+//! Newton's iteration from the points where the walk along a line came closest to a root tells where
+//! the next line should be: just left of the roots wanted. Where it tells nothing, lines step to the
+//! left, by growing steps but never all the way to the chains of a neutral equation or to a line that
+//! could not be counted, and back by bisection. A first line that cannot be counted is moved to the right.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex64;
+
+use super::bounds::dominance;
+use super::cell::Cell;
+use super::count::{close, half_plane};
+use super::isolate::{Search, Seek};
+use super::newton::Disc;
+use super::region::Region;
+use super::set::locate;
+use super::winding::{MAX_EVALUATIONS, Walker};
+use crate::quasipoly::QuasiPolynomial;
+use crate::{Error, Task};
+
+/// Lines tried before giving up.
+const MAX_LINES: usize = 400;
+
+/// Lines given up because a cluster reaches across them.
+const MAX_EVASIONS: u32 = 20;
+
+/// A line this close to the chains, in units of one over the longest delay, is as good as on them.
+const CHAIN_MARGIN: f64 = 1e-4;
+
+/// Evaluations after which a line is given up: those that hug the chains cost without end.
+const EVALUATIONS_PER_LINE: u64 = 2_000_000;
+
+/// Lines given up before the search ends with what it has: next to the chains that is all there is to know,
+/// where there are none a root is still to be found.
+const MAX_GIVEN_UP: [u32; 2] = [3, 8];
+
+/// Times that the first line, where it cannot be counted, is moved to the right.
+const MAX_MOVES: u32 = 6;
+
+/// Newton iterations from a line, besides two for every root wanted.
+const MORE_STARTS: usize = 12;
+
+/// Share of the distance to the chains, or to a line given up, that the next line keeps.
+const APPROACH: f64 = 0.2;
+
+/// The same where it is not the chains, and a root may be anywhere between.
+const SLOW_APPROACH: f64 = 0.7;
+
+/// Share of the way from a root to the chains, or to its neighbour, at which a line is laid.
+const CLEARANCE: f64 = 0.3;
+
+/// What the search for rightmost roots has to know of a function.
+pub(super) trait Spectrum {
+    type Walker<'a>: Seek
+    where
+        Self: 'a;
+
+    /// A walker that gives up after `limit` evaluations.
+    fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> Self::Walker<'a>;
+
+    /// The number of roots right of Re s = `sigma`, and where walking there hinted at roots.
+    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error>;
+
+    /// The upper half of a rectangle with all roots right of Re s = `sigma`, if there are any.
+    fn cell_right_of<'a>(
+        &'a self,
+        walker: &mut Self::Walker<'a>,
+        sigma: f64,
+    ) -> Result<Option<Cell>, Error>;
+}
+
+impl Spectrum for QuasiPolynomial {
+    type Walker<'a> = Walker<'a>;
+
+    fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> Walker<'a> {
+        Walker::with_limit(self, task, limit)
+    }
+
+    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error> {
+        let mut walker = self.walker(task, EVALUATIONS_PER_LINE);
+        let count = half_plane(&mut walker, sigma)?;
+        Ok((count, walker.hints))
+    }
+
+    fn cell_right_of<'a>(
+        &'a self,
+        walker: &mut Walker<'a>,
+        sigma: f64,
+    ) -> Result<Option<Cell>, Error> {
+        let Some(closed) = close(self, &Region::right_of(sigma), dominance)? else {
+            return Ok(None);
+        };
+        let height = closed.symmetric.unwrap_or(0.0);
+        Cell::new(walker, closed.re, (0.0, height), true).map(Some)
+    }
+}
+
+/// A line, and what is known of the half plane to its right.
+#[derive(Debug, Clone)]
+pub(super) struct Line {
+    pub(super) sigma: f64,
+    pub(super) count: u64,
+    pub(super) hints: Vec<Complex64>,
+}
+
+/// Lines for which the count is known.
+pub(super) struct Lines<'a, S: Spectrum> {
+    spectrum: &'a S,
+    task: &'a Task,
+    /// Discs found from the hints of any line, by no order.
+    known: Vec<Disc>,
+    chain: f64,
+    /// The chains, or the rightmost line that could not be counted.
+    barrier: f64,
+    given_up: u32,
+    /// Times that the first line was moved to the right, and why at first.
+    moved: u32,
+    refused: Option<Error>,
+    /// Least distance to the barrier.
+    margin: f64,
+    /// One over the longest delay.
+    first_step: f64,
+    step: f64,
+    start: f64,
+    evasions: u32,
+    /// The leftmost line with too few roots.
+    few: Option<Line>,
+    /// The rightmost line with enough of them.
+    enough: Option<Line>,
+}
+
+impl<'a, S: Spectrum> Lines<'a, S> {
+    pub(super) fn new(spectrum: &'a S, chain: f64, task: &'a Task) -> Self {
+        let step = 1.0 / spectrum.walker(task, MAX_EVALUATIONS).delay_span();
+        let start = if chain < 0.0 { 0.0 } else { chain + step };
+        Self {
+            spectrum,
+            task,
+            known: Vec::new(),
+            chain,
+            barrier: chain,
+            given_up: 0,
+            moved: 0,
+            refused: None,
+            margin: CHAIN_MARGIN * step,
+            first_step: step,
+            step,
+            start,
+            evasions: 0,
+            few: None,
+            enough: None,
+        }
+    }
+
+    pub(super) fn sort_in(&mut self, line: Line, wanted: u64) {
+        if line.count < wanted {
+            self.few = Some(line);
+        } else {
+            self.enough = Some(line);
+        }
+    }
+
+    /// Forget `line` and take up one further left; `false` when that has been done too often or
+    /// leads onto the chains.
+    pub(super) fn evade(&mut self, line: &Line, distance: f64) -> bool {
+        self.evasions += 1;
+        self.start = line.sigma - 2.0 * distance * f64::from(self.evasions);
+        self.few = None;
+        self.enough = None;
+        self.start > self.chain && self.evasions < MAX_EVASIONS
+    }
+
+    /// A line with at least `wanted` roots to its right, and not many more if that is cheap; with
+    /// fewer, and `true`, where no line further left can be counted.
+    pub(super) fn find(&mut self, wanted: u64) -> Result<(Line, bool), Error> {
+        if let Some(line) = self.enough.take_if(|line| line.count < wanted) {
+            self.few = Some(line);
+        }
+        for _ in 0..MAX_LINES {
+            self.task.check()?;
+            let sigma = match (&self.few, &self.enough) {
+                (None, None) => self.start,
+                (Some(few), None) => {
+                    let few = few.clone();
+                    let [beside_chains, without] = MAX_GIVEN_UP;
+                    let free = self.chain == f64::NEG_INFINITY;
+                    let most = if free { without } else { beside_chains };
+                    if few.sigma - self.barrier <= self.margin || self.given_up >= most {
+                        return Ok((few, true));
+                    }
+                    let ahead = few.sigma - self.step;
+                    match self.beyond_known_roots(&few, wanted)? {
+                        // Further left than that there may be many that no hint tells of.
+                        Some(sigma) if sigma >= ahead => sigma,
+                        _ => {
+                            self.step *= 1.5;
+                            // Never onto the barrier, only most of the way: a line costs as
+                            // much as its distance is small, so halving it would pay twice.
+                            let share = if free { SLOW_APPROACH } else { APPROACH };
+                            let kept = share * (few.sigma - self.barrier);
+                            ahead.max(self.barrier + kept.max(0.99 * self.margin))
+                        }
+                    }
+                }
+                (few, Some(enough)) => {
+                    let right = few.as_ref().map_or(f64::INFINITY, |few| few.sigma);
+                    let gap = right - enough.sigma;
+                    if enough.count <= 4 * wanted + 16 || gap <= 1e-3 * enough.sigma.abs() {
+                        return Ok((enough.clone(), false));
+                    }
+                    let step = self.step.min(0.5 * gap);
+                    self.step *= if gap.is_finite() { 1.0 } else { 2.0 };
+                    enough.sigma + step
+                }
+            };
+            match self.counted(sigma) {
+                Ok(line) => self.sort_in(line, wanted),
+                // Too close to the chains, or too far left for double precision.
+                Err(error @ (Error::TooMuch { .. } | Error::Argument(_)))
+                    if self.enough.is_none() =>
+                {
+                    if self.few.is_some() {
+                        self.given_up += 1;
+                    } else if self.moved < MAX_MOVES {
+                        // Further right the delayed terms are smaller.
+                        self.start = sigma + self.first_step * f64::from(1u32 << (2 * self.moved));
+                        self.moved += 1;
+                        self.refused.get_or_insert(error);
+                    } else {
+                        return Err(error);
+                    }
+                    self.barrier = self.barrier.max(sigma);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        // What kept from the first line says more than that no other one served.
+        Err(self.refused.take().unwrap_or(Error::TooMuch {
+            what: "the search for a line right of which the rightmost roots lie",
+            limit: MAX_LINES as u64,
+            unit: "lines",
+            advice: "ask for fewer roots, or for those in a region".into(),
+        }))
+    }
+
+    /// A line just left of the `wanted` rightmost roots, as far as the hints of a line tell: right
+    /// of the next one, of the barrier, and left of `line` itself.
+    fn beyond_known_roots(&mut self, line: &Line, wanted: u64) -> Result<Option<f64>, Error> {
+        let mut starts = line.hints.clone();
+        starts.sort_by(|a, b| b.re.total_cmp(&a.re));
+        starts.truncate(
+            usize::try_from(2 * wanted)
+                .unwrap_or(0)
+                .saturating_add(MORE_STARTS),
+        );
+        self.learn(&starts, u64::MAX, f64::NEG_INFINITY)?;
+        if self.given_up > 0 {
+            self.learn(&self.low_starts(line.sigma), u64::MAX, f64::NEG_INFINITY)?;
+        }
+        self.known
+            .sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
+        let mut total = 0;
+        let mut places = self.known.iter().skip_while(|disc| {
+            total += disc.weight();
+            total < wanted
+        });
+        let Some(last) = places.next() else {
+            return Ok(None);
+        };
+        let edge = last.center.re - last.radius;
+        // Those that tie with it, a pair that is listed twice among them, do not count as next.
+        let next = places
+            .map(|disc| disc.center.re + disc.radius)
+            .find(|right| *right < edge)
+            .unwrap_or(f64::NEG_INFINITY);
+        let free = edge - next.max(self.barrier);
+        // The closer to the root, the more lines have been given up.
+        let share = (0..self.given_up).fold(CLEARANCE, |share, _| 0.1 * share);
+        let sigma = edge - (share * free).min(self.step);
+        let further = line.sigma - sigma > 1e-3 * self.margin;
+        Ok((sigma > self.barrier && further).then_some(sigma))
+    }
+
+    /// Places near the lower end of a line, of which its hints may tell nothing: where one row
+    /// dominates it is not walked, and the hints kept are the first ones, from far up.
+    fn low_starts(&self, sigma: f64) -> Vec<Complex64> {
+        let spacing = 0.5 * PI * self.first_step;
+        (0..MORE_STARTS)
+            .map(|k| Complex64::new(sigma, k as f64 * spacing))
+            .collect()
+    }
+
+    /// Newton's iteration from the hints, until the discs right of `sigma` add up to `count`.
+    fn learn(&mut self, hints: &[Complex64], count: u64, sigma: f64) -> Result<(), Error> {
+        let mut walker = self.spectrum.walker(self.task, MAX_EVALUATIONS);
+        let mut search = Search::with(&mut walker, std::mem::take(&mut self.known));
+        for hint in hints {
+            if search.weight_right_of(sigma) >= count {
+                break;
+            }
+            search.iterate_from(&[*hint], |s| s.is_finite())?;
+        }
+        self.known = search.found().to_vec();
+        Ok(())
+    }
+
+    /// Discs, Im ≥ 0, that hold all roots right of a line.
+    pub(super) fn discs_right_of(&mut self, line: &Line) -> Result<Vec<Disc>, Error> {
+        self.learn(&line.hints, line.count, line.sigma)?;
+        self.learn(&self.low_starts(line.sigma), line.count, line.sigma)?;
+        let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
+        let discs: Vec<Disc> = self.known.iter().filter(right).copied().collect();
+        if discs.iter().map(Disc::weight).sum::<u64>() == line.count {
+            return Ok(discs);
+        }
+        let discs = half_plane_discs(self.spectrum, line.sigma, self.task)?;
+        self.known.clone_from(&discs);
+        Ok(discs)
+    }
+
+    /// Count right of `sigma`, or of a line nearby where a root is in the way.
+    fn counted(&self, sigma: f64) -> Result<Line, Error> {
+        let mut at = sigma;
+        let mut aside = 1.0;
+        loop {
+            match self.spectrum.line(at, self.task) {
+                Ok((count, hints)) => {
+                    return Ok(Line {
+                        sigma: at,
+                        count,
+                        hints,
+                    });
+                }
+                Err(Error::Contour { distance, .. }) if f64::abs(aside) < 1e9 => {
+                    let moved = sigma + aside * distance.max(1e-12 * sigma.abs());
+                    at = if moved > self.chain {
+                        moved
+                    } else {
+                        sigma + aside.abs() * distance
+                    };
+                    aside *= -3.0;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+/// Discs, Im ≥ 0, that hold all roots right of a line, cell by cell.
+pub(super) fn half_plane_discs<S: Spectrum>(
+    spectrum: &S,
+    sigma: f64,
+    task: &Task,
+) -> Result<Vec<Disc>, Error> {
+    let mut walker = spectrum.walker(task, MAX_EVALUATIONS);
+    match spectrum.cell_right_of(&mut walker, sigma)? {
+        Some(cell) => locate(&mut walker, cell),
+        None => Ok(Vec::new()),
+    }
+}
