@@ -607,3 +607,23 @@ def test_exact_delays_have_chains_of_their_own():
     three = 1 - 0.3 * delay(0.1) + 0.4 * delay(0.2) - 0.2 * delay(0.3)
     slowest = max(-np.log(np.abs(np.roots([-0.2, 0.4, -0.3, 1]))) / 0.1)
     assert abs(three.chain_abscissa(strong=False) - slowest) < 1e-11
+
+
+@pytest.mark.parametrize("omega", [0.21666740597802447, 1.0, 2.7298599562231607])
+def test_the_rightmost_root_may_lie_within_rounding_of_the_axis(omega):
+    """A line at 0 is counted in two words, but no disc about the pair is clear of it."""
+    h = (s**2 + omega**2) * (s + 0.3 + (0.2 + 0.1 * s) * delay(1.0))
+    first = h.rightmost()
+    assert np.allclose(first, [1j * omega, -1j * omega], rtol=0, atol=1e-14)
+    assert not h.is_stable()
+    # Beside it by less than its disc: on the edge, and named.
+    for gap in (1e-17, 1e-16, -1e-17, -1e-16):
+        try:
+            number = h.count(re=(gap, 1), im=(-5, 5))
+            assert number in (0, 2)
+        except ContourError as error:
+            assert error.inside == 0
+        try:
+            assert len(h.roots(re=(gap, 1), im=(-5, 5))) in (0, 2)
+        except ContourError as error:
+            assert len(error.on_edge) == 2

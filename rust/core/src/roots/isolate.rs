@@ -343,6 +343,20 @@ impl<'w, W: Seek> Search<'w, W> {
     }
 
     fn mismatch(&self, counted: u64, cell: &Cell) -> Error {
+        // What is counted on one side of an edge may have its disc's centre on the other.
+        let beyond = |from: f64, to: f64, x: f64| (from - x).max(x - to).max(0.0);
+        let reaches = |disc: &&Disc| {
+            let Disc { center, radius, .. } = **disc;
+            let across = beyond(cell.re.0, cell.re.1, center.re);
+            let along = beyond(cell.im.0, cell.im.1, center.im);
+            across.hypot(along) <= radius + 4.0 * f64::EPSILON * center.norm()
+        };
+        if let Some(disc) = self.found.iter().find(reaches) {
+            return Error::Contour {
+                place: disc.center,
+                distance: 4.0 * (disc.radius + f64::EPSILON * disc.center.norm()),
+            };
+        }
         let found = self.found.iter().filter(|disc| cell.holds(disc.center));
         Error::CountMismatch {
             counted,
