@@ -416,6 +416,7 @@ def test_singular_e_with_closed_sides():
     assert system.count(re=(-20, 1), im=(-3, 3.5)) >= n - 1
 
 
+@pytest.mark.usefixtures("listens_to_ctrl_c")
 def test_ctrl_c_stops_a_long_search():
     system = random_system(5, 40)
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
