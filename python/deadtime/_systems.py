@@ -6,7 +6,8 @@ r"""Linear systems with delays in state, input and output, of any order.
 With the characteristic matrix M(s) = s E + sum (s N_j - A_j) e^{-s tau_j}, the poles are the
 roots of det M, and C M^{-1} B + D = det [[M, B], [-C, D]] / det M. Values are taken from the
 matrices, for any order; roots from the expanded determinant while that is safe, and otherwise
-from factorisations of M along contours.
+from factorisations of M along contours. One class, kept whole: most of the file is its
+documentation.
 """
 
 from __future__ import annotations
