@@ -5,7 +5,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
-use deadtime::stability::{Affine, Axis, Family, Term, map};
+use deadtime::stability::{Affine, Axis, Family, Question, Term, map};
 
 const SIDE: u32 = 64;
 
@@ -65,9 +65,13 @@ fn maps(criterion: &mut Criterion) {
     for (name, family, first, second) in &cases {
         let axes = [(0, first), (1, second)].map(|(parameter, points)| Axis { parameter, points });
         for (what, abscissa) in [("counts", false), ("abscissa", true)] {
+            let question = Question {
+                abscissa,
+                ..Question::default()
+            };
             group.bench_function(BenchmarkId::new(*name, what), |bencher| {
                 bencher.iter(|| {
-                    pool.install(|| map(family, &[0.0, 0.0], axes, abscissa, &Task::new()))
+                    pool.install(|| map(family, &[0.0, 0.0], axes, question, &Task::new()))
                 });
             });
         }

@@ -139,10 +139,12 @@ class Family:
         parameters: tuple[int, int],
         first: NDArray[np.float64],
         second: NDArray[np.float64],
+        line: float,
         abscissa: bool,
+        cells: bool,
         threads: int | None = None,
         progress: Callable[[int], object] | None = None,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.uint8]]: ...
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64] | None, NDArray[np.uint8]]: ...
 
 @final
 class LinearLoop:

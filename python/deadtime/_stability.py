@@ -64,6 +64,8 @@ class StabilityMap(ReadOnlyArrays):
         Spectral abscissa in 1/s; NaN where it was not computed or is beyond reach.
     status : ndarray of uint8, shape (n0, n1)
         A `MapStatus`.
+    decay : float
+        Roots right of ``-decay`` count as unstable, 1/s.
 
     Notes
     -----
@@ -75,13 +77,14 @@ class StabilityMap(ReadOnlyArrays):
     unstable: NDArray[np.int32]
     abscissa: _Floats
     status: NDArray[np.uint8]
+    decay: float = 0.0
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
         """Where no root and no chain of roots is unstable or on the boundary, shape (n0, n1)."""
         known = (self.status == MapStatus.OK) | (self.status == MapStatus.CHAIN)
         stable: NDArray[np.bool_] = known & (self.unstable == 0)
-        stable &= (self.status != MapStatus.CHAIN) | (self.abscissa < 0.0)
+        stable &= (self.status != MapStatus.CHAIN) | (self.abscissa < -self.decay)
         stable.flags.writeable = False
         return stable
 
@@ -188,6 +191,8 @@ def stability_map(
     shape: tuple[int, int] = (101, 101),
     *,
     abscissa: bool = True,
+    decay: float = 0.0,
+    proof: str = "curves",
     threads: int | None = None,
     progress: _Progress | None = None,
 ) -> StabilityMap:
@@ -207,6 +212,13 @@ def stability_map(
     abscissa : bool
         Compute the spectral abscissa too, at several times the cost of the counts. (For a sampled
         loop it comes with the counts and is always given.)
+    decay : float
+        Stable means that every root has a real part below ``-decay``, in 1/s.
+    proof : {"curves", "cells"}
+        How counts are proved: by all crossings of the boundary along each row of cells and one count
+        for every row, or by a count for every single cell. Both give the same counts; the second
+        is a check of the first, hundreds of times slower. Where the abscissa is computed, or the
+        family is affine in neither parameter, every cell has a count of its own anyway.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
     progress : callable, optional
@@ -250,11 +262,14 @@ def stability_map(
     """
     names, axes = _axes(ranges, shape)
     threads = thread_number(threads)
+    if proof not in ("curves", "cells"):
+        raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
+    question = _Question(bool(abscissa), finite("decay", decay), proof)
     cells = len(axes[names[0]]) * len(axes[names[1]])
     if isinstance(family, ControlLoop):
-        found = _map_loop(family, names, axes, abscissa, threads, progress)
+        found = _map_loop(family, names, axes, question, threads, progress)
     elif isinstance(family, ParametricQuasiPolynomial):
-        found = _map_family(family, names, axes, abscissa, threads, progress)
+        found = _map_family(family, names, axes, question, threads, progress)
     else:
         raise TypeError(
             f"family of type {type(family).__name__}: give a ControlLoop, or an expression with "
@@ -265,7 +280,16 @@ def stability_map(
     arrays: list[NDArray[Any]] = [*axes.values(), *found]
     for array in arrays:
         read_only(array)
-    return StabilityMap(names, axes, *found)
+    return StabilityMap(names, axes, *found, question.decay)
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What is asked of every cell."""
+
+    abscissa: bool
+    decay: float
+    proof: str
 
 
 _Found: TypeAlias = tuple[NDArray[np.int32], _Floats, NDArray[np.uint8]]
@@ -275,7 +299,7 @@ def _map_family(
     family: ParametricQuasiPolynomial,
     names: tuple[str, str],
     axes: dict[str, _Floats],
-    abscissa: bool,
+    question: _Question,
     threads: int | None,
     progress: _Progress | None,
 ) -> _Found:
@@ -294,16 +318,27 @@ def _map_family(
         )
     places = (family.names.index(names[0]), family.names.index(names[1]))
     first, second = axes[names[0]], axes[names[1]]
-    return family._family.map(
-        [0.0] * len(family.names), places, first, second, abscissa, threads, progress
+    unstable, alpha, status = family._family.map(
+        [0.0] * len(family.names),
+        places,
+        first,
+        second,
+        -question.decay,
+        question.abscissa,
+        question.proof == "cells",
+        threads,
+        progress,
     )
+    if alpha is None:
+        alpha = np.broadcast_to(np.float64(np.nan), unstable.shape)
+    return unstable, alpha, status
 
 
 def _map_loop(
     loop: ControlLoop,
     names: tuple[str, str],
     axes: dict[str, _Floats],
-    abscissa: bool,
+    question: _Question,
     threads: int | None,
     progress: _Progress | None,
 ) -> _Found:
@@ -322,10 +357,15 @@ def _map_loop(
             "loop.replace(delay=...)"
         )
     if loop.is_sampled:
+        if question.decay != 0.0:
+            raise ValueError(
+                f"decay={question.decay}: a sampled loop is judged by the unit circle; use its "
+                "abscissa, which is always computed"
+            )
         return _map_sampled(loop, values, names, axes, threads, progress)
     values |= {name: Parameter(name) for name in names}
     family = loop._characteristic(values)
-    return _map_family(family, names, axes, abscissa, threads, progress)
+    return _map_family(family, names, axes, question, threads, progress)
 
 
 def _map_sampled(

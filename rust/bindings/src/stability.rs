@@ -1,7 +1,7 @@
 //! Bindings of `deadtime::stability`.
 
-use deadtime::stability::{self, Affine, Axis, Family, Term};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use deadtime::stability::{self, Affine, Axis, Family, Proof, Question, Term};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::arrays::in_order;
@@ -55,9 +55,12 @@ impl PyFamily {
         Ok((coefficients, h.delays().to_pyarray(py)))
     }
 
-    /// Counts, abscissas and statuses over two parameters; `values` holds the others.
-    #[pyo3(signature = (values, parameters, first, second, abscissa, threads=None, progress=None))]
-    #[expect(clippy::too_many_arguments, reason = "two axes and how to run")]
+    /// Counts, abscissas (if asked for) and statuses over two parameters; `values` holds the others.
+    #[pyo3(signature = (values, parameters, first, second, line, abscissa, cells, threads=None, progress=None))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "two axes, what is asked and how to run"
+    )]
     fn map<'py>(
         &self,
         py: Python<'py>,
@@ -65,23 +68,33 @@ impl PyFamily {
         parameters: (usize, usize),
         first: Floats<'py>,
         second: Floats<'py>,
+        line: f64,
         abscissa: bool,
+        cells: bool,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Table<'py, i32>, Table<'py, f64>, Table<'py, u8>)> {
+    ) -> PyResult<(Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>)> {
         let (first, second) = (in_order(&first), in_order(&second));
         let axis = |parameter, points| Axis { parameter, points };
         let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
+        let question = Question {
+            line,
+            abscissa,
+            proof: if cells { Proof::Cells } else { Proof::Curves },
+        };
         let family = &self.inner;
         let chart = run(py, threads, progress.as_ref(), |task| {
-            stability::map(family, &values, axes, abscissa, task)
+            stability::map(family, &values, axes, question, task)
         })?;
         let shape = [first.len(), second.len()];
         let status: Vec<u8> = chart.status.iter().map(|status| *status as u8).collect();
+        let asked = abscissa.then_some(chart.abscissa);
         Ok((
-            chart.unstable.to_pyarray(py).reshape(shape)?,
-            chart.abscissa.to_pyarray(py).reshape(shape)?,
-            status.to_pyarray(py).reshape(shape)?,
+            chart.unstable.into_pyarray(py).reshape(shape)?,
+            asked
+                .map(|values| values.into_pyarray(py).reshape(shape))
+                .transpose()?,
+            status.into_pyarray(py).reshape(shape)?,
         ))
     }
 }

@@ -48,6 +48,13 @@ pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance
     })
 }
 
+/// A radius beyond which there is no root with Re s ≥ `sigma`, nor where moduli of coefficients are smaller but
+/// that of the leading one; `None` where chains may lie there.
+pub(crate) fn radius_right_of(h: &QuasiPolynomial, sigma: f64) -> Option<f64> {
+    let found = dominance(h, (sigma, f64::INFINITY))?;
+    (found.row == 0).then_some(found.radius * (1.0 + MARGIN))
+}
+
 /// Bound 1 alone, which takes no more than a sum to check.
 pub(super) fn plain_dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
     nearest(h, re, |_, radius| radius)

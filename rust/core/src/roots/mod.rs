@@ -32,6 +32,7 @@ mod stable;
 mod unit;
 mod winding;
 
+pub(crate) use bounds::radius_right_of;
 pub use certificate::{Certificate, Contour, Segment, certify};
 pub use commensurate::{base_delay, exact_chain_abscissa};
 pub use contour::{Edge, count_with_edge, roots_with_edge};

@@ -17,9 +17,9 @@ pub const ENDLESS: i32 = -1;
 /// The count of a cell where it is not known: a root on the axis, or undecided.
 pub const UNKNOWN: i32 = -2;
 
-/// Chains closer to the axis than this, in e-folds over the longest delay, lie on it: rounding of
+/// Chains closer to the line than this, in e-folds over the longest delay, lie on it: rounding of
 /// the coefficients alone moves them as far.
-const ON_THE_AXIS: f64 = 16.0 * f64::EPSILON;
+const ON_THE_LINE: f64 = 16.0 * f64::EPSILON;
 
 /// What is known of one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,10 +41,11 @@ impl Cell {
     };
 }
 
-/// Judge the stability of h; with `abscissa`, also how far its roots are from the axis.
+/// Judge the stability of h: are there roots right of Re s = `line`? With `abscissa`, also how far its
+/// roots are from the axis.
 ///
 /// * `Ok`: count (and abscissa) hold.
-/// * `Boundary`: a root, or a chain of them, lies on the axis to working precision.
+/// * `Boundary`: a root, or a chain of them, lies on the line to working precision.
 /// * `Chain`: the chains lie further right than every root right of them, so the abscissa is
 ///   theirs; told only with `abscissa`.
 /// * `Infinite`: infinitely many unstable roots, or an advanced equation.
@@ -59,11 +60,11 @@ impl Cell {
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::judge, status::CellStatus};
 /// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![5.0]], vec![0.0, 0.36])?;
-/// let cell = judge(&h, true, &Task::new())?;
+/// let cell = judge(&h, 0.0, true, &Task::new())?;
 /// assert_eq!((cell.unstable, cell.status), (2, CellStatus::Ok));
 /// # Ok::<(), deadtime::Error>(())
 /// ```
-pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, Error> {
+pub fn judge(h: &QuasiPolynomial, line: f64, abscissa: bool, task: &Task) -> Result<Cell, Error> {
     if h.is_zero() {
         return Ok(Cell::UNDECIDED);
     }
@@ -76,9 +77,9 @@ pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, E
     }
     let chain = chain_abscissa(h);
     if !abscissa {
-        let (unstable, status) = match by_chain(h, chain) {
+        let (unstable, status) = match by_chain(h, chain, line) {
             Some(known) => known,
-            None => by_count(count_right_of(h, 0.0, task))?,
+            None => by_count(count_right_of(h, line, task))?,
         };
         return Ok(Cell {
             unstable,
@@ -86,12 +87,16 @@ pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, E
             status,
         });
     }
-    let ((unstable, status), set) = match by_chain(h, chain) {
+    let ((unstable, status), set) = match by_chain(h, chain, line) {
         Some(known) => (known, rightmost(h, 1, task)),
-        None => {
+        None if line == 0.0 => {
             let (number, set) = unstable_and_rightmost(h, task);
             (by_count(number)?, set)
         }
+        None => (
+            by_count(count_right_of(h, line, task))?,
+            rightmost(h, 1, task),
+        ),
     };
     // −∞ where no root lies right of the chains.
     let isolated = set.map(|set| set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re));
@@ -120,13 +125,15 @@ pub fn judge(h: &QuasiPolynomial, abscissa: bool, task: &Task) -> Result<Cell, E
 }
 
 /// Count and status where the chains alone decide.
-fn by_chain(h: &QuasiPolynomial, chain: f64) -> Option<(i32, CellStatus)> {
+fn by_chain(h: &QuasiPolynomial, chain: f64, line: f64) -> Option<(i32, CellStatus)> {
     let longest = h.delays().last().zip(h.delays().first());
     let longest = longest.map_or(0.0, |(last, first)| last - first);
-    if (chain * longest).abs() <= ON_THE_AXIS {
+    // Rounding of the coefficients moves chains by as much as that of log |b/a| = C_D d.
+    let off = (chain - line) * longest;
+    if off.abs() <= ON_THE_LINE * (1.0 + (line * longest).abs()) {
         return Some((UNKNOWN, CellStatus::Boundary));
     }
-    (chain > 0.0).then_some((ENDLESS, CellStatus::Infinite))
+    (chain > line).then_some((ENDLESS, CellStatus::Infinite))
 }
 
 fn by_count(number: Result<u64, Error>) -> Result<(i32, CellStatus), Error> {

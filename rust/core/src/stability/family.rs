@@ -191,6 +191,39 @@ impl Family {
         QuasiPolynomial::new(coefficients, delays)
     }
 
+    /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine in it.
+    pub fn split(&self, parameter: usize) -> Option<(Self, Self)> {
+        let exponent = |term: &Term| term.exponents.get(parameter).copied().unwrap_or(0);
+        let part = |wanted: u32| {
+            let terms = self.terms.iter().flatten();
+            let terms = terms.filter(|term| exponent(term) == wanted).map(|term| {
+                let mut term = term.clone();
+                if let Some(exponent) = term.exponents.get_mut(parameter) {
+                    *exponent = 0;
+                }
+                term
+            });
+            Self::new(self.names.clone(), terms.collect()).ok()
+        };
+        let fixed = |delay: &Affine| {
+            delay
+                .slopes
+                .get(parameter)
+                .is_none_or(|slope| *slope == 0.0)
+        };
+        let affine = self.terms.iter().flatten().all(|term| exponent(term) <= 1);
+        if !(affine && self.delays.iter().all(fixed)) {
+            return None;
+        }
+        part(0).zip(part(1))
+    }
+
+    /// The highest power of s, whatever the parameters are.
+    pub(super) fn degree(&self) -> u32 {
+        let terms = self.terms.iter().flatten();
+        terms.fold(0, |highest, term| highest.max(term.power))
+    }
+
     /// Check that no delay becomes negative where each parameter lies in its range.
     ///
     /// # Errors

@@ -1,27 +1,54 @@
-//! Stability over two parameters of a family, cell by cell.
+//! Stability over two parameters of a family.
 //!
-//! Every cell is computed alone, from its two parameters: it equals [`judge`] of the family's
-//! member there, and results have the same bits for any number of threads. What cannot be formed
-//! (an overflow of a coefficient) is an undecided cell; delays that become negative are refused
-//! before any work is done.
+//! Counts: if the family is affine in one of the two, every value of the other makes a row, whose
+//! crossings of the line give all its cells (`row`); the cost grows with the number of rows and of crossings, not
+//! of cells. Otherwise, and with `Proof::Cells`, every cell is counted alone. Either way a cell
+//! equals [`judge`] of the family's member there, and results have the same bits for any number of threads.
+//! What cannot be formed (an overflow of a coefficient) is an undecided cell; delays that become negative
+//! are refused before any work is done.
 
 use rayon::prelude::*;
 
 use super::cell::{Cell, judge};
 use super::family::Family;
+use super::row::{Members, Row};
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
 /// More cells than anyone can look at.
 const MAX_CELLS: usize = 50_000_000;
 
+/// Lines of a chart filled together, so that strided columns stay in the cache.
+const BLOCK: usize = 32;
+
 /// One axis of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis<'a> {
     /// Index of the parameter.
     pub parameter: usize,
-    /// Its values.
+    /// Its values, increasing.
     pub points: &'a [f64],
+}
+
+/// How the count of a cell is proved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Proof {
+    /// By all crossings of its row, and one count for every run of them.
+    #[default]
+    Curves,
+    /// By a count of its own.
+    Cells,
+}
+
+/// What is asked of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Question {
+    /// Roots right of this line, 1/s, are counted.
+    pub line: f64,
+    /// Is the spectral abscissa asked for too?
+    pub abscissa: bool,
+    /// How counts are proved.
+    pub proof: Proof,
 }
 
 /// A stability map: row-major arrays, the first axis running slowest.
@@ -29,10 +56,21 @@ pub struct Axis<'a> {
 pub struct Chart {
     /// See [`Cell::unstable`].
     pub unstable: Vec<i32>,
-    /// See [`Cell::abscissa`].
+    /// See [`Cell::abscissa`]; empty if not asked for.
     pub abscissa: Vec<f64>,
     /// See [`Cell::status`].
     pub status: Vec<CellStatus>,
+}
+
+impl Chart {
+    /// Nothing unstable; zeros cost nothing until they are written to.
+    fn stable(cells: usize) -> Self {
+        Self {
+            unstable: vec![0; cells],
+            abscissa: Vec::new(),
+            status: vec![CellStatus::Ok; cells],
+        }
+    }
 }
 
 /// Judge the members of `family` over two of its parameters; `values` holds the others.
@@ -44,47 +82,224 @@ pub fn map(
     family: &Family,
     values: &[f64],
     axes: [Axis<'_>; 2],
-    abscissa: bool,
+    question: Question,
     task: &Task,
 ) -> Result<Chart, Error> {
-    let [first, second] = axes;
     let cells = check(family, values, axes)?;
-    let mut chart = Chart {
-        unstable: vec![0; cells],
-        abscissa: vec![f64::NAN; cells],
-        status: vec![CellStatus::Undecided; cells],
+    let map = Map {
+        family,
+        values,
+        axes,
+        question,
+        task,
     };
-    let width = second.points.len();
-    chart
-        .unstable
-        .par_iter_mut()
-        .zip(chart.abscissa.par_iter_mut())
-        .zip(chart.status.par_iter_mut())
-        .enumerate()
-        .try_for_each_init(
-            || values.to_vec(),
-            |values, (index, ((unstable, alpha), status))| {
-                task.check()?;
-                put(values, first, index / width);
-                put(values, second, index % width);
-                let cell = match family.at(values) {
-                    Ok(h) => judge(&h, abscissa, task)?,
-                    Err(_) => Cell::UNDECIDED,
-                };
-                (*unstable, *alpha, *status) = (cell.unstable, cell.abscissa, cell.status);
-                task.advance(1);
-                Ok(())
-            },
-        )?;
-    Ok(chart)
-}
-
-fn put(values: &mut [f64], axis: Axis<'_>, index: usize) {
-    if let (Some(place), Some(value)) = (values.get_mut(axis.parameter), axis.points.get(index)) {
-        *place = *value;
+    if cells == 0 {
+        return Ok(Chart::default());
+    }
+    if question.abscissa || question.proof == Proof::Cells {
+        return map.cell_by_cell();
+    }
+    match Rows::of(&map) {
+        Some(rows) => rows.chart(),
+        None => map.cell_by_cell(),
     }
 }
 
+struct Map<'a> {
+    family: &'a Family,
+    values: &'a [f64],
+    axes: [Axis<'a>; 2],
+    question: Question,
+    task: &'a Task,
+}
+
+impl Map<'_> {
+    fn cell_by_cell(&self) -> Result<Chart, Error> {
+        let Question { line, abscissa, .. } = self.question;
+        let [first, second] = self.axes;
+        let width = second.points.len();
+        let cells = first.points.len() * width;
+        let mut chart = Chart::stable(cells);
+        chart.abscissa = vec![f64::NAN; if abscissa { cells } else { 0 }];
+        let judged = |values: &mut Vec<f64>, index: usize| {
+            self.task.check()?;
+            put(values, first, index / width);
+            put(values, second, index % width);
+            let cell = match self.family.at(values) {
+                Ok(h) => judge(&h, line, abscissa, self.task)?,
+                Err(_) => Cell::UNDECIDED,
+            };
+            self.task.advance(1);
+            Ok(cell)
+        };
+        let start = || self.values.to_vec();
+        let both = chart
+            .unstable
+            .par_iter_mut()
+            .zip(&mut chart.status)
+            .enumerate();
+        if abscissa {
+            both.zip(&mut chart.abscissa).try_for_each_init(
+                start,
+                |values, ((index, (unstable, status)), alpha)| {
+                    let cell = judged(values, index)?;
+                    (*unstable, *alpha, *status) = (cell.unstable, cell.abscissa, cell.status);
+                    Ok(())
+                },
+            )?;
+        } else {
+            both.try_for_each_init(start, |values, (index, (unstable, status))| {
+                let cell = judged(values, index)?;
+                (*unstable, *status) = (cell.unstable, cell.status);
+                Ok(())
+            })?;
+        }
+        Ok(chart)
+    }
+}
+
+/// A map whose family is affine in the parameter along its rows.
+struct Rows<'a> {
+    map: &'a Map<'a>,
+    /// Index of the axis along the rows.
+    along: usize,
+    constant: Family,
+    slope: Family,
+}
+
+impl<'a> Rows<'a> {
+    /// `None` where the family is affine in neither parameter, or points are in disorder.
+    ///
+    /// Leading terms that do not vary along a row keep its roots within bounds; more cells a row cost less.
+    fn of(map: &'a Map<'a>) -> Option<Self> {
+        let candidates = map.axes.iter().enumerate().filter_map(|(along, axis)| {
+            let (constant, slope) = map.family.split(axis.parameter)?;
+            if !axis.points.is_sorted() {
+                return None;
+            }
+            let rank = (slope.degree() < constant.degree(), axis.points.len(), along);
+            Some((
+                rank,
+                Self {
+                    map,
+                    along,
+                    constant,
+                    slope,
+                },
+            ))
+        });
+        candidates
+            .max_by_key(|(rank, _)| *rank)
+            .map(|(_, rows)| rows)
+    }
+
+    fn axis(&self) -> Axis<'a> {
+        let [first, second] = self.map.axes;
+        if self.along == 0 { first } else { second }
+    }
+
+    fn across(&self) -> Axis<'a> {
+        let [first, second] = self.map.axes;
+        if self.along == 0 { second } else { first }
+    }
+
+    fn rows(&self) -> Result<Vec<Row>, Error> {
+        let (axis, across) = (self.axis(), self.across());
+        let rows = (0..across.points.len()).into_par_iter().map(|index| {
+            self.map.task.check()?;
+            let mut values = self.map.values.to_vec();
+            put(&mut values, across, index);
+            let member = |cell: usize| {
+                let mut values = values.clone();
+                put(&mut values, axis, cell);
+                self.map.family.at(&values).ok()
+            };
+            let mut bare = values.clone();
+            put_value(&mut bare, axis.parameter, 0.0);
+            let parts = self.constant.at(&bare).ok().zip(self.slope.at(&bare).ok());
+            let row = Members {
+                parts,
+                points: axis.points,
+                member: &member,
+                line: self.map.question.line,
+            }
+            .count(self.map.task)?;
+            self.map.task.advance(axis.points.len() as u64);
+            Ok(row)
+        });
+        rows.collect()
+    }
+
+    fn chart(&self) -> Result<Chart, Error> {
+        let rows = self.rows()?;
+        let [first, second] = self.map.axes;
+        let width = second.points.len();
+        let mut chart = Chart::stable(first.points.len() * width);
+        let blocks = chart
+            .unstable
+            .par_chunks_mut(BLOCK * width)
+            .zip(chart.status.par_chunks_mut(BLOCK * width));
+        blocks.enumerate().for_each(|(block, (unstable, status))| {
+            let top = block * BLOCK;
+            let lines = unstable.len() / width;
+            if self.along == 1 {
+                for (line, row) in rows.iter().skip(top).take(lines).enumerate() {
+                    for span in &row.spans {
+                        let cells = line * width + span.start..line * width + span.end;
+                        if span.cell.unstable != 0
+                            && let Some(part) = unstable.get_mut(cells.clone())
+                        {
+                            part.fill(span.cell.unstable);
+                        }
+                        if span.cell.status != CellStatus::Ok
+                            && let Some(part) = status.get_mut(cells)
+                        {
+                            part.fill(span.cell.status);
+                        }
+                    }
+                }
+                return;
+            }
+            for (column, row) in rows.iter().enumerate() {
+                let from = row.spans.partition_point(|span| span.end <= top);
+                for span in row.spans.iter().skip(from) {
+                    if span.start >= top + lines {
+                        break;
+                    }
+                    let cells = span.start.max(top) - top..span.end.min(top + lines) - top;
+                    let places = cells.map(|line| line * width + column);
+                    if span.cell.unstable != 0 {
+                        for place in places.clone() {
+                            if let Some(cell) = unstable.get_mut(place) {
+                                *cell = span.cell.unstable;
+                            }
+                        }
+                    }
+                    if span.cell.status != CellStatus::Ok {
+                        for place in places {
+                            if let Some(cell) = status.get_mut(place) {
+                                *cell = span.cell.status;
+                            }
+                        }
+                    }
+                }
+            }
+        });
+        Ok(chart)
+    }
+}
+
+fn put(values: &mut [f64], axis: Axis<'_>, index: usize) {
+    if let Some(value) = axis.points.get(index) {
+        put_value(values, axis.parameter, *value);
+    }
+}
+
+fn put_value(values: &mut [f64], parameter: usize, value: f64) {
+    if let Some(place) = values.get_mut(parameter) {
+        *place = value;
+    }
+}
 /// The number of cells, if the arguments make sense.
 fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, Error> {
     let count = family.names().len();

@@ -1,15 +1,19 @@
 //! Stability of quasi-polynomials with parameters.
 //!
 //! `family` is h(s; p) with gains and delays as parameters; `cell` judges one member of it, with
-//! a proved count of the unstable roots; `grid` judges the members over two parameters.
+//! a proved count of the unstable roots; `grid` judges the members over two parameters, by `row`s in which
+//! one gain varies: `pencil` is such a row, `crossing` says where its roots cross the line.
 
 mod cell;
+mod crossing;
 mod family;
 mod grid;
+mod pencil;
+mod row;
 
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub use family::{Affine, Family, Term};
-pub use grid::{Axis, Chart, map};
+pub use grid::{Axis, Chart, Proof, Question, map};
 
 #[cfg(test)]
 mod tests;

@@ -2,11 +2,21 @@ use std::f64::consts::PI;
 
 use proptest::prelude::*;
 
-use super::{Affine, Axis, ENDLESS, Family, Term, UNKNOWN, judge, map};
+use super::{Affine, Axis, ENDLESS, Family, Proof, Question, Term, UNKNOWN, judge, map};
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{count_right_of, spectral_abscissa};
 use crate::status::CellStatus;
 use crate::{Error, Task};
+
+const COUNTS: Question = Question {
+    line: 0.0,
+    abscissa: false,
+    proof: Proof::Curves,
+};
+const ABSCISSA: Question = Question {
+    abscissa: true,
+    ..COUNTS
+};
 
 fn term(coefficient: f64, exponents: &[u32], power: u32, constant: f64, slopes: &[f64]) -> Term {
     Term {
@@ -139,7 +149,7 @@ fn cells_of_every_kind_are_told_apart() {
         QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec()).unwrap()
     };
     let told = |h: &QuasiPolynomial| {
-        let cell = judge(h, true, &task).unwrap();
+        let cell = judge(h, 0.0, true, &task).unwrap();
         (cell.unstable, cell.status)
     };
     let s: &[f64] = &[0.0, 1.0];
@@ -152,7 +162,7 @@ fn cells_of_every_kind_are_told_apart() {
     // |s + 0.12| > |s|: every root of the chain lies left of its limit.
     let chain_leads = make(&[&[0.12, 1.0], &[0.0, 0.984]], &[0.0, 0.36]);
     assert_eq!(told(&chain_leads), (0, CellStatus::Chain));
-    let cell = judge(&chain_leads, true, &task).unwrap();
+    let cell = judge(&chain_leads, 0.0, true, &task).unwrap();
     assert!((cell.abscissa - 0.984f64.ln() / 0.36).abs() < 1e-14);
     assert_eq!(
         told(&make(&[s, &[2.0, 1.0]], &[0.0, 0.36])),
@@ -210,7 +220,7 @@ fn the_delayed_integrator_follows_the_closed_form_everywhere() {
         },
     ];
     let task = Task::new();
-    let chart = map(&integrator(), &[0.0, 0.0], axes, false, &task).unwrap();
+    let chart = map(&integrator(), &[0.0, 0.0], axes, COUNTS, &task).unwrap();
     assert_eq!(task.done(), 40 * 31);
     let cells = gains
         .iter()
@@ -242,7 +252,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
             .num_threads(threads)
             .build()
             .unwrap()
-            .install(|| map(&velocity(), &[0.0, 0.0], axes, true, &Task::new()).unwrap())
+            .install(|| map(&velocity(), &[0.0, 0.0], axes, ABSCISSA, &Task::new()).unwrap())
     };
     let (one, four) = (run(1), run(4));
     let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -257,7 +267,7 @@ fn a_stopped_map_stops_and_bad_axes_are_refused() {
         parameter,
         points: &points,
     };
-    let run = |values: &[f64], axes, task: &Task| map(&integrator(), values, axes, false, task);
+    let run = |values: &[f64], axes, task: &Task| map(&integrator(), values, axes, COUNTS, task);
     let task = Task::new();
     task.stop();
     assert_eq!(
@@ -348,7 +358,7 @@ proptest! {
             Axis { parameter: 0, points: &[kp] },
             Axis { parameter: 1, points: &[kv] },
         ];
-        let chart = map(&velocity(), &[0.0, 0.0], axes, true, &task).unwrap();
+        let chart = map(&velocity(), &[0.0, 0.0], axes, ABSCISSA, &task).unwrap();
         let h = velocity().at(&[kp, kv]).unwrap();
         prop_assert_eq!(chart.unstable[0] as u64, count_right_of(&h, 0.0, &task).unwrap());
         prop_assert_eq!(chart.abscissa[0], spectral_abscissa(&h, true, &task).unwrap());

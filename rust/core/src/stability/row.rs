@@ -1,0 +1,336 @@
+//! One row of a map: a gain k varies, all else is fixed.
+//!
+//! Where the members A + k B have the same leading terms for all k, their roots with Re s ≥ x lie within
+//! one radius Ω, and their number changes at the crossings of [0, Ω] only (`crossing`). One proved
+//! count anchors each run of cells between crossings whose effect is not known; the others follow by
+//! addition. Cells within the interval of a crossing, or closer to it than MARGIN, are judged alone, as
+//! are all cells of a row for which none of this holds.
+
+use std::ops::Range;
+
+use super::cell::{Cell, UNKNOWN, judge};
+use super::crossing::{Crossing, crossings};
+use super::pencil::Pencil;
+use crate::quasipoly::{Kind, QuasiPolynomial};
+use crate::roots::{chain_abscissa, radius_right_of};
+use crate::status::CellStatus;
+use crate::{Error, Task};
+
+/// Cells closer to a crossing than this, relative to the largest |k| of the row, are judged alone: a proved count of
+/// one of them may refuse what the crossing decides.
+const MARGIN: f64 = 1e-9;
+
+/// Cells with a common count and status.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    pub(super) start: usize,
+    pub(super) end: usize,
+    pub(super) cell: Cell,
+}
+
+/// What is known of a row.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Row {
+    /// All cells, in order.
+    pub(super) spans: Vec<Span>,
+    /// Crossings of the line, by ω.
+    pub(super) crossings: Vec<Crossing>,
+}
+
+/// A row of members A + k B.
+pub(super) struct Members<'a> {
+    /// A and B; `None` where a coefficient overflows.
+    pub(super) parts: Option<(QuasiPolynomial, QuasiPolynomial)>,
+    /// The values of k, increasing.
+    pub(super) points: &'a [f64],
+    /// The member of a cell; `None` where it cannot be formed.
+    pub(super) member: &'a dyn Fn(usize) -> Option<QuasiPolynomial>,
+    /// Roots right of this line are counted.
+    pub(super) line: f64,
+}
+
+impl Members<'_> {
+    /// Counts of all cells.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    pub(super) fn count(&self, task: &Task) -> Result<Row, Error> {
+        let Some((a, b)) = &self.parts else {
+            return self.alone(task);
+        };
+        if b.is_zero() {
+            // All members are the same.
+            let cell = self.judge(0, task)?;
+            let spans = vec![Span {
+                start: 0,
+                end: self.points.len(),
+                cell,
+            }];
+            return Ok(Row {
+                spans,
+                crossings: Vec::new(),
+            });
+        }
+        match self.crossings(a, b, task)? {
+            Some(crossings) => self.between(crossings, task),
+            None => self.alone(task),
+        }
+    }
+
+    /// Every cell judged alone.
+    fn alone(&self, task: &Task) -> Result<Row, Error> {
+        Ok(Row {
+            spans: self.judge_all(0..self.points.len(), task)?,
+            crossings: Vec::new(),
+        })
+    }
+
+    /// All crossings of the row; `None` where they do not decide.
+    fn crossings(
+        &self,
+        a: &QuasiPolynomial,
+        b: &QuasiPolynomial,
+        task: &Task,
+    ) -> Result<Option<Vec<Crossing>>, Error> {
+        let (Some(first), Some(last)) = (self.points.first(), self.points.last()) else {
+            return Ok(None);
+        };
+        let range = (*first, *last);
+        let Some(hull) = hull(a, b, range) else {
+            return Ok(None);
+        };
+        // Where chains lead, or may, every cell says so by itself.
+        if chain_abscissa(&hull) >= self.line {
+            return Ok(None);
+        }
+        let Some(radius) = radius_right_of(&hull, self.line) else {
+            return Ok(None);
+        };
+        let top = ((radius - self.line.abs()) * (radius + self.line.abs()))
+            .max(0.0)
+            .sqrt();
+        let top = top.max(1e-3 * radius) * (1.0 + 1e-9);
+        let Some(pencil) = Pencil::new(a, b, self.line) else {
+            return Ok(None);
+        };
+        if top == 0.0 {
+            return Ok(None);
+        }
+        crossings(&pencil, top, range, task)
+    }
+
+    /// Cells by the crossings between them.
+    fn between(&self, crossings: Vec<Crossing>, task: &Task) -> Result<Row, Error> {
+        let windows = self.windows(&crossings);
+        // What lies between the windows, and the jump to the next of them.
+        let mut free: Vec<(usize, usize, Option<i32>)> = Vec::with_capacity(windows.len() + 1);
+        let mut start = 0;
+        for window in &windows {
+            free.push((start, window.from, window.jump));
+            start = window.to;
+        }
+        free.push((start, self.points.len(), None));
+        let mut spans = Vec::with_capacity(2 * free.len());
+        let mut rest = free.as_slice();
+        let mut gaps = windows.iter();
+        while !rest.is_empty() {
+            let linked = rest
+                .iter()
+                .take_while(|(_, _, jump)| jump.is_some())
+                .count();
+            let (run, others) = rest.split_at((linked + 1).min(rest.len()));
+            rest = others;
+            let cells = self.anchored(run, task)?;
+            for (part, cell) in run.iter().zip(cells) {
+                let (start, end, _) = *part;
+                match cell {
+                    Some(cell) if end > start => spans.push(Span { start, end, cell }),
+                    _ => spans.extend(self.judge_all(start..end, task)?),
+                }
+                let Some(window) = gaps.next() else {
+                    continue;
+                };
+                for start in window.from..window.to {
+                    task.check()?;
+                    let known = cell.and_then(|cell| self.beside_zero(window, cell, start));
+                    let cell = known.map_or_else(|| self.judge(start, task), Ok)?;
+                    let end = start + 1;
+                    spans.push(Span { start, end, cell });
+                }
+            }
+        }
+        Ok(Row { spans, crossings })
+    }
+
+    /// A cell next to a crossing of s = 0, by the sign of h(0): as h(0)/B(0) = k − k₀ grows past zero, so does the
+    /// count by the jump. `below` is the cell before.
+    fn beside_zero(&self, window: &Window, below: Cell, index: usize) -> Option<Cell> {
+        let jump = window.jump.filter(|_| window.rises_at_zero.is_some())?;
+        let h = (self.member)(index)?;
+        let constants = h.coefficients().iter().filter_map(|row| row.first());
+        let mut constants = constants.filter(|c| **c != 0.0);
+        let sum =
+            constants.next().copied().unwrap_or(0.0) + constants.next().copied().unwrap_or(0.0);
+        // The rounded sum of two numbers has the sign of their sum; that of more need not.
+        if constants.next().is_some() {
+            return None;
+        }
+        if sum == 0.0 {
+            return Some(Cell {
+                unstable: UNKNOWN,
+                status: CellStatus::Boundary,
+                ..below
+            });
+        }
+        let above = (sum > 0.0) == window.rises_at_zero?;
+        Some(Cell {
+            unstable: below.unstable + if above { jump } else { 0 },
+            ..below
+        })
+    }
+
+    /// Cells too close to a crossing to be told from it, those without a cell between them merged.
+    fn windows(&self, crossings: &[Crossing]) -> Vec<Window> {
+        let largest = self.points.iter().fold(0.0, |most, k| k.abs().max(most));
+        let margin = MARGIN * largest;
+        let mut windows: Vec<Window> = crossings
+            .iter()
+            .map(|crossing| Window {
+                from: self.points.partition_point(|k| *k < crossing.low - margin),
+                to: self
+                    .points
+                    .partition_point(|k| *k <= crossing.high + margin),
+                jump: crossing.jump,
+                rises_at_zero: crossing
+                    .slope_at_zero
+                    .map(|slope| slope > 0.0)
+                    .filter(|_| self.line == 0.0),
+            })
+            .collect();
+        windows.sort_unstable_by_key(|window| (window.from, window.to));
+        windows.dedup_by(|next, last| {
+            let merge = next.from <= last.to;
+            if merge {
+                last.to = last.to.max(next.to);
+                last.jump = last.jump.zip(next.jump).map(|(a, b)| a + b);
+                last.rises_at_zero = None;
+            }
+            merge
+        });
+        windows
+    }
+
+    /// The cell of each part of a run, whose jumps are known, from a count in the longest of them.
+    fn anchored(
+        &self,
+        run: &[(usize, usize, Option<i32>)],
+        task: &Task,
+    ) -> Result<Vec<Option<Cell>>, Error> {
+        let longest = run
+            .iter()
+            .enumerate()
+            .max_by_key(|(_, (start, end, _))| end - start);
+        let Some((place, (start, end, _))) = longest.filter(|(_, (start, end, _))| end > start)
+        else {
+            return Ok(vec![None; run.len()]);
+        };
+        let anchor = self.judge(start + (end - start) / 2, task)?;
+        if anchor.status != CellStatus::Ok {
+            return Ok(vec![None; run.len()]);
+        }
+        let jump = |part: &(usize, usize, Option<i32>)| part.2.unwrap_or(0);
+        let before: i32 = run.iter().take(place).map(jump).sum();
+        let mut unstable = anchor.unstable - before;
+        let cells = run.iter().map(|part| {
+            let cell = Cell { unstable, ..anchor };
+            unstable += jump(part);
+            // Less than none would contradict the proofs: such cells are counted one by one.
+            (cell.unstable >= 0).then_some(cell)
+        });
+        Ok(cells.collect())
+    }
+
+    fn judge(&self, index: usize, task: &Task) -> Result<Cell, Error> {
+        match (self.member)(index) {
+            Some(h) => judge(&h, self.line, false, task),
+            None => Ok(Cell::UNDECIDED),
+        }
+    }
+
+    fn judge_all(&self, cells: Range<usize>, task: &Task) -> Result<Vec<Span>, Error> {
+        cells
+            .map(|start| {
+                task.check()?;
+                let cell = self.judge(start, task)?;
+                Ok(Span {
+                    start,
+                    end: start + 1,
+                    cell,
+                })
+            })
+            .collect()
+    }
+}
+
+/// Cells whose count is not known from the crossings, and what they do to it together.
+struct Window {
+    from: usize,
+    to: usize,
+    jump: Option<i32>,
+    /// Where all there is is a root crossing s = 0: does h(0) grow with k?
+    rises_at_zero: Option<bool>,
+}
+
+/// A quasi-polynomial whose coefficients are in modulus the largest of all members, those of the leading term
+/// the smallest; `None` where the members do not share their leading terms.
+fn hull(a: &QuasiPolynomial, b: &QuasiPolynomial, range: (f64, f64)) -> Option<QuasiPolynomial> {
+    let degree = a.degree();
+    let mut rows: Vec<(f64, Vec<f64>, Vec<f64>)> = Vec::new();
+    for (h, of_b) in [(a, false), (b, true)] {
+        for (row, delay) in h.terms() {
+            let place = rows.iter().position(|known| known.0 == delay);
+            let place = place.unwrap_or_else(|| {
+                rows.push((delay, Vec::new(), Vec::new()));
+                rows.len() - 1
+            });
+            if let Some(known) = rows.get_mut(place) {
+                *(if of_b { &mut known.2 } else { &mut known.1 }) = row.to_vec();
+            }
+        }
+    }
+    let first = rows.iter().map(|row| row.0).fold(f64::INFINITY, f64::min);
+    let (mut delays, mut sizes) = (Vec::new(), Vec::new());
+    for (delay, a, b) in rows {
+        let length = a.len().max(b.len());
+        let mut row = Vec::with_capacity(length);
+        for power in 0..length {
+            let at = |row: &[f64]| row.get(power).copied().unwrap_or(0.0);
+            let (constant, slope) = (at(&a), at(&b));
+            let ends = [range.0, range.1].map(|k| constant + k * slope);
+            let largest = ends[0].abs().max(ends[1].abs());
+            if power < degree {
+                // Each end loses three roundings.
+                row.push(
+                    largest * (1.0 + 4.0 * f64::EPSILON) + 4.0 * f64::EPSILON * constant.abs(),
+                );
+            } else if slope == 0.0 {
+                row.push(constant.abs());
+            } else if delay == first && power == degree && ends[0] * ends[1] > 0.0 {
+                row.push(
+                    ends[0].abs().min(ends[1].abs()) * (1.0 - 4.0 * f64::EPSILON)
+                        - 4.0 * f64::EPSILON * constant.abs(),
+                );
+            } else {
+                return None;
+            }
+        }
+        delays.push(delay);
+        sizes.push(row);
+    }
+    let hull = QuasiPolynomial::new(sizes, delays).ok()?;
+    let leads = hull.degree() == degree && !matches!(hull.kind(), Kind::Advanced);
+    // With a leading term that varies, the equation must be retarded for all members alike.
+    let varies = b.degree() >= degree;
+    (leads && !(varies && hull.kind() != Kind::Retarded && hull.kind() != Kind::Polynomial))
+        .then_some(hull)
+}
