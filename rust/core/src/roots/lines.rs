@@ -51,6 +51,11 @@ const SLOW_APPROACH: f64 = 0.7;
 /// Share of the way from a root to the chains, or to its neighbour, at which a line is laid.
 const CLEARANCE: f64 = 0.3;
 
+/// The distance from the chains at which the search ends; `step` is one over the longest delay.
+pub(crate) fn chain_margin(step: f64) -> f64 {
+    CHAIN_MARGIN * step
+}
+
 /// What the search for rightmost roots has to know of a function.
 pub(super) trait Spectrum {
     type Walker<'a>: Seek
@@ -144,7 +149,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             given_up: 0,
             moved: 0,
             refused: None,
-            margin: CHAIN_MARGIN * step,
+            margin: chain_margin(step),
             first_step: step,
             step,
             start,

@@ -37,6 +37,7 @@ pub use certificate::{Certificate, Contour, Segment, certify};
 pub use commensurate::{base_delay, exact_chain_abscissa};
 pub use contour::{Edge, count_with_edge, roots_with_edge};
 pub use count::{count, count_right_of};
+pub(crate) use lines::chain_margin;
 pub use neutral::chain_abscissa;
 pub use real::RealPart;
 pub use region::Region;

@@ -100,28 +100,34 @@ pub fn judge(h: &QuasiPolynomial, line: f64, abscissa: bool, task: &Task) -> Res
     };
     // −∞ where no root lies right of the chains.
     let isolated = set.map(|set| set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re));
-    let (abscissa, isolated) = match isolated {
-        Ok(isolated) => (isolated.max(chain), isolated),
-        Err(Error::Interrupted) => return Err(Error::Interrupted),
-        Err(_) => {
-            return Ok(Cell {
-                unstable,
-                abscissa: f64::NAN,
-                status: match status {
-                    CellStatus::Ok => CellStatus::Undecided,
-                    known => known,
-                },
-            });
-        }
-    };
-    Ok(Cell {
+    let cell = Cell {
         unstable,
-        abscissa,
-        status: match status {
+        abscissa: f64::NAN,
+        status,
+    };
+    match isolated {
+        Ok(isolated) => Ok(with_abscissa(cell, isolated, chain)),
+        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(_) => Ok(Cell {
+            status: match status {
+                CellStatus::Ok => CellStatus::Undecided,
+                known => known,
+            },
+            ..cell
+        }),
+    }
+}
+
+/// A cell whose count is known, with its rightmost root and its chains.
+pub(super) fn with_abscissa(cell: Cell, isolated: f64, chain: f64) -> Cell {
+    Cell {
+        abscissa: isolated.max(chain),
+        status: match cell.status {
             CellStatus::Ok if chain > isolated => CellStatus::Chain,
             known => known,
         },
-    })
+        ..cell
+    }
 }
 
 /// Count and status where the chains alone decide.

@@ -96,7 +96,7 @@ pub fn map(
     if cells == 0 {
         return Ok(Chart::default());
     }
-    if question.abscissa || question.proof == Proof::Cells {
+    if question.proof == Proof::Cells {
         return map.cell_by_cell();
     }
     match Rows::of(&map) {
@@ -217,13 +217,16 @@ impl<'a> Rows<'a> {
             let mut bare = values.clone();
             put_value(&mut bare, axis.parameter, 0.0);
             let parts = self.constant.at(&bare).ok().zip(self.slope.at(&bare).ok());
-            let row = Members {
-                parts,
+            let members = Members {
+                parts: parts.as_ref(),
                 points: axis.points,
                 member: &member,
                 line: self.map.question.line,
+            };
+            let mut row = members.count(self.map.task)?;
+            if self.map.question.abscissa {
+                row.cells = members.abscissas(&row, self.map.task)?;
             }
-            .count(self.map.task)?;
             self.map.task.advance(axis.points.len() as u64);
             Ok(row)
         });
@@ -235,6 +238,10 @@ impl<'a> Rows<'a> {
         let [first, second] = self.map.axes;
         let width = second.points.len();
         let mut chart = Chart::stable(first.points.len() * width);
+        if self.map.question.abscissa {
+            self.fill_cells(&rows, &mut chart, width);
+            return Ok(chart);
+        }
         let blocks = chart
             .unstable
             .par_chunks_mut(BLOCK * width)
@@ -286,6 +293,50 @@ impl<'a> Rows<'a> {
             }
         });
         Ok(chart)
+    }
+}
+
+impl Rows<'_> {
+    /// Counts, abscissas and statuses of rows that know every cell.
+    fn fill_cells(&self, rows: &[Row], chart: &mut Chart, width: usize) {
+        chart.abscissa = vec![f64::NAN; chart.unstable.len()];
+        let lines = chart
+            .unstable
+            .par_chunks_mut(BLOCK * width)
+            .zip(chart.abscissa.par_chunks_mut(BLOCK * width))
+            .zip(chart.status.par_chunks_mut(BLOCK * width));
+        lines
+            .enumerate()
+            .for_each(|(block, ((unstable, abscissa), status))| {
+                let top = block * BLOCK;
+                let height = unstable.len() / width;
+                let columns = if self.along == 1 { height } else { width };
+                for outer in 0..columns {
+                    let (row, cells) = if self.along == 1 {
+                        (rows.get(top + outer), 0..width)
+                    } else {
+                        (rows.get(outer), top..top + height)
+                    };
+                    for index in cells {
+                        let place = if self.along == 1 {
+                            outer * width + index
+                        } else {
+                            (index - top) * width + outer
+                        };
+                        let cell = row
+                            .and_then(|row| row.cells.get(index))
+                            .copied()
+                            .unwrap_or(Cell::UNDECIDED);
+                        if let (Some(a), Some(b), Some(c)) = (
+                            unstable.get_mut(place),
+                            abscissa.get_mut(place),
+                            status.get_mut(place),
+                        ) {
+                            (*a, *b, *c) = (cell.unstable, cell.abscissa, cell.status);
+                        }
+                    }
+                }
+            });
     }
 }
 

@@ -2,12 +2,15 @@
 //!
 //! `family` is h(s; p) with gains and delays as parameters; `cell` judges one member of it, with
 //! a proved count of the unstable roots; `grid` judges the members over two parameters, by `row`s in which
-//! one gain varies: `pencil` is such a row, `crossing` says where its roots cross the line.
+//! one gain varies: `pencil` is such a row, `crossing` says where its roots cross the line,
+//! `branch` follows one of them and `leading` the rightmost.
 
+mod branch;
 mod cell;
 mod crossing;
 mod family;
 mod grid;
+mod leading;
 mod pencil;
 mod row;
 

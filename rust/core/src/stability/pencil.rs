@@ -78,19 +78,11 @@ impl Pencil {
     /// `None` where B is zero, or numbers would leave the range of double precision.
     pub(super) fn new(a: &QuasiPolynomial, b: &QuasiPolynomial, x: f64) -> Option<Self> {
         let origin = b.delays().first().copied().filter(|_| !b.is_zero())?;
-        let mut delays: Vec<f64> = a.delays().iter().chain(b.delays()).copied().collect();
-        delays.sort_by(f64::total_cmp);
-        delays.dedup();
-        let row_of = |h: &QuasiPolynomial, delay: f64| {
-            let place = h.delays().iter().position(|d| *d == delay);
-            let row = place.and_then(|index| h.coefficients().get(index));
-            row.cloned().unwrap_or_default()
-        };
-        let rows: Vec<Row> = delays
+        let rows: Vec<Row> = united(a, b)
             .into_iter()
-            .map(|delay| Row {
-                a: row_of(a, delay),
-                b: row_of(b, delay),
+            .map(|(delay, a, b)| Row {
+                a,
+                b,
                 delay: delay - origin,
                 weight: exp(-x * (delay - origin)),
             })
@@ -194,6 +186,21 @@ impl Pencil {
     }
 }
 
+/// Delays of either, increasing, with the rows of both.
+pub(super) fn united(a: &QuasiPolynomial, b: &QuasiPolynomial) -> Vec<(f64, Vec<f64>, Vec<f64>)> {
+    let mut delays: Vec<f64> = a.delays().iter().chain(b.delays()).copied().collect();
+    delays.sort_by(f64::total_cmp);
+    delays.dedup();
+    let row_of = |h: &QuasiPolynomial, delay: f64| {
+        let place = h.delays().iter().position(|d| *d == delay);
+        let row = place.and_then(|index| h.coefficients().get(index));
+        row.cloned().unwrap_or_default()
+    };
+    let rows = delays.into_iter();
+    rows.map(|delay| (delay, row_of(a, delay), row_of(b, delay)))
+        .collect()
+}
+
 /// Add p(s) `turn` and its derivatives by s.
 #[inline(always)]
 fn add_term(sum: &mut Jet, row: &[f64], s: Complex64, delay: f64, turn: Complex64) {
@@ -212,7 +219,7 @@ fn add_term(sum: &mut Jet, row: &[f64], s: Complex64, delay: f64, turn: Complex6
 }
 
 /// The polynomial with the moduli of the coefficients, and its first three derivatives.
-fn sizes(row: &[f64], size: f64) -> [f64; 4] {
+pub(super) fn sizes(row: &[f64], size: f64) -> [f64; 4] {
     let mut p = [0.0; 4];
     for c in row.iter().rev() {
         p[3] = p[3] * size + p[2];

@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use super::cell::{Cell, UNKNOWN, judge};
 use super::crossing::{Crossing, crossings};
-use super::pencil::Pencil;
+use super::pencil::{Pencil, united};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{chain_abscissa, radius_right_of};
 use crate::status::CellStatus;
@@ -35,12 +35,15 @@ pub(super) struct Row {
     pub(super) spans: Vec<Span>,
     /// Crossings of the line, by ω.
     pub(super) crossings: Vec<Crossing>,
+    /// Cell by cell, where the abscissa is asked for.
+    pub(super) cells: Vec<Cell>,
 }
 
 /// A row of members A + k B.
+#[derive(Clone, Copy)]
 pub(super) struct Members<'a> {
     /// A and B; `None` where a coefficient overflows.
-    pub(super) parts: Option<(QuasiPolynomial, QuasiPolynomial)>,
+    pub(super) parts: Option<&'a (QuasiPolynomial, QuasiPolynomial)>,
     /// The values of k, increasing.
     pub(super) points: &'a [f64],
     /// The member of a cell; `None` where it cannot be formed.
@@ -55,7 +58,7 @@ impl Members<'_> {
     /// # Errors
     /// [`Error::Interrupted`] alone.
     pub(super) fn count(&self, task: &Task) -> Result<Row, Error> {
-        let Some((a, b)) = &self.parts else {
+        let Some((a, b)) = self.parts else {
             return self.alone(task);
         };
         if b.is_zero() {
@@ -68,7 +71,7 @@ impl Members<'_> {
             }];
             return Ok(Row {
                 spans,
-                crossings: Vec::new(),
+                ..Row::default()
             });
         }
         match self.crossings(a, b, task)? {
@@ -77,11 +80,42 @@ impl Members<'_> {
         }
     }
 
+    /// The same members and another line.
+    pub(super) fn right_of(self, line: f64) -> Self {
+        Self { line, ..self }
+    }
+
+    /// Counts as far as crossings give them; no spans where they do not.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    pub(super) fn crossed(&self, task: &Task) -> Result<Row, Error> {
+        let Some((a, b)) = self.parts else {
+            return Ok(Row::default());
+        };
+        match self.crossings(a, b, task)? {
+            Some(crossings) => self.between(crossings, task),
+            None => Ok(Row::default()),
+        }
+    }
+
+    fn range(&self) -> Option<(f64, f64)> {
+        self.points
+            .first()
+            .copied()
+            .zip(self.points.last().copied())
+    }
+
+    /// [`hull`] of the members.
+    pub(super) fn hull(&self, a: &QuasiPolynomial, b: &QuasiPolynomial) -> Option<QuasiPolynomial> {
+        hull(a, b, self.range()?)
+    }
+
     /// Every cell judged alone.
     fn alone(&self, task: &Task) -> Result<Row, Error> {
         Ok(Row {
             spans: self.judge_all(0..self.points.len(), task)?,
-            crossings: Vec::new(),
+            ..Row::default()
         })
     }
 
@@ -92,11 +126,7 @@ impl Members<'_> {
         b: &QuasiPolynomial,
         task: &Task,
     ) -> Result<Option<Vec<Crossing>>, Error> {
-        let (Some(first), Some(last)) = (self.points.first(), self.points.last()) else {
-            return Ok(None);
-        };
-        let range = (*first, *last);
-        let Some(hull) = hull(a, b, range) else {
+        let Some((range, hull)) = self.range().zip(self.hull(a, b)) else {
             return Ok(None);
         };
         // Where chains lead, or may, every cell says so by itself.
@@ -159,7 +189,11 @@ impl Members<'_> {
                 }
             }
         }
-        Ok(Row { spans, crossings })
+        Ok(Row {
+            spans,
+            crossings,
+            ..Row::default()
+        })
     }
 
     /// A cell next to a crossing of s = 0, by the sign of h(0): as h(0)/B(0) = k − k₀ grows past zero, so does the
@@ -285,20 +319,8 @@ struct Window {
 /// the smallest; `None` where the members do not share their leading terms.
 fn hull(a: &QuasiPolynomial, b: &QuasiPolynomial, range: (f64, f64)) -> Option<QuasiPolynomial> {
     let degree = a.degree();
-    let mut rows: Vec<(f64, Vec<f64>, Vec<f64>)> = Vec::new();
-    for (h, of_b) in [(a, false), (b, true)] {
-        for (row, delay) in h.terms() {
-            let place = rows.iter().position(|known| known.0 == delay);
-            let place = place.unwrap_or_else(|| {
-                rows.push((delay, Vec::new(), Vec::new()));
-                rows.len() - 1
-            });
-            if let Some(known) = rows.get_mut(place) {
-                *(if of_b { &mut known.2 } else { &mut known.1 }) = row.to_vec();
-            }
-        }
-    }
-    let first = rows.iter().map(|row| row.0).fold(f64::INFINITY, f64::min);
+    let rows = united(a, b);
+    let first = rows.first().map_or(0.0, |row| row.0);
     let (mut delays, mut sizes) = (Vec::new(), Vec::new());
     for (delay, a, b) in rows {
         let length = a.len().max(b.len());
