@@ -145,6 +145,25 @@ class Family:
         threads: int | None = None,
         progress: Callable[[int], object] | None = None,
     ) -> tuple[NDArray[np.int32], NDArray[np.float64] | None, NDArray[np.uint8]]: ...
+    def boundaries(
+        self,
+        values: list[float],
+        parameters: tuple[int, int],
+        first: NDArray[np.float64],
+        second: NDArray[np.float64],
+        line: float,
+        threads: int | None = None,
+    ) -> (
+        tuple[
+            int,
+            list[
+                tuple[
+                    NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int32]
+                ]
+            ],
+        ]
+        | None
+    ): ...
 
 @final
 class LinearLoop:

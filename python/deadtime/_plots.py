@@ -311,22 +311,3 @@ def _arrow(ax: Axes, values: NDArray[np.complex128], reach: float) -> None:
             (tail.real, tail.imag),
             arrowprops={"arrowstyle": "-|>", "color": COLOURS[0], "mutation_scale": 16.0},
         )
-
-
-def plot_stability_map(ax: Axes, chart: StabilityMap, chosen: Mapping[str, float] | None) -> None:
-    """Spectral abscissa where the loop is stable, its boundary, and the chosen gains."""
-    across, up = chart.names
-    x, y = chart.axes[across], chart.axes[up]
-    shading = np.where(chart.stable, chart.abscissa, np.nan).T
-    if np.any(np.isfinite(shading)):
-        drawn = ax.pcolormesh(x, y, shading, cmap="viridis_r", shading="auto", rasterized=True)
-        ax.figure.colorbar(drawn, ax=ax, label="spectral abscissa / (1/s)")
-    if 0.0 < chart.stable.mean() < 1.0:
-        # The abscissa is continuous, so its zero line lies between the cells it separates. Where
-        # it is missing or infinite, the boundary goes by the cells themselves.
-        whole = np.all(np.isfinite(chart.abscissa))
-        level = chart.abscissa if whole else 0.5 - chart.stable.astype(float)
-        ax.contour(x, y, level.T, levels=[0.0], colors="k", linewidths=1.2)
-    if chosen:
-        ax.plot(chosen[across], chosen[up], "*", color=COLOURS[1], ms=14, mec="w")
-    ax.set(xlabel=across, ylabel=up, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))

@@ -14,7 +14,6 @@ from deadtime._plots import (
     new_figure,
     plot_fits,
     plot_responses,
-    plot_stability_map,
 )
 
 if TYPE_CHECKING:
@@ -131,7 +130,7 @@ def _map(study: Study) -> str:
     figure, axes = new_figure(7.0, 4.4)
     design = study.designed
     chart = design.charts[len(design.charts) // 2]
-    plot_stability_map(axes, chart, design.gains)
+    chart.plot(axes, design.gains)
     caption = (
         f"Spectral abscissa of the fitted loop with its hold, at a delay of "
         f"{design.delays[len(design.delays) // 2]:.3f} s; white is unstable, the star is the "

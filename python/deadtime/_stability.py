@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._boundaries import Boundary, boundaries_of
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._loop_stability import sampled_grid
@@ -66,6 +67,8 @@ class StabilityMap(ReadOnlyArrays):
         A `MapStatus`.
     decay : float
         Roots right of ``-decay`` count as unstable, 1/s.
+    family : ParametricQuasiPolynomial or None
+        What was judged; None for a sampled loop.
 
     Notes
     -----
@@ -78,6 +81,36 @@ class StabilityMap(ReadOnlyArrays):
     abscissa: _Floats
     status: NDArray[np.uint8]
     decay: float = 0.0
+    family: ParametricQuasiPolynomial | None = None
+
+    @cached_property
+    def boundaries(self) -> tuple[Boundary, ...]:
+        """Curves on which a root has the real part ``-decay``: tuple of `Boundary`, longest first.
+
+        Raises
+        ------
+        ValueError
+            If the family is affine in neither parameter, or the map is that of a sampled loop.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import deadtime as dtm
+        >>> Kp, Kv = dtm.parameters("Kp Kv")
+        >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(0.36)
+        >>> chart = dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-0.5, 0.5)}, abscissa=False)
+        >>> curve = chart.boundaries[0]
+        >>> curve
+        <Boundary of 101 points: Kp 2.51921 to 5.03842, omega 2.9089 to 5.81776 rad/s>
+        >>> bool(np.allclose(curve.values["Kv"], -np.cos(0.36 * curve.omega)))
+        True
+        """
+        if self.family is None:
+            raise ValueError(
+                "the map of a sampled loop has no crossing curves: its boundary is where the "
+                "abscissa changes sign"
+            )
+        return boundaries_of(self.family, self.axes, self.decay)
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
@@ -131,8 +164,13 @@ class StabilityMap(ReadOnlyArrays):
         }
         return values, float(candidates[place])
 
-    def plot(self, ax: Axes | None = None, chosen: Mapping[str, float] | None = None) -> Axes:
-        """Draw the abscissa of the stable cells and their boundary.
+    def plot(
+        self,
+        ax: Axes | None = None,
+        chosen: Mapping[str, float] | None = None,
+        show: str | None = None,
+    ) -> Axes:
+        """Draw the map: its cells, and its boundaries labelled with their frequency in rad/s.
 
         Parameters
         ----------
@@ -140,15 +178,24 @@ class StabilityMap(ReadOnlyArrays):
             Where to draw; a new figure by default.
         chosen : mapping of str to float, optional
             Values of the two parameters to mark.
+        show : {"abscissa", "counts"}, optional
+            What the colours mean: the spectral abscissa of the stable cells (by default, where it was
+            computed), or the number of unstable roots.
 
         Returns
         -------
         matplotlib.axes.Axes
         """
-        from deadtime._plots import plot_stability_map, shown_axes
+        from deadtime._plots import shown_axes
+        from deadtime._stability_plots import plot_stability_map
 
+        if show not in (None, "abscissa", "counts"):
+            raise ValueError(f"show={show!r}: give 'abscissa' or 'counts'")
+        computed = bool(np.isfinite(self.abscissa).any())
+        if show == "abscissa" and not computed:
+            raise ValueError("the map has no abscissa to show: compute it with abscissa=True")
         ax = shown_axes(ax)
-        plot_stability_map(ax, self, chosen)
+        plot_stability_map(ax, self, chosen, show or ("abscissa" if computed else "counts"))
         return ax
 
     def to_xarray(self) -> Any:
@@ -277,10 +324,11 @@ def stability_map(
         )
     if progress is not None:
         progress(cells)
-    arrays: list[NDArray[Any]] = [*axes.values(), *found]
+    unstable, alpha, status, judged = found
+    arrays: list[NDArray[Any]] = [*axes.values(), unstable, alpha, status]
     for array in arrays:
         read_only(array)
-    return StabilityMap(names, axes, *found, question.decay)
+    return StabilityMap(names, axes, unstable, alpha, status, question.decay, judged)
 
 
 @dataclass(frozen=True)
@@ -292,7 +340,9 @@ class _Question:
     proof: str
 
 
-_Found: TypeAlias = tuple[NDArray[np.int32], _Floats, NDArray[np.uint8]]
+_Found: TypeAlias = tuple[
+    NDArray[np.int32], _Floats, NDArray[np.uint8], ParametricQuasiPolynomial | None
+]
 
 
 def _map_family(
@@ -331,7 +381,7 @@ def _map_family(
     )
     if alpha is None:
         alpha = np.broadcast_to(np.float64(np.nan), unstable.shape)
-    return unstable, alpha, status
+    return unstable, alpha, status, family
 
 
 def _map_loop(
@@ -388,7 +438,7 @@ def _map_sampled(
     unsure = (status == MapStatus.BOUNDARY) | (status == MapStatus.UNDECIDED)
     unstable = np.where(unsure, np.int32(-2), unstable)
     shape = first.shape
-    return unstable.reshape(shape), abscissa.reshape(shape), status.reshape(shape)
+    return unstable.reshape(shape), abscissa.reshape(shape), status.reshape(shape), None
 
 
 def _axes(

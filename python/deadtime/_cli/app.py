@@ -37,7 +37,6 @@ from deadtime._plots import (
     plot_fits,
     plot_responses,
     plot_root_set,
-    plot_stability_map,
 )
 from deadtime._readers import read_recording
 from deadtime._recording import Recording
@@ -265,7 +264,7 @@ def map_(
     best, abscissa = chart.best() if share > 0.0 else (None, np.nan)
     if plot is not None:
         figure, axes = new_figure(7.0, 4.5)
-        plot_stability_map(axes, chart, best)
+        chart.plot(axes, best)
         save_figure(figure, plot)
     if as_json:
         print_json(
@@ -340,7 +339,7 @@ def design(
     response = found.loop.step_response()
     if plot is not None:
         figure, axes = new_figure(7.0, 4.5)
-        plot_stability_map(axes, found.charts[len(found.charts) // 2], found.gains)
+        found.charts[len(found.charts) // 2].plot(axes, found.gains)
         save_figure(figure, plot)
     if as_json:
         print_json(

@@ -11,6 +11,14 @@ use crate::runtime::run;
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Table<'py, T> = Bound<'py, PyArray2<T>>;
 
+/// Gains, rows, frequencies and jumps of a boundary.
+type Curve<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i32>>,
+);
+
 /// coefficient, exponents, power of s, constant part of the delay, its slopes.
 type Row = (f64, Vec<u32>, u32, f64, Vec<f64>);
 
@@ -96,5 +104,45 @@ impl PyFamily {
                 .transpose()?,
             status.into_pyarray(py).reshape(shape)?,
         ))
+    }
+
+    /// The axis along the rows, and the curves: positions on it, rows, frequencies and jumps.
+    #[pyo3(signature = (values, parameters, first, second, line, threads=None))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "two axes, what is asked and how to run"
+    )]
+    fn boundaries<'py>(
+        &self,
+        py: Python<'py>,
+        values: Vec<f64>,
+        parameters: (usize, usize),
+        first: Floats<'py>,
+        second: Floats<'py>,
+        line: f64,
+        threads: Option<usize>,
+    ) -> PyResult<Option<(usize, Vec<Curve<'py>>)>> {
+        let (first, second) = (in_order(&first), in_order(&second));
+        let axis = |parameter, points| Axis { parameter, points };
+        let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
+        let family = &self.inner;
+        let found = run(py, threads, None, |task| {
+            stability::boundaries(family, &values, axes, line, task)
+        })?;
+        Ok(found.map(|found| {
+            let curves = found.curves.into_iter().map(|curve| {
+                let gains: Vec<f64> = curve.iter().map(|vertex| vertex.gain).collect();
+                let rows: Vec<i64> = curve.iter().map(|vertex| vertex.row as i64).collect();
+                let omegas: Vec<f64> = curve.iter().map(|vertex| vertex.omega).collect();
+                let jumps: Vec<i32> = curve.iter().map(|vertex| vertex.jump).collect();
+                (
+                    gains.into_pyarray(py),
+                    rows.into_pyarray(py),
+                    omegas.into_pyarray(py),
+                    jumps.into_pyarray(py),
+                )
+            });
+            (found.along, curves.collect())
+        }))
     }
 }

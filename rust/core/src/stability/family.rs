@@ -224,6 +224,11 @@ impl Family {
         terms.fold(0, |highest, term| highest.max(term.power))
     }
 
+    /// Is there a term without s?
+    pub(super) fn has_constant(&self) -> bool {
+        self.terms.iter().flatten().any(|term| term.power == 0)
+    }
+
     /// Check that no delay becomes negative where each parameter lies in its range.
     ///
     /// # Errors

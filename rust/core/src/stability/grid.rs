@@ -10,6 +10,8 @@
 use rayon::prelude::*;
 
 use super::cell::{Cell, judge};
+use super::crossing::Crossing;
+use super::curves::{Vertex, join};
 use super::family::Family;
 use super::row::{Members, Row};
 use crate::status::CellStatus;
@@ -105,6 +107,51 @@ pub fn map(
     }
 }
 
+/// The boundaries of a map: see [`Vertex`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Boundaries {
+    /// Which of the two axes runs along the rows, whose values are the gains of the vertices.
+    pub along: usize,
+    /// Each curve with its points in order.
+    pub curves: Vec<Vec<Vertex>>,
+}
+
+/// The curves on which roots lie on the line; `None` where the family is affine in neither parameter.
+///
+/// # Errors
+/// As for [`map`].
+pub fn boundaries(
+    family: &Family,
+    values: &[f64],
+    axes: [Axis<'_>; 2],
+    line: f64,
+    task: &Task,
+) -> Result<Option<Boundaries>, Error> {
+    check(family, values, axes)?;
+    let map = Map {
+        family,
+        values,
+        axes,
+        question: Question {
+            line,
+            ..Question::default()
+        },
+        task,
+    };
+    let Some(rows) = Rows::of(&map) else {
+        return Ok(None);
+    };
+    let points = rows.axis().points;
+    let (Some(low), Some(high)) = (points.first(), points.last()) else {
+        return Ok(None);
+    };
+    let crossings = rows.crossings()?;
+    Ok(Some(Boundaries {
+        along: rows.along,
+        curves: join(&crossings, (*low, *high)),
+    }))
+}
+
 struct Map<'a> {
     family: &'a Family,
     values: &'a [f64],
@@ -170,14 +217,20 @@ struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// `None` where the family is affine in neither parameter, or points are in disorder.
     ///
-    /// Leading terms that do not vary along a row keep its roots within bounds; more cells a row cost less.
+    /// Leading terms that do not vary along a row keep its roots within bounds; with a term without s in
+    /// B, a root at 0 crosses within rows, not between them; more cells a row cost less.
     fn of(map: &'a Map<'a>) -> Option<Self> {
         let candidates = map.axes.iter().enumerate().filter_map(|(along, axis)| {
             let (constant, slope) = map.family.split(axis.parameter)?;
             if !axis.points.is_sorted() {
                 return None;
             }
-            let rank = (slope.degree() < constant.degree(), axis.points.len(), along);
+            let rank = (
+                slope.degree() < constant.degree(),
+                slope.has_constant(),
+                axis.points.len(),
+                along,
+            );
             Some((
                 rank,
                 Self {
@@ -204,6 +257,25 @@ impl<'a> Rows<'a> {
     }
 
     fn rows(&self) -> Result<Vec<Row>, Error> {
+        self.each(|members| {
+            let mut row = members.count(self.map.task)?;
+            if self.map.question.abscissa {
+                row.cells = members.abscissas(&row, self.map.task)?;
+            }
+            self.map.task.advance(members.points.len() as u64);
+            Ok(row)
+        })
+    }
+
+    fn crossings(&self) -> Result<Vec<Vec<Crossing>>, Error> {
+        self.each(|members| Ok(members.found(self.map.task)?.unwrap_or_default()))
+    }
+
+    /// Do the same for all rows.
+    fn each<T: Send>(
+        &self,
+        work: impl Fn(Members<'_>) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
         let (axis, across) = (self.axis(), self.across());
         let rows = (0..across.points.len()).into_par_iter().map(|index| {
             self.map.task.check()?;
@@ -217,18 +289,12 @@ impl<'a> Rows<'a> {
             let mut bare = values.clone();
             put_value(&mut bare, axis.parameter, 0.0);
             let parts = self.constant.at(&bare).ok().zip(self.slope.at(&bare).ok());
-            let members = Members {
+            work(Members {
                 parts: parts.as_ref(),
                 points: axis.points,
                 member: &member,
                 line: self.map.question.line,
-            };
-            let mut row = members.count(self.map.task)?;
-            if self.map.question.abscissa {
-                row.cells = members.abscissas(&row, self.map.task)?;
-            }
-            self.map.task.advance(axis.points.len() as u64);
-            Ok(row)
+            })
         });
         rows.collect()
     }

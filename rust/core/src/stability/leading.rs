@@ -27,6 +27,9 @@ const NEARBY: f64 = 1.5;
 /// Lines a row may have before its cells are searched alone.
 const MAX_LINES: usize = 64;
 
+/// Cells to either side that have to lie left of the chains as well.
+const BESIDE: usize = 2;
+
 /// Roots closer to the chains than this many margins are left to the search in a single cell.
 const CLOSE_TO_CHAINS: f64 = 10.0;
 
@@ -199,7 +202,16 @@ impl<'a> Leading<'a> {
                 self.lines.len() - 1
             }
         };
-        Ok((self.count(place, index) == Some(0)).then_some(Known::Chains))
+        // A root between the line and the chains is found by a search in a single cell; it comes out, or goes
+        // in, a few cells away at most.
+        let around = index.saturating_sub(BESIDE)
+            ..=index
+                .saturating_add(BESIDE)
+                .min(self.members.points.len() - 1);
+        let clear = around
+            .into_iter()
+            .all(|cell| self.count(place, cell) == Some(0));
+        Ok(clear.then_some(Known::Chains))
     }
 
     fn lay(&mut self, sigma: f64) -> Result<(), Error> {

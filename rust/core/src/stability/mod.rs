@@ -3,11 +3,12 @@
 //! `family` is h(s; p) with gains and delays as parameters; `cell` judges one member of it, with
 //! a proved count of the unstable roots; `grid` judges the members over two parameters, by `row`s in which
 //! one gain varies: `pencil` is such a row, `crossing` says where its roots cross the line,
-//! `branch` follows one of them and `leading` the rightmost.
+//! `curves` joins the crossings of all rows to the boundaries of the map; `branch` follows one of them and `leading` the rightmost.
 
 mod branch;
 mod cell;
 mod crossing;
+mod curves;
 mod family;
 mod grid;
 mod leading;
@@ -15,8 +16,9 @@ mod pencil;
 mod row;
 
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
+pub use curves::Vertex;
 pub use family::{Affine, Family, Term};
-pub use grid::{Axis, Chart, Proof, Question, map};
+pub use grid::{Axis, Boundaries, Chart, Proof, Question, boundaries, map};
 
 #[cfg(test)]
 mod tests;

@@ -33,8 +33,6 @@ pub(super) struct Span {
 pub(super) struct Row {
     /// All cells, in order.
     pub(super) spans: Vec<Span>,
-    /// Crossings of the line, by ω.
-    pub(super) crossings: Vec<Crossing>,
     /// Cell by cell, where the abscissa is asked for.
     pub(super) cells: Vec<Cell>,
 }
@@ -75,7 +73,7 @@ impl Members<'_> {
             });
         }
         match self.crossings(a, b, task)? {
-            Some(crossings) => self.between(crossings, task),
+            Some(crossings) => self.between(&crossings, task),
             None => self.alone(task),
         }
     }
@@ -90,11 +88,8 @@ impl Members<'_> {
     /// # Errors
     /// [`Error::Interrupted`] alone.
     pub(super) fn crossed(&self, task: &Task) -> Result<Row, Error> {
-        let Some((a, b)) = self.parts else {
-            return Ok(Row::default());
-        };
-        match self.crossings(a, b, task)? {
-            Some(crossings) => self.between(crossings, task),
+        match self.found(task)? {
+            Some(crossings) => self.between(&crossings, task),
             None => Ok(Row::default()),
         }
     }
@@ -119,7 +114,18 @@ impl Members<'_> {
         })
     }
 
-    /// All crossings of the row; `None` where they do not decide.
+    /// All crossings of the row by ω; `None` where they do not decide.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    pub(super) fn found(&self, task: &Task) -> Result<Option<Vec<Crossing>>, Error> {
+        match self.parts {
+            Some((a, b)) => self.crossings(a, b, task),
+            None => Ok(None),
+        }
+    }
+
+    /// [`found`](Self::found), of parts that are known.
     fn crossings(
         &self,
         a: &QuasiPolynomial,
@@ -150,8 +156,8 @@ impl Members<'_> {
     }
 
     /// Cells by the crossings between them.
-    fn between(&self, crossings: Vec<Crossing>, task: &Task) -> Result<Row, Error> {
-        let windows = self.windows(&crossings);
+    fn between(&self, crossings: &[Crossing], task: &Task) -> Result<Row, Error> {
+        let windows = self.windows(crossings);
         // What lies between the windows, and the jump to the next of them.
         let mut free: Vec<(usize, usize, Option<i32>)> = Vec::with_capacity(windows.len() + 1);
         let mut start = 0;
@@ -191,7 +197,6 @@ impl Members<'_> {
         }
         Ok(Row {
             spans,
-            crossings,
             ..Row::default()
         })
     }
