@@ -145,7 +145,8 @@ def test_cell_is_the_pointwise_call(family):
         cell = zip(chart.names, (i, j), strict=True)
         h = family.at(**{name: chart.axes[name][k] for name, k in cell})
         assert unstable == h.count(re=(0, None))
-        assert chart.abscissa[i, j] == h.spectral_abscissa()
+        # Two ways to the same root, each within its disc.
+        assert abs(chart.abscissa[i, j] - h.spectral_abscissa()) <= 1e-11
         assert chart.stable[i, j] == h.is_stable()
 
 
@@ -254,7 +255,7 @@ def test_best_is_the_leftmost_abscissa():
     chart = dtm.stability_map(VELOCITY, {"Kp": (0.1, 6), "Kv": (-0.95, 0.95)}, shape=(50, 39))
     values, abscissa = chart.best()
     assert abscissa == chart.abscissa[chart.stable].min()
-    assert VELOCITY.at(**values).spectral_abscissa() == abscissa
+    assert abs(VELOCITY.at(**values).spectral_abscissa() - abscissa) <= 1e-11
     with pytest.raises(ValueError, match="no cell of the map is stable"):
         dtm.stability_map(VELOCITY, {"Kp": (-2, -1), "Kv": (0, 0.5)}, (3, 3)).best()
     with pytest.raises(ValueError, match="abscissa=True"):
@@ -316,11 +317,10 @@ def test_to_xarray_names_the_axes():
 
 def test_progress_is_told_and_ends_with_all_cells():
     told = []
-    dtm.stability_map(
-        VELOCITY, {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}, shape=(150, 100), progress=told.append
-    )
+    ranges = {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}
+    dtm.stability_map(VELOCITY, ranges, shape=(300, 200), proof="cells", progress=told.append)
     assert told == sorted(told)
-    assert told[-1] == 15000
+    assert told[-1] == 60000
     assert len(told) > 1
 
 

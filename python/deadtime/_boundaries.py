@@ -60,14 +60,15 @@ def boundaries_of(
     family: ParametricQuasiPolynomial,
     axes: dict[str, _Floats],
     decay: float,
+    damping: tuple[float, float] | None = None,
     threads: int | None = None,
 ) -> tuple[Boundary, ...]:
-    """Curves on which members of `family` have roots with real part ``-decay``, longest first."""
+    """Curves on which members of `family` have roots on the edge, longest first."""
     names = tuple(axes)
     places = (family.names.index(names[0]), family.names.index(names[1]))
     first, second = (axes[name] for name in names)
     found = family._family.boundaries(
-        [0.0] * len(family.names), places, first, second, -decay, threads
+        [0.0] * len(family.names), places, first, second, decay, damping, threads
     )
     if found is None:
         raise ValueError(

@@ -139,7 +139,8 @@ class Family:
         parameters: tuple[int, int],
         first: NDArray[np.float64],
         second: NDArray[np.float64],
-        line: float,
+        decay: float,
+        damping: tuple[float, float] | None,
         abscissa: bool,
         cells: bool,
         threads: int | None = None,
@@ -151,7 +152,8 @@ class Family:
         parameters: tuple[int, int],
         first: NDArray[np.float64],
         second: NDArray[np.float64],
-        line: float,
+        decay: float,
+        damping: tuple[float, float] | None,
         threads: int | None = None,
     ) -> (
         tuple[

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from deadtime._recording import Recording
     from deadtime._response import Response
     from deadtime._rootset import RootSet
-    from deadtime._stability import StabilityMap
     from deadtime._transfer import TransferFunction
 
 __all__ = [
@@ -34,7 +33,6 @@ __all__ = [
     "plot_nyquist",
     "plot_responses",
     "plot_root_set",
-    "plot_stability_map",
     "shown_axes",
     "shown_rows",
 ]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,6 +67,8 @@ class StabilityMap(ReadOnlyArrays):
         A `MapStatus`.
     decay : float
         Roots right of ``-decay`` count as unstable, 1/s.
+    damping : (ratio, horizon) or None
+        Roots right of ``-horizon``, 1/s, with a smaller damping ratio count as unstable, too.
     family : ParametricQuasiPolynomial or None
         What was judged; None for a sampled loop.
 
@@ -81,11 +83,12 @@ class StabilityMap(ReadOnlyArrays):
     abscissa: _Floats
     status: NDArray[np.uint8]
     decay: float = 0.0
+    damping: tuple[float, float] | None = None
     family: ParametricQuasiPolynomial | None = None
 
     @cached_property
     def boundaries(self) -> tuple[Boundary, ...]:
-        """Curves on which a root has the real part ``-decay``: tuple of `Boundary`, longest first.
+        """Curves on which a root lies on the edge of stability: `Boundary` objects, longest first.
 
         Raises
         ------
@@ -101,7 +104,7 @@ class StabilityMap(ReadOnlyArrays):
         >>> chart = dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-0.5, 0.5)}, abscissa=False)
         >>> curve = chart.boundaries[0]
         >>> curve
-        <Boundary of 101 points: Kp 2.51921 to 5.03842, omega 2.9089 to 5.81776 rad/s>
+        <Boundary of 101 points: Kp 2.51917 to 5.05472, Kv -0.5 to 0.5, omega 2.90888 to 5.81776 rad/s>
         >>> bool(np.allclose(curve.values["Kv"], -np.cos(0.36 * curve.omega)))
         True
         """
@@ -110,7 +113,7 @@ class StabilityMap(ReadOnlyArrays):
                 "the map of a sampled loop has no crossing curves: its boundary is where the "
                 "abscissa changes sign"
             )
-        return boundaries_of(self.family, self.axes, self.decay)
+        return boundaries_of(self.family, self.axes, self.decay, self.damping)
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
@@ -179,8 +182,8 @@ class StabilityMap(ReadOnlyArrays):
         chosen : mapping of str to float, optional
             Values of the two parameters to mark.
         show : {"abscissa", "counts"}, optional
-            What the colours mean: the spectral abscissa of the stable cells (by default, where it was
-            computed), or the number of unstable roots.
+            What the colours mean: the spectral abscissa of the stable cells (by default, where it
+            was computed), or the number of unstable roots.
 
         Returns
         -------
@@ -239,6 +242,7 @@ def stability_map(
     *,
     abscissa: bool = True,
     decay: float = 0.0,
+    damping: tuple[float, float] | None = None,
     proof: str = "curves",
     threads: int | None = None,
     progress: _Progress | None = None,
@@ -261,11 +265,15 @@ def stability_map(
         loop it comes with the counts and is always given.)
     decay : float
         Stable means that every root has a real part below ``-decay``, in 1/s.
+    damping : (ratio, horizon), optional
+        Stable also means that every root with a real part above ``-horizon``, in 1/s, has a
+        damping ratio ``-Re s/abs(s)`` of at least `ratio`. (Faster ones are let go: a loop with a
+        delay has infinitely many of them, with damping ratios down to 0.)
     proof : {"curves", "cells"}
-        How counts are proved: by all crossings of the boundary along each row of cells and one count
-        for every row, or by a count for every single cell. Both give the same counts; the second
-        is a check of the first, hundreds of times slower. Where the abscissa is computed, or the
-        family is affine in neither parameter, every cell has a count of its own anyway.
+        How cells are proved: by all crossings of the boundary along each row of cells and one
+        count for every row, or each cell by itself. Both give the same counts; the second is a
+        check of the first, hundreds of times slower. Where the family is affine in neither
+        parameter, every cell is judged by itself anyway.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
     progress : callable, optional
@@ -311,7 +319,7 @@ def stability_map(
     threads = thread_number(threads)
     if proof not in ("curves", "cells"):
         raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
-    question = _Question(bool(abscissa), finite("decay", decay), proof)
+    question = _Question(bool(abscissa), finite("decay", decay), _damping(damping), proof)
     cells = len(axes[names[0]]) * len(axes[names[1]])
     if isinstance(family, ControlLoop):
         found = _map_loop(family, names, axes, question, threads, progress)
@@ -328,7 +336,9 @@ def stability_map(
     arrays: list[NDArray[Any]] = [*axes.values(), unstable, alpha, status]
     for array in arrays:
         read_only(array)
-    return StabilityMap(names, axes, unstable, alpha, status, question.decay, judged)
+    return StabilityMap(
+        names, axes, unstable, alpha, status, question.decay, question.damping, judged
+    )
 
 
 @dataclass(frozen=True)
@@ -337,6 +347,7 @@ class _Question:
 
     abscissa: bool
     decay: float
+    damping: tuple[float, float] | None
     proof: str
 
 
@@ -373,7 +384,8 @@ def _map_family(
         places,
         first,
         second,
-        -question.decay,
+        question.decay,
+        question.damping,
         question.abscissa,
         question.proof == "cells",
         threads,
@@ -407,10 +419,10 @@ def _map_loop(
             "loop.replace(delay=...)"
         )
     if loop.is_sampled:
-        if question.decay != 0.0:
+        if question.decay != 0.0 or question.damping is not None:
             raise ValueError(
-                f"decay={question.decay}: a sampled loop is judged by the unit circle; use its "
-                "abscissa, which is always computed"
+                f"decay={question.decay}, damping={question.damping}: a sampled loop is judged by "
+                "the unit circle; use its abscissa, which is always computed"
             )
         return _map_sampled(loop, values, names, axes, threads, progress)
     values |= {name: Parameter(name) for name in names}
@@ -464,6 +476,16 @@ def _axes(
             "shape, or several maps of smaller ranges"
         )
     return (first, second), axes
+
+
+def _damping(given: object) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    try:
+        ratio, horizon = cast(Any, given)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"damping={given!r}: give (ratio, horizon), such as (0.4, 5.0)") from error
+    return finite("damping ratio", ratio), finite("horizon of the damping", horizon)
 
 
 def _shape(shape: Sequence[int]) -> tuple[int, int]:

@@ -57,7 +57,7 @@ def _shade_abscissa(
 def _shade_counts(
     ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> None:
-    """Number of unstable roots: white for none, darker the more there are, grey for no end of them."""
+    """Number of unstable roots: green for none, grey for no end of them."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -107,12 +107,13 @@ def _missing_edges(chart: StabilityMap) -> NDArray[np.bool_]:
 
 def _label(ax: Axes, chart: StabilityMap, curve: Boundary) -> None:
     """Write the frequencies of a curve beside it, in the middle of its course."""
+    across, up = chart.names
     high = float(curve.omega.max())
     middle = len(curve) // 2
     text = "ω = 0" if high == 0.0 else f"ω = {curve.omega[middle]:.3g}"
     ax.annotate(
         text,
-        tuple(float(curve.values[name][middle]) for name in chart.names),
+        (float(curve.values[across][middle]), float(curve.values[up][middle])),
         textcoords="offset points",
         xytext=(4, 4),
         fontsize="x-small",

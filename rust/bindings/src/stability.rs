@@ -1,6 +1,6 @@
 //! Bindings of `deadtime::stability`.
 
-use deadtime::stability::{self, Affine, Axis, Family, Proof, Question, Term};
+use deadtime::stability::{self, Affine, Axis, Damping, Demand, Family, Proof, Question, Term};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 
@@ -64,7 +64,7 @@ impl PyFamily {
     }
 
     /// Counts, abscissas (if asked for) and statuses over two parameters; `values` holds the others.
-    #[pyo3(signature = (values, parameters, first, second, line, abscissa, cells, threads=None, progress=None))]
+    #[pyo3(signature = (values, parameters, first, second, decay, damping, abscissa, cells, threads=None, progress=None))]
     #[expect(
         clippy::too_many_arguments,
         reason = "two axes, what is asked and how to run"
@@ -76,7 +76,8 @@ impl PyFamily {
         parameters: (usize, usize),
         first: Floats<'py>,
         second: Floats<'py>,
-        line: f64,
+        decay: f64,
+        damping: Option<(f64, f64)>,
         abscissa: bool,
         cells: bool,
         threads: Option<usize>,
@@ -86,7 +87,7 @@ impl PyFamily {
         let axis = |parameter, points| Axis { parameter, points };
         let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
         let question = Question {
-            line,
+            demand: demand(decay, damping),
             abscissa,
             proof: if cells { Proof::Cells } else { Proof::Curves },
         };
@@ -107,7 +108,7 @@ impl PyFamily {
     }
 
     /// The axis along the rows, and the curves: positions on it, rows, frequencies and jumps.
-    #[pyo3(signature = (values, parameters, first, second, line, threads=None))]
+    #[pyo3(signature = (values, parameters, first, second, decay, damping, threads=None))]
     #[expect(
         clippy::too_many_arguments,
         reason = "two axes, what is asked and how to run"
@@ -119,7 +120,8 @@ impl PyFamily {
         parameters: (usize, usize),
         first: Floats<'py>,
         second: Floats<'py>,
-        line: f64,
+        decay: f64,
+        damping: Option<(f64, f64)>,
         threads: Option<usize>,
     ) -> PyResult<Option<(usize, Vec<Curve<'py>>)>> {
         let (first, second) = (in_order(&first), in_order(&second));
@@ -127,7 +129,7 @@ impl PyFamily {
         let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
         let family = &self.inner;
         let found = run(py, threads, None, |task| {
-            stability::boundaries(family, &values, axes, line, task)
+            stability::boundaries(family, &values, axes, demand(decay, damping), task)
         })?;
         Ok(found.map(|found| {
             let curves = found.curves.into_iter().map(|curve| {
@@ -144,5 +146,13 @@ impl PyFamily {
             });
             (found.along, curves.collect())
         }))
+    }
+}
+
+/// Decay, and (damping ratio, horizon).
+fn demand(decay: f64, damping: Option<(f64, f64)>) -> Demand {
+    Demand {
+        decay,
+        damping: damping.map(|(ratio, horizon)| Damping { ratio, horizon }),
     }
 }

@@ -6,8 +6,13 @@
 //! delays. The abscissa is the larger of the rightmost root's real part and the abscissa of the
 //! chains. What double precision cannot tell is named, not guessed.
 
+use num_complex::Complex64;
+
+use super::demand::Demand;
 use crate::quasipoly::{Kind, QuasiPolynomial};
-use crate::roots::{chain_abscissa, count_right_of, rightmost, unstable_and_rightmost};
+use crate::roots::{
+    Region, chain_abscissa, count_right_of, rightmost, roots, unstable_and_rightmost,
+};
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
@@ -41,8 +46,8 @@ impl Cell {
     };
 }
 
-/// Judge the stability of h: are there roots right of Re s = `line`? With `abscissa`, also how far its
-/// roots are from the axis.
+/// Judge the stability of h: how many of its roots offend against `demand`? With `abscissa`, also how far
+/// they are from the axis.
 ///
 /// * `Ok`: count (and abscissa) hold.
 /// * `Boundary`: a root, or a chain of them, lies on the line to working precision.
@@ -58,13 +63,18 @@ impl Cell {
 /// [`Error::Interrupted`] alone.
 ///
 /// ```
-/// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::judge, status::CellStatus};
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::{Demand, judge}, status::CellStatus};
 /// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![5.0]], vec![0.0, 0.36])?;
-/// let cell = judge(&h, 0.0, true, &Task::new())?;
+/// let cell = judge(&h, Demand::default(), true, &Task::new())?;
 /// assert_eq!((cell.unstable, cell.status), (2, CellStatus::Ok));
 /// # Ok::<(), deadtime::Error>(())
 /// ```
-pub fn judge(h: &QuasiPolynomial, line: f64, abscissa: bool, task: &Task) -> Result<Cell, Error> {
+pub fn judge(
+    h: &QuasiPolynomial,
+    demand: Demand,
+    abscissa: bool,
+    task: &Task,
+) -> Result<Cell, Error> {
     if h.is_zero() {
         return Ok(Cell::UNDECIDED);
     }
@@ -77,9 +87,9 @@ pub fn judge(h: &QuasiPolynomial, line: f64, abscissa: bool, task: &Task) -> Res
     }
     let chain = chain_abscissa(h);
     if !abscissa {
-        let (unstable, status) = match by_chain(h, chain, line) {
+        let (unstable, status) = match by_chain(h, chain, demand.leftmost()) {
             Some(known) => known,
-            None => by_count(count_right_of(h, line, task))?,
+            None => by_count(offending(h, demand, task))?,
         };
         return Ok(Cell {
             unstable,
@@ -87,16 +97,13 @@ pub fn judge(h: &QuasiPolynomial, line: f64, abscissa: bool, task: &Task) -> Res
             status,
         });
     }
-    let ((unstable, status), set) = match by_chain(h, chain, line) {
+    let ((unstable, status), set) = match by_chain(h, chain, demand.leftmost()) {
         Some(known) => (known, rightmost(h, 1, task)),
-        None if line == 0.0 => {
+        None if demand == Demand::default() => {
             let (number, set) = unstable_and_rightmost(h, task);
             (by_count(number)?, set)
         }
-        None => (
-            by_count(count_right_of(h, line, task))?,
-            rightmost(h, 1, task),
-        ),
+        None => (by_count(offending(h, demand, task))?, rightmost(h, 1, task)),
     };
     // −∞ where no root lies right of the chains.
     let isolated = set.map(|set| set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re));
@@ -128,6 +135,23 @@ pub(super) fn with_abscissa(cell: Cell, isolated: f64, chain: f64) -> Cell {
         },
         ..cell
     }
+}
+
+/// The number of offending roots: counted, or sorted one by one where the edge is not one line.
+fn offending(h: &QuasiPolynomial, demand: Demand, task: &Task) -> Result<u64, Error> {
+    let line = demand.leftmost();
+    if demand.damping.is_none() {
+        return count_right_of(h, line, task);
+    }
+    let set = match roots(h, &Region::right_of(line), task) {
+        // A well damped root there offends no one: look from further left.
+        Err(Error::Contour { .. }) => roots(h, &Region::right_of(1.01 * line), task)?,
+        set => set?,
+    };
+    demand.offending(&set).ok_or(Error::Contour {
+        place: Complex64::new(line, 0.0),
+        distance: 0.0,
+    })
 }
 
 /// Count and status where the chains alone decide.

@@ -1,15 +1,17 @@
-//! Where roots of A + k B cross a vertical line as k varies: all of them, proved.
+//! Where roots of A + k B cross the edge of what is demanded (`demand`) as k varies: all of them, proved.
 //!
-//! They are the zeros of F (`pencil`) on [0, Ω], beyond which no root lies. From a point on, Taylor's
+//! They are the zeros of F (`pencil`) on its pieces, up to where no root lies. From a point on, Taylor's
 //! formula with the bound on F‴ proves over some length that F keeps its sign ("clear"), that F′ does
 //! ("monotone"), or that any crossing there has |k| beyond the range. Where what two neighbouring points prove meets, the signs of F at both tell whether
-//! there is exactly one zero between them or none. F is odd: ω = 0 is a zero, simple if F′(0) ≠ 0.
+//! there is exactly one zero between them or none. On the real axis F vanishes, simply if F′ ≠ 0 there.
 //!
 //! At a simple zero k = −Re(A/B), and as k grows the root goes to the left where F′ > 0, to the right
-//! where F′ < 0: with A/B + k = 0 and D = d(A/B)/ds, ds/dk = −1/D and F′ = |B|² Re D. Two roots cross,
-//! s and its mirror image, or one at ω = 0. Where neither can be proved, next to a double zero
+//! where F′ < 0: with A/B + k = 0 and D = d(A/B)/ds, ds/dk = −1/D, whose part along the normal −ic of the edge to the
+//! right has the sign of −Im(c D) = −F′/|B|². Two roots cross, s and its mirror image, or one that is real. Where neither can be proved, next to a double zero
 //! of F, the crossing is reported with an interval of k and no direction: what it does to the count is
 //! for others to find out. Each k comes with an interval that is proved to hold it.
+
+use num_complex::Complex64;
 
 use super::pencil::{Bounds, Pencil, Point};
 use crate::quasipoly::modulus;
@@ -65,14 +67,16 @@ struct Reach {
     sense: Sense,
 }
 
-/// All crossings with ω ≤ `top` and k in `range`, by increasing ω.
+/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece begin on the
+/// real axis?
 ///
-/// `None` where the line cannot be searched: B vanishes where A does, or precision is used up.
+/// `None` where it cannot be searched: B vanishes where A does, or precision is used up.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.
 pub(super) fn crossings(
     pencil: &Pencil,
+    from_axis: bool,
     top: f64,
     range: (f64, f64),
     task: &Task,
@@ -80,12 +84,16 @@ pub(super) fn crossings(
     let Some(mut search) = Search::new(pencil, range, top) else {
         return Ok(None);
     };
-    let Some(mut here) = search.start() else {
+    let Some(mut here) = (if from_axis {
+        search.start()
+    } else {
+        search.enter()
+    }) else {
         return Ok(None);
     };
     let mut stride = f64::INFINITY;
     for step in 0..MAX_POINTS {
-        if here.omega >= top {
+        if here.t >= top {
             return Ok(Some(search.found));
         }
         if step % 256 == 255 {
@@ -94,7 +102,7 @@ pub(super) fn crossings(
         let Some(next) = search.advance(&here, stride) else {
             return Ok(None);
         };
-        stride = 2.5 * (next.omega - here.omega);
+        stride = 2.5 * (next.t - here.t);
         here = next;
     }
     Ok(None)
@@ -116,29 +124,40 @@ impl<'a> Search<'a> {
         Some(Self {
             pencil,
             step,
-            bounds: pencil.bounds(step, step)?,
+            bounds: pencil.bounds(0.0, step, step)?,
             range,
             top,
             found: Vec::new(),
         })
     }
 
-    /// Bounds that hold up to `omega`.
-    fn bounds_to(&mut self, omega: f64) -> Option<Bounds> {
-        if omega > self.bounds.reach {
-            self.bounds = self.pencil.bounds(omega, self.step)?;
+    /// Bounds that hold from `low`, beyond which all is done, to `high`.
+    fn bounds_to(&mut self, low: f64, high: f64) -> Option<Bounds> {
+        if high > self.bounds.reach {
+            self.bounds = self.pencil.bounds(low, high, self.step)?;
         }
         Some(self.bounds)
     }
 
-    /// Deal with ω = 0 and return a point beyond it where the sign of F is known.
+    /// The first point of a piece that begins off the real axis, or one beyond it where the sign of F is known.
+    fn enter(&mut self) -> Option<Point> {
+        let first = self.pencil.at(0.0);
+        if self.is_clear(&first) {
+            Some(first)
+        } else {
+            self.skip(&first)
+        }
+    }
+
+    /// Deal with the real axis and return a point beyond it where the sign of F is known.
     fn start(&mut self) -> Option<Point> {
         let zero = self.pencil.at(0.0);
         let slope = zero.f[1];
         let room = slope.abs() - self.bounds.error[1];
         if room > 0.0 {
-            // F(0) = F″(0) = 0, so that F′ differs from F′(0) by ω² |F‴|/2 at most.
-            let length = (2.0 * room / self.bounds.third).sqrt() * SHARE;
+            // F(0) = 0, and up to here F′ keeps its sign.
+            let bend = zero.f[2].abs() + self.bounds.error[2];
+            let length = quadratic(room, -bend, -0.5 * self.bounds.third) * SHARE;
             self.record(&zero, 0.0, Some(if slope > 0.0 { -1 } else { 1 }))?;
             let limit = self.top.min(self.bounds.reach);
             for share in [1.0, 0.7, 0.4, 0.2, 0.1] {
@@ -199,23 +218,23 @@ impl<'a> Search<'a> {
 
     /// The next point: at most as far as both prove what lies between, or past what cannot be resolved.
     fn advance(&mut self, here: &Point, stride: f64) -> Option<Point> {
-        let rest = self.top - here.omega;
-        let bounds = self.bounds_to(1.05 * here.omega + 0.5 * self.step)?;
-        let most = rest.min(stride).min(bounds.reach - here.omega);
+        let rest = self.top - here.t;
+        let bounds = self.bounds_to(here.t, 1.05 * here.t + 0.5 * self.step)?;
+        let most = rest.min(stride).min(bounds.reach - here.t);
         let own = self.reach(here, 1.0, most, &bounds);
         let mut length = (1.9 * own.length).min(most);
         for attempt in 0..6 {
-            if here.omega + length <= here.omega {
+            if here.t + length <= here.t {
                 break;
             }
             let end = if length >= rest {
                 self.top
             } else {
-                here.omega + length
+                here.t + length
             };
             let next = self.pencil.at(end);
             if self.is_clear(&next) {
-                let back = self.reach(&next, -1.0, end - here.omega, &bounds);
+                let back = self.reach(&next, -1.0, end - here.t, &bounds);
                 if let Some(zero) = between(here, own, &next, back) {
                     if zero {
                         self.refine(here, &next)?;
@@ -235,15 +254,15 @@ impl<'a> Search<'a> {
 
     /// Leave a place behind where neither F nor F′ is known to keep its sign.
     fn skip(&mut self, here: &Point) -> Option<Point> {
-        let mut step = LEAST_STEP * here.omega.max(self.step);
+        let mut step = LEAST_STEP * here.t.max(self.step);
         for _ in 0..MAX_DOUBLINGS {
-            let end = (here.omega + step).min(self.top);
-            let bounds = self.bounds_to(end)?;
+            let end = (here.t + step).min(self.top);
+            let bounds = self.bounds_to(here.t, end)?;
             let next = self.pencil.at(end);
             let ahead = self.reach(&next, 1.0, step, &bounds);
             if end >= self.top || (self.is_clear(&next) && ahead.length > 0.25 * step) {
-                let half = 0.5 * (end - here.omega);
-                let middle = self.pencil.at(here.omega + half);
+                let half = 0.5 * (end - here.t);
+                let middle = self.pencil.at(here.t + half);
                 self.record(&middle, half * (1.0 + 1e-9), None)?;
                 return Some(next);
             }
@@ -256,7 +275,7 @@ impl<'a> Search<'a> {
     fn refine(&mut self, left: &Point, right: &Point) -> Option<()> {
         let rising = right.f[0] > 0.0;
         let jump = Some(if rising { -2 } else { 2 });
-        let (mut low, mut high) = (left.omega, right.omega);
+        let (mut low, mut high) = (left.t, right.t);
         let quotient = |point: &Point| (point.f[0] / point.f[1]).abs();
         let mut best = if quotient(left) < quotient(right) {
             *left
@@ -279,18 +298,18 @@ impl<'a> Search<'a> {
             let newton = value / slope;
             let halley = newton / (1.0 - 0.5 * newton * bend / slope);
             if (best.f[0] > 0.0) == rising {
-                high = best.omega;
+                high = best.t;
             } else {
-                low = best.omega;
+                low = best.t;
             }
-            let mut omega = best.omega - halley;
-            if !(low < omega && omega < high) {
-                omega = 0.5 * (low + high);
+            let mut t = best.t - halley;
+            if !(low < t && t < high) {
+                t = 0.5 * (low + high);
             }
-            if !(low < omega && omega < high) {
+            if !(low < t && t < high) {
                 break;
             }
-            best = self.pencil.at(omega);
+            best = self.pencil.at(t);
         }
         let half = 0.5 * (high - low);
         let middle = self.pencil.at(low + half);
@@ -299,7 +318,7 @@ impl<'a> Search<'a> {
 
     /// Note the crossing within `radius` of `point`, if its k may lie in the range.
     fn record(&mut self, point: &Point, radius: f64, jump: Option<i32>) -> Option<()> {
-        let bounds = self.bounds_to(point.omega + radius)?;
+        let bounds = self.bounds_to(point.t - radius, point.t + radius)?;
         let (a, b) = (modulus(point.a), modulus(point.b));
         let spread = |i: usize| {
             bounds.rounding * [bounds.a, bounds.b][i][0] + radius * [bounds.a, bounds.b][i][1]
@@ -318,12 +337,12 @@ impl<'a> Search<'a> {
         let (low, high) = (gain - error, gain + error);
         if high >= self.range.0 && low <= self.range.1 {
             self.found.push(Crossing {
-                omega: point.omega,
+                omega: point.s.im,
                 gain,
                 low,
                 high,
                 jump,
-                slope_at_zero: (point.omega == 0.0 && radius == 0.0).then_some(point.b.re),
+                slope_at_zero: (point.s == Complex64::ZERO && radius == 0.0).then_some(point.b.re),
             });
         }
         Some(())
@@ -363,7 +382,7 @@ fn cubic(a: f64, b: f64, c: f64, d: f64, most: f64) -> f64 {
 
 /// Is there exactly one zero between two points, or none? `None` where their reaches do not tell.
 fn between(left: &Point, right_of: Reach, right: &Point, left_of: Reach) -> Option<bool> {
-    let gap = right.omega - left.omega;
+    let gap = right.t - left.t;
     let differ = (left.f[0] > 0.0) != (right.f[0] > 0.0);
     // One of them alone may reach all the way.
     if right_of.length >= gap {

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::cell::{Cell, judge};
 use super::crossing::Crossing;
 use super::curves::{Vertex, join};
+use super::demand::Demand;
 use super::family::Family;
 use super::row::{Members, Row};
 use crate::status::CellStatus;
@@ -45,8 +46,8 @@ pub enum Proof {
 /// What is asked of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
-    /// Roots right of this line, 1/s, are counted.
-    pub line: f64,
+    /// Roots that offend against this are counted.
+    pub demand: Demand,
     /// Is the spectral abscissa asked for too?
     pub abscissa: bool,
     /// How counts are proved.
@@ -87,6 +88,7 @@ pub fn map(
     question: Question,
     task: &Task,
 ) -> Result<Chart, Error> {
+    question.demand.check()?;
     let cells = check(family, values, axes)?;
     let map = Map {
         family,
@@ -116,7 +118,7 @@ pub struct Boundaries {
     pub curves: Vec<Vec<Vertex>>,
 }
 
-/// The curves on which roots lie on the line; `None` where the family is affine in neither parameter.
+/// The curves on which roots lie on the edge of what is demanded; `None` where the family is affine in neither parameter.
 ///
 /// # Errors
 /// As for [`map`].
@@ -124,16 +126,17 @@ pub fn boundaries(
     family: &Family,
     values: &[f64],
     axes: [Axis<'_>; 2],
-    line: f64,
+    demand: Demand,
     task: &Task,
 ) -> Result<Option<Boundaries>, Error> {
+    demand.check()?;
     check(family, values, axes)?;
     let map = Map {
         family,
         values,
         axes,
         question: Question {
-            line,
+            demand,
             ..Question::default()
         },
         task,
@@ -162,7 +165,9 @@ struct Map<'a> {
 
 impl Map<'_> {
     fn cell_by_cell(&self) -> Result<Chart, Error> {
-        let Question { line, abscissa, .. } = self.question;
+        let Question {
+            demand, abscissa, ..
+        } = self.question;
         let [first, second] = self.axes;
         let width = second.points.len();
         let cells = first.points.len() * width;
@@ -173,7 +178,7 @@ impl Map<'_> {
             put(values, first, index / width);
             put(values, second, index % width);
             let cell = match self.family.at(values) {
-                Ok(h) => judge(&h, line, abscissa, self.task)?,
+                Ok(h) => judge(&h, demand, abscissa, self.task)?,
                 Err(_) => Cell::UNDECIDED,
             };
             self.task.advance(1);
@@ -293,7 +298,7 @@ impl<'a> Rows<'a> {
                 parts: parts.as_ref(),
                 points: axis.points,
                 member: &member,
-                line: self.map.question.line,
+                demand: self.map.question.demand,
             })
         });
         rows.collect()

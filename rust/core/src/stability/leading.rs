@@ -93,7 +93,7 @@ impl Members<'_> {
                 match (known, (self.member)(index)) {
                     (Known::Isolated(abscissa), _) => Ok(with_abscissa(cell, abscissa, chain)),
                     (Known::Chains, _) => Ok(with_abscissa(cell, f64::NEG_INFINITY, chain)),
-                    (Known::Nothing, Some(h)) => judge(&h, self.line, true, task),
+                    (Known::Nothing, Some(h)) => judge(&h, self.demand, true, task),
                     (Known::Nothing, None) => Ok(Cell::UNDECIDED),
                 }
             })

@@ -1,18 +1,19 @@
-//! A pencil A(s) + k B(s) on a vertical line s = x + iω, and the function whose zeros are its crossings.
+//! A pencil A(s) + k B(s) on a straight line s = s₀ + c t, |c| = 1, and the function whose zeros are its crossings.
 //!
-//! With the delays counted from one of B's, F(ω) = Im(A B*) vanishes where some real k makes
+//! With the delays counted from one of B's, F(t) = Im(A B*) vanishes where some real k makes
 //! A + k B zero at s, and there k = −Re(A/B) (D-subdivision: Neimark 1949). F and its first two
-//! derivatives in ω come from A, A′, A″ and those of B; |F‴| ≤ A₃B₀ + 3A₂B₁ + 3A₁B₂ + A₀B₃, where A_i bounds
-//! |A⁽ⁱ⁾| by the moduli of its coefficients for all ω up to `Bounds::reach`.
+//! derivatives in t come from A, A′, A″ and those of B; |F‴| ≤ A₃B₀ + 3A₂B₁ + 3A₁B₂ + A₀B₃, where A_i bounds
+//! |A⁽ⁱ⁾| by the moduli of its coefficients on a stretch of the line.
 //!
 //! Rounding, as derived in `quasipoly::probe`: A, A′ and A″ of degree n with m terms are within
-//! ε A_i, ε = u (12n + m + 16 + 4 d (|x| + ω)), d the largest delay. Coefficients and delays that are
-//! themselves sums of a few rounded products change A by u (8 + 8 d (|x| + ω)) A₀ at most, which ε includes:
+//! ε A_i, ε = u (12n + m + 16 + 4 d (|x| + |y|)), d the largest delay. Coefficients and delays that are
+//! themselves sums of a few rounded products change A by u (8 + 8 d (|x| + |y|)) A₀ at most, which ε includes:
 //! what is proved holds for both. Then F⁽ⁱ⁾ is within 2.25 ε times the product of bounds that bounds it: 2 ε + ε² from the
 //! factors, 3 u from their product.
 
 use num_complex::Complex64;
 
+use super::demand::Piece;
 use crate::elementary::{exp, sin_cos};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 
@@ -26,40 +27,42 @@ const ROOM: f64 = 1.0 + 1e-9;
 /// Underflow cannot change sums that are larger by so much.
 const USABLE: std::ops::Range<f64> = 1e-250..1e280;
 
-/// The rows of A and B with one delay, and e^(−x d).
+/// The rows of A and B with one delay d, and |e^(−s d)| where it is the same all along.
 #[derive(Debug, Clone)]
 struct Row {
     a: Vec<f64>,
     b: Vec<f64>,
     delay: f64,
-    weight: f64,
+    weight: Option<f64>,
 }
 
-/// A(s) + k B(s) on the line Re s = x.
+/// A(s) + k B(s) along a line.
 #[derive(Debug, Clone)]
 pub(super) struct Pencil {
     rows: Vec<Row>,
-    x: f64,
+    line: Piece,
     degree: f64,
     longest: f64,
 }
 
-/// Value and first two derivatives by ω.
+/// Value and first two derivatives.
 type Jet = [Complex64; 3];
 
-/// What is known at one ω.
+/// What is known at one t.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
-    pub(super) omega: f64,
+    pub(super) t: f64,
+    pub(super) s: Complex64,
     pub(super) a: Complex64,
     pub(super) b: Complex64,
     /// F, F′, F″.
     pub(super) f: [f64; 3],
 }
 
-/// Bounds for all ω up to `reach`.
+/// Bounds on a stretch of the line.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
+    /// The t of its far end.
     pub(super) reach: f64,
     /// A₀, A₁.
     pub(super) a: [f64; 2],
@@ -76,21 +79,27 @@ pub(super) struct Bounds {
 
 impl Pencil {
     /// `None` where B is zero, or numbers would leave the range of double precision.
-    pub(super) fn new(a: &QuasiPolynomial, b: &QuasiPolynomial, x: f64) -> Option<Self> {
+    pub(super) fn new(a: &QuasiPolynomial, b: &QuasiPolynomial, line: Piece) -> Option<Self> {
         let origin = b.delays().first().copied().filter(|_| !b.is_zero())?;
         let rows: Vec<Row> = united(a, b)
             .into_iter()
-            .map(|(delay, a, b)| Row {
-                a,
-                b,
-                delay: delay - origin,
-                weight: exp(-x * (delay - origin)),
+            .map(|(delay, a, b)| {
+                let delay = delay - origin;
+                let upright = line.along.re == 0.0;
+                Row {
+                    a,
+                    b,
+                    delay,
+                    weight: (upright || delay == 0.0).then(|| exp(-line.from.re * delay)),
+                }
             })
             .collect();
-        let usable = |row: &Row| USABLE.contains(&row.weight) && row.delay.is_finite();
+        let usable = |row: &Row| {
+            row.weight.is_none_or(|weight| USABLE.contains(&weight)) && row.delay.is_finite()
+        };
         let longest = rows.iter().fold(0.0, |d, row| row.delay.abs().max(d));
         rows.iter().all(usable).then(|| Self {
-            x,
+            line,
             degree: a.degree().max(b.degree()) as f64,
             longest,
             rows,
@@ -102,26 +111,29 @@ impl Pencil {
         1.0 / self.longest
     }
 
-    /// A, B and F at x + iω.
-    pub(super) fn at(&self, omega: f64) -> Point {
-        let s = Complex64::new(self.x, omega);
+    /// A, B and F at one t.
+    pub(super) fn at(&self, t: f64) -> Point {
+        let s = self.line.from + self.line.along * t;
         let (mut a, mut b) = ([Complex64::ZERO; 3], [Complex64::ZERO; 3]);
         for row in &self.rows {
+            let weight = row.weight.unwrap_or_else(|| exp(-row.delay * s.re));
             let turn = if row.delay == 0.0 {
-                Complex64::new(row.weight, 0.0)
+                Complex64::new(weight, 0.0)
             } else {
-                let (sine, cosine) = sin_cos(row.delay * omega);
-                Complex64::new(row.weight * cosine, -row.weight * sine)
+                let (sine, cosine) = sin_cos(row.delay * s.im);
+                Complex64::new(weight * cosine, -weight * sine)
             };
             add_term(&mut a, &row.a, s, row.delay, turn);
             add_term(&mut b, &row.b, s, row.delay, turn);
         }
-        // d/dω = i d/ds.
-        let along = |[value, slope, bend]: Jet| [value, Complex64::new(-slope.im, slope.re), -bend];
+        // d/dt = c d/ds.
+        let c = self.line.along;
+        let along = |[value, slope, bend]: Jet| [value, c * slope, c * c * bend];
         let (p, q) = (along(a), along(b));
         let cross = |i: usize, j: usize| p[i].im * q[j].re - p[i].re * q[j].im;
         Point {
-            omega,
+            t,
+            s,
             a: p[0],
             b: q[0],
             f: [
@@ -132,13 +144,23 @@ impl Pencil {
         }
     }
 
-    /// Bounds for all ω up to a little more than `omega`, by `step` or so; `None` where they leave the range
-    /// of double precision.
-    pub(super) fn bounds(&self, omega: f64, step: f64) -> Option<Bounds> {
-        let reach = AHEAD * omega + step;
-        let size = modulus(Complex64::new(self.x, reach)) * ROOM;
+    /// Bounds from `low` to a little more than `high`, by `step` or so; `None` where they leave the range of
+    /// double precision.
+    pub(super) fn bounds(&self, low: f64, high: f64, step: f64) -> Option<Bounds> {
+        let reach = AHEAD * high + step;
+        let ends = [low, reach].map(|t| self.line.from + self.line.along * t);
+        // A modulus is largest, and an exponential of the real part, at one of the ends.
+        let size = modulus(ends[0]).max(modulus(ends[1])) * ROOM;
+        let heaviest = |row: &Row| {
+            let [first, last] = ends.map(|s| exp(-row.delay * s.re));
+            row.weight.unwrap_or(first.max(last) * ROOM)
+        };
+        let weights: Vec<f64> = self.rows.iter().map(heaviest).collect();
+        if !weights.iter().all(|weight| USABLE.contains(weight)) {
+            return None;
+        }
         let (mut a, mut b) = ([0.0; 4], [0.0; 4]);
-        for row in &self.rows {
+        for (row, weight) in self.rows.iter().zip(&weights) {
             let d = row.delay.abs();
             for (sums, coefficients) in [(&mut a, &row.a), (&mut b, &row.b)] {
                 let [p, p1, p2, p3] = sizes(coefficients, size);
@@ -149,25 +171,29 @@ impl Pencil {
                     p3 + d * (3.0 * p2 + d * (3.0 * p1 + d * p)),
                 ];
                 for (sum, term) in sums.iter_mut().zip(terms) {
-                    *sum += row.weight * term * ROOM;
+                    *sum += weight * term * ROOM;
                 }
             }
         }
-        // A modulus does not turn: its delays may be counted from any of them.
+        // How fast a modulus changes does not depend on which of the delays the others are counted from if the
+        // line is upright; if not, from the own one.
         let modulus = [0, 1].map(|which| {
             let from = |origin: f64| {
-                self.rows.iter().fold(0.0, |sum, row| {
-                    let [p, p1, ..] = sizes(if which == 0 { &row.a } else { &row.b }, size);
-                    sum + row.weight * (p1 + (row.delay - origin).abs() * p) * ROOM
-                })
+                self.rows
+                    .iter()
+                    .zip(&weights)
+                    .fold(0.0, |sum, (row, weight)| {
+                        let [p, p1, ..] = sizes(if which == 0 { &row.a } else { &row.b }, size);
+                        sum + weight * (p1 + (row.delay - origin).abs() * p) * ROOM
+                    })
             };
+            if self.line.along.re != 0.0 {
+                return from(0.0);
+            }
             let all = self.rows.iter().map(|row| from(row.delay));
             all.fold(f64::INFINITY, f64::min)
         });
-        let units = 12.0 * self.degree
-            + self.rows.len() as f64
-            + 24.0
-            + 16.0 * self.longest * (self.x.abs() + reach);
+        let units = 12.0 * self.degree + self.rows.len() as f64 + 24.0 + 32.0 * self.longest * size;
         let rounding = 0.51 * f64::EPSILON * units;
         let first = a[1] * b[0] + a[0] * b[1];
         let second = a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2];

@@ -1,7 +1,7 @@
 //! One row of a map: a gain k varies, all else is fixed.
 //!
-//! Where the members A + k B have the same leading terms for all k, their roots with Re s ≥ x lie within
-//! one radius Ω, and their number changes at the crossings of [0, Ω] only (`crossing`). One proved
+//! Where the members A + k B have the same leading terms for all k, their offending roots lie within
+//! one radius, and their number changes at the crossings of the edge only (`crossing`). One proved
 //! count anchors each run of cells between crossings whose effect is not known; the others follow by
 //! addition. Cells within the interval of a crossing, or closer to it than MARGIN, are judged alone, as
 //! are all cells of a row for which none of this holds.
@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use super::cell::{Cell, UNKNOWN, judge};
 use super::crossing::{Crossing, crossings};
+use super::demand::Demand;
 use super::pencil::{Pencil, united};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{chain_abscissa, radius_right_of};
@@ -46,8 +47,8 @@ pub(super) struct Members<'a> {
     pub(super) points: &'a [f64],
     /// The member of a cell; `None` where it cannot be formed.
     pub(super) member: &'a dyn Fn(usize) -> Option<QuasiPolynomial>,
-    /// Roots right of this line are counted.
-    pub(super) line: f64,
+    /// Roots that offend against it are counted.
+    pub(super) demand: Demand,
 }
 
 impl Members<'_> {
@@ -78,9 +79,12 @@ impl Members<'_> {
         }
     }
 
-    /// The same members and another line.
+    /// The same members, roots right of `line` being counted.
     pub(super) fn right_of(self, line: f64) -> Self {
-        Self { line, ..self }
+        Self {
+            demand: Demand::left_of(line),
+            ..self
+        }
     }
 
     /// Counts as far as crossings give them; no spans where they do not.
@@ -136,23 +140,31 @@ impl Members<'_> {
             return Ok(None);
         };
         // Where chains lead, or may, every cell says so by itself.
-        if chain_abscissa(&hull) >= self.line {
+        let leftmost = self.demand.leftmost();
+        if chain_abscissa(&hull) >= leftmost {
             return Ok(None);
         }
-        let Some(radius) = radius_right_of(&hull, self.line) else {
+        let Some(radius) = radius_right_of(&hull, leftmost).filter(|radius| *radius > 0.0) else {
             return Ok(None);
         };
-        let top = ((radius - self.line.abs()) * (radius + self.line.abs()))
-            .max(0.0)
-            .sqrt();
+        let side = leftmost.abs();
+        let top = ((radius - side) * (radius + side)).max(0.0).sqrt();
         let top = top.max(1e-3 * radius) * (1.0 + 1e-9);
-        let Some(pencil) = Pencil::new(a, b, self.line) else {
-            return Ok(None);
-        };
-        if top == 0.0 {
-            return Ok(None);
+        let mut all = Vec::new();
+        for (index, piece) in self.demand.pieces().into_iter().enumerate() {
+            let length = piece.length.min(top - piece.from.im);
+            if length <= 0.0 {
+                break;
+            }
+            let Some(pencil) = Pencil::new(a, b, piece) else {
+                return Ok(None);
+            };
+            match crossings(&pencil, index == 0, length, range, task)? {
+                Some(found) => all.extend(found),
+                None => return Ok(None),
+            }
         }
-        crossings(&pencil, top, range, task)
+        Ok(Some(all))
     }
 
     /// Cells by the crossings between them.
@@ -240,10 +252,7 @@ impl Members<'_> {
                     .points
                     .partition_point(|k| *k <= crossing.high + margin),
                 jump: crossing.jump,
-                rises_at_zero: crossing
-                    .slope_at_zero
-                    .map(|slope| slope > 0.0)
-                    .filter(|_| self.line == 0.0),
+                rises_at_zero: crossing.slope_at_zero.map(|slope| slope > 0.0),
             })
             .collect();
         windows.sort_unstable_by_key(|window| (window.from, window.to));
@@ -291,7 +300,7 @@ impl Members<'_> {
 
     fn judge(&self, index: usize, task: &Task) -> Result<Cell, Error> {
         match (self.member)(index) {
-            Some(h) => judge(&h, self.line, false, task),
+            Some(h) => judge(&h, self.demand, false, task),
             None => Ok(Cell::UNDECIDED),
         }
     }

@@ -2,14 +2,17 @@ use std::f64::consts::PI;
 
 use proptest::prelude::*;
 
-use super::{Affine, Axis, ENDLESS, Family, Proof, Question, Term, UNKNOWN, judge, map};
+use super::{Affine, Axis, Demand, ENDLESS, Family, Proof, Question, Term, UNKNOWN, judge, map};
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{count_right_of, spectral_abscissa};
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
 const COUNTS: Question = Question {
-    line: 0.0,
+    demand: Demand {
+        decay: 0.0,
+        damping: None,
+    },
     abscissa: false,
     proof: Proof::Curves,
 };
@@ -149,7 +152,7 @@ fn cells_of_every_kind_are_told_apart() {
         QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec()).unwrap()
     };
     let told = |h: &QuasiPolynomial| {
-        let cell = judge(h, 0.0, true, &task).unwrap();
+        let cell = judge(h, Demand::default(), true, &task).unwrap();
         (cell.unstable, cell.status)
     };
     let s: &[f64] = &[0.0, 1.0];
@@ -162,7 +165,7 @@ fn cells_of_every_kind_are_told_apart() {
     // |s + 0.12| > |s|: every root of the chain lies left of its limit.
     let chain_leads = make(&[&[0.12, 1.0], &[0.0, 0.984]], &[0.0, 0.36]);
     assert_eq!(told(&chain_leads), (0, CellStatus::Chain));
-    let cell = judge(&chain_leads, 0.0, true, &task).unwrap();
+    let cell = judge(&chain_leads, Demand::default(), true, &task).unwrap();
     assert!((cell.abscissa - 0.984f64.ln() / 0.36).abs() < 1e-14);
     assert_eq!(
         told(&make(&[s, &[2.0, 1.0]], &[0.0, 0.36])),
