@@ -195,10 +195,15 @@ impl<'a, const D: usize> Tree<'a, D> {
             share: 1.0,
         }]);
         while tree.boxes.undecided > limits.undecided && !waiting.is_empty() {
-            if tree.boxes.unstable.len() + waiting.len() >= limits.boxes {
+            // Each box judged makes one more at most.
+            let room = limits
+                .boxes
+                .saturating_sub(tree.boxes.unstable.len() + waiting.len());
+            if room == 0 {
                 break;
             }
-            let group: Vec<Waiting<D>> = waiting.drain(..GROUP.min(waiting.len())).collect();
+            let size = GROUP.min(waiting.len()).min(room);
+            let group: Vec<Waiting<D>> = waiting.drain(..size).collect();
             let verdicts = tree.judge(&group, task)?;
             for (judged, verdict) in group.into_iter().zip(verdicts) {
                 tree.file(judged, verdict, &mut waiting);
@@ -265,5 +270,139 @@ impl<'a, const D: usize> Tree<'a, D> {
         let Range { low, high } = &one.claim.range;
         self.boxes.low.extend(self.reduced.values_at(low));
         self.boxes.high.extend(self.reduced.values_at(high));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Affine, Term, judge, largest_stable_box, stability_radius};
+    use super::*;
+
+    /// s + (Kp + Kv s) e^(−s T)
+    fn velocity() -> Family {
+        let term = |exponents: [u32; 3], power, slope| Term {
+            coefficient: 1.0,
+            exponents: exponents.to_vec(),
+            power,
+            delay: Affine {
+                constant: 0.0,
+                slopes: vec![0.0, 0.0, slope],
+            },
+        };
+        let terms = vec![
+            term([0, 0, 0], 1, 0.0),
+            term([1, 0, 0], 0, 1.0),
+            term([0, 1, 0], 1, 1.0),
+        ];
+        Family::new(["Kp", "Kv", "T"].map(str::to_owned).to_vec(), terms).unwrap()
+    }
+
+    fn limits(undecided: f64, boxes: usize) -> Limits {
+        Limits { undecided, boxes }
+    }
+
+    /// Every corner and the centre of each proved box has its count.
+    fn members_agree(family: &Family, boxes: &Boxes, every: usize) {
+        let count = family.names().len();
+        let corners = boxes.low.chunks(count).zip(boxes.high.chunks(count));
+        let proved = corners.zip(&boxes.unstable).filter(|(_, n)| **n != UNKNOWN);
+        for ((low, high), unstable) in proved.step_by(every) {
+            for corner in 0..(1 << count) {
+                let values: Vec<f64> = (0..count)
+                    .map(|i| {
+                        if corner >> i & 1 == 0 {
+                            low[i]
+                        } else {
+                            high[i]
+                        }
+                    })
+                    .collect();
+                let h = family.at(&values).unwrap();
+                assert_eq!(judge(&h, false, &Task::new()).unwrap().unstable, *unstable);
+            }
+        }
+    }
+
+    #[test]
+    fn members_of_proved_boxes_have_their_count() {
+        let family = velocity();
+        for ranges in [
+            [(0.0, 6.0), (-1.0, 1.0), (0.36, 0.36)],
+            [(-9.0, 9.0), (-1.5, 1.5), (0.2, 0.2)],
+            [(-1.0, 6.0), (0.3, 0.3), (0.0, 1.0)],
+            [(0.0, 6.0), (-0.9, 0.9), (0.3, 0.5)],
+        ] {
+            let found = proved_boxes(&family, &ranges, limits(0.03, 50_000), &Task::new()).unwrap();
+            assert!(found.undecided <= 0.03);
+            members_agree(&family, &found, 7);
+        }
+    }
+
+    #[test]
+    fn the_number_of_boxes_and_their_volume_are_as_said() {
+        let ranges = [(0.0, 6.0), (-1.0, 1.0), (0.36, 0.36)];
+        let found = proved_boxes(&velocity(), &ranges, limits(0.0, 300), &Task::new()).unwrap();
+        assert_eq!(found.unstable.len(), 300);
+        assert_eq!(found.nodes.len(), 599);
+        let sides = found.low.chunks(3).zip(found.high.chunks(3));
+        let volumes = sides.map(|(low, high)| (high[0] - low[0]) * (high[1] - low[1]) / 12.0);
+        let (mut all, mut unknown) = (0.0, 0.0);
+        for (volume, unstable) in volumes.zip(&found.unstable) {
+            all += volume;
+            unknown += if *unstable == UNKNOWN { volume } else { 0.0 };
+        }
+        assert!((all - 1.0f64).abs() < 1e-12 && (unknown - found.undecided).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ranges_without_sense_are_refused() {
+        let task = Task::new();
+        let family = velocity();
+        for ranges in [
+            vec![(0.0, 1.0)],
+            vec![(1.0, 0.0), (0.0, 0.0), (0.1, 0.1)],
+            vec![(0.0, f64::NAN), (0.0, 0.0), (0.1, 0.1)],
+            vec![(f64::MIN, f64::MAX), (0.0, 0.0), (0.1, 0.1)],
+            vec![(0.0, 1.0), (0.0, 0.0), (-0.1, 0.1)],
+            vec![(0.0, 0.0), (0.0, 1.0), (0.1, 0.1)],
+        ] {
+            let refused = proved_boxes(&family, &ranges, limits(0.1, 100), &task);
+            assert!(matches!(refused, Err(Error::Argument(_))), "{ranges:?}");
+        }
+    }
+
+    #[test]
+    fn a_stopped_task_stops() {
+        let task = Task::new();
+        task.stop();
+        let ranges = [(0.0, 6.0), (-1.0, 1.0), (0.36, 0.36)];
+        let found = proved_boxes(&velocity(), &ranges, limits(0.0, 1000), &task);
+        assert_eq!(found, Err(Error::Interrupted));
+    }
+
+    #[test]
+    fn the_radius_is_that_of_the_closed_form() {
+        // Kv = 0: stable for Kp T < π/2, reached where both have grown by the radius.
+        let point = [2.0, 0.0, 0.36];
+        let found = stability_radius(
+            &velocity(),
+            &point,
+            &[2.0, 0.0, 0.36],
+            (1e-6, 100_000),
+            &Task::new(),
+        )
+        .unwrap();
+        let truth = (0.5 * std::f64::consts::PI / 0.72).sqrt() - 1.0;
+        assert!(found.radius <= truth && truth <= found.upper);
+        assert!(found.upper <= found.radius * (1.0 + 2e-6));
+    }
+
+    #[test]
+    fn the_largest_box_of_one_parameter_is_the_stable_interval() {
+        let ranges = [(-3.0, 9.0), (0.0, 0.0), (0.5, 0.5)];
+        let found = largest_stable_box(&velocity(), &ranges, None, 1e-9, &Task::new());
+        let (low, high) = found.unwrap().unwrap()[0];
+        assert!(low > 0.0 && low < 1e-7 && high < std::f64::consts::PI);
+        assert!(high > std::f64::consts::PI - 1e-7);
     }
 }

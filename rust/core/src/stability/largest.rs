@@ -80,7 +80,7 @@ fn search<const D: usize>(
     };
     let point = around.map(place);
     let mut local = Local::new(&reduced);
-    let full = drawn(&boxes, family.names().len(), &whole, side, &place);
+    let full = drawn(&boxes, family.names().len(), &whole, side, place);
     let unit = |x: f64, i: usize| {
         let width = whole.high[i] - whole.low[i];
         if width > 0.0 {

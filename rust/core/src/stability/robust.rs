@@ -81,13 +81,16 @@ pub fn robust_map(
         .collect()
 }
 
+/// A point of an interval.
+type End = fn(&(f64, f64)) -> f64;
+
 fn judge_cell(
     family: &Family,
     ranges: &[(f64, f64)],
     boxes: usize,
     task: &Task,
 ) -> Result<i32, Error> {
-    let ends: [fn(&(f64, f64)) -> f64; 3] = [|r| r.0, |r| r.1, |r| r.0 + 0.5 * (r.1 - r.0)];
+    let ends: [End; 3] = [|r| r.0, |r| r.1, |r| r.0 + 0.5 * (r.1 - r.0)];
     let mut most = 0;
     let mut unknown = false;
     for end in ends {

@@ -36,10 +36,10 @@ fn gap<const D: usize>(from: &LocalRow<D>, to: &LocalRow<D>, half: &[f64; D]) ->
     let centre = to.delay - from.delay;
     let mut spread = 0.0;
     let mut least = centre;
-    for i in 0..D {
-        let rate = to.slopes[i] - from.slopes[i];
-        spread += rate.abs() * half[i];
-        least -= rate.abs() * half[i];
+    for ((own, other), r) in to.slopes.iter().zip(&from.slopes).zip(half) {
+        let reach = (own - other).abs() * r;
+        spread += reach;
+        least -= reach;
     }
     let rounding = 16.0 * f64::EPSILON * (from.size + to.size);
     // A parameter alone, or a number, is never less than its range says.
@@ -143,7 +143,7 @@ fn frequency<const D: usize>(local: &Local<D>, own: usize, degree: usize) -> Opt
                     (true, _) => 0.0,
                     (false, _) => high * power,
                 };
-                if (degree - k) % 2 == 0 {
+                if (degree - k).is_multiple_of(2) {
                     same += part;
                 } else {
                     other += part;

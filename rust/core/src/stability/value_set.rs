@@ -107,7 +107,7 @@ impl<const D: usize> Expansion<D> {
             largest = largest.max(size);
             all += size + most_slope * rho;
             if row.moves {
-                for i in 0..D {
+                for (i, r) in half.iter().enumerate() {
                     let mut p_i = Complex64::ZERO;
                     let (mut most_i, mut most_slope_i) = (0.0, 0.0);
                     for c in row.coefficients.iter().rev() {
@@ -120,8 +120,8 @@ impl<const D: usize> Expansion<D> {
                     if rate != 0.0 {
                         own.slopes[i] -= times_iw(value) * row.slopes[i];
                     }
-                    sizes += (most_i + top * rate * most) * half[i];
-                    all += most_i * half[i];
+                    sizes += (most_i + top * rate * most) * r;
+                    all += most_i * r;
                     own.mixed[i] += most_slope_i + d * most_i + rate * (most + top * pace);
                     for l in 0..D {
                         let (mut bend, mut most_l) = (0.0, 0.0);
