@@ -5,6 +5,15 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
 from deadtime import gallery
+from deadtime._boxes import (
+    ProvedBoxes,
+    RobustMap,
+    StabilityRadius,
+    largest_stable_box,
+    proved_boxes,
+    robust_map,
+    stability_radius,
+)
 from deadtime._certificate import Certificate
 from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
@@ -80,14 +89,17 @@ __all__ = [
     "Parameter",
     "ParametricQuasiPolynomial",
     "Plant",
+    "ProvedBoxes",
     "QuasiPolynomial",
     "RationalPlant",
     "Recording",
     "RecordingError",
     "Response",
+    "RobustMap",
     "RootSet",
     "Sensitivity",
     "StabilityMap",
+    "StabilityRadius",
     "Step",
     "TransferFunction",
     "Whiteness",
@@ -105,11 +117,15 @@ __all__ = [
     "lambertw_log",
     "lambertw_offset",
     "lambertwm1",
+    "largest_stable_box",
     "low_level_callable",
     "parameters",
+    "proved_boxes",
     "read_recording",
     "rightmost_branches",
+    "robust_map",
     "s",
     "stability_map",
+    "stability_radius",
     "wrightomega",
 ]

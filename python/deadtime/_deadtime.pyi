@@ -22,10 +22,14 @@ __all__ = [
     "lambertw_offset",
     "lambertwm1",
     "lambertwm1_number",
+    "largest_stable_box",
     "limit_threads",
     "nap",
+    "proved_boxes",
+    "robust_map",
     "sampled_abscissa_grid",
     "spin",
+    "stability_radius",
     "thread_count",
     "wrightomega",
 ]
@@ -166,6 +170,42 @@ class Family:
         ]
         | None
     ): ...
+
+def proved_boxes(
+    family: Family,
+    ranges: list[_Pair],
+    undecided: float,
+    boxes: int,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> tuple[
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int32],
+    tuple[NDArray[np.int8], NDArray[np.float64], NDArray[np.int64]],
+    float,
+]: ...
+def largest_stable_box(
+    family: Family,
+    ranges: list[_Pair],
+    around: list[float] | None,
+    tol: float,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> list[_Pair] | None: ...
+def stability_radius(
+    family: Family, point: list[float], scales: list[float], tol: float, boxes: int
+) -> tuple[float, float, list[float] | None]: ...
+def robust_map(
+    family: Family,
+    ranges: list[_Pair],
+    parameters: tuple[int, int],
+    first: NDArray[np.float64],
+    second: NDArray[np.float64],
+    boxes: int,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> NDArray[np.int32]: ...
 
 @final
 class LinearLoop:

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._boundaries import Boundary, boundaries_of
+from deadtime._families import family_of, numbers_of
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._loop_stability import sampled_grid
-from deadtime._parametric import Parameter, ParametricQuasiPolynomial
+from deadtime._parametric import ParametricQuasiPolynomial
 from deadtime._validation import finite, thread_number
 
 if TYPE_CHECKING:
@@ -103,8 +104,8 @@ class StabilityMap(ReadOnlyArrays):
         >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(0.36)
         >>> chart = dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-0.5, 0.5)}, abscissa=False)
         >>> curve = chart.boundaries[0]
-        >>> curve
-        <Boundary of 101 points: Kp 2.51917 to 5.05472, Kv -0.5 to 0.5, omega 2.90888 to 5.81776 rad/s>
+        >>> len(curve), curve.along, float(curve.omega.min().round(3))
+        (101, 'Kp', 2.909)
         >>> bool(np.allclose(curve.values["Kv"], -np.cos(0.36 * curve.omega)))
         True
         """
@@ -321,15 +322,15 @@ def stability_map(
         raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
     question = _Question(bool(abscissa), finite("decay", decay), _damping(damping), proof)
     cells = len(axes[names[0]]) * len(axes[names[1]])
-    if isinstance(family, ControlLoop):
-        found = _map_loop(family, names, axes, question, threads, progress)
-    elif isinstance(family, ParametricQuasiPolynomial):
-        found = _map_family(family, names, axes, question, threads, progress)
+    if isinstance(family, ControlLoop) and family.is_sampled:
+        if question.decay != 0.0 or question.damping is not None:
+            raise ValueError(
+                f"decay={question.decay}, damping={question.damping}: a sampled loop is judged by "
+                "the unit circle; use its abscissa, which is always computed"
+            )
+        found = _map_sampled(family, numbers_of(family, names), names, axes, threads, progress)
     else:
-        raise TypeError(
-            f"family of type {type(family).__name__}: give a ControlLoop, or an expression with "
-            "the parameters of dtm.parameters('...')"
-        )
+        found = _map_family(family_of(family, names), names, axes, question, threads, progress)
     if progress is not None:
         progress(cells)
     unstable, alpha, status, judged = found
@@ -365,18 +366,6 @@ def _map_family(
     progress: _Progress | None,
 ) -> _Found:
     """Judge the members of a family."""
-    unknown = [name for name in names if name not in family.names]
-    if unknown:
-        raise ValueError(
-            f"ranges for {', '.join(unknown)}: no such parameter, there "
-            + (f"is {', '.join(family.names)}" if family.names else "is none")
-        )
-    missing = [name for name in family.names if name not in names]
-    if missing:
-        raise ValueError(
-            f"no value for {', '.join(missing)}: put a number in its place where the family is "
-            "written, or give it one of the two ranges"
-        )
     places = (family.names.index(names[0]), family.names.index(names[1]))
     first, second = axes[names[0]], axes[names[1]]
     unstable, alpha, status = family._family.map(
@@ -394,40 +383,6 @@ def _map_family(
     if alpha is None:
         alpha = np.broadcast_to(np.float64(np.nan), unstable.shape)
     return unstable, alpha, status, family
-
-
-def _map_loop(
-    loop: ControlLoop,
-    names: tuple[str, str],
-    axes: dict[str, _Floats],
-    question: _Question,
-    threads: int | None,
-    progress: _Progress | None,
-) -> _Found:
-    """Judge a loop whose named numbers vary."""
-    values: dict[str, Any] = {**loop.parameters}
-    values.pop("limit", None)
-    unknown = [name for name in names if name not in values and name != "delay"]
-    if unknown:
-        raise ValueError(
-            f"ranges for {', '.join(unknown)}: stability depends on no such number of this loop, "
-            f"but on {', '.join(dict.fromkeys([*values, 'delay']))}"
-        )
-    if "delay" not in values and "delay" not in names:
-        raise ValueError(
-            "the delay of this loop is None: give it a range, or set it with "
-            "loop.replace(delay=...)"
-        )
-    if loop.is_sampled:
-        if question.decay != 0.0 or question.damping is not None:
-            raise ValueError(
-                f"decay={question.decay}, damping={question.damping}: a sampled loop is judged by "
-                "the unit circle; use its abscissa, which is always computed"
-            )
-        return _map_sampled(loop, values, names, axes, threads, progress)
-    values |= {name: Parameter(name) for name in names}
-    family = loop._characteristic(values)
-    return _map_family(family, names, axes, question, threads, progress)
 
 
 def _map_sampled(

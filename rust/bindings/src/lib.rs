@@ -1,6 +1,7 @@
 //! The seam between the `deadtime` core and Python: it converts and nothing else.
 
 mod arrays;
+mod boxes;
 mod dde;
 mod errors;
 mod matrix;
@@ -16,6 +17,8 @@ use pyo3::prelude::*;
 /// Native part of the `deadtime` package; use the names of `deadtime` instead.
 #[pymodule(gil_used = false)]
 mod _deadtime {
+    #[pymodule_export]
+    use super::boxes::{largest_stable_box, proved_boxes, robust_map, stability_radius};
     #[pymodule_export]
     use super::dde::{PyLinearLoop, sampled_abscissa_grid};
     #[pymodule_export]

@@ -25,7 +25,7 @@ type Row = (f64, Vec<u32>, u32, f64, Vec<f64>);
 /// A quasi-polynomial with named parameters.
 #[pyclass(frozen, module = "deadtime._deadtime", name = "Family")]
 pub(crate) struct PyFamily {
-    inner: Family,
+    pub(crate) inner: Family,
 }
 
 #[pymethods]

@@ -154,6 +154,11 @@ impl Family {
         &self.names
     }
 
+    /// Distinct delays with the terms that share them.
+    pub(super) fn rows(&self) -> impl Iterator<Item = (&Affine, &[Term])> {
+        self.delays.iter().zip(self.terms.iter().map(Vec::as_slice))
+    }
+
     /// The member of the family at `values`, one for each parameter.
     ///
     /// # Errors

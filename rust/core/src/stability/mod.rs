@@ -1,10 +1,19 @@
 //! Stability of quasi-polynomials with parameters.
 //!
-//! `family` is h(s; p) with gains and delays as parameters; `cell` judges one member of it, with
-//! a proved count of the roots that offend against a `demand`; `grid` judges the members over two parameters, by `row`s in which
-//! one gain varies: `pencil` is such a row, `crossing` says where its roots cross the line,
-//! `curves` joins the crossings of all rows to the boundaries of the map; `branch` follows one of them and `leading` the rightmost.
+//! `family` is h(s; p) with gains and delays as parameters; `demand` what is asked of the roots; `cell` judges one
+//! member, with a proved count of the roots that offend.
+//!
+//! Maps: `grid` judges the members over two parameters, by `row`s in which one gain varies. `pencil` is such a row,
+//! `crossing` says where its roots cross the edge, `curves` joins the crossings of all rows to the boundaries;
+//! `branch` follows one root along a row and `leading` the rightmost.
+//!
+//! Whole boxes of parameters: `reduced` is the family with its fixed parameters put in, `local` what
+//! a box knows of it, `value_set` the proof that h(iw) has no zero over a box and a stretch of w,
+//! `tail` that nothing comes from infinity, `prove` both together with a count. `boxes` divides ranges
+//! into proved boxes, `largest` looks for one large stable box, `radius` asks how far parameters may
+//! move, `robust` maps what holds over an interval.
 
+mod boxes;
 mod branch;
 mod cell;
 mod crossing;
@@ -12,15 +21,27 @@ mod curves;
 mod demand;
 mod family;
 mod grid;
+mod largest;
 mod leading;
+mod local;
 mod pencil;
+mod prove;
+mod radius;
+mod reduced;
+mod robust;
 mod row;
+mod tail;
+mod value_set;
 
+pub use boxes::{Boxes, Limits, Node, proved_boxes};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub use curves::Vertex;
 pub use demand::{Damping, Demand};
 pub use family::{Affine, Family, Term};
 pub use grid::{Axis, Boundaries, Chart, Proof, Question, boundaries, map};
+pub use largest::largest_stable_box;
+pub use radius::{Radius, stability_radius};
+pub use robust::robust_map;
 
 #[cfg(test)]
 mod tests;
