@@ -23,6 +23,9 @@ const BEYOND: usize = 6;
 /// Relative radius at which the search for the least one begins.
 const LEAST: f64 = 4.0 * f64::EPSILON;
 
+/// Relative radius up to which a single root is sought among others.
+const CLOSE: f64 = 1e-3;
+
 const MARGIN: f64 = 1e-9;
 
 /// The disc about the cluster at `z`, up to radius `most`; `None` where none is proved.
@@ -50,6 +53,17 @@ pub(super) fn cluster(probe: &mut Probe<'_>, z: Complex64, most: f64) -> Option<
         }
     }
     None
+}
+
+/// The disc about the only root next to `z`, if one is proved; others may be so close that their distance is
+/// a small share of |z|.
+pub(super) fn single(probe: &Probe<'_>, z: Complex64) -> Option<Disc> {
+    let most = CLOSE * modulus(z);
+    let disc = proved(probe, z, 1, most)?;
+    if disc.is_on_axis() && z.im != 0.0 {
+        return proved(probe, Complex64::new(z.re, 0.0), 1, most);
+    }
+    Some(disc.mirrored_up())
 }
 
 /// The zero of the (m − 1)-st derivative next to `z`, by one step of Newton's iteration.

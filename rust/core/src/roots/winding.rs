@@ -58,8 +58,8 @@ const RIPPLE: f64 = 0.3;
 /// Evaluations along a line before such terms are looked for: short steps find the hints.
 const PATIENCE: u64 = 500;
 
-/// How many times further these may let a step go.
-const CALM: f64 = 64.0;
+/// How many times further these may let a step go; there are no more hints on the way then.
+const CALM: f64 = 1e6;
 
 /// Change of arg h along a line, in rad, and a bound on its error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -131,6 +131,11 @@ impl<'a> Walker<'a> {
             sharp_at: None,
             patient_until: PATIENCE,
         }
+    }
+
+    /// Take places where double precision does not tell a root from none for roots.
+    pub(super) fn keep_to_doubles(&mut self) {
+        self.sharp = MAX_SHARP;
     }
 
     /// Look at the task and at the budget now and then.
@@ -228,7 +233,8 @@ impl<'a> Walker<'a> {
             // The bound grows exponentially with the span: come down in steps, not at once.
             span = (3.0 * best).max(0.125 * span);
         }
-        if self.sharp_at == Some(s) {
+        // Not where the slope is all that is in the way.
+        if self.sharp_at == Some(s) && best < 0.5 * most.min(room / slope) {
             best = best.max(self.crowded_reach(s, most));
         }
         if self.probe.evaluations() < self.patient_until {
@@ -407,7 +413,7 @@ impl Walk for Walker<'_> {
     }
 }
 
-fn is_finite(jet: &Jet) -> bool {
+pub(super) fn is_finite(jet: &Jet) -> bool {
     jet.value.is_finite()
         && jet.slope.is_finite()
         && jet.value_error.is_finite()
