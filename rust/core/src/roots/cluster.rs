@@ -95,6 +95,10 @@ fn proved(probe: &Probe<'_>, center: Complex64, m: usize, most: f64) -> Option<D
         (below + above) * (1.0 + MARGIN) < own
     };
     let mut radius = LEAST * modulus(center).max(1e-9 * most);
+    if radius <= 0.0 {
+        // At 0, where nothing tells how small a disc is to be.
+        return None;
+    }
     while !holds(radius) {
         radius *= 2.0;
         // Also where a value is not a number.

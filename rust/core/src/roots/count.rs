@@ -259,7 +259,9 @@ pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, E
 }
 
 fn count_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, Error> {
-    if region.re.1 == f64::INFINITY && region.im == Region::right_of(0.0).im && region.re.0.is_finite()
+    if region.re.1 == f64::INFINITY
+        && region.im == Region::right_of(0.0).im
+        && region.re.0.is_finite()
     {
         return count_right_of_as_given(h, region.re.0, task);
     }
@@ -333,12 +335,16 @@ pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     };
     walker.probe.refer_to(row);
     // The further out, the smaller the terms of which nothing but the size is known there.
-    let tried = (0..FURTHER).map(|k| Complex64::new(sigma, height(radius * f64::from(1u32 << (3 * k)))));
+    let tried =
+        (0..FURTHER).map(|k| Complex64::new(sigma, height(radius * f64::from(1u32 << (3 * k)))));
     let mut jets = tried.map(|end| (end, walker.jet(end)));
     // The error of its angle counts twice.
     let sure = |jet: &Jet| is_clear(jet) && modulus(jet.value) > 32.0 * jet.value_error;
     let Some((end, jet)) = jets.find(|(_, jet)| sure(jet)) else {
-        return Err(super::winding::overflow(Complex64::new(sigma, height(radius))));
+        return Err(super::winding::overflow(Complex64::new(
+            sigma,
+            height(radius),
+        )));
     };
     let top = end.im;
     let direction = (end / modulus(end)).powu(u32::try_from(degree).unwrap_or(u32::MAX));

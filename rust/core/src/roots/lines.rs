@@ -31,10 +31,11 @@ const MAX_EVASIONS: u32 = 20;
 const CHAIN_MARGIN: f64 = 1e-4;
 
 /// Evaluations after which the first line is given up: those that hug the chains cost without end. Every
-/// one after it may cost half as much.
+/// one after it may cost half as much, but not less than the second number.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
+const LEAST_PER_LINE: u64 = 500_000;
 
-/// A line on which a root lies is moved by this share of one over the longest delay at least: right beside
+/// A first line on which a root lies is moved by this share of one over the longest delay at least: right beside
 /// the root it would cost more than one further away.
 const ASIDE: f64 = 1e-3;
 
@@ -88,12 +89,8 @@ pub(super) trait Spectrum {
 
     /// The number of roots right of Re s = `sigma`, and where walking there hinted at roots, as far as
     /// `effort` allows.
-    fn line(
-        &self,
-        sigma: f64,
-        effort: Effort,
-        task: &Task,
-    ) -> Result<(u64, Vec<Complex64>), Error>;
+    fn line(&self, sigma: f64, effort: Effort, task: &Task)
+    -> Result<(u64, Vec<Complex64>), Error>;
 
     /// Where roots may be that no line comes close to.
     fn far_starts(&self) -> Vec<Complex64>;
@@ -217,6 +214,12 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         }
     }
 
+    /// Was the line moved aside as far as one that is known to have too few roots?
+    fn is_behind(&self, line: &Line, wanted: u64) -> bool {
+        let known = self.few.as_ref();
+        line.count < wanted && known.is_some_and(|few| few.sigma <= line.sigma)
+    }
+
     /// Forget `line` and take up one further left; `false` when that has been done too often or
     /// leads onto the chains.
     pub(super) fn evade(&mut self, line: &Line, distance: f64) -> bool {
@@ -271,13 +274,17 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 }
             };
             match self.counted(sigma) {
+                Ok(line) if self.is_behind(&line, wanted) => {
+                    self.given_up += 1;
+                    self.barrier = self.barrier.max(sigma);
+                }
                 Ok(line) => self.sort_in(line, wanted),
                 // Too close to the chains, or too far left for double precision.
                 Err(error @ (Error::TooMuch { .. } | Error::Argument(_)))
                     if self.enough.is_none() =>
                 {
                     if matches!(error, Error::TooMuch { .. }) {
-                        self.limit /= 2;
+                        self.limit = (self.limit / 2).max(LEAST_PER_LINE);
                     }
                     if self.few.is_some() {
                         self.given_up += 1;
@@ -374,8 +381,11 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         line: &Line,
         n: usize,
     ) -> Result<(Vec<Disc>, f64), Error> {
-        let (right, left): (Vec<_>, Vec<_>) =
-            line.hints.iter().copied().partition(|hint| hint.re > line.sigma);
+        let (right, left): (Vec<_>, Vec<_>) = line
+            .hints
+            .iter()
+            .copied()
+            .partition(|hint| hint.re > line.sigma);
         self.learn(&right, line.count, line.sigma)?;
         self.learn(&left, line.count, line.sigma)?;
         self.learn(&self.low_starts(line.sigma), line.count, line.sigma)?;
@@ -428,12 +438,15 @@ impl<'a, S: Spectrum> Lines<'a, S> {
     /// that root counts.
     fn counted(&self, sigma: f64) -> Result<Line, Error> {
         let mut at = sigma;
+        // A line between roots that are known has its place, the first one may be anywhere nearby.
+        let free = self.few.is_none() && self.enough.is_none();
+        let least = if free { ASIDE * self.first_step } else { 0.0 };
         let mut aside = -1.0;
         let mut attempt = 0;
         loop {
             let effort = Effort {
                 limit: self.limit,
-                sharp: attempt >= IN_DOUBLES,
+                sharp: !free || attempt >= IN_DOUBLES,
             };
             match self.spectrum.line(at, effort, self.task) {
                 Ok((count, hints)) => {
@@ -444,7 +457,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                     });
                 }
                 Err(error @ Error::Contour { distance, .. }) => {
-                    let distance = distance.max(1e-12 * sigma.abs()).max(ASIDE * self.first_step);
+                    let distance = distance.max(1e-12 * sigma.abs()).max(least);
                     let moved = sigma + aside * distance;
                     at = if moved > self.chain {
                         moved

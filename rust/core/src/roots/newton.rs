@@ -147,7 +147,10 @@ fn sharpened(
         let step = newton_step(&jet);
         let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
         let small = modulus(step) <= 2.0 * f64::EPSILON * modulus(z);
-        let next = z - step * multiple(step, before);
+        let mut next = z - step * multiple(step, before);
+        if !window(next) {
+            next = z - step;
+        }
         let ahead = next.is_finite() && window(next);
         if small || lost_in_rounding || !ahead {
             break;
