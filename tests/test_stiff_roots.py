@@ -1,4 +1,4 @@
-"""Equations whose numbers lie many decades apart, and edges beside clusters, against ball arithmetic.
+"""Equations with numbers many decades apart, and edges beside clusters, against ball arithmetic.
 
 Each was refused once although balls decide.
 """
@@ -42,7 +42,7 @@ def test_counts_beside_clusters(number):
 
 
 def test_half_planes_of_stiff_equations_are_counted_in_no_time():
-    """s² + 2.6e25 s + 1e50 and a delayed term: the chord is 1e25 high, and one row leads all along it."""
+    """A delayed term beside it: the chord is 1e25 high, and one row leads all along it."""
     h = s**2 + 2.6e25 * s + 1e50 + 3.0 * s * delay(20.0)
     assert [h.count(re=(sigma, None)) for sigma in (0.0, -1.0)] == [0, 0]
 
