@@ -22,6 +22,9 @@ pub(super) const ROUNDING: f64 = 1.02 * 0.25 * f64::EPSILON * f64::EPSILON;
 /// Rounding a two-word number to a double, likewise.
 pub(super) const LAST_ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
+/// No phase is wrong by more than a half turn: 2.5 of the exponential, in units of u².
+const OPPOSITE: f64 = 10.0 / (f64::EPSILON * f64::EPSILON);
+
 /// e^−600 is below this, and then taken for zero.
 const VANISHING: f64 = 1e-260;
 
@@ -140,7 +143,7 @@ pub(super) fn jet(h: &QuasiPolynomial, reference: usize, s: Complex64) -> Jet {
         slope = slope.plus(turned).plus(lag);
         let length = row.len() as f64;
         let gap = gap.high.abs();
-        let shared = 4.0 * count + 64.0 + 3.0 * gap * reach;
+        let shared = 4.0 * count + 64.0 + (3.0 * gap * reach).min(OPPOSITE);
         gaps += gap;
         value_error += (17.0 * length + shared) * bound * weight;
         slope_error += (34.0 * length + shared) * (slope_bound + gap * bound) * weight;

@@ -23,6 +23,9 @@ const BEYOND: usize = 6;
 /// Relative radius at which the search for the least one begins.
 const LEAST: f64 = 4.0 * f64::EPSILON;
 
+/// Relative radius up to which a single root is sought among others.
+const CLOSE: f64 = 1e-3;
+
 const MARGIN: f64 = 1e-9;
 
 /// The disc about the cluster at `z`, up to radius `most`; `None` where none is proved.
@@ -50,6 +53,17 @@ pub(super) fn cluster(probe: &mut Probe<'_>, z: Complex64, most: f64) -> Option<
         }
     }
     None
+}
+
+/// The disc about the only root next to `z`, if one is proved; others may be so close that their distance is
+/// a small share of |z|.
+pub(super) fn single(probe: &Probe<'_>, z: Complex64) -> Option<Disc> {
+    let most = CLOSE * modulus(z);
+    let disc = proved(probe, z, 1, most)?;
+    if disc.is_on_axis() && z.im != 0.0 {
+        return proved(probe, Complex64::new(z.re, 0.0), 1, most);
+    }
+    Some(disc.mirrored_up())
 }
 
 /// The zero of the (m − 1)-st derivative next to `z`, by one step of Newton's iteration.
@@ -81,6 +95,10 @@ fn proved(probe: &Probe<'_>, center: Complex64, m: usize, most: f64) -> Option<D
         (below + above) * (1.0 + MARGIN) < own
     };
     let mut radius = LEAST * modulus(center).max(1e-9 * most);
+    if radius <= 0.0 {
+        // At 0, where nothing tells how small a disc is to be.
+        return None;
+    }
     while !holds(radius) {
         radius *= 2.0;
         // Also where a value is not a number.

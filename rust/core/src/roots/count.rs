@@ -19,11 +19,14 @@ use super::region::Region;
 use super::unit::OwnTime;
 use super::winding::{Turn, Walker, is_clear};
 use crate::elementary::angle;
-use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
+use crate::quasipoly::{Jet, Kind, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
 /// Evaluations spent on the real axis before the roots themselves are asked for.
 const SURVEY_LIMIT: u64 = 10_000;
+
+/// Radii tried for the arc that closes a half plane, each eight times the one before.
+const FURTHER: u32 = 5;
 
 /// Coefficients are not scaled down to less than two to this power.
 const LOWEST_EXPONENT: i32 = -1000;
@@ -256,6 +259,12 @@ pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, E
 }
 
 fn count_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, Error> {
+    if region.re.1 == f64::INFINITY
+        && region.im == Region::right_of(0.0).im
+        && region.re.0.is_finite()
+    {
+        return count_right_of_as_given(h, region.re.0, task);
+    }
     let prepared = Prepared::new(h)?;
     let h = &prepared.rest;
     region.check()?;
@@ -321,13 +330,23 @@ pub(super) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     // All roots are at 0: any radius will do.
     let radius = if radius == 0.0 { 1.0 } else { radius };
     // Just beyond the circle.
-    let top = ((radius - sigma) * (radius + sigma)).sqrt() * (1.0 + 1e-9) + f64::MIN_POSITIVE;
-    let end = Complex64::new(sigma, top);
+    let height = |radius: f64| {
+        ((radius - sigma) * (radius + sigma)).sqrt() * (1.0 + 1e-9) + f64::MIN_POSITIVE
+    };
     walker.probe.refer_to(row);
-    let jet = walker.jet(end);
-    if !is_clear(&jet) {
-        return Err(super::winding::overflow(end));
-    }
+    // The further out, the smaller the terms of which nothing but the size is known there.
+    let tried =
+        (0..FURTHER).map(|k| Complex64::new(sigma, height(radius * f64::from(1u32 << (3 * k)))));
+    let mut jets = tried.map(|end| (end, walker.jet(end)));
+    // The error of its angle counts twice.
+    let sure = |jet: &Jet| is_clear(jet) && modulus(jet.value) > 32.0 * jet.value_error;
+    let Some((end, jet)) = jets.find(|(_, jet)| sure(jet)) else {
+        return Err(super::winding::overflow(Complex64::new(
+            sigma,
+            height(radius),
+        )));
+    };
+    let top = end.im;
     let direction = (end / modulus(end)).powu(u32::try_from(degree).unwrap_or(u32::MAX));
     let leading = h
         .coefficients()

@@ -118,7 +118,7 @@ pub(super) fn descend(
         return nowhere;
     };
     walker.probe.refer_to(leader);
-    let (top, bottom) = (walker.probe.jet(from), walker.probe.jet(here));
+    let (top, bottom) = (walker.jet(from), walker.jet(here));
     if !(is_clear(&top) && is_clear(&bottom) && turned.is_finite()) {
         return nowhere;
     }

@@ -129,6 +129,14 @@ impl<'w, W: Seek> Search<'w, W> {
         self.found.iter().filter(right).map(Disc::weight).sum()
     }
 
+    /// Does a disc known hold no other root than its own as far as `place`, or its mirror image? Newton's
+    /// iteration from there would lead to it again.
+    pub(super) fn knows(&self, place: Complex64) -> bool {
+        let place = Complex64::new(place.re, place.im.abs());
+        let mut near = self.found.iter();
+        near.any(|disc| (disc.center - place).norm() < disc.isolation)
+    }
+
     /// The discs, ordered by the height of their centres.
     pub(super) fn found(&self) -> &[Disc] {
         &self.found

@@ -16,6 +16,7 @@ use super::isolate::{Search, Seek};
 use super::newton::Disc;
 use super::region::Region;
 use super::set::locate;
+use super::tropical::tropical_roots;
 use super::winding::{MAX_EVALUATIONS, Walker};
 use crate::quasipoly::QuasiPolynomial;
 use crate::{Error, Task};
@@ -29,8 +30,24 @@ const MAX_EVASIONS: u32 = 20;
 /// A line this close to the chains, in units of one over the longest delay, is as good as on them.
 const CHAIN_MARGIN: f64 = 1e-4;
 
-/// Evaluations after which a line is given up: those that hug the chains cost without end.
+/// Evaluations after which the first line is given up: those that hug the chains cost without end. Every
+/// one after it may cost half as much, but not less than the second number.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
+const LEAST_PER_LINE: u64 = 500_000;
+
+/// A first line on which a root lies is moved by this share of one over the longest delay at least: right beside
+/// the root it would cost more than one further away.
+const ASIDE: f64 = 1e-3;
+
+/// A line that would have to be moved further than this, in the same unit, meets something else than a
+/// root.
+const MOST_ASIDE: f64 = 1e6;
+
+/// Times that a line is moved aside before it is walked in two words.
+const IN_DOUBLES: u32 = 4;
+
+/// Times that a line is moved aside.
+const MAX_ASIDE: u32 = 20;
 
 /// Lines given up before the search ends with what it has: next to the chains that is all there is to know,
 /// where there are none a root is still to be found.
@@ -56,6 +73,16 @@ pub(crate) fn chain_margin(step: f64) -> f64 {
     CHAIN_MARGIN * step
 }
 
+/// What a line may cost.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effort {
+    /// Evaluations after which it is given up.
+    pub(super) limit: u64,
+    /// Are places evaluated in two words where doubles do not tell a root from none? A line meets such
+    /// places next to roots only, and there is mostly another line to take.
+    pub(super) sharp: bool,
+}
+
 /// What the search for rightmost roots has to know of a function.
 pub(super) trait Spectrum {
     type Walker<'a>: Seek
@@ -65,8 +92,13 @@ pub(super) trait Spectrum {
     /// A walker that gives up after `limit` evaluations.
     fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> Self::Walker<'a>;
 
-    /// The number of roots right of Re s = `sigma`, and where walking there hinted at roots.
-    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error>;
+    /// The number of roots right of Re s = `sigma`, and where walking there hinted at roots, as far as
+    /// `effort` allows.
+    fn line(&self, sigma: f64, effort: Effort, task: &Task)
+    -> Result<(u64, Vec<Complex64>), Error>;
+
+    /// Where roots may be that no line comes close to.
+    fn far_starts(&self) -> Vec<Complex64>;
 
     /// The upper half of a rectangle with all roots right of Re s = `sigma`, if there are any.
     fn cell_right_of<'a>(
@@ -83,10 +115,27 @@ impl Spectrum for QuasiPolynomial {
         Walker::with_limit(self, task, limit)
     }
 
-    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error> {
-        let mut walker = self.walker(task, EVALUATIONS_PER_LINE);
+    fn line(
+        &self,
+        sigma: f64,
+        effort: Effort,
+        task: &Task,
+    ) -> Result<(u64, Vec<Complex64>), Error> {
+        let mut walker = self.walker(task, effort.limit);
+        if !effort.sharp {
+            walker.keep_to_doubles();
+        }
         let count = half_plane(&mut walker, sigma)?;
         Ok((count, walker.hints))
+    }
+
+    fn far_starts(&self) -> Vec<Complex64> {
+        let degree = self.degree();
+        let leading = self.coefficients().iter();
+        leading
+            .filter(|row| row.len() > degree)
+            .flat_map(|row| tropical_roots(row))
+            .collect()
     }
 
     fn cell_right_of<'a>(
@@ -123,6 +172,8 @@ pub(super) struct Lines<'a, S: Spectrum> {
     /// Times that the first line was moved to the right, and why at first.
     moved: u32,
     refused: Option<Error>,
+    /// Evaluations that the next line may cost.
+    limit: u64,
     /// Least distance to the barrier.
     margin: f64,
     /// One over the longest delay.
@@ -149,6 +200,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             given_up: 0,
             moved: 0,
             refused: None,
+            limit: EVALUATIONS_PER_LINE,
             margin: chain_margin(step),
             first_step: step,
             step,
@@ -165,6 +217,12 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         } else {
             self.enough = Some(line);
         }
+    }
+
+    /// Was the line moved aside as far as one that is known to have too few roots?
+    fn is_behind(&self, line: &Line, wanted: u64) -> bool {
+        let known = self.few.as_ref();
+        line.count < wanted && known.is_some_and(|few| few.sigma <= line.sigma)
     }
 
     /// Forget `line` and take up one further left; `false` when that has been done too often or
@@ -221,11 +279,18 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 }
             };
             match self.counted(sigma) {
+                Ok(line) if self.is_behind(&line, wanted) => {
+                    self.given_up += 1;
+                    self.barrier = self.barrier.max(sigma);
+                }
                 Ok(line) => self.sort_in(line, wanted),
                 // Too close to the chains, or too far left for double precision.
                 Err(error @ (Error::TooMuch { .. } | Error::Argument(_)))
                     if self.enough.is_none() =>
                 {
+                    if matches!(error, Error::TooMuch { .. }) {
+                        self.limit = (self.limit / 2).max(LEAST_PER_LINE);
+                    }
                     if self.few.is_some() {
                         self.given_up += 1;
                     } else if self.moved < MAX_MOVES {
@@ -305,32 +370,90 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             if search.weight_right_of(sigma) >= count {
                 break;
             }
+            if search.knows(*hint) {
+                continue;
+            }
             search.iterate_from(&[*hint], |s| s.is_finite())?;
         }
         self.known = search.found().to_vec();
         Ok(())
     }
 
-    /// Discs, Im ≥ 0, that hold all roots right of a line.
-    pub(super) fn discs_right_of(&mut self, line: &Line) -> Result<Vec<Disc>, Error> {
-        self.learn(&line.hints, line.count, line.sigma)?;
+    /// Discs, Im ≥ 0, that hold all roots right of a line: the one given, or one further right with `n` discs
+    /// or more where not all those of the one given are found.
+    pub(super) fn discs_right_of(
+        &mut self,
+        line: &Line,
+        n: usize,
+    ) -> Result<(Vec<Disc>, f64), Error> {
+        let (right, left): (Vec<_>, Vec<_>) = line
+            .hints
+            .iter()
+            .copied()
+            .partition(|hint| hint.re > line.sigma);
+        self.learn(&right, line.count, line.sigma)?;
+        self.learn(&left, line.count, line.sigma)?;
         self.learn(&self.low_starts(line.sigma), line.count, line.sigma)?;
-        let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
-        let discs: Vec<Disc> = self.known.iter().filter(right).copied().collect();
-        if discs.iter().map(Disc::weight).sum::<u64>() == line.count {
-            return Ok(discs);
+        if let Some(discs) = self.known_right_of(line) {
+            return Ok((discs, line.sigma));
+        }
+        self.learn(&self.spectrum.far_starts(), line.count, line.sigma)?;
+        if let Some(discs) = self.known_right_of(line) {
+            return Ok((discs, line.sigma));
+        }
+        if let Some(sigma) = self.beside_the_first(n).filter(|sigma| *sigma > line.sigma)
+            && let Ok(nearer) = self.counted(sigma)
+            && let Some(discs) = self.known_right_of(&nearer)
+            && discs.len() >= n
+        {
+            return Ok((discs, nearer.sigma));
         }
         let discs = half_plane_discs(self.spectrum, line.sigma, self.task)?;
         self.known.clone_from(&discs);
-        Ok(discs)
+        Ok((discs, line.sigma))
     }
 
-    /// Count right of `sigma`, or of a line nearby where a root is in the way.
+    /// The known discs right of a line, if they hold all roots there.
+    fn known_right_of(&self, line: &Line) -> Option<Vec<Disc>> {
+        let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
+        let discs: Vec<Disc> = self.known.iter().filter(right).copied().collect();
+        (discs.iter().map(Disc::weight).sum::<u64>() == line.count).then_some(discs)
+    }
+
+    /// A line left of the first `n` known discs, right of the next one.
+    fn beside_the_first(&mut self, n: usize) -> Option<f64> {
+        self.known
+            .sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
+        let edge = self
+            .known
+            .get(..n)?
+            .iter()
+            .map(|disc| disc.center.re - disc.radius)
+            .fold(f64::INFINITY, f64::min);
+        let next = self
+            .known
+            .iter()
+            .map(|disc| disc.center.re + disc.radius)
+            .filter(|right| *right < edge)
+            .fold(self.barrier, f64::max);
+        Some(edge - (CLEARANCE * (edge - next)).min(self.first_step))
+    }
+
+    /// Count right of `sigma`, or of a line nearby where a root is in the way: further left at first, where
+    /// that root counts.
     fn counted(&self, sigma: f64) -> Result<Line, Error> {
         let mut at = sigma;
-        let mut aside = 1.0;
+        // A line between roots that are known has its place, the first one may be anywhere nearby.
+        let free = self.few.is_none() && self.enough.is_none();
+        let least = if free { ASIDE * self.first_step } else { 0.0 };
+        let mut aside = -1.0;
+        let mut attempt = 0;
         loop {
-            match self.spectrum.line(at, self.task) {
+            let effort = Effort {
+                limit: self.limit,
+                sharp: !free || attempt >= IN_DOUBLES,
+            };
+            match self.spectrum.line(at, effort, self.task) {
                 Ok((count, hints)) => {
                     return Ok(Line {
                         sigma: at,
@@ -338,14 +461,25 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                         hints,
                     });
                 }
-                Err(Error::Contour { distance, .. }) if f64::abs(aside) < 1e9 => {
-                    let moved = sigma + aside * distance.max(1e-12 * sigma.abs());
+                Err(error @ Error::Contour { distance, .. }) => {
+                    let distance = distance.max(1e-12 * sigma.abs()).max(least);
+                    let moved = sigma + aside * distance;
                     at = if moved > self.chain {
                         moved
                     } else {
-                        sigma + aside.abs() * distance
+                        sigma + f64::abs(aside) * distance
                     };
+                    if distance > MOST_ASIDE * self.first_step {
+                        return Err(Error::argument(format!(
+                            "the roots right of Re s = {sigma} cannot be counted: the numbers of this \
+                             equation differ too much in size for double precision"
+                        )));
+                    }
+                    if attempt >= MAX_ASIDE {
+                        return Err(error);
+                    }
                     aside *= -3.0;
+                    attempt += 1;
                 }
                 Err(error) => return Err(error),
             }

@@ -6,7 +6,7 @@
 //! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability, along `lines`; `neutral` knows the chains, `commensurate`
 //! those of exact delays, `stable`
 //! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be;
-//! `unit` chooses the unit of time; `certificate`
+//! `tropical` guesses where roots far out are; `unit` chooses the unit of time; `certificate`
 //! writes the proof of a count down. `matrix` does the same for det M(s), not expanded. Elementary functions are those of `crate::elementary`, with
 //! proved bounds; each file says what its inequalities leave for rounding.
 
@@ -29,6 +29,7 @@ mod rightmost;
 mod sensitivity;
 mod set;
 mod stable;
+mod tropical;
 mod unit;
 mod winding;
 

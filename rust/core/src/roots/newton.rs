@@ -7,10 +7,12 @@
 //! the radius of isolation; margins of 1e-9 cover the rounding of these few operations.
 //!
 //! Where double precision proves no disc, or only a wide one, jets in two words are tried.
+//! Next to other roots, where B exceeds |g″| by far, Taylor coefficients in two words decide (`cluster`).
 //! Roots that two words do not tell apart are a matter of `cluster`.
 
 use num_complex::Complex64;
 
+use super::cluster::single;
 use super::winding::newton_step;
 use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
 
@@ -18,6 +20,9 @@ const MAX_STEPS: u32 = 60;
 
 /// Relative radius above which a disc is worth evaluations in two words.
 const SHARP_ENOUGH: f64 = 1e-12;
+
+/// A value of less than this share of its error leaves nothing for another step to win.
+const ARRIVED: f64 = 0.25;
 
 /// Squares of slopes outside these leave the range of double precision.
 const LEAST: f64 = 1e-150;
@@ -93,6 +98,13 @@ pub(super) fn newton(
         }
         let step = newton_step(&jet);
         let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
+        if modulus(jet.value) <= ARRIVED * jet.value_error
+            && let Some(disc) = disc_from(probe, z, &jet)
+            && disc.radius <= SHARP_ENOUGH * modulus(z)
+            && !disc.is_on_axis()
+        {
+            return Outcome::Simple(disc.mirrored_up());
+        }
         let small = modulus(step) <= 2.0 * f64::EPSILON * modulus(z);
         let next = z - step;
         let ahead = next.is_finite() && window(next);
@@ -135,7 +147,10 @@ fn sharpened(
         let step = newton_step(&jet);
         let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
         let small = modulus(step) <= 2.0 * f64::EPSILON * modulus(z);
-        let next = z - step * multiple(step, before);
+        let mut next = z - step * multiple(step, before);
+        if !window(next) {
+            next = z - step;
+        }
         let ahead = next.is_finite() && window(next);
         if small || lost_in_rounding || !ahead {
             break;
@@ -145,6 +160,7 @@ fn sharpened(
     }
     simple_disc(probe, z, Probe::sharp_jet)
         .or(known)
+        .or_else(|| single(probe, z))
         .map_or(Outcome::Stalled(z), Outcome::Simple)
 }
 

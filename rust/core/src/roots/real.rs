@@ -9,9 +9,9 @@
 use num_complex::Complex64;
 
 use super::certificate::{Segment, TRIFLE};
-use super::winding::{Walker, is_clear};
+use super::winding::{Walker, is_clear, is_finite};
 use crate::Error;
-use crate::quasipoly::modulus;
+use crate::quasipoly::{Jet, modulus};
 
 /// A part of the real axis about which all is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,9 +51,10 @@ pub(super) fn survey_real(
     mut visit: impl FnMut(RealPart),
 ) -> Result<u64, Error> {
     let mut total = 0;
-    let mut parts = vec![re];
+    walker.probe.refer_to_dominant(re.0.into());
+    let mut parts = vec![((re.0, sign(walker, re.0)), (re.1, sign(walker, re.1)))];
     let begun = walker.probe.evaluations();
-    while let Some((low, high)) = parts.pop() {
+    while let Some(((low, at_low), (high, at_high))) = parts.pop() {
         walker.pause()?;
         let middle = Complex64::new(low + 0.5 * (high - low), 0.0);
         if walker.probe.evaluations() - begun > limit {
@@ -64,9 +65,8 @@ pub(super) fn survey_real(
         }
         // The middle is rounded, so the halves differ.
         let r = (high - middle.re).max(middle.re - low);
-        walker.probe.refer_to_dominant(middle);
+        let jet = referred_jet(walker, middle.re);
         let reference = walker.probe.reference();
-        let jet = walker.jet(middle);
         let bend = walker.probe.curvature_around(modulus(middle) + r, r);
         let slope = modulus(jet.slope);
         let trifle = TRIFLE * modulus(jet.value) / r;
@@ -84,7 +84,7 @@ pub(super) fn survey_real(
             continue;
         }
         if bend * r < SHARE * slope - jet.slope_error
-            && let (Some(a), Some(b)) = (sign(walker, low), sign(walker, high))
+            && let (Some(a), Some(b)) = (at_low, at_high)
         {
             total += u64::from(a != b);
             visit(RealPart::Monotone {
@@ -104,25 +104,39 @@ pub(super) fn survey_real(
                 distance: 2.0 * (high - low).max(f64::EPSILON * modulus(middle)),
             });
         };
-        parts.extend([(cut, high), (low, cut)]);
+        parts.extend([(cut, (high, at_high)), ((low, at_low), cut)]);
     }
     Ok(total)
 }
 
+/// The jet at `x`, relative to a term that is not much smaller than another.
+fn referred_jet(walker: &mut Walker<'_>, x: f64) -> Jet {
+    let s = Complex64::new(x, 0.0);
+    let jet = walker.jet(s);
+    if let Some(larger) = jet.overtaken_by {
+        walker.probe.refer_to(larger);
+    } else if is_finite(&jet) {
+        return jet;
+    } else {
+        walker.probe.refer_to_dominant(s);
+    }
+    walker.jet(s)
+}
+
 /// Is h positive at `x`? `None` where rounding hides it.
 fn sign(walker: &mut Walker<'_>, x: f64) -> Option<bool> {
-    let s = Complex64::new(x, 0.0);
     // e^(x τ) is positive: the sign of g is that of h, whatever the reference.
-    walker.probe.refer_to_dominant(s);
-    let jet = walker.jet(s);
+    let jet = referred_jet(walker, x);
     is_clear(&jet).then_some(jet.value.re > 0.0)
 }
 
-fn place_to_cut(walker: &mut Walker<'_>, low: f64, high: f64) -> Option<f64> {
+/// A place between and the sign there.
+fn place_to_cut(walker: &mut Walker<'_>, low: f64, high: f64) -> Option<(f64, Option<bool>)> {
     [0.4871, 0.5417, 0.4393, 0.6307, 0.3301, 0.75, 0.25]
         .into_iter()
         .find_map(|share| {
             let cut = low + share * (high - low);
-            (low < cut && cut < high && sign(walker, cut).is_some()).then_some(cut)
+            let positive = (low < cut && cut < high).then(|| sign(walker, cut))?;
+            positive.map(|_| (cut, positive))
         })
 }

@@ -137,19 +137,19 @@ pub(super) fn leading<S: Spectrum>(
     let mut wanted = n as u64;
     loop {
         let (line, last) = lines.find(wanted)?;
-        let discs = match lines.discs_right_of(&line) {
+        let (discs, sigma) = match lines.discs_right_of(&line, n) {
             Ok(discs) => discs,
             // A cluster reaches across the line.
             Err(Error::Contour { distance, .. }) if lines.evade(&line, distance) => continue,
             Err(error) => return Err(error),
         };
-        let discs = listed(discs, line.sigma);
+        let discs = listed(discs, sigma);
         if discs.len() >= n || last {
             // Right of its chains a neutral equation may have none, a retarded one always has.
             return if discs.is_empty() && chain == f64::NEG_INFINITY {
                 Err(beyond_reach())
             } else {
-                Ok(first(discs, n, line.sigma))
+                Ok(first(discs, n, sigma))
             };
         }
         // A pair counts twice in the half plane but once in the list.

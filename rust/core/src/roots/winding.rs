@@ -46,11 +46,17 @@ const USABLE: std::ops::Range<f64> = 1e-270..1e290;
 /// Error of one computed difference of arguments: 16 u and more than 3 u of τ_c Δy.
 pub(super) const STEP_ERROR: f64 = 8.0 * f64::EPSILON;
 
+/// Error of an angle, in rad, that an end of a line may have: some dozens of ends add up.
+const MOST_UNCERTAIN: f64 = 0.01;
+
 /// Slopes count as at least this of the value, so that one can divide by them.
 const LEAST_SLOPE: f64 = 1e-100;
 
 /// Order of the Taylor polynomial next to several roots.
 const CROWD: usize = 8;
+
+/// Steps of less than this angle of the fastest exponential tell of several roots nearby.
+const TIGHT: f64 = 1e-3;
 
 /// Share of the value that terms may have which are counted by their size alone.
 const RIPPLE: f64 = 0.3;
@@ -58,8 +64,8 @@ const RIPPLE: f64 = 0.3;
 /// Evaluations along a line before such terms are looked for: short steps find the hints.
 const PATIENCE: u64 = 500;
 
-/// How many times further these may let a step go.
-const CALM: f64 = 64.0;
+/// How many times further these may let a step go; there are no more hints on the way then.
+const CALM: f64 = 1e6;
 
 /// Change of arg h along a line, in rad, and a bound on its error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -107,6 +113,8 @@ pub(super) struct Walker<'a> {
     pub(super) hints: Vec<Complex64>,
     checked: u64,
     limit: u64,
+    /// The largest delay less the smallest, in s.
+    span: f64,
     sharp: u32,
     /// The last place where that was needed.
     sharp_at: Option<Complex64>,
@@ -127,10 +135,16 @@ impl<'a> Walker<'a> {
             hints: Vec::new(),
             checked: 0,
             limit,
+            span: h.delays().last().unwrap_or(&0.0) - h.delays().first().unwrap_or(&0.0),
             sharp: 0,
             sharp_at: None,
             patient_until: PATIENCE,
         }
+    }
+
+    /// Take places where double precision does not tell a root from none for roots.
+    pub(super) fn keep_to_doubles(&mut self) {
+        self.sharp = MAX_SHARP;
     }
 
     /// Look at the task and at the budget now and then.
@@ -154,8 +168,19 @@ impl<'a> Walker<'a> {
 
     /// The jet at `s`, in two words where double precision does not tell the value from zero.
     pub(super) fn jet(&mut self, s: Complex64) -> Jet {
+        self.jet_unless(s, is_clear)
+    }
+
+    /// The jet at an end of a line, where the error of its angle counts: in two words also where it
+    /// would be more than a little.
+    fn end_jet(&mut self, s: Complex64) -> Jet {
+        self.jet_unless(s, |jet| is_clear(jet) && uncertainty(jet) < MOST_UNCERTAIN)
+    }
+
+    /// The jet at `s`, in two words unless it is `good` in one.
+    fn jet_unless(&mut self, s: Complex64, good: impl Fn(&Jet) -> bool) -> Jet {
         let jet = self.probe.jet(s);
-        if is_clear(&jet) || !is_finite(&jet) || self.sharp >= MAX_SHARP {
+        if good(&jet) || !is_finite(&jet) || self.sharp >= MAX_SHARP {
             return jet;
         }
         self.sharp += 1;
@@ -168,10 +193,10 @@ impl<'a> Walker<'a> {
 
     /// The jet at `s`, its value proved to be at least four times its error.
     fn clear_jet(&mut self, s: Complex64) -> Result<Jet, Error> {
-        let mut jet = self.jet(s);
+        let mut jet = self.end_jet(s);
         if !is_finite(&jet) {
             self.probe.refer_to_dominant(s);
-            jet = self.jet(s);
+            jet = self.end_jet(s);
         }
         if !is_finite(&jet) {
             return Err(overflow(s));
@@ -228,7 +253,14 @@ impl<'a> Walker<'a> {
             // The bound grows exponentially with the span: come down in steps, not at once.
             span = (3.0 * best).max(0.125 * span);
         }
-        if self.sharp_at == Some(s) {
+        // Not where the slope is all that is in the way.
+        let farthest = room / slope;
+        let crowded = if self.sharp_at == Some(s) {
+            best < 0.5 * most.min(farthest)
+        } else {
+            best * self.span < TIGHT && best < 0.02 * farthest
+        };
+        if crowded {
             best = best.max(self.crowded_reach(s, most));
         }
         if self.probe.evaluations() < self.patient_until {
@@ -365,7 +397,11 @@ impl<'a> Walker<'a> {
                 break;
             }
             overflows = false;
-            let ahead = self.jet(next);
+            let ahead = if next == to {
+                self.end_jet(next)
+            } else {
+                self.jet(next)
+            };
             if !is_finite(&ahead) {
                 overflows = true;
                 length *= 0.25;
@@ -407,7 +443,7 @@ impl Walk for Walker<'_> {
     }
 }
 
-fn is_finite(jet: &Jet) -> bool {
+pub(super) fn is_finite(jet: &Jet) -> bool {
     jet.value.is_finite()
         && jet.slope.is_finite()
         && jet.value_error.is_finite()

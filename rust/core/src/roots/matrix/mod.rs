@@ -26,7 +26,7 @@ use self::outer::Leading;
 use self::walker::{MAX_EVALUATIONS, MatrixWalker};
 use super::cell::Cell;
 use super::count::Closed;
-use super::lines::{Spectrum, half_plane_discs};
+use super::lines::{Effort, Spectrum, half_plane_discs};
 use super::region::Region;
 use super::rightmost::{first, leading};
 use super::set::{RootSet, all_discs};
@@ -78,10 +78,19 @@ impl Spectrum for Prepared<'_> {
         MatrixWalker::new(self.system, task, limit)
     }
 
-    fn line(&self, sigma: f64, task: &Task) -> Result<(u64, Vec<Complex64>), Error> {
-        let mut walker = self.walker(task, EVALUATIONS_PER_LINE);
+    fn line(
+        &self,
+        sigma: f64,
+        effort: Effort,
+        task: &Task,
+    ) -> Result<(u64, Vec<Complex64>), Error> {
+        let mut walker = self.walker(task, effort.limit.min(EVALUATIONS_PER_LINE));
         let cell = self.cell(&mut walker, sigma)?;
         Ok((cell.map_or(0, |cell| cell.count), walker.hints))
+    }
+
+    fn far_starts(&self) -> Vec<Complex64> {
+        Vec::new()
     }
 
     fn cell_right_of<'a>(
