@@ -155,7 +155,7 @@ fn offending(h: &QuasiPolynomial, demand: Demand, task: &Task) -> Result<u64, Er
 }
 
 /// Count and status where the chains alone decide.
-fn by_chain(h: &QuasiPolynomial, chain: f64, line: f64) -> Option<(i32, CellStatus)> {
+pub(super) fn by_chain(h: &QuasiPolynomial, chain: f64, line: f64) -> Option<(i32, CellStatus)> {
     let longest = h.delays().last().zip(h.delays().first());
     let longest = longest.map_or(0.0, |(last, first)| last - first);
     // Rounding of the coefficients moves chains by as much as that of log |b/a| = C_D d.

@@ -15,7 +15,6 @@ use super::cell::{Cell, judge, with_abscissa};
 use super::row::{Members, Row};
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{Region, chain_abscissa, chain_margin, rightmost, roots};
-use crate::status::CellStatus;
 use crate::{Error, Task};
 
 /// Roots to follow.
@@ -221,10 +220,8 @@ impl<'a> Leading<'a> {
     }
 
     fn count(&self, place: usize, index: usize) -> Option<i32> {
-        let spans = &self.lines.get(place)?.row.spans;
-        let span = spans.get(spans.partition_point(|span| span.end <= index))?;
-        let holds = span.start <= index && span.cell.status == CellStatus::Ok;
-        holds.then_some(span.cell.unstable)
+        let cell = self.lines.get(place)?.row.cell(index)?;
+        Some(cell.unstable)
     }
 
     /// Are the roots right of a line all there are, and one at least?

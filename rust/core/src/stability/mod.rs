@@ -3,7 +3,7 @@
 //! `family` is h(s; p) with gains and delays as parameters; `demand` what is asked of the roots; `cell` judges one
 //! member, with a proved count of the roots that offend.
 //!
-//! Maps: `grid` judges the members over two parameters, by `row`s in which one gain varies. `pencil` is such a row,
+//! Maps: `grid` judges the members over two parameters, by `rows` along which one gain varies. `row` is one of them, `pencil` its functions,
 //! `crossing` says where its roots cross the edge, `curves` joins the crossings of all rows to the boundaries;
 //! `branch` follows one root along a row and `leading` the rightmost.
 //!
@@ -30,6 +30,7 @@ mod radius;
 mod reduced;
 mod robust;
 mod row;
+mod rows;
 mod tail;
 mod value_set;
 

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use super::cell::{Cell, UNKNOWN, judge};
+use super::cell::{Cell, UNKNOWN, by_chain, judge};
 use super::crossing::{Crossing, crossings};
 use super::demand::Demand;
 use super::pencil::{Pencil, united};
@@ -38,6 +38,15 @@ pub(super) struct Row {
     pub(super) cells: Vec<Cell>,
 }
 
+impl Row {
+    /// A cell whose count holds.
+    pub(super) fn cell(&self, index: usize) -> Option<Cell> {
+        let place = self.spans.partition_point(|span| span.end <= index);
+        let span = self.spans.get(place)?;
+        (span.start <= index && span.cell.status == CellStatus::Ok).then_some(span.cell)
+    }
+}
+
 /// A row of members A + k B.
 #[derive(Clone, Copy)]
 pub(super) struct Members<'a> {
@@ -49,6 +58,8 @@ pub(super) struct Members<'a> {
     pub(super) member: &'a dyn Fn(usize) -> Option<QuasiPolynomial>,
     /// Roots that offend against it are counted.
     pub(super) demand: Demand,
+    /// A cell whose count is known already, and its index.
+    pub(super) anchor: Option<(usize, Cell)>,
 }
 
 impl Members<'_> {
@@ -63,15 +74,10 @@ impl Members<'_> {
         if b.is_zero() {
             // All members are the same.
             let cell = self.judge(0, task)?;
-            let spans = vec![Span {
-                start: 0,
-                end: self.points.len(),
-                cell,
-            }];
-            return Ok(Row {
-                spans,
-                ..Row::default()
-            });
+            return Ok(self.uniform(cell));
+        }
+        if let Some(cell) = self.hull(a, b).and_then(|hull| self.led_by_chains(&hull)) {
+            return Ok(self.uniform(cell));
         }
         match self.crossings(a, b, task)? {
             Some(crossings) => self.between(&crossings, task),
@@ -79,10 +85,34 @@ impl Members<'_> {
         }
     }
 
+    /// All cells alike.
+    fn uniform(&self, cell: Cell) -> Row {
+        let end = self.points.len();
+        Row {
+            spans: vec![Span {
+                start: 0,
+                end,
+                cell,
+            }],
+            ..Row::default()
+        }
+    }
+
+    /// Every member has the chains of the hull, whose leading terms are theirs: if these decide, for all.
+    fn led_by_chains(&self, hull: &QuasiPolynomial) -> Option<Cell> {
+        let (unstable, status) = by_chain(hull, chain_abscissa(hull), self.demand.leftmost())?;
+        Some(Cell {
+            unstable,
+            abscissa: f64::NAN,
+            status,
+        })
+    }
+
     /// The same members, roots right of `line` being counted.
     pub(super) fn right_of(self, line: f64) -> Self {
         Self {
             demand: Demand::left_of(line),
+            anchor: None,
             ..self
         }
     }
@@ -282,7 +312,17 @@ impl Members<'_> {
         else {
             return Ok(vec![None; run.len()]);
         };
-        let anchor = self.judge(start + (end - start) / 2, task)?;
+        let within = |(index, _): &(usize, Cell)| {
+            run.iter()
+                .position(|(start, end, _)| (*start..*end).contains(index))
+        };
+        let known = self
+            .anchor
+            .and_then(|known| within(&known).zip(Some(known.1)));
+        let (place, anchor) = match known {
+            Some(known) => known,
+            None => (place, self.judge(start + (end - start) / 2, task)?),
+        };
         if anchor.status != CellStatus::Ok {
             return Ok(vec![None; run.len()]);
         }
