@@ -51,6 +51,15 @@ def test_abscissas_are_those_of_cells_alone(name):
     np.testing.assert_allclose(chart.abscissa, cells.abscissa, rtol=1e-10, atol=1e-10)
 
 
+def test_a_slanted_edge_is_searched_to_its_end():
+    # It was once left at the height at which the last, upright piece ends.
+    a, b = dtm.parameters("a b")
+    family = s**3 + 2 * b * delay(0.25) + 0 * a
+    ranges = {"a": [0.0], "b": [-2.0, -1.0, 1.0]}
+    chart = dtm.stability_map(family, ranges, abscissa=False, damping=(0.4, 1.5))
+    assert chart.unstable.tolist() == [[3, 1, 2]]
+
+
 def test_the_damping_ratio_is_that_of_the_roots():
     family, ranges = FAMILIES["pendulum"]
     ratio, horizon, decay = 0.45, 2.5, 0.2
@@ -198,6 +207,17 @@ def test_random_families_have_the_same_abscissas(family, low, high, decay):
     # Next to a double root both are known to half the digits.
     np.testing.assert_allclose(chart.abscissa[known], cells.abscissa[known], rtol=1e-6, atol=1e-6)
     assert (np.isfinite(chart.abscissa) == np.isfinite(cells.abscissa)).all()
+
+
+def test_a_mirror_image_is_not_a_second_root():
+    # A followed root once went over to the lower half plane, onto the image of another one, and the two
+    # of them made up for a pair that nobody followed.
+    a, b = dtm.parameters("a b")
+    family = 1 + 5 * s**2 + s**3 + 3 * b * s**2 * delay(0.875)
+    family = family + (5 * a * s**2 - 2 * a * s) * delay(1.938)
+    chart = dtm.stability_map(family, {"a": (-0.688, 4.75), "b": [3.0]}, (13, 1 + 1))
+    worst = [family.at(a=float(k), b=3.0).spectral_abscissa() for k in chart.axes["a"]]
+    np.testing.assert_allclose(chart.abscissa[:, 0], worst, atol=1e-10)
 
 
 def test_pickled_maps_keep_their_boundaries():

@@ -173,10 +173,11 @@ impl Branch {
         &self.now
     }
 
-    /// Follow the root to another k; `None` where it is lost.
+    /// Follow the root to another k; `None` where it is lost, or would be the mirror image of one that is followed
+    /// as well.
     pub(super) fn follow(&mut self, plane: &Plane, k: f64) -> Option<()> {
         let guess = self.extrapolated(k);
-        let root = settle(plane, &mut self.around, guess, k)?;
+        let root = settle(plane, &mut self.around, guess, k).filter(|root| root.s.im >= 0.0)?;
         self.before = std::mem::replace(&mut self.now, root);
         Some(())
     }

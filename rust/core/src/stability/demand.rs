@@ -39,6 +39,17 @@ pub(super) struct Piece {
     pub(super) length: f64,
 }
 
+impl Piece {
+    /// The t up to which |s| is at most `radius`, or a little more: |s| grows along the edge.
+    pub(super) fn within(&self, radius: f64) -> f64 {
+        let lean = self.from.re * self.along.re + self.from.im * self.along.im;
+        let (start, end) = (self.from.norm(), radius * (1.0 + 1e-9));
+        let square = lean * lean + (end - start) * (end + start);
+        // A line that the disc does not reach still has its point on the real axis.
+        (square.max(0.0).sqrt() - lean).max(1e-3 * radius)
+    }
+}
+
 impl Demand {
     /// Re s < `line` alone.
     pub(super) fn left_of(line: f64) -> Self {
@@ -165,6 +176,25 @@ mod tests {
             }
             let last = pieces[pieces.len() - 1];
             assert!((last.from - Complex64::new(-3.0, 4.0)).norm() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn pieces_end_where_the_disc_does() {
+        let damping = Some(Damping {
+            ratio: 0.6,
+            horizon: 3.0,
+        });
+        for radius in [2.0, 4.5, 6.0, 20.0] {
+            for piece in (Demand {
+                decay: 1.5,
+                damping,
+            })
+            .pieces()
+            {
+                let end = piece.from + piece.along * piece.within(radius);
+                assert!(piece.from.norm() > radius || (end.norm() / radius - 1.0).abs() < 1e-8);
+            }
         }
     }
 

@@ -177,12 +177,9 @@ impl Members<'_> {
         let Some(radius) = radius_right_of(&hull, leftmost).filter(|radius| *radius > 0.0) else {
             return Ok(None);
         };
-        let side = leftmost.abs();
-        let top = ((radius - side) * (radius + side)).max(0.0).sqrt();
-        let top = top.max(1e-3 * radius) * (1.0 + 1e-9);
         let mut all = Vec::new();
         for (index, piece) in self.demand.pieces().into_iter().enumerate() {
-            let length = piece.length.min(top - piece.from.im);
+            let length = piece.length.min(piece.within(radius));
             if length <= 0.0 {
                 break;
             }
