@@ -1,4 +1,4 @@
-"""Curves in a map on which roots lie on the line that decides stability."""
+"""What divides a map: curves on which roots lie on the edge of stability, and chains of roots."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._parametric import ParametricQuasiPolynomial
 
-__all__ = ["Boundary", "boundaries_of"]
+__all__ = ["Boundary", "boundaries_of", "chains_of"]
 
 _Floats: TypeAlias = NDArray[np.float64]
 
@@ -65,11 +65,7 @@ def boundaries_of(
 ) -> tuple[Boundary, ...]:
     """Curves on which members of `family` have roots on the edge, longest first."""
     names = tuple(axes)
-    places = (family.names.index(names[0]), family.names.index(names[1]))
-    first, second = (axes[name] for name in names)
-    found = family._family.boundaries(
-        [0.0] * len(family.names), places, first, second, decay, damping, threads
-    )
+    found = family._family.boundaries(*_grid(family, axes), decay, damping, threads)
     if found is None:
         raise ValueError(
             f"the family is affine in neither {names[0]} nor {names[1]}: its boundaries are known "
@@ -85,3 +81,18 @@ def boundaries_of(
             read_only(array)
         result.append(Boundary(values, omega, crossing, names[along]))
     return tuple(result)
+
+
+def chains_of(family: ParametricQuasiPolynomial, axes: dict[str, _Floats]) -> _Floats:
+    """Abscissas of the chains of roots of the members of `family`, shape (n0, n1)."""
+    found: _Floats = read_only(family._family.chains(*_grid(family, axes)))
+    return found
+
+
+def _grid(
+    family: ParametricQuasiPolynomial, axes: dict[str, _Floats]
+) -> tuple[list[float], tuple[int, int], _Floats, _Floats]:
+    """Values, places and points of two parameters as the native core takes them."""
+    one, two = axes
+    places = (family.names.index(one), family.names.index(two))
+    return [0.0] * len(family.names), places, axes[one], axes[two]

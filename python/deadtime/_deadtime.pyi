@@ -150,6 +150,13 @@ class Family:
         threads: int | None = None,
         progress: Callable[[int], object] | None = None,
     ) -> tuple[NDArray[np.int32], NDArray[np.float64] | None, NDArray[np.uint8]]: ...
+    def chains(
+        self,
+        values: list[float],
+        parameters: tuple[int, int],
+        first: NDArray[np.float64],
+        second: NDArray[np.float64],
+    ) -> NDArray[np.float64]: ...
     def boundaries(
         self,
         values: list[float],

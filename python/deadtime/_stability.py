@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._boundaries import Boundary, boundaries_of
+from deadtime._boundaries import Boundary, boundaries_of, chains_of
 from deadtime._families import family_of, numbers_of
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
@@ -115,6 +115,40 @@ class StabilityMap(ReadOnlyArrays):
                 "abscissa changes sign"
             )
         return boundaries_of(self.family, self.axes, self.decay, self.damping)
+
+    @cached_property
+    def chain_abscissa(self) -> _Floats:
+        """Abscissa of the chains of roots in 1/s, shape (n0, n1): -inf without chains.
+
+        Chains are judged robustly, as in `QuasiPolynomial.chain_abscissa`.
+
+        Raises
+        ------
+        ValueError
+            If the map is that of a sampled loop, which has no chains.
+        """
+        if self.family is None:
+            raise ValueError("the map of a sampled loop has no chains: its poles are finitely many")
+        return chains_of(self.family, self.axes)
+
+    @cached_property
+    def strongly_stable(self) -> NDArray[np.bool_]:
+        """Where the chains lie left of ``-decay``, also after small changes of the delays.
+
+        Outside this region no gain helps: infinitely many roots are unstable, or arbitrarily small
+        changes of the delays make them so. Shape (n0, n1); true everywhere for retarded families.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> Kp, Kv = dtm.parameters("Kp Kv")
+        >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(0.36)
+        >>> chart = dtm.stability_map(h, {"Kp": [1.0], "Kv": [-1.2, 0.0, 0.7, 1.0]}, abscissa=False)
+        >>> chart.strongly_stable.tolist()
+        [[False, True, True, False]]
+        """
+        strong: NDArray[np.bool_] = read_only(self.chain_abscissa < -self.decay)
+        return strong
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:

@@ -11,6 +11,9 @@ use crate::runtime::run;
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Table<'py, T> = Bound<'py, PyArray2<T>>;
 
+/// Counts, abscissas if asked for, and statuses.
+type Cells<'py> = (Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>);
+
 /// Gains, rows, frequencies and jumps of a boundary.
 type Curve<'py> = (
     Bound<'py, PyArray1<f64>>,
@@ -82,7 +85,7 @@ impl PyFamily {
         cells: bool,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>)> {
+    ) -> PyResult<Cells<'py>> {
         let (first, second) = (in_order(&first), in_order(&second));
         let axis = |parameter, points| Axis { parameter, points };
         let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
@@ -105,6 +108,25 @@ impl PyFamily {
                 .transpose()?,
             status.into_pyarray(py).reshape(shape)?,
         ))
+    }
+
+    /// The abscissas of the chains over two parameters; `values` holds the others.
+    fn chains<'py>(
+        &self,
+        py: Python<'py>,
+        values: Vec<f64>,
+        parameters: (usize, usize),
+        first: Floats<'py>,
+        second: Floats<'py>,
+    ) -> PyResult<Table<'py, f64>> {
+        let (first, second) = (in_order(&first), in_order(&second));
+        let axis = |parameter, points| Axis { parameter, points };
+        let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
+        let family = &self.inner;
+        let found = run(py, None, None, |task| {
+            stability::chains(family, &values, axes, task)
+        })?;
+        found.into_pyarray(py).reshape([first.len(), second.len()])
     }
 
     /// The axis along the rows, and the curves: positions on it, rows, frequencies and jumps.

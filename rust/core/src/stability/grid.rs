@@ -10,11 +10,12 @@
 use rayon::prelude::*;
 
 use super::cell::{Cell, judge};
+use super::chart::Chart;
 use super::curves::{Vertex, join};
 use super::demand::Demand;
 use super::family::Family;
 use super::rows::Rows;
-use crate::status::CellStatus;
+use crate::roots::chain_abscissa;
 use crate::{Error, Task};
 
 /// More cells than anyone can look at.
@@ -48,28 +49,6 @@ pub struct Question {
     pub abscissa: bool,
     /// How counts are proved.
     pub proof: Proof,
-}
-
-/// A stability map: row-major arrays, the first axis running slowest.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Chart {
-    /// See [`Cell::unstable`].
-    pub unstable: Vec<i32>,
-    /// See [`Cell::abscissa`]; empty if not asked for.
-    pub abscissa: Vec<f64>,
-    /// See [`Cell::status`].
-    pub status: Vec<CellStatus>,
-}
-
-impl Chart {
-    /// Nothing unstable; zeros cost nothing until they are written to.
-    pub(super) fn stable(cells: usize) -> Self {
-        Self {
-            unstable: vec![0; cells],
-            abscissa: Vec::new(),
-            status: vec![CellStatus::Ok; cells],
-        }
-    }
 }
 
 /// Judge the members of `family` over two of its parameters; `values` holds the others.
@@ -149,6 +128,31 @@ pub fn boundaries(
         along: rows.along,
         curves: join(&crossings, (*low, *high)),
     }))
+}
+
+/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it cannot be formed.
+///
+/// # Errors
+/// As for [`map`].
+pub fn chains(
+    family: &Family,
+    values: &[f64],
+    axes: [Axis<'_>; 2],
+    task: &Task,
+) -> Result<Vec<f64>, Error> {
+    let cells = check(family, values, axes)?;
+    let [first, second] = axes;
+    let width = second.points.len();
+    let cell = |values: &mut Vec<f64>, index: usize| {
+        task.check()?;
+        put(values, first, index / width);
+        put(values, second, index % width);
+        Ok(family.at(values).map_or(f64::NAN, |h| chain_abscissa(&h)))
+    };
+    (0..cells)
+        .into_par_iter()
+        .map_init(|| values.to_vec(), cell)
+        .collect()
 }
 
 pub(super) struct Map<'a> {

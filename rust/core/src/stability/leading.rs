@@ -69,7 +69,7 @@ impl Members<'_> {
     ///
     /// # Errors
     /// [`Error::Interrupted`] alone.
-    pub(super) fn abscissas(&self, axis: &Row, task: &Task) -> Result<Vec<Cell>, Error> {
+    pub(super) fn abscissas(&self, axis: &Row, task: &Task) -> Result<Row, Error> {
         let counted = axis
             .spans
             .iter()
@@ -78,7 +78,7 @@ impl Members<'_> {
             .parts
             .as_ref()
             .and_then(|(a, b)| Leading::new(self, a, b, task));
-        counted
+        let cells: Result<Vec<Cell>, Error> = counted
             .enumerate()
             .map(|(index, cell)| {
                 task.check()?;
@@ -96,7 +96,8 @@ impl Members<'_> {
                     (Known::Nothing, None) => Ok(Cell::UNDECIDED),
                 }
             })
-            .collect()
+            .collect();
+        Ok(Row::of(&cells?))
     }
 }
 

@@ -16,6 +16,7 @@
 mod boxes;
 mod branch;
 mod cell;
+mod chart;
 mod crossing;
 mod curves;
 mod demand;
@@ -36,10 +37,11 @@ mod value_set;
 
 pub use boxes::{Boxes, Limits, Node, proved_boxes};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
+pub use chart::Chart;
 pub use curves::Vertex;
 pub use demand::{Damping, Demand};
 pub use family::{Affine, Family, Term};
-pub use grid::{Axis, Boundaries, Chart, Proof, Question, boundaries, map};
+pub use grid::{Axis, Boundaries, Proof, Question, boundaries, chains, map};
 pub use largest::largest_stable_box;
 pub use radius::{Radius, stability_radius};
 pub use robust::robust_map;

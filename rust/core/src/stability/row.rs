@@ -34,11 +34,33 @@ pub(super) struct Span {
 pub(super) struct Row {
     /// All cells, in order.
     pub(super) spans: Vec<Span>,
-    /// Cell by cell, where the abscissa is asked for.
-    pub(super) cells: Vec<Cell>,
+    /// Cell by cell, where they are asked for.
+    pub(super) abscissas: Vec<f64>,
 }
 
 impl Row {
+    /// The row of these cells with their abscissas.
+    pub(super) fn of(cells: &[Cell]) -> Self {
+        let mut spans: Vec<Span> = Vec::new();
+        for (index, cell) in cells.iter().enumerate() {
+            let same = |span: &&mut Span| {
+                (span.cell.unstable, span.cell.status) == (cell.unstable, cell.status)
+            };
+            match spans.last_mut().filter(same) {
+                Some(span) => span.end = index + 1,
+                None => spans.push(Span {
+                    start: index,
+                    end: index + 1,
+                    cell: *cell,
+                }),
+            }
+        }
+        Self {
+            spans,
+            abscissas: cells.iter().map(|cell| cell.abscissa).collect(),
+        }
+    }
+
     /// A cell whose count holds.
     pub(super) fn cell(&self, index: usize) -> Option<Cell> {
         let place = self.spans.partition_point(|span| span.end <= index);

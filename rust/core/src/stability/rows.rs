@@ -3,16 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::cell::Cell;
+use super::chart::Chart;
 use super::crossing::Crossing;
 use super::family::Family;
-use super::grid::{Axis, Chart, Map, put, put_value};
+use super::grid::{Axis, Map, put, put_value};
 use super::row::{Members, Row};
 use crate::Error;
-use crate::status::CellStatus;
-
-/// Lines of a chart filled together, so that strided columns stay in the cache.
-const BLOCK: usize = 32;
 
 /// A map whose family is affine in the parameter along its rows.
 pub(super) struct Rows<'a> {
@@ -74,10 +70,12 @@ impl<'a> Rows<'a> {
                     .and_then(|(column, row)| Some((*column, row.cell(index)?))),
                 ..members
             };
-            let mut row = members.count(self.map.task)?;
-            if self.map.question.abscissa {
-                row.cells = members.abscissas(&row, self.map.task)?;
-            }
+            let counts = members.count(self.map.task)?;
+            let row = if self.map.question.abscissa {
+                members.abscissas(&counts, self.map.task)?
+            } else {
+                counts
+            };
             self.map.task.advance(members.points.len() as u64);
             Ok(row)
         })
@@ -154,106 +152,8 @@ impl<'a> Rows<'a> {
     pub(super) fn chart(&self) -> Result<Chart, Error> {
         let rows = self.rows()?;
         let [first, second] = self.map.axes;
-        let width = second.points.len();
-        let mut chart = Chart::stable(first.points.len() * width);
-        if self.map.question.abscissa {
-            self.fill_cells(&rows, &mut chart, width);
-            return Ok(chart);
-        }
-        let blocks = chart
-            .unstable
-            .par_chunks_mut(BLOCK * width)
-            .zip(chart.status.par_chunks_mut(BLOCK * width));
-        blocks.enumerate().for_each(|(block, (unstable, status))| {
-            let top = block * BLOCK;
-            let lines = unstable.len() / width;
-            if self.along == 1 {
-                for (line, row) in rows.iter().skip(top).take(lines).enumerate() {
-                    for span in &row.spans {
-                        let cells = line * width + span.start..line * width + span.end;
-                        if span.cell.unstable != 0
-                            && let Some(part) = unstable.get_mut(cells.clone())
-                        {
-                            part.fill(span.cell.unstable);
-                        }
-                        if span.cell.status != CellStatus::Ok
-                            && let Some(part) = status.get_mut(cells)
-                        {
-                            part.fill(span.cell.status);
-                        }
-                    }
-                }
-                return;
-            }
-            for (column, row) in rows.iter().enumerate() {
-                let from = row.spans.partition_point(|span| span.end <= top);
-                for span in row.spans.iter().skip(from) {
-                    if span.start >= top + lines {
-                        break;
-                    }
-                    let cells = span.start.max(top) - top..span.end.min(top + lines) - top;
-                    let places = cells.map(|line| line * width + column);
-                    if span.cell.unstable != 0 {
-                        for place in places.clone() {
-                            if let Some(cell) = unstable.get_mut(place) {
-                                *cell = span.cell.unstable;
-                            }
-                        }
-                    }
-                    if span.cell.status != CellStatus::Ok {
-                        for place in places {
-                            if let Some(cell) = status.get_mut(place) {
-                                *cell = span.cell.status;
-                            }
-                        }
-                    }
-                }
-            }
-        });
+        let mut chart = Chart::stable(first.points.len() * second.points.len());
+        chart.fill(&rows, second.points.len(), self.along == 0);
         Ok(chart)
-    }
-}
-
-impl Rows<'_> {
-    /// Counts, abscissas and statuses of rows that know every cell.
-    fn fill_cells(&self, rows: &[Row], chart: &mut Chart, width: usize) {
-        chart.abscissa = vec![f64::NAN; chart.unstable.len()];
-        let lines = chart
-            .unstable
-            .par_chunks_mut(BLOCK * width)
-            .zip(chart.abscissa.par_chunks_mut(BLOCK * width))
-            .zip(chart.status.par_chunks_mut(BLOCK * width));
-        lines
-            .enumerate()
-            .for_each(|(block, ((unstable, abscissa), status))| {
-                let top = block * BLOCK;
-                let height = unstable.len() / width;
-                let columns = if self.along == 1 { height } else { width };
-                for outer in 0..columns {
-                    let (row, cells) = if self.along == 1 {
-                        (rows.get(top + outer), 0..width)
-                    } else {
-                        (rows.get(outer), top..top + height)
-                    };
-                    for index in cells {
-                        let place = if self.along == 1 {
-                            outer * width + index
-                        } else {
-                            (index - top) * width + outer
-                        };
-                        let cell = row
-                            .and_then(|row| row.cells.get(index))
-                            .copied()
-                            .unwrap_or(Cell::UNDECIDED);
-                        if let (Some(a), Some(b), Some(c)) = (
-                            unstable.get_mut(place),
-                            abscissa.get_mut(place),
-                            status.get_mut(place),
-                        ) {
-                            (*a, *b, *c) = (cell.unstable, cell.abscissa, cell.status);
-                        }
-                    }
-                }
-            });
     }
 }

@@ -2,7 +2,10 @@ use std::f64::consts::PI;
 
 use proptest::prelude::*;
 
-use super::{Affine, Axis, Demand, ENDLESS, Family, Proof, Question, Term, UNKNOWN, judge, map};
+use super::{
+    Affine, Axis, Damping, Demand, ENDLESS, Family, Proof, Question, Term, UNKNOWN, boundaries,
+    judge, map,
+};
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{count_right_of, spectral_abscissa};
 use crate::status::CellStatus;
@@ -367,5 +370,88 @@ proptest! {
         prop_assert_eq!(chart.abscissa[0], spectral_abscissa(&h, true, &task).unwrap());
         // Both proved, hence never at odds.
         prop_assert_eq!(chart.unstable[0] > 0, chart.abscissa[0] > 0.0);
+    }
+}
+
+#[test]
+fn rows_say_what_single_cells_say() {
+    let gains: Vec<f64> = (0..40).map(|i| -2.0 + 0.25 * f64::from(i)).collect();
+    let others: Vec<f64> = (0..25).map(|i| -1.2 + 0.1 * f64::from(i)).collect();
+    let damping = Some(Damping {
+        ratio: 0.4,
+        horizon: 1.0,
+    });
+    let demands = [(0.0, None), (0.35, None), (0.0, damping), (0.2, damping)];
+    for (first, second) in [(&gains, &others), (&others, &gains)] {
+        let order = if first.len() == 40 { [0, 1] } else { [1, 0] };
+        let axes = [(order[0], first), (order[1], second)]
+            .map(|(parameter, points)| Axis { parameter, points });
+        for (decay, damping) in demands {
+            let [curves, cells] = [Proof::Curves, Proof::Cells].map(|proof| {
+                let question = Question {
+                    demand: Demand { decay, damping },
+                    abscissa: false,
+                    proof,
+                };
+                map(&velocity(), &[0.0, 0.0], axes, question, &Task::new()).unwrap()
+            });
+            assert_eq!(curves, cells, "{decay} {damping:?}");
+        }
+    }
+}
+
+#[test]
+fn boundaries_are_closed_forms_in_order() {
+    // s + (Kp + Kv s) e^(−0.36 s): Kp = w sin(0.36 w), Kv = −cos(0.36 w).
+    let gains = [0.5, 6.0];
+    let others: Vec<f64> = (0..61).map(|i| -0.6 + 0.02 * f64::from(i)).collect();
+    let axes =
+        [(0, &gains[..]), (1, &others[..])].map(|(parameter, points)| Axis { parameter, points });
+    let found = boundaries(
+        &velocity(),
+        &[0.0, 0.0],
+        axes,
+        Demand::default(),
+        &Task::new(),
+    );
+    let found = found.unwrap().unwrap();
+    assert_eq!((found.along, found.curves.len()), (0, 1));
+    let curve = &found.curves[0];
+    assert_eq!(curve.len(), others.len());
+    for (vertex, kv) in curve.iter().zip(&others) {
+        let omega = (-kv).acos() / 0.36;
+        // A crossing is known to some rounding errors of the bounds of F, not of F itself.
+        assert!((vertex.omega - omega).abs() < 1e-10);
+        assert!((vertex.gain - omega * (0.36 * omega).sin()).abs() < 1e-9);
+        assert_eq!(vertex.jump, 2);
+    }
+}
+
+#[test]
+fn a_curve_that_turns_back_is_one() {
+    // The pendulum s² − 1 + (Kp + Kd s) e^(−0.3 s): the gains of one row meet its curve twice.
+    let none = [0.0, 0.0];
+    let terms = vec![
+        term(1.0, &[0, 0], 2, 0.0, &none),
+        term(-1.0, &[0, 0], 0, 0.0, &none),
+        term(1.0, &[1, 0], 0, 0.3, &none),
+        term(1.0, &[0, 1], 1, 0.3, &none),
+    ];
+    let family = Family::new(names("Kp Kd"), terms).unwrap();
+    let range = |low: f64, high: f64, count: u32| -> Vec<f64> {
+        (0..count)
+            .map(|i| low + (high - low) * f64::from(i) / f64::from(count - 1))
+            .collect()
+    };
+    let (first, second) = (range(1.5, 8.0, 131), range(0.0, 6.0, 5));
+    let axes =
+        [(0, &first[..]), (1, &second[..])].map(|(parameter, points)| Axis { parameter, points });
+    let found = boundaries(&family, &none, axes, Demand::default(), &Task::new());
+    let curves = found.unwrap().unwrap().curves;
+    assert!(!curves.is_empty());
+    for curve in &curves {
+        for pair in curve.windows(2) {
+            assert!(pair[0].row.abs_diff(pair[1].row) <= 1);
+        }
     }
 }
