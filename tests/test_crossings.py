@@ -110,6 +110,14 @@ def test_a_neutral_equation_with_its_delay_free():
     check_by_counts(found)
 
 
+def test_a_pair_that_only_touches_the_axis_has_no_direction():
+    # |A|^2 - |B|^2 = (1 - w^2)^2
+    found = dtm.crossings(s**2 + 0.5 * s + 1.0 + 0.5 * s * delay(T), {"T": (0.05, 8.0)})
+    assert found.values == pytest.approx(math.pi, rel=1e-7)
+    assert found.direction.tolist() == [0]
+    assert found.counts.tolist() == [0, 0]
+
+
 def test_several_fixed_delays_beside_the_free_one():
     family = s**2 + 0.7 * s + 1.0 + 0.6 * delay(0.4) + (0.9 - 0.2 * s) * delay(T + 0.3)
     check_by_counts(dtm.crossings(family, {"T": (0.0, 30.0)}))
@@ -156,7 +164,7 @@ def test_a_lag_and_a_gain_of_the_plant_vary_too():
     st.floats(0.0, 2.0),
     st.floats(0.05, 2.0),
 )
-def test_counts_step_by_the_directions(fixed, varied, early, late):
+def test_counts_step_by_the_directions_of_gains(fixed, varied, early, late):
     family = s ** len(fixed) + K * sum(c * s**k for k, c in enumerate(varied)) * delay(late)
     family = family + sum(c * s**k for k, c in enumerate(fixed)) * delay(early)
     try:

@@ -45,7 +45,7 @@ _Rows: TypeAlias = dict[tuple[float, float], dict[int, float]]
 #: More crossings than anyone can look at.
 _MOST = 1_000_000
 
-#: A zero that both parts share is a multiple one of the difference of their squares, and so is met to
+#: A zero that both parts share is a multiple one of the difference of their squares, and so met to
 #: the square or the third root of the rounding only; their quotient means nothing there.
 _COMMON = 1e-4
 
@@ -429,9 +429,7 @@ def _delays_of(rows: _Rows, name: str) -> tuple[_Floats, _Floats, _Floats, NDArr
             f"neither the terms with {name} nor those without outweigh the others at high "
             "frequencies: there is no end to the frequencies at which roots may cross"
         )
-    difference = DifferenceOfSquares(a, b)
-    slope, noise = difference.slope(omega), difference.noise(omega)[1]
-    direction = np.where(np.abs(slope) > noise, 2.0 * np.sign(slope), 0.0).astype(np.int32)
+    direction = _directions(DifferenceOfSquares(a, b), omega)
     size = OnAxis(a, 0.0).bounds(omega)[0]
     stays = (direction == 0) & (np.abs(a(1j * omega)) <= _COMMON * size)
     if stays.any():
@@ -441,6 +439,17 @@ def _delays_of(rows: _Rows, name: str) -> tuple[_Floats, _Floats, _Floats, NDArr
         )
     turn = np.mod(np.angle(-b(1j * omega) / a(1j * omega)), 2.0 * np.pi)
     return omega, turn / (multiple * omega), 2.0 * np.pi / (multiple * omega), direction
+
+
+def _directions(difference: DifferenceOfSquares, omega: _Floats) -> NDArray[np.int32]:
+    """2 or -2 where the slope keeps its sign as far as rounding may hide the zero, else 0."""
+    value, slope = np.abs(difference.value(omega)), difference.slope(omega)
+    noise, slope_noise = difference.noise(omega)
+    size = np.maximum(np.abs(slope), np.finfo(np.float64).tiny)
+    hidden = np.minimum(2.0 * (value + noise) / size, omega)
+    change = difference.change(omega, hidden, size + slope_noise)[1]
+    found = np.where(size > change + slope_noise, 2.0 * np.sign(slope), 0.0)
+    return found.astype(np.int32)
 
 
 def _part(rows: _Rows, slope: float, shift: float) -> QuasiPolynomial:
