@@ -19,6 +19,9 @@ type Curve<'py> = (
     Bound<'py, PyArray1<i32>>,
 );
 
+/// Counts, abscissas and statuses of a map.
+type Charted<'py> = (Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>);
+
 /// Gains, frequencies and jumps (0 where unknown) of crossings.
 type Crossings<'py> = (
     Bound<'py, PyArray1<f64>>,
@@ -89,7 +92,7 @@ impl PyFamily {
         cells: bool,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>)> {
+    ) -> PyResult<Charted<'py>> {
         let (first, second) = (in_order(&first), in_order(&second));
         let axis = |parameter, points| Axis { parameter, points };
         let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
