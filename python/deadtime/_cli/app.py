@@ -351,6 +351,7 @@ def map_(
         console.print(
             f"most stable cell: {gains}, spectral abscissa {abscissa:.4g} 1/s; it bears {bears}",
             highlight=False,
+            soft_wrap=True,
         )
     if crossed is not None:
         print_table(_crossings_table(crossed))
