@@ -1,80 +1,135 @@
-//! Stability maps, one thread: time per map of 64 by 64 cells, counts alone and with abscissa.
+//! Stability maps of five families, one thread: counts alone on a picture of 1000 by 1000 cells, with abscissa on
+//! 100 by 100, and how counts grow with the picture: 500, 1000 and 2000 cells a side.
 //!
-//! The velocity loop s + (Kp + Kv s) e^(−0.36 s) is neutral, the integrator s + Kp e^(−s T)
-//! retarded with the delay as a parameter.
+//! The velocity loop is neutral, with a filter on the derivative it is retarded of degree 3; the pendulum
+//! is unstable without control, the two gains of the last one have a delay each.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
 use deadtime::stability::{Affine, Axis, Family, Question, Term, map};
 
-const SIDE: u32 = 64;
+/// Coefficient, powers of the two gains, power of s, delay.
+type Row = (f64, [u32; 2], u32, f64);
 
-/// Points inside the range: its ends are the boundary of stability in places.
-fn inside(low: f64, high: f64) -> Vec<f64> {
-    (0..SIDE)
-        .map(|i| low + (high - low) * (f64::from(i) + 0.5) / f64::from(SIDE))
-        .collect()
+struct Case {
+    name: &'static str,
+    family: Family,
+    ranges: [(f64, f64); 2],
 }
 
-fn term(exponents: [u32; 2], power: u32, constant: f64, slopes: [f64; 2]) -> Term {
-    Term {
-        coefficient: 1.0,
-        exponents: exponents.to_vec(),
-        power,
-        delay: Affine {
-            constant,
-            slopes: slopes.to_vec(),
-        },
+fn case(name: &'static str, rows: Vec<Row>, ranges: [(f64, f64); 2]) -> Case {
+    let terms = rows
+        .into_iter()
+        .map(|(coefficient, exponents, power, delay)| Term {
+            coefficient,
+            exponents: exponents.to_vec(),
+            power,
+            delay: Affine {
+                constant: delay,
+                slopes: vec![0.0; 2],
+            },
+        });
+    let names = vec!["first".to_owned(), "second".to_owned()];
+    Case {
+        name,
+        family: Family::new(names, terms.collect()).expect("a good family"),
+        ranges,
     }
 }
 
-fn family(names: [&str; 2], terms: Vec<Term>) -> Family {
-    let names = names.map(str::to_owned).to_vec();
-    Family::new(names, terms).expect("a good family")
+fn cases() -> Vec<Case> {
+    const NONE: [u32; 2] = [0, 0];
+    const FIRST: [u32; 2] = [1, 0];
+    const SECOND: [u32; 2] = [0, 1];
+    let (t, corner) = (0.36, 38.0);
+    vec![
+        case(
+            "velocity",
+            vec![(1.0, NONE, 1, 0.0), (1.0, FIRST, 0, t), (1.0, SECOND, 1, t)],
+            [(0.0, 6.0), (-1.0, 1.0)],
+        ),
+        case(
+            "velocity_filtered",
+            vec![
+                (1.0, NONE, 3, 0.0),
+                (2.0 * corner, NONE, 2, 0.0),
+                (corner * corner, NONE, 1, 0.0),
+                (1.0, FIRST, 2, t),
+                (2.0 * corner, FIRST, 1, t),
+                (corner * corner, FIRST, 0, t),
+                (corner * corner, SECOND, 1, t),
+            ],
+            [(0.0, 6.0), (-1.0, 1.0)],
+        ),
+        case(
+            "pendulum",
+            vec![
+                (1.0, NONE, 2, 0.0),
+                (-1.0, NONE, 0, 0.0),
+                (1.0, FIRST, 0, 0.3),
+                (1.0, SECOND, 1, 0.3),
+            ],
+            [(0.0, 8.0), (0.0, 6.0)],
+        ),
+        case(
+            "pi_first_order",
+            vec![
+                (2.0, NONE, 2, 0.0),
+                (1.0, NONE, 1, 0.0),
+                (1.5, FIRST, 1, 0.5),
+                (1.5, SECOND, 0, 0.5),
+            ],
+            [(-1.0, 8.0), (0.0, 8.0)],
+        ),
+        case(
+            "two_delays",
+            vec![
+                (1.0, NONE, 1, 0.0),
+                (1.0, FIRST, 0, 0.3),
+                (1.0, SECOND, 0, 1.1),
+            ],
+            [(-6.0, 6.0), (-6.0, 6.0)],
+        ),
+    ]
+}
+
+/// Both ends included, as from Python.
+fn points((low, high): (f64, f64), side: u32) -> Vec<f64> {
+    (0..side)
+        .map(|i| low + (high - low) * f64::from(i) / f64::from(side - 1))
+        .collect()
 }
 
 fn maps(criterion: &mut Criterion) {
-    let none = [0.0, 0.0];
-    let s = || term([0, 0], 1, 0.0, none);
-    let velocity = vec![
-        s(),
-        term([1, 0], 0, 0.36, none),
-        term([0, 1], 1, 0.36, none),
-    ];
-    let integrator = vec![s(), term([1, 0], 0, 0.0, [0.0, 1.0])];
-    let cases = [
-        (
-            "velocity",
-            family(["Kp", "Kv"], velocity),
-            inside(0.0, 6.0),
-            inside(-1.0, 1.0),
-        ),
-        (
-            "integrator",
-            family(["Kp", "T"], integrator),
-            inside(0.0, 20.0),
-            inside(0.0, 2.0),
-        ),
-    ];
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .expect("a thread");
     let mut group = criterion.benchmark_group("stability_map");
-    group.throughput(Throughput::Elements(u64::from(SIDE * SIDE)));
-    for (name, family, first, second) in &cases {
-        let axes = [(0, first), (1, second)].map(|(parameter, points)| Axis { parameter, points });
-        for (what, abscissa) in [("counts", false), ("abscissa", true)] {
-            let question = Question {
-                abscissa,
-                ..Question::default()
-            };
-            group.bench_function(BenchmarkId::new(*name, what), |bencher| {
+    group.sample_size(10);
+    let mut measure = |what: &str, case: &Case, side: u32, abscissa: bool| {
+        let [first, second] = case.ranges.map(|range| points(range, side));
+        let axes =
+            [(0, &first), (1, &second)].map(|(parameter, points)| Axis { parameter, points });
+        let question = Question {
+            abscissa,
+            ..Question::default()
+        };
+        group.throughput(Throughput::Elements(u64::from(side) * u64::from(side)));
+        group.bench_function(
+            BenchmarkId::new(format!("{}/{what}", case.name), side),
+            |bencher| {
                 bencher.iter(|| {
-                    pool.install(|| map(family, &[0.0, 0.0], axes, question, &Task::new()))
+                    pool.install(|| map(&case.family, &[0.0, 0.0], axes, question, &Task::new()))
                 });
-            });
+            },
+        );
+    };
+    for case in cases() {
+        for side in [500, 1000, 2000] {
+            measure("counts", &case, side, false);
         }
+        measure("abscissa", &case, 100, true);
     }
     group.finish();
 }

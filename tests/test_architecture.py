@@ -47,6 +47,7 @@ FLOORS = [
         "_loop_run",
         "_loop_stability",
         "_boundaries",
+        "_crossings",
         "_stability",
         "_families",
         "_boxes",

@@ -210,8 +210,8 @@ def test_random_families_have_the_same_abscissas(family, low, high, decay):
 
 
 def test_a_mirror_image_is_not_a_second_root():
-    # A followed root once went over to the lower half plane, onto the image of another one, and the two
-    # of them made up for a pair that nobody followed.
+    # A followed root once went over to the lower half plane, onto the image of another one, and
+    # the two of them made up for a pair that nobody followed.
     a, b = dtm.parameters("a b")
     family = 1 + 5 * s**2 + s**3 + 3 * b * s**2 * delay(0.875)
     family = family + (5 * a * s**2 - 2 * a * s) * delay(1.938)

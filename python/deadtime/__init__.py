@@ -17,6 +17,7 @@ from deadtime._boxes import (
 from deadtime._certificate import Certificate
 from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
+from deadtime._crossings import Crossings, crossings, delay_margin
 from deadtime._design import Design, design
 from deadtime._errors import (
     CertificateError,
@@ -73,6 +74,7 @@ __all__ = [
     "ConvergenceError",
     "CountMismatchError",
     "CramerRaoBound",
+    "Crossings",
     "DeadtimeError",
     "DelayEstimate",
     "DelaySystem",
@@ -103,9 +105,11 @@ __all__ = [
     "Step",
     "TransferFunction",
     "Whiteness",
+    "crossings",
     "damping_ratio",
     "dde_roots",
     "delay",
+    "delay_margin",
     "design",
     "estimate_delay",
     "feedback",

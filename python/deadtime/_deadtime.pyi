@@ -177,6 +177,9 @@ class Family:
         ]
         | None
     ): ...
+    def crossings(
+        self, values: list[float], parameter: int, ends: tuple[float, float]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]: ...
 
 def proved_boxes(
     family: Family,

@@ -41,7 +41,7 @@ from deadtime._frequency import (
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Margins", "margins"]
+__all__ = ["Margins", "gain_crossovers", "margins"]
 
 Vector = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ def margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins:
     stable = (d + n).is_stable()
     a, b = _by_delay(d, d.degree), _by_delay(n, d.degree)
 
-    crossovers, all_gain = _gain_crossovers(n, d)
+    crossovers, all_gain = gain_crossovers(n, d)
     at = n(1j * crossovers) / d(1j * crossovers)
     turn = np.mod(np.pi + np.angle(at), 2.0 * np.pi)
     delays = turn / crossovers
@@ -208,7 +208,7 @@ def _refuse_what_has_none(n: QuasiPolynomial, d: QuasiPolynomial) -> None:
         )
 
 
-def _gain_crossovers(n: QuasiPolynomial, d: QuasiPolynomial) -> tuple[Vector, float]:
+def gain_crossovers(n: QuasiPolynomial, d: QuasiPolynomial) -> tuple[Vector, float]:
     """All frequencies above zero with |n| = |d|, and up to where that is all."""
     k = min(powers_of_s(n), powers_of_s(d)) if n.coefficients.any() else 0
     n, d = without_powers(n, k), without_powers(d, k)

@@ -6,18 +6,25 @@ use pyo3::prelude::*;
 
 use crate::arrays::in_order;
 use crate::errors::to_python;
-use crate::runtime::run;
+use crate::runtime::{run, run_here};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Table<'py, T> = Bound<'py, PyArray2<T>>;
-
-/// Counts, abscissas if asked for, and statuses.
-type Cells<'py> = (Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>);
 
 /// Gains, rows, frequencies and jumps of a boundary.
 type Curve<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i32>>,
+);
+
+/// Counts, abscissas and statuses of a map.
+type Charted<'py> = (Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>);
+
+/// Gains, frequencies and jumps (0 where unknown) of crossings.
+type Crossings<'py> = (
+    Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i32>>,
 );
@@ -85,7 +92,7 @@ impl PyFamily {
         cells: bool,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Cells<'py>> {
+    ) -> PyResult<Charted<'py>> {
         let (first, second) = (in_order(&first), in_order(&second));
         let axis = |parameter, points| Axis { parameter, points };
         let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
@@ -168,6 +175,28 @@ impl PyFamily {
             });
             (found.along, curves.collect())
         }))
+    }
+
+    /// Crossings of the imaginary axis as one gain grows within a range; `values` holds the others.
+    fn crossings<'py>(
+        &self,
+        py: Python<'py>,
+        values: Vec<f64>,
+        parameter: usize,
+        ends: (f64, f64),
+    ) -> PyResult<Crossings<'py>> {
+        let family = &self.inner;
+        let found = run_here(py, |task| {
+            stability::crossings_along(family, &values, parameter, ends, task)
+        })?;
+        let gains: Vec<f64> = found.iter().map(|place| place.gain).collect();
+        let omegas: Vec<f64> = found.iter().map(|place| place.omega).collect();
+        let jumps: Vec<i32> = found.iter().map(|place| place.jump.unwrap_or(0)).collect();
+        Ok((
+            gains.into_pyarray(py),
+            omegas.into_pyarray(py),
+            jumps.into_pyarray(py),
+        ))
     }
 }
 

@@ -5,7 +5,8 @@
 //!
 //! Maps: `grid` judges the members over two parameters, by `rows` along which one gain varies. `row` is one of them, `pencil` its functions,
 //! `crossing` says where its roots cross the edge, `curves` joins the crossings of all rows to the boundaries;
-//! `branch` follows one root along a row and `leading` the rightmost.
+//! `branch` follows one root along a row and `leading` the rightmost. `along` lists the crossings of the imaginary
+//! axis as a single gain varies.
 //!
 //! Whole boxes of parameters: `reduced` is the family with its fixed parameters put in, `local` what
 //! a box knows of it, `value_set` the proof that h(iw) has no zero over a box and a stretch of w,
@@ -13,6 +14,7 @@
 //! into proved boxes, `largest` looks for one large stable box, `radius` asks how far parameters may
 //! move, `robust` maps what holds over an interval.
 
+mod along;
 mod boxes;
 mod branch;
 mod cell;
@@ -35,6 +37,7 @@ mod rows;
 mod tail;
 mod value_set;
 
+pub use along::{Place, crossings_along};
 pub use boxes::{Boxes, Limits, Node, proved_boxes};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub use chart::Chart;
