@@ -261,7 +261,10 @@ impl<'a> Leading<'a> {
             Some((gap, middle)) if gap > 1e-3 * self.scale => middle,
             _ => first - 0.5 * self.scale,
         };
-        let sigma = sigma.max(0.5 * (floor + first));
+        // The further left, the longer the line until no root can cross it.
+        let sigma = sigma
+            .max(0.5 * (floor + first))
+            .max(first - NEARBY * self.scale);
         (sigma < first
             && self
                 .lines
