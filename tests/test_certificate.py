@@ -18,16 +18,7 @@ from deadtime._certificate_parts import Monotone, Segment
 from deadtime._enclosures import angle, cos_sin, dyadic, exponential, pi
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-
-CASES = {
-    case["name"]: case
-    for case in json.loads(
-        (Path(__file__).parent / "reference" / "root_cases.json").read_text(encoding="utf-8")
-    )["cases"]
-}
-
-# A root lies exactly on an edge: no count, no certificate.
-ROOT_ON_AN_EDGE = {"on_contour"}
+from root_cases import CASES, ROOT_ON_AN_EDGE
 
 # A multiple root or a cluster lies on the real axis, which is an edge.
 CLUSTER_ON_THE_AXIS = {"double_at_0", "near_double", "mazanti_mult6", "mid_mult4_exact0"}
