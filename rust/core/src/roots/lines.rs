@@ -391,15 +391,12 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             .iter()
             .copied()
             .partition(|hint| hint.re > line.sigma);
-        self.learn(&right, line.count, line.sigma)?;
-        self.learn(&left, line.count, line.sigma)?;
-        self.learn(&self.low_starts(line.sigma), line.count, line.sigma)?;
-        if let Some(discs) = self.known_right_of(line) {
-            return Ok((discs, line.sigma));
-        }
-        self.learn(&self.spectrum.far_starts(), line.count, line.sigma)?;
-        if let Some(discs) = self.known_right_of(line) {
-            return Ok((discs, line.sigma));
+        let (low, far) = (self.low_starts(line.sigma), self.spectrum.far_starts());
+        for starts in [right, left, low, far] {
+            self.learn(&starts, line.count, line.sigma)?;
+            if let Some(discs) = self.known_right_of(line) {
+                return Ok((discs, line.sigma));
+            }
         }
         if let Some(sigma) = self.beside_the_first(n).filter(|sigma| *sigma > line.sigma)
             && let Ok(nearer) = self.counted(sigma)
