@@ -33,7 +33,7 @@ const CHAIN_MARGIN: f64 = 1e-4;
 /// Evaluations after which the first line is given up: those that hug the chains cost without end. Every
 /// one after it may cost half as much, but not less than the second number.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
-const LEAST_PER_LINE: u64 = 500_000;
+const LEAST_PER_LINE: u64 = 100_000;
 
 /// A first line on which a root lies is moved by this share of one over the longest delay at least: right beside
 /// the root it would cost more than one further away.
