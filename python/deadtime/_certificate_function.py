@@ -1,7 +1,9 @@
 """The function of a certificate in exact numbers: enclosures of its values, bounds on its bends.
 
 Coefficients, delays and points are doubles, so whole numbers over powers of two: polynomials are
-computed without any rounding, exponentials enclosed in fixed point.
+computed without any rounding, exponentials enclosed in fixed point. The slope in a disc is
+bounded to second order; next to several roots, where the higher derivatives are far below the
+moduli of their terms, by the Taylor polynomial at the middle.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
-from typing import NoReturn
+from typing import NoReturn, TypeAlias
 
 from deadtime._enclosures import cos_sin, dyadic, exponential, shifted
 from deadtime._errors import CertificateError
@@ -22,6 +24,15 @@ _DIGITS = 120
 
 # Digits of enclosures where only an inequality with a wide margin is asked for.
 _FEW = 128
+
+# Order of Taylor polynomials next to several roots.
+_ORDER = 8
+
+# More digits than that make nothing true that is not so with them.
+_MOST_DIGITS = 1 << 14
+
+
+_Exact: TypeAlias = tuple[Fraction, Fraction]
 
 
 class ExactFunction:
@@ -123,6 +134,57 @@ class ExactFunction:
             total += Fraction(curved, 1 << below) * exponential_above(exponent)
         return total
 
+    def steepness(self, middle: complex, radius: Fraction, index: int, size: float) -> Fraction:
+        """Bound |g'| in a disc by the Taylor polynomial, for values of about `size`."""
+        # |g'| <= sum k |a_k| r^(k - 1) + (n + 1) R r^n, R bounding the coefficient a_(n + 1).
+        total = (_ORDER + 1) * self._taylor_rest(middle, radius, index)
+        for k, bound in reversed(list(enumerate(self._taylor(middle, radius, index, size)))[1:]):
+            total = total * radius + k * bound
+        return total
+
+    def _taylor(self, middle: complex, radius: Fraction, index: int, size: float) -> list[Fraction]:
+        """Bounds on the moduli of the Taylor coefficients of g up to the highest order used."""
+        x, y = pair(middle)
+        (nx, qx), (ny, qy) = dyadic(middle.real), dyadic(middle.imag)
+        q = max(qx, qy)
+        nx, ny = nx << (q - qx), ny << (q - qy)
+        terms = []
+        largest = 0
+        for j, row in enumerate(self.rows_exact):
+            gap = self.delays_exact[j] - self.delays_exact[index]
+            polynomial = _expanded(_moved(row, x, y, _ORDER), gap)
+            terms.append((j, polynomial))
+            # Digits before the point of the terms on the rim of the disc.
+            spread = max((abs(a) + abs(b)) * radius**k for k, (a, b) in enumerate(polynomial))
+            spread *= exponential_above(-gap * x) if gap * x < 0 else 1
+            largest = max(largest, (spread.numerator // spread.denominator).bit_length())
+        bits = min(_DIGITS + 64 - math.frexp(size)[1] + largest, _MOST_DIGITS)
+        bits = max(128, -(-bits // 64) * 64)
+        sums = [(Fraction(0), Fraction(0), Fraction(0))] * (_ORDER + 1)
+        for j, polynomial in terms:
+            parts = self._factor(self.delays[j] - self.delays[index], nx, ny, q, bits)
+            tr, ti, error = (Fraction(part, 1 << bits) for part in parts)
+            for k, (a, b) in enumerate(polynomial):
+                re, im, lost = sums[k]
+                off = (abs(a) + abs(b)) * error
+                sums[k] = (re + a * tr - b * ti, im + a * ti + b * tr, lost + off)
+        return [above(abs(re), abs(im)) + 2 * lost for re, im, lost in sums]
+
+    def _taylor_rest(self, middle: complex, radius: Fraction, index: int) -> Fraction:
+        """Bound on the Taylor coefficient after these at every point of a disc, by moduli."""
+        x, y = pair(middle)
+        reach = above(abs(x), abs(y)) + radius
+        digits = max(0, 100 + reach.denominator.bit_length() - reach.numerator.bit_length())
+        reach = Fraction(_ceil(reach, digits), 1 << digits)
+        total = Fraction(0)
+        for row, tau in zip(self.rows_exact, self.delays_exact, strict=True):
+            gap = tau - self.delays_exact[index]
+            moved = _moved([abs(c) for c in row], reach, Fraction(0), _ORDER + 1)
+            # All terms of one sign: -|gap| in place of the gap.
+            bound, _ = _expanded(moved, -abs(gap), _ORDER + 1)[-1]
+            total += bound * exponential_above(abs(gap) * radius - gap * x)
+        return total
+
 
 class Enclosure:
     """g and g' at a point in units of 2**-bits, and what they are wrong by at most."""
@@ -150,6 +212,28 @@ class Enclosure:
         """Bound |g'|."""
         size = math.isqrt(self.wr**2 + self.wi**2) + 1 + 2 * self.worse
         return Fraction(size, 1 << self.bits)
+
+
+def _moved(row: Sequence[Fraction], x: Fraction, y: Fraction, order: int) -> list[_Exact]:
+    """p(s + t) in powers of t, s = x + iy, by repeated synthetic division."""
+    values = [(Fraction(c), Fraction(0)) for c in row]
+    for lowest in range(min(len(row), order + 1)):
+        a, b = Fraction(0), Fraction(0)
+        for i in range(len(row) - 1, lowest - 1, -1):
+            a, b = values[i] = a * x - b * y + values[i][0], a * y + b * x + values[i][1]
+    return values[: order + 1]
+
+
+def _expanded(moved: list[_Exact], gap: Fraction, order: int = _ORDER) -> list[_Exact]:
+    """Taylor coefficients of p(s + t) e^(-gap t)."""
+    powers = [Fraction(1)]
+    for k in range(1, order + 1):
+        powers.append(-powers[-1] * gap / k)
+    found = []
+    for k in range(order + 1):
+        pairs = list(zip(moved, reversed(powers[: k + 1]), strict=False))
+        found.append((sum(a * c for (a, _), c in pairs), sum(b * c for (_, b), c in pairs)))
+    return [(Fraction(a), Fraction(b)) for a, b in found]
 
 
 def fail(message: str) -> NoReturn:
