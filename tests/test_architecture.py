@@ -25,7 +25,7 @@ CORE_ARROWS = {
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
 FLOORS = [
     {"_errors", "_frozen", "_validation", "_deadtime", "_enclosures"},
-    {"_certificate_parts", "_certificate_check", "_certificate"},
+    {"_certificate_parts", "_certificate_function", "_certificate_check", "_certificate"},
     {
         "_ufunc",
         "_special",
@@ -51,6 +51,9 @@ FLOORS = [
         "_stability",
         "_families",
         "_boxes",
+        "_intervals",
+        "_robust",
+        "_stability_radius",
         "_determinant",
         "_matrix_roots",
         "_frequency",

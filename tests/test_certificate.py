@@ -5,29 +5,19 @@ import dataclasses
 import json
 import math
 import pickle
-from itertools import pairwise
 from pathlib import Path
 
 import deadtime
-import flint
 import mpmath as mp
 import numpy as np
 import pytest
+from ball_certificate import ball_count
 from deadtime import Certificate, CertificateError, ContourError, QuasiPolynomial, delay, s
 from deadtime._certificate_parts import Monotone, Segment
 from deadtime._enclosures import angle, cos_sin, dyadic, exponential, pi
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-
-CASES = {
-    case["name"]: case
-    for case in json.loads(
-        (Path(__file__).parent / "reference" / "root_cases.json").read_text(encoding="utf-8")
-    )["cases"]
-}
-
-# A root lies exactly on an edge: no count, no certificate.
-ROOT_ON_AN_EDGE = {"on_contour"}
+from root_cases import CASES, ROOT_ON_AN_EDGE
 
 # A multiple root or a cluster lies on the real axis, which is an edge.
 CLUSTER_ON_THE_AXIS = {"double_at_0", "near_double", "mazanti_mult6", "mid_mult4_exact0"}
@@ -336,7 +326,8 @@ def test_certificates_do_not_change():
 
 def test_the_checker_uses_neither_the_prover_nor_floating_point_functions():
     package = Path(deadtime.__file__).parent
-    for name in ("_certificate", "_certificate_check", "_certificate_parts", "_enclosures"):
+    names = ("", "_check", "_function", "_parts")
+    for name in (*(f"_certificate{name}" for name in names), "_enclosures"):
         tree = ast.parse((package / f"{name}.py").read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom):
@@ -392,75 +383,6 @@ def test_numbers_out_of_range():
 
 
 # A third party: ball arithmetic
-
-
-def ball_count(proof):
-    """Verify a certificate of a closed rectangle in python-flint's balls; the count.
-
-    Each segment: g on the whole of it, by the mean value form over balls; then the turns of arg h
-    between the ends of segments, as principal arguments of quotients of balls.
-    """
-    acb, arb = flint.acb, flint.arb
-    old, flint.ctx.prec = flint.ctx.prec, 160
-    try:
-        rows = [[arb(c) * arb(2) ** proof.scale for c in row] for row in proof.coefficients]
-        rows = [row[proof.zeros :] for row in rows]
-        taus = [arb(tau) for tau in proof.delays]
-
-        def ball(z):
-            return acb(arb(z.real), arb(z.imag))
-
-        def horner(row, z):
-            value = acb(0)
-            for c in reversed(row):
-                value = value * z + c
-            return value
-
-        def g(z, c):
-            terms = zip(rows, taus, strict=True)
-            return sum(
-                (horner(row, z) * (-z * (tau - taus[c])).exp() for row, tau in terms), acb(0)
-            )
-
-        def slope(z, c):
-            total = acb(0)
-            for row, tau in zip(rows, taus, strict=True):
-                primed = [k * a for k, a in enumerate(row)][1:]
-                gap = tau - taus[c]
-                total += (horner(primed, z) - gap * horner(row, z)) * (-z * gap).exp()
-            return total
-
-        total = 0
-        for contour in proof.contours:
-            turned = arb(0)
-            assert all(one.end == two.start for one, two in pairwise(contour.segments))
-            ends = [contour.segments[0].start, contour.segments[-1].end]
-            (a, b), (c, d) = contour.re, contour.im
-            assert ends == [complex(b if contour.symmetric else a, c), complex(a, c)]
-            assert {complex(b, d), complex(a, d)} <= {part.end for part in contour.segments}
-            for part in contour.segments:
-                # In eight pieces: a rectangle of balls is wider than the disc.
-                ends = [part.start + k / 8 * (part.end - part.start) for k in range(8)] + [part.end]
-                for start, end in pairwise(ends):
-                    a, b = ball(start), ball(end)
-                    hull = a.union(b)
-                    first, last = g(a, part.reference), g(b, part.reference)
-                    over = (first + slope(hull, part.reference) * (hull - a)) / first
-                    assert over.real > 0, "g may leave its half plane"
-                    turned += (last / first).arg() - taus[part.reference] * (b - a).imag
-            unit = arb.pi() * (1 if contour.symmetric else 2)
-            number = (turned / unit).unique_fmpz()
-            assert number is not None
-            assert int(number) == contour.count
-            total += int(number)
-    finally:
-        flint.ctx.prec = old
-    (a, b), (c, d) = proof.region
-    if c != 0 and d != 0:
-        inside = a < 0 < b and c < 0 < d
-        assert total + (proof.zeros if inside else 0) == proof.count
-        return proof.count
-    return total
 
 
 @pytest.mark.parametrize("name", sorted(set(CASES) - ROOT_ON_AN_EDGE))

@@ -114,9 +114,16 @@ def test_numbers_near_the_ends_of_double_precision_do_not_hang(gain, delay):
 
 def test_a_refused_abscissa_says_the_true_reason():
     # It was once said to be a constant, or to need more lines than had been drawn.
-    fast = dtm.PV(2.0, 0.3, filter=dtm.DerivativeFilter(1e20))
-    with pytest.raises(ValueError, match="leaves the range of double precision"):
-        LOOP.replace(controller=fast).spectral_abscissa()
+    loops = {
+        omega: LOOP.replace(controller=dtm.PV(2.0, 0.3, filter=dtm.DerivativeFilter(omega)))
+        for omega in (1e20, 1e100, 1e153)
+    }
+    ideal = LOOP.replace(controller=dtm.PV(2.0, 0.3)).spectral_abscissa()
+    # As far as squares of omega are numbers, the filter is as good as none.
+    assert abs(loops[1e20].spectral_abscissa() - ideal) < 1e-13
+    assert abs(loops[1e100].spectral_abscissa() - ideal) < 1e-13
+    with pytest.raises(ValueError, match="differ too much in size for double precision"):
+        loops[1e153].spectral_abscissa()
     with pytest.raises(ValueError, match="constant"):
         (0.0 * dtm.s + 1.0).spectral_abscissa()
 

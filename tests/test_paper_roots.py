@@ -1,7 +1,7 @@
 """Root sets that other programs get wrong, and those the figures of Armah and Yi show.
 
 What is known here that is in no table: every disc is counted in ball arithmetic, every branch of
-Lambert W is compared. The certified table itself is in test_roots.
+Lambert W is compared. The certified table itself is in test_root_cases.
 """
 
 import math

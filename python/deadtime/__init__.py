@@ -5,15 +5,7 @@ maps of the gains that are stable, and exact simulation with hold and limit.
 """
 
 from deadtime import gallery
-from deadtime._boxes import (
-    ProvedBoxes,
-    RobustMap,
-    StabilityRadius,
-    largest_stable_box,
-    proved_boxes,
-    robust_map,
-    stability_radius,
-)
+from deadtime._boxes import ProvedBoxes, largest_stable_box, proved_boxes
 from deadtime._certificate import Certificate
 from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
@@ -45,6 +37,7 @@ from deadtime._quasipolynomial import QuasiPolynomial, delay, s
 from deadtime._readers import read_recording
 from deadtime._recording import Recording, Step
 from deadtime._response import Response
+from deadtime._robust import RobustMap, robust_map
 from deadtime._rootset import RootSet
 from deadtime._scalar_delay import dde_roots, rightmost_branches
 from deadtime._sensitivity import Sensitivity
@@ -57,6 +50,7 @@ from deadtime._special_forms import (
     wrightomega,
 )
 from deadtime._stability import MapStatus, StabilityMap, stability_map
+from deadtime._stability_radius import StabilityRadius, stability_radius
 from deadtime._systems import DelaySystem
 from deadtime._transfer import TransferFunction, feedback
 

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from deadtime._boxes import ProvedBoxes, RobustMap
+    from deadtime._boxes import ProvedBoxes
+    from deadtime._robust import RobustMap
 
 __all__ = ["plot_boxes", "plot_robust_map", "shown_axes"]
 

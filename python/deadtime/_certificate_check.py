@@ -18,25 +18,20 @@ between whole numbers or fractions.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
+from deadtime._certificate_function import ExactFunction, above, exponential_above, fail, pair
 from deadtime._certificate_parts import Contour, Monotone, Segment
-from deadtime._enclosures import angle, cos_sin, dyadic, exponential, pi, shifted
+from deadtime._enclosures import angle, pi
 from deadtime._errors import CertificateError
 
 if TYPE_CHECKING:
     from deadtime._certificate import Certificate
 
 __all__ = ["check"]
-
-# Binary digits kept below the size of a value; doubles have 53.
-_DIGITS = 120
-
-# Digits of enclosures where only an inequality with a wide margin is asked for.
-_FEW = 128
 
 
 def check(certificate: Certificate) -> int:
@@ -58,21 +53,9 @@ class _Checker:
 
     def __init__(self, certificate: Certificate) -> None:
         self.certificate = certificate
-        rows = [_trimmed(row, certificate.zeros) for row in certificate.coefficients]
-        if len(rows) != len(certificate.delays) or not rows:
-            _fail("coefficients and delays do not belong together")
-        factor = Fraction(2) ** certificate.scale
-        exact = [[Fraction(c) * factor for c in row] for row in rows]
-        self.rows_exact = exact
-        self.q = max(c.denominator.bit_length() - 1 for row in exact for c in row)
-        self.rows = [[int(c * (1 << self.q)) for c in row] for row in exact]
-        self.delays_exact = [Fraction(tau) for tau in certificate.delays]
-        if any(not a < b for a, b in pairwise(self.delays_exact)) or any(
-            tau < 0 for tau in self.delays_exact
-        ):
-            _fail("the delays do not increase from 0 up")
-        self.t = max(tau.denominator.bit_length() - 1 for tau in self.delays_exact)
-        self.delays = [int(tau * (1 << self.t)) for tau in self.delays_exact]
+        self.function = ExactFunction(
+            certificate.coefficients, certificate.delays, certificate.scale, certificate.zeros
+        )
 
     # The claims, from the count down
 
@@ -81,7 +64,7 @@ class _Checker:
         claimed = self.certificate
         (a, b), (c, d) = claimed.region
         if not (a < b and c < d and a < math.inf and b > -math.inf):
-            _fail(f"the region {claimed.region} has a range that does not increase")
+            fail(f"the region {claimed.region} has a range that does not increase")
         total = self._zeros()
         re, im = self._check_closing()
         wanted = []
@@ -95,19 +78,19 @@ class _Checker:
                 wanted.append((re, im, False))
         given = [(contour.re, contour.im, contour.symmetric) for contour in claimed.contours]
         if given != wanted:
-            _fail(f"the paths go around {given}, not around {wanted}")
+            fail(f"the paths go around {given}, not around {wanted}")
         for contour in claimed.contours:
             number = self._turns(contour)
             if number != contour.count:
-                _fail(f"the function turns {number} times, not {contour.count}")
+                fail(f"the function turns {number} times, not {contour.count}")
             if contour.symmetric and im[0] == 0:
                 real = self._real_roots(contour.re)
                 if number < real or (number - real) % 2:
-                    _fail(f"{real} of {number} roots are real: the others would not be pairs")
+                    fail(f"{real} of {number} roots are real: the others would not be pairs")
                 number = real + (number - real) // 2
             total += number
         if total != claimed.count:
-            _fail(f"{total} roots are proved, not {claimed.count}")
+            fail(f"{total} roots are proved, not {claimed.count}")
         return total
 
     def _zeros(self) -> int:
@@ -115,11 +98,11 @@ class _Checker:
         zeros = self.certificate.zeros
         (a, b), (c, d) = self.certificate.region
         if zeros < 0:
-            _fail(f"{zeros} roots at 0")
+            fail(f"{zeros} roots at 0")
         if zeros == 0 or a > 0 or b < 0 or c > 0 or d < 0:
             return 0
         if a == 0 or b == 0:
-            _fail("a root at 0 lies on the edge")
+            fail("a root at 0 lies on the edge")
         return zeros
 
     # 1: what is cut off
@@ -131,11 +114,11 @@ class _Checker:
             c, d = -d, -c
         re, im = claimed.closed
         if not all(map(math.isfinite, (*re, *im))):
-            _fail("the closed region is not finite")
+            fail("the closed region is not finite")
         radius = math.inf
         if math.isinf(c) or math.isinf(d):
             if claimed.beyond is None:
-                _fail("no bound is given for an open imaginary part")
+                fail("no bound is given for an open imaginary part")
             row, radius = claimed.beyond
             self._check_dominance(row, radius, (a, b))
         height = max(abs(im[0]), abs(im[1]))
@@ -146,7 +129,7 @@ class _Checker:
         lower = im[0] == c or c < im[0] <= -radius
         upper = im[1] == d or d > im[1] >= radius
         if not (left and right and lower and upper):
-            _fail(f"roots between the region {claimed.region} and {claimed.closed} are possible")
+            fail(f"roots between the region {claimed.region} and {claimed.closed} are possible")
         return re, im
 
     def _check_dominance(self, index: int, radius: float, re: tuple[float, float]) -> None:
@@ -154,22 +137,22 @@ class _Checker:
 
         Divided by |s|^n the others fall with |s|, so the radius itself is the worst.
         """
-        degree = max(map(len, self.rows)) - 1
-        if not (0 <= index < len(self.rows) and 0 <= radius < math.inf):
-            _fail("the bound of the roots is not one")
-        if len(self.rows[index]) != degree + 1:
-            _fail("the row that is said to dominate does not have the highest degree")
-        room = abs(self.rows_exact[index][degree])
+        degree = max(map(len, self.function.rows)) - 1
+        if not (0 <= index < len(self.function.rows) and 0 <= radius < math.inf):
+            fail("the bound of the roots is not one")
+        if len(self.function.rows[index]) != degree + 1:
+            fail("the row that is said to dominate does not have the highest degree")
+        room = abs(self.function.rows_exact[index][degree])
         lower = [Fraction(0)] * degree
-        for j, row in enumerate(self.rows_exact):
-            gap = self.delays_exact[j] - self.delays_exact[index]
+        for j, row in enumerate(self.function.rows_exact):
+            gap = self.function.delays_exact[j] - self.function.delays_exact[index]
             if gap == 0:
                 weight = Fraction(1)
             else:
                 edge = re[0] if gap > 0 else re[1]
                 if math.isinf(edge):
-                    _fail("no term dominates in a strip open to that side")
-                weight = _exponential_above(-gap * Fraction(edge))
+                    fail("no term dominates in a strip open to that side")
+                weight = exponential_above(-gap * Fraction(edge))
             for k, c in enumerate(row):
                 if k < degree:
                     lower[k] += weight * abs(c)
@@ -179,17 +162,20 @@ class _Checker:
         # Beyond 0 itself only a constant has no roots.
         positive = radius > 0 or degree == 0
         if not positive or room * r**degree <= sum(c * r**k for k, c in enumerate(lower)):
-            _fail(f"roots beyond |s| = {radius} are not excluded")
+            fail(f"roots beyond |s| = {radius} are not excluded")
 
     def _is_right_edge(self, x: float, height: float) -> bool:
-        return _dominates_rightward(self.rows_exact, self.delays_exact, x, height)
+        return _dominates_rightward(self.function.rows_exact, self.function.delays_exact, x, height)
 
     def _is_left_edge(self, x: float, height: float) -> bool:
         """As on the right, for h(-s) e^(-s tau_last)."""
         rows = [
-            [-c if k % 2 else c for k, c in enumerate(row)] for row in reversed(self.rows_exact)
+            [-c if k % 2 else c for k, c in enumerate(row)]
+            for row in reversed(self.function.rows_exact)
         ]
-        delays = [self.delays_exact[-1] - tau for tau in reversed(self.delays_exact)]
+        delays = [
+            self.function.delays_exact[-1] - tau for tau in reversed(self.function.delays_exact)
+        ]
         return _dominates_rightward(rows, delays, -x, height)
 
     # 2: paths
@@ -206,107 +192,42 @@ class _Checker:
             while here != end:
                 segment = next(segments, None)
                 if segment is None:
-                    _fail(f"the path breaks off at {here}")
+                    fail(f"the path breaks off at {here}")
                 if segment.start != here:
-                    _fail(f"the path has a gap between {here} and {segment.start}")
+                    fail(f"the path has a gap between {here} and {segment.start}")
                 here = segment.end
                 if not _goes_on(segment.start, here, end):
-                    _fail(f"the path strays from its edge at {here}")
+                    fail(f"the path strays from its edge at {here}")
         if next(segments, None) is not None:
-            _fail("the path goes on behind its end")
+            fail("the path goes on behind its end")
 
     # 3: segments
 
-    def _enclose(self, s: complex, index: int, size: float) -> _Enclosure:
-        """Enclose g and g' at s, with digits enough for values of about `size`."""
-        (x, qx), (y, qy) = dyadic(s.real), dyadic(s.imag)
-        q = max(qx, qy)
-        x, y = x << (q - qx), y << (q - qy)
-        polynomials = []
-        largest = 0
-        for row in self.rows:
-            pr = pi_ = dr = di = 0
-            for power, c in enumerate(reversed(row)):
-                dr, di = dr * x - di * y + pr, dr * y + di * x + pi_
-                pr, pi_ = pr * x - pi_ * y + (c << (q * power)), pr * y + pi_ * x
-            shift = self.q + q * (len(row) - 1)
-            polynomials.append((pr, pi_, dr, di, shift))
-            largest = max(
-                largest,
-                (abs(pr) + abs(pi_)).bit_length() - shift,
-                (abs(dr) + abs(di)).bit_length() - shift + q,
-            )
-        gaps = [tau - self.delays[index] for tau in self.delays]
-        widest = max(map(abs, gaps)).bit_length() - self.t
-        bits = _DIGITS - math.frexp(size)[1] + max(0, largest) + max(0, widest)
-        bits = max(128, -(-bits // 64) * 64)
-        found = _Enclosure(bits)
-        for (pr, pi_, dr, di, shift), gap in zip(polynomials, gaps, strict=True):
-            tr, ti, error = self._factor(gap, x, y, q, bits)
-            vr, vi = (pr * tr - pi_ * ti) >> shift, (pr * ti + pi_ * tr) >> shift
-            lost = (((abs(pr) + abs(pi_)) * error) >> shift) + 2
-            shift -= q
-            wr = shifted(dr * tr - di * ti, -shift) - ((gap * vr) >> self.t)
-            wi = shifted(dr * ti + di * tr, -shift) - ((gap * vi) >> self.t)
-            worse = shifted((abs(dr) + abs(di)) * error, -shift)
-            found.add(vr, vi, lost, wr, wi, worse + ((abs(gap) * lost) >> self.t) + 5)
-        return found
-
-    def _factor(self, gap: int, x: int, y: int, q: int, bits: int) -> tuple[int, int, int]:
-        """e^(-s gap) times 2**bits, each part within the error given."""
-        low, high, shift = exponential(-gap * x, self.t + q, bits)
-        low, high = shifted(low, bits - shift), shifted(high, bits - shift) + 1
-        cosine, sine = cos_sin(gap * y, self.t + q, bits)
-        # The weight, the angle (2 units each), and the rounding of the product.
-        error = high - low + ((high * 2) >> bits) + 2
-        return (low * cosine) >> bits, -((low * sine) >> bits), error
-
-    def _bend(self, middle: complex, radius: Fraction, index: int) -> Fraction:
-        """Bound |g''| in a disc by moduli of coefficients: exact but for |s| and exponentials."""
-        x, y = _pair(middle)
-        reach = _above(abs(x), abs(y)) + radius
-        # A hundred digits of the largest |s|, rounded up.
-        size = reach.numerator.bit_length() - reach.denominator.bit_length()
-        q = max(0, 100 - size)
-        n = _ceil(reach, q)
-        total = Fraction(0)
-        for row, tau in zip(self.rows, self.delays, strict=True):
-            p = dp = ddp = 0
-            for power, c in enumerate(reversed(row)):
-                ddp = ddp * n + dp
-                dp = dp * n + p
-                p = p * n + (abs(c) << (q * power))
-            gap = abs(tau - self.delays[index])
-            # All three over 2^(q degree + 2 t), like the coefficients over 2^self.q besides.
-            curved = (ddp << (2 * q + 2 * self.t + 1)) + (gap * dp << (q + self.t + 1))
-            curved += gap * gap * p
-            exponent = Fraction(gap, 1 << self.t) * radius
-            exponent -= Fraction(tau - self.delays[index], 1 << self.t) * x
-            below = self.q + q * (len(row) - 1) + 2 * self.t
-            total += Fraction(curved, 1 << below) * _exponential_above(exponent)
-        return total
-
     def _check_segment(self, segment: Segment) -> None:
         """Verify that g keeps to the disc of radius error + slope r about `value`, without 0."""
-        if not 0 <= segment.reference < len(self.rows):
-            _fail(f"there is no delay number {segment.reference}")
+        if not 0 <= segment.reference < len(self.function.rows):
+            fail(f"there is no delay number {segment.reference}")
         if not (segment.error >= 0 and segment.slope >= 0):
-            _fail("a bound is negative")
+            fail("a bound is negative")
         where = f"between {segment.start} and {segment.end}"
         radius = _radius(segment.start, segment.middle, segment.end)
-        value = _pair(segment.value)
+        value = pair(segment.value)
         spread = Fraction(segment.error) + Fraction(segment.slope) * radius
         if not spread**2 < value[0] ** 2 + value[1] ** 2:
-            _fail(f"the function may vanish {where}")
+            fail(f"the function may vanish {where}")
         # More digits where the slope, times r, is compared with the value.
         size = abs(segment.value) / max(1.0, float(radius))
-        found = self._enclose(segment.middle, segment.reference, size)
+        found = self.function.enclose(segment.middle, segment.reference, size)
         if not found.is_within(value, Fraction(segment.error)):
-            _fail(f"the value stated for {segment.middle}, {where}, is not the function's")
-        bend = self._bend(segment.middle, radius, segment.reference)
+            fail(f"the value stated for {segment.middle}, {where}, is not the function's")
+        bend = self.function.bend(segment.middle, radius, segment.reference)
         steepest = found.slope_above() + bend * radius
-        if steepest > Fraction(segment.slope):
-            _fail(f"the slope stated {where} can be exceeded")
+        claimed = Fraction(segment.slope)
+        if steepest > claimed:
+            # Next to several roots.
+            steepest = self.function.steepness(segment.middle, radius, segment.reference, size)
+        if steepest > claimed:
+            fail(f"the slope stated {where} can be exceeded")
 
     # 4: turns
 
@@ -324,30 +245,30 @@ class _Checker:
                 self._clear_end(first.start, first),
                 self._clear_end(last.end, last),
             ]
-            values = [ends[0], *(_pair(segment.value) for segment in leg), ends[1]]
+            values = [ends[0], *(pair(segment.value) for segment in leg), ends[1]]
             for before, after in pairwise(values):
                 half_turns += 2 * _crossing(before, after)
             angles = [_angle(value) for value in ends]
             gone = Fraction(last.end.imag) - Fraction(first.start.imag)
             total += angles[1] - angles[0]
-            total -= self.delays_exact[first.reference] * gone * (1 << 64)
+            total -= self.function.delays_exact[first.reference] * gone * (1 << 64)
             # An end is known to 2^-20 of itself, an angle to 8 units.
             slack += 2 * ((1 << 45) + 8)
         turn = pi(64)
         number = half_turns + round(total / turn)
         off = abs(total - (number - half_turns) * turn) + abs(number - half_turns) + slack
         if off >= turn // 4:
-            _fail("the function does not turn a whole number of times")
+            fail("the function does not turn a whole number of times")
         unit = 1 if contour.symmetric else 2
         if number < 0 or number % unit:
-            _fail(f"{number} half turns are no number of roots")
+            fail(f"{number} half turns are no number of roots")
         return number // unit
 
     def _clear_end(self, place: complex, segment: Segment) -> tuple[Fraction, Fraction]:
         """Enclose g where a leg begins or ends, to 2^-20 of itself."""
-        found = self._enclose(place, segment.reference, abs(segment.value))
+        found = self.function.enclose(place, segment.reference, abs(segment.value))
         if found.lost << 20 > max(abs(found.vr), abs(found.vi)):
-            _fail(f"the function may vanish at {place}")
+            fail(f"the function may vanish at {place}")
         unit = Fraction(1, 1 << found.bits)
         return found.vr * unit, found.vi * unit
 
@@ -359,114 +280,46 @@ class _Checker:
         for part in self.certificate.real:
             start, end = part.start.real, part.end.real
             if start != here or not start < end:
-                _fail(f"the real axis has a gap between {here} and {start}")
+                fail(f"the real axis has a gap between {here} and {start}")
             if isinstance(part, Monotone):
                 total += self._check_monotone(part)
             else:
                 if part.start.imag or part.end.imag or part.middle.imag:
-                    _fail("a part of the real axis lies off it")
+                    fail("a part of the real axis lies off it")
                 if not start <= part.middle.real <= end:
-                    _fail("a middle lies outside its segment")
+                    fail("a middle lies outside its segment")
                 self._check_segment(part)
             here = end
         if here != re[1]:
-            _fail(f"the real axis is not covered beyond {here}")
+            fail(f"the real axis is not covered beyond {here}")
         return total
 
     def _check_monotone(self, part: Monotone) -> int:
         """One root or none where g' keeps its sign."""
-        if not 0 <= part.reference < len(self.rows) or not (part.error >= 0 and part.bend >= 0):
-            _fail("a part of the real axis is badly formed")
+        if not 0 <= part.reference < len(self.function.rows) or not (
+            part.error >= 0 and part.bend >= 0
+        ):
+            fail("a part of the real axis is badly formed")
         start, end, middle = map(Fraction, (part.start, part.end, part.middle))
         radius = max(end - middle, middle - start)
         slope, error, bend = map(Fraction, (part.slope, part.error, part.bend))
         if not error + bend * radius < abs(slope) or not start <= middle <= end:
-            _fail(f"the function may turn around between {part.start} and {part.end}")
-        found = self._enclose(complex(part.middle), part.reference, abs(part.slope))
+            fail(f"the function may turn around between {part.start} and {part.end}")
+        found = self.function.enclose(complex(part.middle), part.reference, abs(part.slope))
         unit = Fraction(1, 1 << found.bits)
         if abs(found.wr * unit - slope) + found.worse * unit > error:
-            _fail(f"the slope stated at {part.middle} is not the function's")
-        if self._bend(complex(part.middle), radius, part.reference) > bend:
-            _fail(f"the curvature stated about {part.middle} can be exceeded")
+            fail(f"the slope stated at {part.middle} is not the function's")
+        if self.function.bend(complex(part.middle), radius, part.reference) > bend:
+            fail(f"the curvature stated about {part.middle} can be exceeded")
         signs = set()
         for end_point in (part.start, part.end):
-            found = self._enclose(complex(end_point), part.reference, abs(part.slope) * 1e-9)
+            found = self.function.enclose(
+                complex(end_point), part.reference, abs(part.slope) * 1e-9
+            )
             if abs(found.vr) <= found.lost:
-                _fail(f"the function may vanish at {end_point}")
+                fail(f"the function may vanish at {end_point}")
             signs.add(found.vr > 0)
         return len(signs) - 1
-
-
-class _Enclosure:
-    """g and g' at a point in units of 2**-bits, and what they are wrong by at most."""
-
-    __slots__ = ("bits", "lost", "vi", "vr", "wi", "worse", "wr")
-
-    def __init__(self, bits: int) -> None:
-        self.bits = bits
-        self.vr = self.vi = self.wr = self.wi = 0
-        self.lost = self.worse = 0
-
-    def add(self, vr: int, vi: int, lost: int, wr: int, wi: int, worse: int) -> None:
-        """Add a term; errors are those of each part."""
-        self.vr, self.vi, self.wr, self.wi = self.vr + vr, self.vi + vi, self.wr + wr, self.wi + wi
-        self.lost, self.worse = self.lost + lost, self.worse + worse
-
-    def is_within(self, center: tuple[Fraction, Fraction], radius: Fraction) -> bool:
-        """Tell whether g is surely that close to `center`."""
-        unit = Fraction(1, 1 << self.bits)
-        room = radius - 2 * self.lost * unit
-        off = (self.vr * unit - center[0], self.vi * unit - center[1])
-        return room >= 0 and off[0] ** 2 + off[1] ** 2 <= room**2
-
-    def slope_above(self) -> Fraction:
-        """Bound |g'|."""
-        size = math.isqrt(self.wr**2 + self.wi**2) + 1 + 2 * self.worse
-        return Fraction(size, 1 << self.bits)
-
-
-def _fail(message: str) -> NoReturn:
-    raise CertificateError(f"the certificate is false: {message}")
-
-
-def _trimmed(row: Sequence[float], zeros: int) -> list[float]:
-    """A row without the common power of s and without trailing zeros."""
-    if any(row[:zeros]):
-        _fail(f"s^{zeros} is not a factor of the function")
-    kept = list(row[zeros:])
-    while kept and kept[-1] == 0:
-        kept.pop()
-    if not kept:
-        _fail("a row of coefficients is zero")
-    return kept
-
-
-def _pair(value: complex) -> tuple[Fraction, Fraction]:
-    return Fraction(value.real), Fraction(value.imag)
-
-
-def _binary(x: Fraction) -> tuple[int, int]:
-    """Numerator and binary exponent of a fraction whose denominator is a power of two."""
-    return x.numerator, x.denominator.bit_length() - 1
-
-
-def _ceil(x: Fraction, bits: int) -> int:
-    return -((-x.numerator << bits) // x.denominator)
-
-
-def _above(x: Fraction, y: Fraction) -> Fraction:
-    """Bound of the length of (x, y), by less than 2^-100 of it or 2^-1200."""
-    largest = max(x, y)
-    if largest == 0:
-        return largest
-    bits = 110 + max(0, largest.denominator.bit_length() - largest.numerator.bit_length())
-    a, b = _ceil(x, bits), _ceil(y, bits)
-    return Fraction(math.isqrt(a * a + b * b) + 1, 1 << bits)
-
-
-def _exponential_above(x: Fraction) -> Fraction:
-    _, high, shift = exponential(*_binary(x), _FEW)
-    return high * Fraction(2) ** -shift
 
 
 def _dominates_rightward(
@@ -480,14 +333,14 @@ def _dominates_rightward(
     if not x > 0:
         return False
     edge = Fraction(x)
-    size = _above(edge, Fraction(height))
+    size = above(edge, Fraction(height))
     degree = len(rows[0]) - 1
     total = Fraction(0)
     for row, tau in zip(rows, delays, strict=True):
         gap = tau - delays[0]
         if gap > 0 and edge * gap < len(row) - 1 - degree:
             return False
-        weight = _exponential_above(-gap * edge)
+        weight = exponential_above(-gap * edge)
         for k, c in enumerate(row):
             if gap > 0 or k < degree:
                 total += weight * abs(c) * size**k
@@ -512,7 +365,7 @@ def _radius(start: complex, middle: complex, end: complex) -> Fraction:
     elif start.real == middle.real == end.real:
         a, m, b = start.imag, middle.imag, end.imag
     else:
-        _fail(f"a middle lies off its segment, between {start} and {end}")
+        fail(f"a middle lies off its segment, between {start} and {end}")
     return max(abs(Fraction(m) - Fraction(a)), abs(Fraction(b) - Fraction(m)))
 
 

@@ -50,7 +50,7 @@ impl QuasiPolynomial {
     /// ```
     pub fn value(&self, s: Complex64) -> Complex64 {
         let Scaled { value, delay, .. } = self.scaled_value(s);
-        if value.is_nan() && s.is_finite() {
+        if !value.is_finite() && s.is_finite() {
             return beyond::value(self, s);
         }
         if delay == 0.0 {

@@ -6,7 +6,8 @@
 //! confirms e and D for every segment knows how arg g turns from middle to middle, by less than a
 //! half turn each time, and by −τ_c Im s how arg h turns: the winding number.
 //! D is |g′(m)| + e′ + B r with B the bound of `curvature_around` on |g″|, and a trifle of |v|/r more,
-//! so that a checker that works to so many digits of v can confirm it where g is almost constant.
+//! so that a checker that works to so many digits of v can confirm it where g is almost constant. Next to
+//! several roots D is the bound of `crowd`.
 //!
 //! The segments are longer or shorter than the steps of `winding`, which proves the same number
 //! from both ends of each step; that number stands in the certificate.
@@ -16,6 +17,7 @@ use num_complex::Complex64;
 use super::bounds::{self, Dominance};
 use super::cell::Cell;
 use super::count::{Prepared, close, closed_sides, upper_half};
+use super::crowd::Crowd;
 use super::real::{RealPart, survey_real};
 use super::region::Region;
 use super::winding::{Walker, is_clear};
@@ -30,6 +32,9 @@ const MARGIN: f64 = 1e-12;
 
 /// What a checker's digits must be good for, relative to the value.
 pub(super) const TRIFLE: f64 = 1e-20;
+
+/// Several roots may be near where the bound on g″ allows less than this share of what the slope would.
+pub(super) const CROWDED: f64 = 0.02;
 
 /// More than anyone wants to file.
 const MAX_SEGMENTS: usize = 1_000_000;
@@ -232,9 +237,16 @@ fn segment(
         .curvature_around(modulus(middle) + radius, radius);
     let flat = modulus(jet.slope) + jet.slope_error;
     let trifle = TRIFLE * modulus(jet.value) / radius;
-    let slope = (flat + bend * radius) * (1.0 + MARGIN) + trifle;
     let room = SHARE * modulus(jet.value) - jet.value_error;
-    if is_clear(&jet) && slope * radius < room {
+    let mut slope = (flat + bend * radius) * (1.0 + MARGIN) + trifle;
+    let mut reach = 2.0 * room / (flat + (flat * flat + 4.0 * bend * room).sqrt());
+    let clear = is_clear(&jet);
+    if clear && slope * radius >= room && reach < CROWDED * room / flat {
+        let crowd = Crowd::new(&walker.probe, middle);
+        slope = crowd.slope(radius) + trifle;
+        reach = reach.max(crowd.steady_reach(SHARE, radius));
+    }
+    if clear && slope * radius < room {
         return Ok(Segment {
             start,
             end,
@@ -245,6 +257,5 @@ fn segment(
             slope,
         });
     }
-    let reach = 2.0 * room / (flat + (flat * flat + 4.0 * bend * room).sqrt());
     Err(if reach.is_finite() { reach } else { 0.0 })
 }

@@ -117,3 +117,31 @@ fn proved(probe: &Probe<'_>, center: Complex64, m: usize, most: f64) -> Option<D
         multiplicity: u32::try_from(m).ok()?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Error;
+    use crate::quasipoly::QuasiPolynomial;
+
+    #[test]
+    fn a_disc_about_exactly_0_is_found_or_given_up() -> Result<(), Error> {
+        // s − 1 + e^(−s) = s²/2 − s³/6 + …
+        let double = QuasiPolynomial::new(vec![vec![-1.0, 1.0], vec![1.0]], vec![0.0, 1.0])?;
+        let mut probe = Probe::new(&double);
+        let found = cluster(&mut probe, Complex64::ZERO, 1.0);
+        assert!(found.is_some_and(|disc| {
+            disc.center == Complex64::ZERO && disc.multiplicity == 2 && disc.radius < 1e-13
+        }));
+        // Twice a radius of 0 is 0: the search for a larger one once did not end.
+        for multiplicity in 1..4 {
+            for most in [0.0, f64::MIN_POSITIVE, f64::NAN] {
+                assert!(proved(&probe, Complex64::ZERO, multiplicity, most).is_none());
+            }
+        }
+        // Nor does |z| = 0 tell how far a single root is to be sought.
+        let simple = QuasiPolynomial::new(vec![vec![-1.0, 2.0], vec![1.0]], vec![0.0, 1.0])?;
+        assert!(single(&Probe::new(&simple), Complex64::ZERO).is_none());
+        Ok(())
+    }
+}

@@ -33,7 +33,7 @@ const CHAIN_MARGIN: f64 = 1e-4;
 /// Evaluations after which the first line is given up: those that hug the chains cost without end. Every
 /// one after it may cost half as much, but not less than the second number.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
-const LEAST_PER_LINE: u64 = 500_000;
+const LEAST_PER_LINE: u64 = 100_000;
 
 /// A first line on which a root lies is moved by this share of one over the longest delay at least: right beside
 /// the root it would cost more than one further away.
@@ -391,15 +391,12 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             .iter()
             .copied()
             .partition(|hint| hint.re > line.sigma);
-        self.learn(&right, line.count, line.sigma)?;
-        self.learn(&left, line.count, line.sigma)?;
-        self.learn(&self.low_starts(line.sigma), line.count, line.sigma)?;
-        if let Some(discs) = self.known_right_of(line) {
-            return Ok((discs, line.sigma));
-        }
-        self.learn(&self.spectrum.far_starts(), line.count, line.sigma)?;
-        if let Some(discs) = self.known_right_of(line) {
-            return Ok((discs, line.sigma));
+        let (low, far) = (self.low_starts(line.sigma), self.spectrum.far_starts());
+        for starts in [right, left, low, far] {
+            self.learn(&starts, line.count, line.sigma)?;
+            if let Some(discs) = self.known_right_of(line) {
+                return Ok((discs, line.sigma));
+            }
         }
         if let Some(sigma) = self.beside_the_first(n).filter(|sigma| *sigma > line.sigma)
             && let Ok(nearer) = self.counted(sigma)

@@ -17,6 +17,7 @@ mod cluster;
 mod commensurate;
 mod contour;
 mod count;
+mod crowd;
 mod dominated;
 mod isolate;
 mod lines;

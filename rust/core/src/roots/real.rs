@@ -8,7 +8,8 @@
 
 use num_complex::Complex64;
 
-use super::certificate::{Segment, TRIFLE};
+use super::certificate::{CROWDED, Segment, TRIFLE};
+use super::crowd::Crowd;
 use super::winding::{Walker, is_clear, is_finite};
 use crate::Error;
 use crate::quasipoly::{Jet, modulus};
@@ -70,8 +71,15 @@ pub(super) fn survey_real(
         let bend = walker.probe.curvature_around(modulus(middle) + r, r);
         let slope = modulus(jet.slope);
         let trifle = TRIFLE * modulus(jet.value) / r;
-        let steepest = (slope + jet.slope_error + curved * bend * r) * (1.0 + 1e-12) + trifle;
-        if steepest * r < SHARE * modulus(jet.value) - jet.value_error {
+        let flat = slope + jet.slope_error;
+        let mut steepest = (flat + curved * bend * r) * (1.0 + 1e-12) + trifle;
+        let room = SHARE * modulus(jet.value) - jet.value_error;
+        // Without parts to state, other means end the survey sooner.
+        let crowded = curved == 1.0 && bend * r > flat / CROWDED && is_clear(&jet);
+        if crowded && steepest * r >= room {
+            steepest = Crowd::new(&walker.probe, middle).slope(r) + trifle;
+        }
+        if steepest * r < room {
             visit(RealPart::Empty(Segment {
                 start: low.into(),
                 end: high.into(),

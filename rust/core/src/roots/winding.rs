@@ -20,8 +20,9 @@
 use num_complex::Complex64;
 
 use super::cell::Walk;
+use super::crowd::Crowd;
 use crate::elementary::angle;
-use crate::quasipoly::{Jet, Probe, QuasiPolynomial, expansion, modulus, remainder};
+use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
 /// Share of |v| that g may move by.
@@ -51,9 +52,6 @@ const MOST_UNCERTAIN: f64 = 0.01;
 
 /// Slopes count as at least this of the value, so that one can divide by them.
 const LEAST_SLOPE: f64 = 1e-100;
-
-/// Order of the Taylor polynomial next to several roots.
-const CROWD: usize = 8;
 
 /// Steps of less than this angle of the fastest exponential tell of several roots nearby.
 const TIGHT: f64 = 1e-3;
@@ -261,43 +259,12 @@ impl<'a> Walker<'a> {
             best * self.span < TIGHT && best < 0.02 * farthest
         };
         if crowded {
-            best = best.max(self.crowded_reach(s, most));
+            best = best.max(Crowd::new(&self.probe, s).reach(SHARE, most));
         }
         if self.probe.evaluations() < self.patient_until {
             return best;
         }
         best.max(self.calm_reach(jet, s, along, most.min(CALM * best)))
-    }
-
-    /// The same by the Taylor polynomial of g in two words, next to several roots: there the second
-    /// derivative is as small as a power of the distance to them, which no bound of moduli sees.
-    fn crowded_reach(&self, s: Complex64, most: f64) -> f64 {
-        let (h, reference) = (self.probe.function(), self.probe.reference());
-        let near = expansion(h, reference, s, CROWD);
-        let sizes: Vec<f64> = near.coefficients.iter().copied().map(modulus).collect();
-        let Some((own, higher)) = sizes.split_first() else {
-            return 0.0;
-        };
-        let room = SHARE * own - near.errors.first().copied().unwrap_or(f64::INFINITY);
-        let errors = near.errors.iter().skip(1);
-        let known: Vec<f64> = higher
-            .iter()
-            .zip(errors)
-            .map(|(size, error)| size + error)
-            .collect();
-        let mut r = known
-            .first()
-            .map_or(0.0, |slope| (room / slope).min(most))
-            .max(0.0);
-        for _ in 0..60 {
-            let rest = remainder(h, reference, s, r, CROWD + 1);
-            let change = known.iter().rev().fold(rest, |sum, size| sum * r + size) * r;
-            if change * (1.0 + 1e-9) < room {
-                return r * (1.0 - 1e-12);
-            }
-            r *= 0.7;
-        }
-        0.0
     }
 
     /// The same where fast terms are so small that their size is bound enough.

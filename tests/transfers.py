@@ -1,0 +1,58 @@
+"""Random transfer functions, loops with margins, and what rounding may do to their values."""
+
+import deadtime as dtm
+import numpy as np
+from deadtime import TransferFunction, delay, s
+from hypothesis import assume
+from hypothesis import strategies as st
+
+numbers = st.floats(-5, 5, allow_subnormal=False).map(lambda x: round(x, 3))
+times = st.floats(0, 2, allow_subnormal=False).map(lambda x: round(x, 3))
+points = st.complex_numbers(max_magnitude=3, allow_subnormal=False)
+
+
+@st.composite
+def quasi_polynomials(draw, rows=3, degree=2):
+    m, d = draw(st.integers(1, rows)), draw(st.integers(0, degree))
+    row = st.lists(numbers, min_size=d + 1, max_size=d + 1)
+    return dtm.QuasiPolynomial(
+        draw(st.lists(row, min_size=m, max_size=m)), draw(st.lists(times, min_size=m, max_size=m))
+    )
+
+
+@st.composite
+def transfer_functions(draw):
+    den = draw(quasi_polynomials())
+    assume(den.coefficients.any())
+    return TransferFunction(draw(quasi_polynomials()), den)
+
+
+def terms(h, z):
+    """Sum of the moduli of the terms of h: what its rounding error is measured against."""
+    powers = abs(z) ** np.arange(h.degree + 1)
+    return float(np.exp(-z.real * h.delays) @ (np.abs(h.coefficients) @ powers))
+
+
+def error(G, z):
+    """Bound on the rounding error of G(z): the terms are few and the powers low."""
+    n, d = abs(G.num(z)), abs(G.den(z))
+    return 1e-13 * (terms(G.num, z) + n / d * terms(G.den, z)) / d
+
+
+def close(value, wanted, *systems, z):
+    return abs(value - wanted) <= sum(error(G, z) for G in systems)
+
+
+LOOPS = [
+    2.0 / s * delay(0.36),
+    3.0 / (s + 0.7) * delay(0.4),
+    (2 + 0.3 * s) * delay(0.36) / s,
+    (2 * delay(0.3) + delay(1.1)) / (s + 0.5 * s * delay(0.7)) * 0.2,
+    1.5 * (s + 1) / (s * (s**2 + 0.5 * s + 9)) * delay(0.05),
+    4 * (s**2 + 0.02 * s + 1) / (s * (s + 1) * (s + 2)) * (1 + 0.5 * delay(2.0)) * 0.4,
+    (1 + 0.4 * s) * delay(0.2) / (s * (s + 1 + 0.3 * delay(1.5))),
+    0.9 * (s + 0.2) / (s + 2) * delay(0.5),
+    5.0 / (s + 1) ** 3,
+    # Three crossings, the least delay at the last.
+    2.0 / s + 0.5 * s / (s**2 + 0.05 * s + 25),
+]
