@@ -141,11 +141,14 @@ impl<'a> Leading<'a> {
             return Ok(Known::Nothing);
         };
         let plane = &self.plane;
+        let followed = self.branches.len();
         self.branches
             .retain_mut(|branch| branch.follow(plane, k).is_some());
+        // Without the one that is lost the others may lie far to the left, where lines are long.
+        let lost = self.branches.len() < followed;
         let mut roots: Vec<Root> = self.branches.iter().map(|branch| *branch.root()).collect();
         roots.sort_by(|p, q| q.s.re.total_cmp(&p.s.re));
-        if let Some(known) = self.by_lines(index, &roots)? {
+        if !lost && let Some(known) = self.by_lines(index, &roots)? {
             return Ok(known);
         }
         self.search(index, k)
@@ -301,9 +304,11 @@ impl<'a> Leading<'a> {
             Err(_) => found.clone(),
         };
         let upper = others.roots.iter().filter(|root| root.im >= 0.0);
-        for root in upper.take(FOLLOWED) {
-            self.branches.extend(Branch::through(&self.plane, *root, k));
-        }
+        let branches = upper
+            .take(FOLLOWED)
+            .map(|root| Branch::through(&self.plane, *root, k));
+        // All of them or none: those behind a multiple root prove nothing without it.
+        self.branches = branches.collect::<Option<_>>().unwrap_or_default();
         Ok(Known::Isolated(first.re))
     }
 }
