@@ -178,6 +178,11 @@ impl Branch {
     pub(super) fn follow(&mut self, plane: &Plane, k: f64) -> Option<()> {
         let guess = self.extrapolated(k);
         let root = settle(plane, &mut self.around, guess, k).filter(|root| root.s.im >= 0.0)?;
+        // Newton's step from next to a multiple root leads anywhere.
+        let size = modulus(self.now.s);
+        if modulus(root.s - self.now.s) > plane.unit(size) {
+            return None;
+        }
         self.before = std::mem::replace(&mut self.now, root);
         Some(())
     }
