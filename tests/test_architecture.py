@@ -46,6 +46,7 @@ FLOORS = [
         "_loop_model",
         "_loop_run",
         "_loop_stability",
+        "_map_axes",
         "_boundaries",
         "_crossings",
         "_stability",

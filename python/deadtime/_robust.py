@@ -23,7 +23,7 @@ from deadtime._intervals import (
     ranges_of,
     side,
 )
-from deadtime._stability import _axes
+from deadtime._map_axes import map_axes
 from deadtime._validation import thread_number
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def robust_map(
     >>> chart
     <RobustMap Kp 0.1 to 5.9 (30), Kv -0.9 to 0.9 (19) for all T 0.3 to 0.4: 305 of 570 stable>
     """
-    axis_names, axes = _axes(ranges, shape)
+    axis_names, axes = map_axes(ranges, shape)
     held, intervals = ranges_of(over)
     twice = [name for name in held if name in axes]
     if twice:

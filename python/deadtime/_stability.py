@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import importlib
-import math
-import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +17,7 @@ from deadtime._families import family_of, numbers_of
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._loop_stability import sampled_grid
+from deadtime._map_axes import damping_demand, map_axes
 from deadtime._parametric import ParametricQuasiPolynomial
 from deadtime._validation import finite, thread_number
 
@@ -29,9 +28,6 @@ __all__ = ["MapStatus", "StabilityMap", "stability_map"]
 
 _Floats: TypeAlias = NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int], object]
-
-#: More cells than a picture holds.
-_MAX_CELLS = 50_000_000
 
 
 class MapStatus(IntEnum):
@@ -350,11 +346,11 @@ def stability_map(
     >>> dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}, shape=(60, 37))
     <StabilityMap Kp 0.1 to 6 (60), Kv -0.9 to 0.9 (37): 1321 of 2220 stable>
     """
-    names, axes = _axes(ranges, shape)
+    names, axes = map_axes(ranges, shape)
     threads = thread_number(threads)
     if proof not in ("curves", "cells"):
         raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
-    question = _Question(bool(abscissa), finite("decay", decay), _damping(damping), proof)
+    question = _Question(bool(abscissa), finite("decay", decay), damping_demand(damping), proof)
     cells = len(axes[names[0]]) * len(axes[names[1]])
     if isinstance(family, ControlLoop) and family.is_sampled:
         if question.decay != 0.0 or question.damping is not None:
@@ -440,76 +436,3 @@ def _map_sampled(
     unstable = np.where(unsure, np.int32(-2), unstable)
     shape = first.shape
     return unstable.reshape(shape), abscissa.reshape(shape), status.reshape(shape), None
-
-
-def _axes(
-    ranges: Mapping[str, Any], shape: tuple[int, int]
-) -> tuple[tuple[str, str], dict[str, _Floats]]:
-    """Names and points of the two axes."""
-    if not isinstance(ranges, Mapping):
-        raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
-    if len(ranges) != 2:
-        raise ValueError(
-            f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}): a map has two"
-        )
-    first, second = ranges
-    sizes = _shape(shape)
-    axes = {
-        name: _points(name, ranges[name], size)
-        for name, size in zip((first, second), sizes, strict=True)
-    }
-    cells = math.prod(len(points) for points in axes.values())
-    if cells > _MAX_CELLS:
-        raise ValueError(
-            f"{cells} cells: more than {_MAX_CELLS} are more than a picture holds; take a smaller "
-            "shape, or several maps of smaller ranges"
-        )
-    return (first, second), axes
-
-
-def _damping(given: object) -> tuple[float, float] | None:
-    if given is None:
-        return None
-    try:
-        ratio, horizon = cast(Any, given)
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"damping={given!r}: give (ratio, horizon), such as (0.4, 5.0)") from error
-    return finite("damping ratio", ratio), finite("horizon of the damping", horizon)
-
-
-def _shape(shape: Sequence[int]) -> tuple[int, int]:
-    try:
-        first, second = (operator.index(size) for size in shape)
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"shape={shape!r}: give two whole numbers") from error
-    if min(first, second) < 2:
-        raise ValueError(f"shape={shape!r}: give at least 2 points a range")
-    if first * second > _MAX_CELLS:
-        raise ValueError(
-            f"shape={shape!r}: more than {_MAX_CELLS} cells are more than a picture holds; take "
-            "fewer, or several maps of smaller ranges"
-        )
-    return first, second
-
-
-def _points(name: str, given: Any, size: int) -> _Floats:
-    if isinstance(given, tuple):
-        if len(given) != 2:
-            raise ValueError(
-                f"{name}={given!r}: a tuple is a range (low, high); give points as a list or array"
-            )
-        low, high = (finite(name, end) for end in given)
-        if low >= high:
-            raise ValueError(f"{name}={given!r}: the low end of a range is below its high end")
-        return np.linspace(low, high, size)
-    array = np.asarray(given)
-    if array.dtype.kind not in "iuf":
-        raise TypeError(f"{name}={given!r}: give a range (low, high) or an array of real numbers")
-    points = np.array(array, dtype=np.float64)
-    if points.ndim != 1 or points.size == 0:
-        raise ValueError(f"{name} of shape {points.shape}: give points in one dimension, not none")
-    if not np.isfinite(points).all():
-        raise ValueError(f"{name}: not all points are finite")
-    if not (np.diff(points) > 0.0).all():
-        raise ValueError(f"{name}: points must increase; sort them and drop repeated ones")
-    return points
