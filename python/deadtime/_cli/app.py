@@ -6,7 +6,6 @@ import csv
 import os
 import shlex
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -16,16 +15,15 @@ from rich import box
 from rich.table import Table
 
 from deadtime._cli import options as opt
+from deadtime._cli.maps import map_gains
 from deadtime._cli.show import (
     console,
-    counted,
     estimates_table,
     print_json,
     print_table,
     save_figure,
     stages,
 )
-from deadtime._crossings import Crossings, crossings, delay_margin
 from deadtime._design import design as find_design
 from deadtime._errors import DeadtimeError
 from deadtime._estimation import estimate_delay
@@ -44,7 +42,6 @@ from deadtime._readers import read_recording
 from deadtime._recording import Recording
 from deadtime._report import write_report
 from deadtime._rootset import RootSet
-from deadtime._stability import stability_map
 
 __all__ = ["app", "run"]
 
@@ -61,12 +58,6 @@ Method = Literal["all", "overshoot", "waveform"]
 Map = Literal["dominant", "exact", "saturated"]
 Objective = Literal["abscissa", "settling_time"]
 Ends = tuple[float, float]
-Proof = Literal["curves", "cells"]
-Gains = Literal["Kp", "Kv"]
-
-#: Boundaries of a map that are described.
-SHOWN_CURVES = 4
-
 
 #: What ends a command with one line; anything else is a defect and shows where it is.
 FAILURES = (
@@ -250,167 +241,7 @@ def _roots_table(found: RootSet) -> Table:
     return table
 
 
-@app.command("map")
-def map_(
-    delay: opt.Delay,
-    kp: Annotated[Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
-    kv: Annotated[Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    sample_time: opt.Sample_time = None,
-    filter: opt.Filter = None,  # noqa: A002
-    shape: Annotated[tuple[int, int], typer.Option(help="Cells along each axis.")] = (121, 121),
-    counts: Annotated[
-        bool, typer.Option("--counts", help="Count unstable roots only: a fraction of the time.")
-    ] = False,
-    decay: Annotated[
-        float, typer.Option(help="Stable: every root decays at least so fast, 1/s.")
-    ] = 0.0,
-    damping: Annotated[
-        Ends | None,
-        typer.Option(help="And: least damping ratio, of roots that decay slower than so many 1/s."),
-    ] = None,
-    proof: Annotated[
-        Proof, typer.Option(help="Prove whole rows by their crossings, or every cell alone.")
-    ] = "curves",
-    along: Annotated[
-        Gains | None, typer.Option(help="List the crossings of the axis along this gain.")
-    ] = None,
-    at: Annotated[
-        float | None, typer.Option(help="The other gain there. Without: that of the best cell.")
-    ] = None,
-    plot: opt.Plot = None,
-    as_json: opt.As_json = False,
-) -> None:
-    """Map which gains of a PV controller are stable, with the boundary and the best of them."""
-    loop = _pv_loop(delay, gain, lag, sample_time, None, filter)
-    with counted("mapping", shape[0] * shape[1], quiet=as_json) as progress:
-        chart = stability_map(
-            loop,
-            {"Kp": kp, "Kv": kv},
-            shape=shape,
-            abscissa=not counts,
-            decay=decay,
-            damping=damping,
-            proof=proof,
-            progress=progress,
-        )
-    best, abscissa, margin = None, np.nan, np.nan
-    if chart.stable.any() and np.isfinite(chart.abscissa).any():
-        best, abscissa = chart.best()
-        margin = delay_margin(loop.replace(**best))
-    crossed = None if along is None else _crossings_along(loop, along, at, best, chart.axes)
-    # A sampled loop has no curves.
-    curves = () if loop.is_sampled else chart.boundaries
-    if plot is not None:
-        figure, axes = new_figure(7.0, 4.5)
-        chart.plot(axes, best)
-        save_figure(figure, plot)
-    if as_json:
-        print_json(
-            {
-                "axes": chart.axes,
-                "unstable": chart.unstable,
-                "abscissa": None if counts and not loop.is_sampled else chart.abscissa,
-                "status": chart.status,
-                "boundaries": [
-                    {
-                        **curve.values,
-                        "omega": curve.omega,
-                        "crossing": curve.crossing,
-                        "along": curve.along,
-                    }
-                    for curve in curves
-                ],
-                "best": best,
-                "best_abscissa": abscissa,
-                "best_delay_margin": margin,
-                "crossings": None
-                if crossed is None
-                else {
-                    "parameter": crossed.parameter,
-                    "values": crossed.values,
-                    "omega": crossed.omega,
-                    "direction": crossed.direction,
-                    "counts": crossed.counts,
-                },
-            }
-        )
-        return
-    cells = chart.stable.size
-    share = float(np.mean(chart.stable))
-    console.print(f"{cells} cells, {100 * share:.1f} % stable", highlight=False)
-    for curve in curves[:SHOWN_CURVES]:
-        ends = f"{curve.omega.min():.4g} to {curve.omega.max():.4g} rad/s"
-        console.print(f"boundary of {len(curve)} points, omega {ends}", highlight=False)
-    if len(curves) > SHOWN_CURVES:
-        console.print(f"and {len(curves) - SHOWN_CURVES} shorter boundaries", highlight=False)
-    if best is not None:
-        gains = ", ".join(f"{name} = {value:.4g}" for name, value in best.items())
-        bears = "any further delay" if margin == np.inf else f"{margin:.4g} s more delay"
-        console.print(
-            f"most stable cell: {gains}, spectral abscissa {abscissa:.4g} 1/s; it bears {bears}",
-            highlight=False,
-            soft_wrap=True,
-        )
-    if crossed is not None:
-        print_table(_crossings_table(crossed))
-
-
-def _crossings_along(
-    loop: ControlLoop,
-    along: Gains,
-    at: float | None,
-    best: dict[str, float] | None,
-    axes: Mapping[str, np.ndarray],
-) -> Crossings:
-    """Crossings along one gain within its range, the other one at `at` or that of the best cell."""
-    other = "Kv" if along == "Kp" else "Kp"
-    if at is None:
-        if best is None:
-            raise ValueError(f"--along {along} needs --at: no cell is known to be the best")
-        at = best[other]
-    ends = (float(axes[along][0]), float(axes[along][-1]))
-    return crossings(loop, {along: ends}, at={other: at})
-
-
-def _crossings_table(crossed: Crossings) -> Table:
-    table = Table(box=box.SIMPLE_HEAD)
-    heads = (crossed.parameter, "omega / (rad/s)", "become unstable", "unstable above")
-    for head in heads:
-        table.add_column(head, justify="right")
-    low = crossed.range[0]
-    table.add_row(f"{low:.6g}", "", "", _told(crossed.counts[0]))
-    for value, omega, direction, count in zip(
-        crossed.values, crossed.omega, crossed.direction, crossed.counts[1:], strict=True
-    ):
-        moved = f"{direction:+d}" if direction else "?"
-        table.add_row(f"{value:.10g}", f"{omega:.6g}", moved, _told(count))
-    return table
-
-
-def _told(count: int) -> str:
-    return str(count) if count >= 0 else "?"
-
-
-def _pv_loop(
-    delay: float | None,
-    gain: float,
-    lag: float,
-    sample_time: float | None,
-    limit: float | None,
-    corner: float | None,
-) -> ControlLoop:
-    return opt.described_loop(
-        1.0,
-        0.1,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        limit=limit,
-        corner=corner,
-    )
+app.command("map")(map_gains)
 
 
 @app.command()
@@ -431,7 +262,7 @@ def design(
     as_json: opt.As_json = False,
 ) -> None:
     """Find PV gains: the most stable on the map, or the fastest to settle."""
-    loop = _pv_loop(delay, gain, lag, sample_time, limit, filter)
+    loop = opt.pv_loop(delay, gain, lag, sample_time, limit, filter)
     if (kp is None) != (kv is None):
         raise ValueError("give both --kp and --kv, or neither")
     opt.check_duration(loop if delay_to is None else loop.replace(delay=delay_to))

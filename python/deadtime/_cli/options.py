@@ -32,6 +32,7 @@ __all__ = [
     "Window",
     "check_duration",
     "described_loop",
+    "pv_loop",
 ]
 
 File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
@@ -109,3 +110,24 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
                 f"{name} is {length:g} s, less than a millionth of the {duration:g} s to simulate: "
                 "that takes too long; leave out what lasts almost nothing, or shorten the rest"
             )
+
+
+def pv_loop(
+    delay: float | None,
+    gain: float,
+    lag: float,
+    sample_time: float | None,
+    limit: float | None,
+    corner: float | None,
+) -> ControlLoop:
+    """The loop of a PV controller with any gains: they are to be varied."""
+    return described_loop(
+        1.0,
+        0.1,
+        delay=delay,
+        gain=gain,
+        lag=lag,
+        sample_time=sample_time,
+        limit=limit,
+        corner=corner,
+    )
