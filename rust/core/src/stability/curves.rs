@@ -158,6 +158,14 @@ pub(super) fn join(rows: &[Vec<Crossing>], range: (f64, f64)) -> Vec<Vec<Vertex>
         group.push(arm);
     }
     whole.extend(turned(group, scale));
+    // In the order of the rows again, as far as a curve has one.
+    for curve in &mut whole {
+        if let (Some(first), Some(last)) = (curve.first(), curve.last())
+            && first.row > last.row
+        {
+            curve.reverse();
+        }
+    }
     whole
 }
 
