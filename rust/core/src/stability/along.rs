@@ -3,10 +3,7 @@
 //! The members h = A + k B, k in [low, high], have all their roots with Re s ≥ 0 within one radius: there the
 //! moduli of the exponentials are at most one, so that with p the least modulus of the leading
 //! coefficient of the smallest delay, q the sum of the largest ones of all other terms in sⁿ and c_j
-//! that of all terms in sʲ,
-//!
-//!     h = 0, Re s ≥ 0, |s| = r   ⟹   (p − q) rⁿ ≤ Σ_{j<n} c_j rʲ,
-//!
+//! that of all terms in sʲ, h = 0, Re s ≥ 0 and |s| = r imply (p − q) rⁿ ≤ Σ_{j<n} c_j rʲ,
 //! which holds for no r beyond the positive zero of the difference (Cauchy 1829). Up to it, `crossing` finds every
 //! crossing, with proof. Where p ≤ q there is no such radius: the leading term vanishes, or chains of
 //! roots of a neutral equation may lead; that is refused.
