@@ -57,14 +57,14 @@ def stability_radius(
     point : mapping of str to float
         A stable point.
     scales : mapping of str to float, optional
-        The unit in which each parameter moves, |value| by default; 0 for one that does not move.
+        The unit in which each parameter moves, its modulus by default; 0 for one that does not move.
     tol : float
         Relative width of the interval from `radius` to `upper`.
 
     Returns
     -------
     StabilityRadius
-        Every p with |p_i - point_i| <= radius * scale_i is proved stable, delays cut off at 0.
+        Every p with ``abs(p_i - point_i) <= radius * scale_i`` is proved stable, delays cut off at 0.
 
     Raises
     ------
