@@ -57,14 +57,15 @@ def stability_radius(
     point : mapping of str to float
         A stable point.
     scales : mapping of str to float, optional
-        The unit in which each parameter moves, its modulus by default; 0 for one that does not move.
+        The unit in which each parameter moves, its modulus by default; 0 for one that stays.
     tol : float
         Relative width of the interval from `radius` to `upper`.
 
     Returns
     -------
     StabilityRadius
-        Every p with ``abs(p_i - point_i) <= radius * scale_i`` is proved stable, delays cut off at 0.
+        Every p with ``abs(p_i - point_i) <= radius * scale_i`` is proved stable, delays cut off
+        at 0.
 
     Raises
     ------
