@@ -43,6 +43,7 @@ FLOORS = [
         "_controllers",
         "_response",
         "_loop",
+        "_fixed_step",
         "_loop_model",
         "_loop_run",
         "_loop_stability",

@@ -28,6 +28,7 @@ from deadtime._estimation import (
     estimate_delay,
 )
 from deadtime._expansion import Expansion
+from deadtime._fixed_step import simulate_fixed_step
 from deadtime._loop import ControlLoop
 from deadtime._low_level import low_level_callable
 from deadtime._margins import Margins
@@ -123,6 +124,7 @@ __all__ = [
     "rightmost_branches",
     "robust_map",
     "s",
+    "simulate_fixed_step",
     "stability_map",
     "stability_radius",
     "wrightomega",

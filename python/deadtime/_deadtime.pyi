@@ -216,6 +216,30 @@ def robust_map(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> NDArray[np.int32]: ...
+def fixed_step_run(
+    plant: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float],
+    controller: tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        float,
+        float,
+        float,
+        float,
+    ],
+    delay: float,
+    delay_path: str,
+    limit: float | None,
+    sample_steps: int | None,
+    solver: str,
+    step: float,
+    steps: int,
+    state: NDArray[np.float64],
+    output: float,
+    command: float,
+    reference: tuple[float, NDArray[np.float64], NDArray[np.float64]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
 @final
 class LinearLoop:

@@ -19,7 +19,7 @@ from deadtime._validation import finite, real_array
 if TYPE_CHECKING:
     from deadtime._loop import ControlLoop
 
-__all__ = ["simulate_loop"]
+__all__ = ["reference_jumps", "settled_step", "simulate_loop", "steady_state"]
 
 Vector = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def simulate_loop(
     start = float(times[0])
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
-    jumps = _jumps(times, reference, reference_time, before)
+    jumps = reference_jumps(times, reference, reference_time, before)
     past = jumps.at(np.array([np.nextafter(start, -np.inf)]))[0]
     state, command = state_at_rest(
         loop.plant, loop.controller, loop.parameters, initial, float(past)
@@ -108,7 +108,7 @@ def simulate_loop(
         inputs=inputs,
         breaks=_distinct(breaks[breaks >= 0.0], delay) + start,
         reference=jumps.at(times),
-        steady_state=_steady_state(loop, float(jumps.values[-1])),
+        steady_state=steady_state(loop, float(jumps.values[-1])),
         _dense=_Again(loop, start, ahead, arguments),
     )
 
@@ -128,7 +128,7 @@ def settled_step(loop: ControlLoop, amplitude: float) -> Response:
     return response
 
 
-def _steady_state(loop: ControlLoop, reference: float) -> float | None:
+def steady_state(loop: ControlLoop, reference: float) -> float | None:
     gains = loop._model.rest_gains
     if gains is None:
         return None
@@ -138,7 +138,7 @@ def _steady_state(loop: ControlLoop, reference: float) -> float | None:
     return output * reference
 
 
-def _jumps(
+def reference_jumps(
     times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
 ) -> _Jumps:
     values = real_array("reference", reference)

@@ -4,6 +4,7 @@ mod arrays;
 mod boxes;
 mod dde;
 mod errors;
+mod fixed_step;
 mod matrix;
 mod pointers;
 mod quasipoly;
@@ -21,6 +22,8 @@ mod _deadtime {
     use super::boxes::{largest_stable_box, proved_boxes, robust_map, stability_radius};
     #[pymodule_export]
     use super::dde::{PyLinearLoop, sampled_abscissa_grid};
+    #[pymodule_export]
+    use super::fixed_step::fixed_step_run;
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]

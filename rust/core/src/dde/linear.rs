@@ -128,6 +128,14 @@ impl Reference {
         Self::new(before, vec![0.0], vec![value])
     }
 
+    /// The value that holds at `time`.
+    pub(crate) fn at(&self, time: f64) -> f64 {
+        match self.times.partition_point(|&jump| jump <= time) {
+            0 => self.before,
+            place => self.values[place - 1],
+        }
+    }
+
     /// A reader that walks forward in time.
     pub(crate) fn cursor(&self) -> Cursor<'_> {
         Cursor {

@@ -5,9 +5,11 @@
 //! * [`sampled`]: the same loop with the command held between samples: exact response, transition
 //!   matrix, poles, grids of poles;
 //! * [`continuous`]: the loop in continuous time, exact to rounding by the method of steps;
+//! * [`fixed_step`]: the loop in fixed steps, with the errors of block-diagram tools;
 //! * [`propagator`]: the response of x′ = A x + g to constant g (matrix exponential).
 
 pub mod continuous;
+pub mod fixed_step;
 pub mod linear;
 pub mod propagator;
 pub mod sampled;

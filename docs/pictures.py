@@ -1,0 +1,34 @@
+"""Make the pictures of these pages: ``python docs/pictures.py``.
+
+They are kept beside the pages, so that building the pages needs no run of the package.
+"""
+
+from pathlib import Path
+
+import deadtime as dtm
+import matplotlib.pyplot as plt
+import numpy as np
+
+IMAGES = Path(__file__).parent / "images"
+
+
+def fixed_steps() -> None:
+    """A filtered loop at a step of one sample, by six solvers, beside the exact response."""
+    filtered = dtm.PV(Kp=2.0, Kv=0.19, filter=dtm.DerivativeFilter(omega=38.0))
+    loop = dtm.ControlLoop(
+        dtm.Integrator(), filtered, delay=0.36, limit=1.0, delay_path="measurement"
+    )
+    figure, axes = plt.subplots(figsize=(7.0, 4.0), layout="constrained")
+    for solver in ("ode1", "ode2", "ode3", "ode4", "ode5", "ode8"):
+        found = dtm.simulate_fixed_step(loop, 4.0, step=0.065, solver=solver)
+        axes.plot(found.time, found.outputs, ".-", linewidth=0.8, markersize=3, label=solver)
+    exact = loop.simulate(np.linspace(0.0, 4.0, 801))
+    axes.plot(exact.time, exact.outputs, "k", linewidth=1.5, label="exact")
+    axes.set(xlabel="time (s)", ylabel="height (m)", ylim=(-0.1, 1.4))
+    axes.set_title("One loop, steps of 0.065 s, six solvers")
+    axes.legend(ncols=2)
+    figure.savefig(IMAGES / "fixed-steps.png", dpi=110)
+
+
+if __name__ == "__main__":
+    fixed_steps()
