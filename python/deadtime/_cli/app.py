@@ -54,7 +54,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Method = Literal["all", "overshoot", "waveform"]
+Method = Literal["all", "output_error", "overshoot", "waveform"]
 Map = Literal["dominant", "exact", "saturated"]
 Objective = Literal["abscissa", "settling_time"]
 Ends = tuple[float, float]
@@ -116,7 +116,8 @@ def estimate(
         Map, typer.Option(help="From overshoot to delay, for --method overshoot.")
     ] = "dominant",
     free: Annotated[
-        str, typer.Option(help="What --method waveform fits: of delay, gain, lag.")
+        str,
+        typer.Option(help="What waveform and output_error fit: of delay, gain, lag."),
     ] = "delay,gain",
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
@@ -131,7 +132,7 @@ def estimate(
         fit = estimate_delay(recording, loop, method="overshoot", map=map, window=window)
     else:
         names = [name.strip() for name in free.split(",") if name.strip()]
-        fit = estimate_delay(recording, loop, method="waveform", free=names, window=window)
+        fit = estimate_delay(recording, loop, method=method, free=names, window=window)
     if plot is not None:
         save_figure(plot_estimate(fit), plot)
     if as_json:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Literal
 
+from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.waveform import estimate_by_waveform
 from deadtime._loop import ControlLoop
+from deadtime._plants import Integrator
 from deadtime._recording import Recording
 
 __all__ = ["estimate_delay"]
@@ -18,12 +20,12 @@ def estimate_delay(
     recording: Recording,
     loop: ControlLoop,
     *,
-    method: Literal["auto", "overshoot", "waveform"] = "auto",
+    method: Literal["auto", "output_error", "overshoot", "waveform"] = "auto",
     free: Sequence[str] = ("delay", "gain"),
     window: tuple[float | None, float | None] | None = None,
     **options: Any,
 ) -> DelayEstimate:
-    """Estimate the delay of a closed loop from a recording of its step response.
+    """Estimate the delay of a closed loop from a recording of it.
 
     Parameters
     ----------
@@ -31,15 +33,20 @@ def estimate_delay(
         Reference and output over time, as logged where the controller runs.
     loop : ControlLoop
         What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
-    method : {"auto", "overshoot", "waveform"}
-        ``"waveform"`` fits the simulated loop to the whole window and is what ``"auto"`` takes.
+    method : {"auto", "output_error", "overshoot", "waveform"}
+        ``"output_error"`` fits the response of the vehicle to the command as it was logged: the
+        best there is, and what ``"auto"`` takes where the recording has a command.
+        ``"waveform"`` fits the simulated loop to the whole window, and is taken elsewhere.
         ``"overshoot"`` reads one number, as Armah & Yi did.
     free : sequence of str
-        What ``"waveform"`` fits: any of ``"delay"``, ``"gain"`` and ``"lag"``. The overshoot
-        method fits the delay alone.
+        What is fitted: any of ``"delay"``, ``"gain"`` and ``"lag"``. The overshoot method fits the
+        delay alone.
     window : (float or None, float or None), optional
-        The part of the recording to use, s. It should begin at rest and hold one step.
+        The part of the recording to use, s. For ``"waveform"`` and ``"overshoot"`` it should begin
+        at rest and hold one step; ``"output_error"`` takes any in which the command changes.
     **options
+        For ``"output_error"``: ``initial_output``, the true output at the start where it is known;
+        fitted otherwise.
         For ``"overshoot"``: ``map="dominant"`` (the paper's), ``"exact"`` (the exact step
         response) or ``"saturated"`` (the loop simulated with its hold and limit).
 
@@ -85,7 +92,16 @@ def estimate_delay(
         raise TypeError(f"recording is a {type(recording).__name__}, not a Recording")
     if not isinstance(loop, ControlLoop):
         raise TypeError(f"loop is a {type(loop).__name__}, not a ControlLoop")
-    if method in ("auto", "waveform"):
+    if method == "auto":
+        logged = recording.command is not None and isinstance(loop.plant, Integrator)
+        method = "output_error" if logged else "waveform"
+    if method == "output_error":
+        if set(options) - {"initial_output"}:
+            raise ValueError(
+                f"the output-error method has the option 'initial_output', not {set(options)!r}"
+            )
+        return estimate_by_output_error(recording, loop, window, free, **options)
+    if method == "waveform":
         if options:
             raise ValueError(f"the waveform method has no option {next(iter(options))!r}")
         return estimate_by_waveform(recording, loop, window, free)
@@ -93,4 +109,6 @@ def estimate_delay(
         if set(options) - {"map"}:
             raise ValueError(f"the overshoot method has the option 'map', not {set(options)!r}")
         return estimate_by_overshoot(recording, loop, window, **options)
-    raise ValueError(f"method={method!r} is not one of 'auto', 'overshoot', 'waveform'")
+    raise ValueError(
+        f"method={method!r} is not one of 'auto', 'output_error', 'overshoot', 'waveform'"
+    )

@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from deadtime._estimation.profile import Profile
 from deadtime._estimation.residuals import Whiteness
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
+from deadtime._validation import real_array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,6 +94,7 @@ class DelayEstimate(ReadOnlyArrays):
     message: str
     uncalibrated: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
+    _profile: Profile | None = None
 
     def __post_init__(self) -> None:
         read_only(self.cov)
@@ -156,13 +159,60 @@ class DelayEstimate(ReadOnlyArrays):
             raise ValueError(
                 f"{name!r} was not fitted, there are intervals for {', '.join(self.stderr)}"
             )
+        value = self._value(name)
+        if self._profile is not None and self._profile.preferred:
+            return self._profile.interval(name, value, self._reach(name), level)
         freedom = max(1, self.residuals.size - len(self.free))
         reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
-        value = self.delay_plus_lag if name == "delay+lag" else self.loop.parameters[name]
         low = value - reach
         if name != "gain":
             low = max(0.0, low)
         return (low, value + reach)
+
+    def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
+        """How much worse the best fit gets when one quantity is held.
+
+        Parameters
+        ----------
+        name : str
+            One of `free`, or ``"delay+lag"``.
+        values : array_like, shape (n,), optional
+            Where to hold it; by default 41 values, four standard errors to either side.
+
+        Returns
+        -------
+        values, t : ndarray, shape (n,)
+            At each value the t at which a confidence interval would end there, so that it is 1.96
+            at the ends of a 95 % interval of many samples, and 0 at the fitted value.
+
+        Raises
+        ------
+        ValueError
+            When the method has no profile or the quantity was not fitted.
+        """
+        if self._profile is None:
+            raise ValueError(f"the {self.method} method has no profile; method='output_error' has")
+        if name not in self.stderr:
+            raise ValueError(
+                f"{name!r} was not fitted, there are profiles for {', '.join(self.stderr)}"
+            )
+        if values is None:
+            middle, reach = self._value(name), 4.0 * self._reach(name)
+            low = middle - reach if name == "gain" else max(0.0, middle - reach)
+            values = np.linspace(low, middle + reach, 41)
+        held = np.atleast_1d(real_array("values", values))
+        found = [self._profile.statistic(name, float(value)) for value in held]
+        return held, np.sqrt(np.array(found))
+
+    def _value(self, name: str) -> float:
+        """The fitted value of a quantity."""
+        if name == "delay+lag":
+            return self.delay_plus_lag
+        return float(self.loop.parameters[name])
+
+    def _reach(self, name: str) -> float:
+        """About one standard error; where a quantity is at its bound, that of the delay."""
+        return self.stderr[name] or self.stderr.get("delay", 0.0)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the arrays, as plain values for JSON."""

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.evidence import check_distinguishable, embedded, standard_errors
 from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime._estimation.result import CramerRaoBound, DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
@@ -39,10 +40,6 @@ GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
 
 #: Grid points that are refined; the best of them wins.
 REFINED = 3
-
-#: Ratio of singular values of the scaled Jacobian below which data do not tell two numbers apart:
-#: rounding in difference quotients is at about 1e-8.
-INDISTINGUISHABLE = 1e-6
 
 #: A lag that changes the cost by less than this share is none: least squares itself stops there.
 VANISHING = 1e-6
@@ -76,24 +73,24 @@ def estimate_by_waveform(
     _check_ends(values, problem.ends())
     held = [name for name in names if name != "gain" and values[name] <= 1e-9]
     loose = [i for i, name in enumerate((*names, "start")) if name not in held]
-    _check_distinguishable(jacobian[:, loose], [(*names, "initial output")[i] for i in loose])
+    check_distinguishable(jacobian[:, loose], [(*names, "initial output")[i] for i in loose])
     whiteness = whiteness_of(residuals, len(names))
     exact = float(np.max(np.abs(residuals))) <= 1e-9 * float(np.ptp(data.output))
     adequate = (whiteness.white or exact) and not held
-    white = _embed(white_covariance(jacobian[:, loose], residuals), loose, jacobian.shape[1])
+    white = embedded(white_covariance(jacobian[:, loose], residuals), loose, jacobian.shape[1])
     spread = white
     if not whiteness.white:
         robust = robust_covariance(jacobian[:, loose], residuals)
-        spread = _embed(robust, loose, jacobian.shape[1])
+        spread = embedded(robust, loose, jacobian.shape[1])
     count = len(names)
     noise = float(np.sqrt(residuals @ residuals / (residuals.size - solution.parameters.size)))
     return DelayEstimate(
         method="waveform",
         loop=loop.replace(**values),
         free=names,
-        stderr=_stderr(names, spread),
+        stderr=standard_errors(names, spread),
         cov=spread[:count, :count],
-        crb=CramerRaoBound((*names, "initial output"), noise, _stderr(names, white)),
+        crb=CramerRaoBound((*names, "initial output"), noise, standard_errors(names, white)),
         recording=data,
         residuals=residuals,
         whiteness=whiteness,
@@ -266,40 +263,6 @@ def _check_ends(values: Mapping[str, float], ends: Mapping[str, tuple[float, flo
                     "is no answer of such a loop to this reference; check columns, signs, units "
                     "and gains, and choose a window around one step"
                 )
-
-
-def _check_distinguishable(jacobian: Array, names: list[str]) -> None:
-    norms = np.linalg.norm(jacobian, axis=0)
-    if not np.all(np.isfinite(norms)) or np.any(norms == 0.0):
-        blind = [name for name, norm in zip(names, norms, strict=True) if not norm > 0.0]
-        raise NotIdentifiableError(
-            f"the recording does not depend on the {' or '.join(blind) or 'parameters'}: the "
-            "window holds no response to a step, or the command is at its limit throughout"
-        )
-    _, singular, directions = np.linalg.svd(jacobian / norms)
-    if singular[-1] < INDISTINGUISHABLE * singular[0]:
-        weights = np.abs(directions[-1])
-        mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]
-        raise NotIdentifiableError(
-            f"{' and '.join(mixed)} cannot be told apart by this recording: fix one of them, or "
-            "record a step that is not at the limit throughout"
-        )
-
-
-def _embed(cov: Array, loose: list[int], size: int) -> Array:
-    """Covariance of all parameters: what stands at its bound has none of its own."""
-    full = np.zeros((size, size))
-    full[np.ix_(loose, loose)] = cov
-    return full
-
-
-def _stderr(names: tuple[str, ...], cov: Array) -> dict[str, float]:
-    errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
-    if "delay" in names:
-        total = np.array([1.0 if name in ("delay", "lag") else 0.0 for name in names])
-        count = len(names)
-        errors["delay+lag"] = float(np.sqrt(total @ cov[:count, :count] @ total))
-    return errors
 
 
 def _message(names: tuple[str, ...], held: list[str], adequate: bool) -> str:

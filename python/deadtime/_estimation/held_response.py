@@ -1,0 +1,78 @@
+"""Response of an integrator with a lag to a held command, at any time, with its derivatives.
+
+A command u_k that holds from t_k to t_{k+1} goes into gain/(s (lag s + 1)). For a gain of one,
+
+    v' = (u - v)/lag,  F' = v,  F(t) = I(t) - lag v(t),  I = the integral of u,
+
+(v = u without a lag), from rest before the first command. Both are exact: between commands I is a
+line and v - u_k decays as e^(-(t - t_k)/lag). dF/dt = v, and with p = dv/dlag, whose own
+recursion is the derivative of that of v, dF/dlag = -v - lag p.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["HeldResponse", "Response"]
+
+Array = NDArray[np.float64]
+
+
+class Response(NamedTuple):
+    """F, dF/dt and dF/dlag at some times."""
+
+    value: Array
+    rate: Array
+    by_lag: Array
+
+
+class HeldResponse:
+    """The response of an integrator to one record of commands.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        From when each command holds, s, increasing; the last one holds for ever.
+    command : ndarray, shape (n,)
+        The commands.
+    """
+
+    def __init__(self, time: Array, command: Array) -> None:
+        self.time, self.command = time, command
+        self._steps = np.diff(time)
+        self._integral = np.concatenate([[0.0], np.cumsum(command[:-1] * self._steps)])
+
+    def at(self, times: Array, lag: float = 0.0) -> Response:
+        """F and its derivatives at `times` for a lag in s."""
+        row = np.searchsorted(self.time, times, side="right") - 1
+        before = row < 0
+        row = np.maximum(row, 0)
+        since = np.where(before, 0.0, times - self.time[row])
+        command = np.where(before, 0.0, self.command[row])
+        integral = self._integral[row] + command * since
+        if lag == 0.0:
+            # To first order a lag is a delay: dF/dlag = -v at no lag.
+            return Response(integral, command, -command)
+        velocity, by_lag = self._velocities(lag)
+        decay = np.exp(-since / lag)
+        gap = np.where(before, 0.0, velocity[row] - command)
+        v = command + gap * decay
+        p = np.where(before, 0.0, by_lag[row]) * decay + gap * decay * since / lag**2
+        return Response(integral - lag * v, v, -v - lag * p)
+
+    def _velocities(self, lag: float) -> tuple[Array, Array]:
+        """V and dv/dlag when each command begins."""
+        v, p = np.zeros_like(self.command), np.zeros_like(self.command)
+        decays = np.exp(-self._steps / lag)
+        slopes = self._steps / lag**2
+        now, slope = 0.0, 0.0
+        for k, (u, decay, rate) in enumerate(
+            zip(self.command[:-1].tolist(), decays.tolist(), slopes.tolist(), strict=True), 1
+        ):
+            slope = decay * (slope + (now - u) * rate)
+            now = u + (now - u) * decay
+            v[k], p[k] = now, slope
+        return v, p

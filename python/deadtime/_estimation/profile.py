@@ -1,0 +1,81 @@
+"""Profile likelihood: how much worse the best fit gets when one number is held.
+
+For white Gaussian noise of unknown size, (cost(value) - best)/(best/freedom) is distributed as
+the square of Student's t where the model is nearly linear, and the interval holds all values for
+which it stays below the quantile squared (Bates & Watts 1988, section 6.1). Where residuals are
+coloured, the quantile is widened by the ratio of robust and plain standard errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+from scipy.optimize import brentq
+
+__all__ = ["Profile"]
+
+Array = NDArray[np.float64]
+
+#: An end of an interval is sought no farther than this many times its Gaussian distance.
+FARTHEST = 64.0
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The profile of the cost of one fit.
+
+    Attributes
+    ----------
+    cost : callable
+        Least sum of squares with the named quantity held at a value.
+    best : float
+        The least sum of squares.
+    freedom : int
+        Samples less fitted numbers.
+    widening : dict of str to float
+        Robust over plain standard error of each quantity.
+    preferred : str
+        Why the Gaussian interval is not to be used; empty where it is.
+    """
+
+    cost: Callable[[str, float], float]
+    best: float
+    freedom: int
+    widening: Mapping[str, float]
+    preferred: str = ""
+
+    def statistic(self, name: str, value: float) -> float:
+        """The square of t at which `value` is the end of an interval."""
+        worse = max(0.0, self.cost(name, value) - self.best)
+        scale = self.best / self.freedom
+        widening = self.widening.get(name, 1.0)
+        return worse / (scale * widening**2) if scale > 0.0 else float(np.inf) * (worse > 0.0)
+
+    def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
+        """Ends of the interval around the fitted `value`, no lower than zero but for a gain."""
+        quantile = float(special.stdtrit(self.freedom, 0.5 + level / 2)) ** 2
+        floor = -np.inf if name == "gain" else 0.0
+        reach = max(stderr, 1e-9 * abs(value), 1e-12)
+        return self._end(name, value, -reach, quantile, floor), self._end(
+            name, value, reach, quantile, floor
+        )
+
+    def _end(self, name: str, value: float, reach: float, quantile: float, floor: float) -> float:
+        def excess(offset: float) -> float:
+            return self.statistic(name, value + offset) - quantile
+
+        inner, factor = 0.0, 1.0
+        while factor <= FARTHEST:
+            outer = reach * factor
+            if value + outer <= floor:
+                if excess(floor - value) <= 0.0:
+                    return floor
+                outer = floor - value
+            if excess(outer) > 0.0:
+                return value + float(brentq(excess, inner, outer, xtol=1e-6 * abs(reach)))
+            inner, factor = outer, 2.0 * factor
+        return value + inner
