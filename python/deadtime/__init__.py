@@ -52,6 +52,7 @@ from deadtime._special_forms import (
 )
 from deadtime._stability import MapStatus, StabilityMap, stability_map
 from deadtime._stability_radius import StabilityRadius, stability_radius
+from deadtime._sweep import Sweep, SweepStatus, sweep
 from deadtime._systems import DelaySystem
 from deadtime._transfer import TransferFunction, feedback
 
@@ -98,6 +99,8 @@ __all__ = [
     "StabilityMap",
     "StabilityRadius",
     "Step",
+    "Sweep",
+    "SweepStatus",
     "TransferFunction",
     "Whiteness",
     "crossings",
@@ -127,5 +130,6 @@ __all__ = [
     "simulate_fixed_step",
     "stability_map",
     "stability_radius",
+    "sweep",
     "wrightomega",
 ]

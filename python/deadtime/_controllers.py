@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._batch import matrix, vector
 from deadtime._transfer import TransferFunction
 from deadtime._validation import finite, positive
 
@@ -36,10 +37,10 @@ class ControllerEquations(NamedTuple):
     B: Vector
     E: Vector
     C: Vector
-    p: float
-    q: float
-    M: float
-    impulse: float
+    p: Any
+    q: Any
+    M: Any
+    impulse: Any
 
 
 @dataclass(frozen=True)
@@ -170,56 +171,62 @@ class Controller(ABC):
             num = _sum(num, _scaled(i, rolled_off))
         return num, _product(integral, rolled_off)
 
-    def _equations(self, values: Mapping[str, float]) -> ControllerEquations:
+    def _equations(self, values: Mapping[str, Any]) -> ControllerEquations:
         """Equations of the states: integral of the error first, filter after it."""
         terms = self._terms(values)
         on_error = 1.0 if terms.derivative_of_error else 0.0
-        blocks: list[tuple[Vector, Vector, Vector, Vector]] = []
+        blocks: list[list[list[Any]]] = []
+        drive: list[Any] = []
+        along: list[Any] = []
+        row: list[Any] = []
         p, q = -terms.proportional, 0.0
         if terms.integrates:
-            blocks.append(
-                (np.zeros((1, 1)), np.array([-1.0]), np.array([1.0]), np.array([terms.integral]))
-            )
+            blocks.append([[0.0]])
+            drive.append(-1.0)
+            along.append(1.0)
+            row.append(terms.integral)
         if terms.differentiates and self._filter is None:
             q = -terms.derivative
         elif terms.differentiates:
             omega, damping = values["omega"], values["damping"]
             # The second state is the derivative over omega, so that both are of one size.
-            both = np.array([[0.0, omega], [-omega, -2.0 * damping * omega]])
-            into = np.array([0.0, omega])
-            out = np.array([0.0, -terms.derivative * omega])
+            blocks.append([[0.0, omega], [-omega, -2.0 * damping * omega]])
+            drive += [0.0, omega]
             # The filter sees y, or y - r for a derivative of the error.
-            blocks.append((both, into, -on_error * into, out))
-        size = sum(len(block[1]) for block in blocks)
-        matrix = np.zeros((size, size))
-        at = 0
+            along += [0.0, -on_error * omega]
+            row += [0.0, -terms.derivative * omega]
+        rows: list[list[Any]] = []
         for block in blocks:
-            n = len(block[1])
-            matrix[at : at + n, at : at + n] = block[0]
-            at += n
-        drive, along, row = (
-            np.concatenate([np.zeros(0), *(block[part] for block in blocks)]) for part in (1, 2, 3)
-        )
+            before = len(rows)
+            after = len(drive) - before - len(block)
+            rows += [[0.0] * before + line + [0.0] * after for line in block]
         return ControllerEquations(
-            matrix, drive, along, row, p, q, terms.proportional, -on_error * q
+            A=matrix(rows),
+            B=vector(drive),
+            E=vector(along),
+            C=vector(row),
+            p=p,
+            q=q,
+            M=terms.proportional,
+            impulse=-on_error * q,
         )
 
     def _rest(
-        self, values: Mapping[str, float], output: float, reference: float, command: float
+        self, values: Mapping[str, Any], output: float, reference: float, command: Any
     ) -> Vector:
         """States after a long time at constant `output` and `reference`, giving `command`.
 
         The integral takes the value at which the controller takes over without a bump.
         """
         terms = self._terms(values)
-        states: list[float] = []
+        states: list[Any] = []
         if terms.integrates:
             missing = command - terms.proportional * (reference - output)
             states.append(missing / terms.integral if terms.integral != 0.0 else 0.0)
         if terms.differentiates and self._filter is not None:
             seen = output - reference if terms.derivative_of_error else output
             states += [seen, 0.0]
-        return np.array(states)
+        return vector(states)
 
 
 class _Terms(NamedTuple):

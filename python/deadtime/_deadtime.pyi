@@ -24,12 +24,15 @@ __all__ = [
     "lambertwm1_number",
     "largest_stable_box",
     "limit_threads",
+    "loop_sensitivities",
     "nap",
     "proved_boxes",
     "robust_map",
     "sampled_abscissa_grid",
     "spin",
     "stability_radius",
+    "sweep_figures",
+    "sweep_responses",
     "thread_count",
     "wrightomega",
 ]
@@ -275,6 +278,44 @@ class LinearLoop:
     def transition_matrix(self) -> NDArray[np.float64]: ...
     def poles(self) -> NDArray[np.complex128]: ...
 
+def loop_sensitivities(
+    states: int,
+    row: NDArray[np.float64],
+    row_slopes: NDArray[np.float64],
+    state: NDArray[np.float64],
+    state_slopes: NDArray[np.float64],
+    command: float,
+    command_slopes: NDArray[np.float64],
+    ahead: NDArray[np.float64],
+    output_times: NDArray[np.float64],
+    input_times: NDArray[np.float64],
+    reference_before: float,
+    reference_times: NDArray[np.float64],
+    reference_values: NDArray[np.float64],
+    command_history: NDArray[np.float64],
+    sample_phase: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def sweep_figures(
+    states: int,
+    rows: NDArray[np.float64],
+    amplitude: float,
+    is_ahead: bool,
+    steady: NDArray[np.float64],
+    span: float,
+    settling: float,
+    rise: tuple[float, float],
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+def sweep_responses(
+    states: int,
+    rows: NDArray[np.float64],
+    amplitude: float,
+    is_ahead: bool,
+    times: NDArray[np.float64],
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
 def sampled_abscissa_grid(
     cells: int,
     states: int,

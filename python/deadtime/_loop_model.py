@@ -9,59 +9,80 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._batch import column, number, vector, zeros
 from deadtime._controllers import Controller
 from deadtime._deadtime import LinearLoop
 from deadtime._plants import Plant, realise, rest
 
-__all__ = ["LoopModel", "state_at_rest"]
+__all__ = ["LoopModel", "rest_of", "state_at_rest"]
 
 Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class LoopModel:
-    """The matrices of a loop with numbers in the place of every parameter."""
+    """The matrices of a loop with numbers in the place of every parameter.
+
+    Where the numbers are arrays, the matrices of one loop an element are in the leading axes.
+    """
 
     A: Vector
     B: Vector
     E: Vector
     K: Vector
-    L: float
-    M: float
+    L: Any
+    M: Any
     C: Vector
-    D: float
-    impulse: float
+    D: Any
+    impulse: Any
 
     @classmethod
-    def build(cls, plant: Plant, controller: Controller, values: Mapping[str, float]) -> LoopModel:
+    def build(cls, plant: Plant, controller: Controller, values: Mapping[str, Any]) -> LoopModel:
         """Close the loop around `plant`, numbers taken from `values`."""
         p = realise(*plant._polynomials(values))
         c = controller._equations(values)
-        if c.q != 0.0 and p.D != 0.0:
+        if np.any(c.q != 0.0) and np.any(p.D != 0.0):
             raise ValueError(
                 f"the plant passes its command straight to its output (D={p.D}), so its output "
                 "has no ideal derivative: give the controller a DerivativeFilter"
             )
-        n, m = len(p.B), len(c.B)
-        A = np.zeros((n + m, n + m))
-        A[:n, :n] = p.A
-        A[n:, :n] = np.outer(c.B, p.C)
-        A[n:, n:] = c.A
+        n, m = p.B.shape[-1], c.B.shape[-1]
+        A = zeros((n + m, n + m), p.A, c.A, c.B[..., None])
+        A[..., :n, :n] = p.A
+        A[..., n:, :n] = c.B[..., None] * p.C
+        A[..., n:, n:] = c.A
+        feedback = column(c.p) * p.C + column(c.q) * (p.C @ p.A)
         return cls(
             A=A,
-            B=np.concatenate([p.B, c.B * p.D]),
-            E=np.concatenate([np.zeros(n), c.E]),
-            K=np.concatenate([c.p * p.C + c.q * (p.C @ p.A), c.C]),
-            L=float(c.p * p.D + c.q * (p.C @ p.B)),
-            M=float(c.M),
+            B=_joined(p.B, c.B * column(p.D)),
+            E=_joined(np.zeros(n), c.E),
+            K=_joined(feedback, c.C),
+            L=number(c.p * p.D + c.q * (p.B @ p.C)),
+            M=number(c.M),
             C=np.concatenate([p.C, np.zeros(m)]),
             D=p.D,
-            impulse=float(c.impulse),
+            impulse=number(c.impulse),
         )
+
+    def row(self, delay: Any, sample_time: Any = None, limit: Any = None) -> NDArray[Any]:
+        """Write the loop, or each of many, as one row of numbers for the native part.
+
+        Returns
+        -------
+        ndarray, shape (..., n * n + 4 n + 7)
+            A, B, E, K, C, L, M, D, impulse, the delay, the sample time (0 for none) and the limit
+            (infinite for none).
+        """
+        flat = self.A.reshape(*self.A.shape[:-2], -1)
+        period = 0.0 if sample_time is None else sample_time
+        bound = np.inf if limit is None else limit
+        numbers = vector([self.L, self.M, self.D, self.impulse, delay, period, bound])
+        return _joined(flat, self.B, self.E, self.K, self.C, numbers)
 
     def native(
         self, delay: float, sample_time: float | None = None, limit: float | None = None
@@ -102,13 +123,36 @@ class LoopModel:
         return float(self.C @ x[:n] + self.D * x[n]), float(x[n])
 
 
+def _joined(*parts: NDArray[Any]) -> NDArray[Any]:
+    """Concatenate vectors whose leading axes broadcast."""
+    leading = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
+    return np.concatenate(
+        [np.broadcast_to(part, leading + part.shape[-1:]) for part in parts], axis=-1
+    )
+
+
+def rest_of(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Output and command at rest under a unit reference, NaN where there is no such rest.
+
+    `LoopModel.rest_gains` of many loops: with plant b/a, feedback f/g and reference path q/g they
+    are b q / (a g + b f) and a q / (a g + b f) at s = 0.
+    """
+    b, a = (part[-1] for part in plant._polynomials(values))
+    f, g = (part[-1] for part in controller._feedback(values))
+    q = controller._reference(values)[0][-1]
+    total = a * g + b * f
+    exists = np.abs(total) > 1e-13 * (np.abs(a * g) + np.abs(b * f))
+    total = np.where(exists, total, np.nan)
+    return b * q / total, a * q / total
+
+
 def state_at_rest(
     plant: Plant,
     controller: Controller,
-    values: Mapping[str, float],
+    values: Mapping[str, Any],
     output: float,
     reference: float,
-) -> tuple[Vector, float]:
+) -> tuple[Vector, Any]:
     """State of a loop whose plant rests at `output`, and the command that holds it there."""
     state, command = rest(*plant._polynomials(values), output)
     return np.concatenate([state, controller._rest(values, output, reference, command)]), command

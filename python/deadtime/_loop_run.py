@@ -6,6 +6,7 @@ delay, so outputs are asked for that much later and their breaks are moved back.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,13 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._loop_model import state_at_rest
+from deadtime._loop_sensitivities import output_and_input_slopes, slope_names
 from deadtime._response import Response
 from deadtime._validation import finite, real_array
 
 if TYPE_CHECKING:
     from deadtime._loop import ControlLoop
 
-__all__ = ["reference_jumps", "settled_step", "simulate_loop", "steady_state"]
+__all__ = ["increasing", "reference_jumps", "settled_step", "simulate_loop", "steady_state"]
 
 Vector = NDArray[np.float64]
 
@@ -73,11 +75,13 @@ def simulate_loop(
     reference_time: ArrayLike | None,
     command_history: ArrayLike,
     sample_phase: float,
+    sensitivities: Sequence[str] = (),
 ) -> Response:
     """Check the arguments of `ControlLoop.simulate` and run it."""
-    times = _increasing("time", time)
+    times = increasing("time", time)
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
+    names = slope_names(loop, sensitivities)
     start = float(times[0])
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
@@ -100,6 +104,9 @@ def simulate_loop(
     )
     since = _on_samples(times - start, start, loop.sample_time, sample_phase)
     outputs, inputs, output_breaks, input_breaks = native.simulate(since + ahead, since, *arguments)
+    slopes, input_slopes = output_and_input_slopes(
+        loop, names, (initial, float(past)), since, arguments
+    )
 
     breaks = np.concatenate([output_breaks - ahead, input_breaks])
     return Response(
@@ -109,6 +116,8 @@ def simulate_loop(
         breaks=_distinct(breaks[breaks >= 0.0], delay) + start,
         reference=jumps.at(times),
         steady_state=steady_state(loop, float(jumps.values[-1])),
+        sensitivities=slopes,
+        input_sensitivities=input_slopes,
         _dense=_Again(loop, start, ahead, arguments),
     )
 
@@ -149,7 +158,7 @@ def reference_jumps(
                 "array of as many values as there are times"
             )
         return _Jumps(times[:1], values.reshape(1), before)
-    where = times if reference_time is None else _increasing("reference_time", reference_time)
+    where = times if reference_time is None else increasing("reference_time", reference_time)
     if values.shape != where.shape or values.size == 0:
         raise ValueError(
             f"reference has shape {values.shape} and its times {where.shape}: give one value for "
@@ -158,7 +167,8 @@ def reference_jumps(
     return _Jumps(where, values, before)
 
 
-def _increasing(name: str, given: ArrayLike) -> Vector:
+def increasing(name: str, given: ArrayLike) -> Vector:
+    """Return the times as an array, or raise where they do not increase."""
     times = np.atleast_1d(real_array(name, given))
     if times.ndim != 1:
         raise ValueError(f"{name} has shape {times.shape}: give a one-dimensional array")

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, SupportsFloat, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._batch import matrix, number, vector
 from deadtime._transfer import TransferFunction
 from deadtime._validation import finite, non_negative, non_zero
 
@@ -55,7 +56,7 @@ class Plant(ABC):
 
     @abstractmethod
     def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        """Numerator and denominator, descending, in numbers or symbols taken from `values`."""
+        """Numerator and denominator, descending, in numbers, arrays or symbols of `values`."""
 
     def polynomials(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Numerator and denominator of the transfer function.
@@ -259,29 +260,25 @@ def kit_plant() -> RationalPlant:
     return RationalPlant(num=(0.15265, 5.1529), den=(1.0, 5.820, 0.0))
 
 
-def realise(num: Sequence[float], den: Sequence[float]) -> StateSpace:
-    """Observable canonical form of num/den (descending, proper)."""
-    a = _trimmed(den)
-    b = np.zeros(len(a))
-    numerator = _trimmed(num)
-    b[len(a) - len(numerator) :] = numerator
-    b, a = b / a[0], a / a[0]
-    n = len(a) - 1
-    matrix = np.eye(n, k=1)
-    output = np.zeros(n)
-    if n:
-        matrix[:, 0] -= a[1:]
-        output[0] = 1.0
-    return StateSpace(matrix, b[1:] - a[1:] * b[0], output, float(b[0]))
+def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
+    """Observable canonical form of num/den (descending, proper); entries may be arrays."""
+    a, b = _led(den), _led(num)
+    b = [0.0] * (len(a) - len(b)) + b
+    direct, n = b[0] / a[0], len(a) - 1
+    poles, gains = ([c / a[0] for c in part[1:]] for part in (a, b))
+    chain = np.eye(n, k=1)
+    rows = [[0.0 - pole, *chain[i, 1:]] for i, pole in enumerate(poles)]
+    drive = [gain - pole * direct for gain, pole in zip(gains, poles, strict=True)]
+    return StateSpace(matrix(rows), vector(drive), np.eye(1, n)[0], number(direct))
 
 
-def rest(num: Sequence[float], den: Sequence[float], output: float) -> tuple[Any, float]:
+def rest(num: Sequence[Any], den: Sequence[Any], output: float) -> tuple[Any, Any]:
     """State and command of a plant at rest with the given output, for `realise`'s state."""
     plant = realise(num, den)
     n = len(plant.B)
-    zeros, poles = float(_trimmed(num)[-1]), float(_trimmed(den)[-1])
+    zeros, poles = num[-1], den[-1]
     if poles == 0.0 or output == 0.0:
-        command = 0.0
+        command: Any = 0.0
     elif zeros == 0.0:
         raise ValueError(
             f"initial_output={output}: this plant has no steady gain and rests only at zero, "
@@ -289,12 +286,18 @@ def rest(num: Sequence[float], den: Sequence[float], output: float) -> tuple[Any
         )
     else:
         command = output * poles / zeros
-    state = np.zeros(n)
+    state: list[Any] = []
     if n:
-        state[0] = output - plant.D * command
+        state.append(output - plant.D * command)
         for i in range(n - 1):
-            state[i + 1] = -(plant.A[i, 0] * state[0] + plant.B[i] * command)
-    return state, command
+            state.append(-(plant.A[i, 0] * state[0] + plant.B[i] * command))
+    return vector(state), command
+
+
+def _led(coefficients: Sequence[Any]) -> list[Any]:
+    """Drop leading entries that are zero throughout, keep at least one."""
+    first = next((i for i, c in enumerate(coefficients) if np.any(c != 0.0)), -1)
+    return list(coefficients)[first:]
 
 
 def _trimmed(coefficients: Sequence[float]) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,6 +48,11 @@ class Response(ReadOnlyArrays):
     steady_state : float or None
         The output at which the loop rests under the last reference, None where there is no such
         rest within the limit.
+    sensitivities : dict of str to ndarray, shape (n,)
+        Derivatives of `outputs`, at fixed times, with respect to the numbers of the loop that
+        `ControlLoop.simulate` was asked for, by name.
+    input_sensitivities : dict of str to ndarray, shape (n,)
+        The same of `inputs`.
 
     Examples
     --------
@@ -64,12 +69,16 @@ class Response(ReadOnlyArrays):
     breaks: Vector
     reference: Vector
     steady_state: float | None = None
+    sensitivities: dict[str, Vector] = field(default_factory=dict)
+    input_sensitivities: dict[str, Vector] = field(default_factory=dict)
     _dense: Callable[[Vector], Vector] | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "outputs", "inputs", "breaks", "reference"):
             array = np.array(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, read_only(array))
+        read_only(self.sensitivities)
+        read_only(self.input_sensitivities)
 
     def __repr__(self) -> str:
         rests = "" if self.steady_state is None else f", steady state {self.steady_state:g}"

@@ -11,7 +11,9 @@ use pyo3::prelude::*;
 pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
     let message = error.to_string();
     match error {
-        Error::Argument(_) | Error::TooMuch { .. } => PyValueError::new_err(message),
+        Error::Argument(_) | Error::TooMuch { .. } | Error::Diverges { .. } => {
+            PyValueError::new_err(message)
+        }
         Error::Interrupted => PyKeyboardInterrupt::new_err(message),
         Error::Convergence { best, .. } => own(py, "ConvergenceError", (message, best)),
         Error::Contour {

@@ -11,6 +11,7 @@ mod quasipoly;
 mod runtime;
 mod special;
 mod stability;
+mod sweeps;
 mod ufunc;
 
 use pyo3::prelude::*;
@@ -34,6 +35,8 @@ mod _deadtime {
     use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]
     use super::stability::PyFamily;
+    #[pymodule_export]
+    use super::sweeps::{loop_sensitivities, sweep_figures, sweep_responses};
     #[pymodule_export]
     use super::ufunc::limit_threads;
     use pyo3::prelude::*;

@@ -9,6 +9,18 @@ pub enum Error {
     #[error("{0}")]
     Argument(String),
 
+    /// A response has grown out of bounds.
+    #[error(
+        "the response exceeds {bound:e} at t = {time} s after the start: the loop is unstable, end \
+         the simulation earlier, lower the gain or give it a limit"
+    )]
+    Diverges {
+        /// What it exceeds.
+        bound: f64,
+        /// When, s.
+        time: f64,
+    },
+
     /// The caller asked to stop (Ctrl-C).
     #[error("interrupted")]
     Interrupted,

@@ -13,6 +13,8 @@
 
 use crate::{Error, Task};
 
+use super::scalar::Scalar;
+use super::wanted::Wanted;
 use super::{continuous, sampled};
 
 /// Largest magnitude of a state before a run is given up as diverging.
@@ -20,61 +22,61 @@ pub const DIVERGED: f64 = 1e150;
 
 /// The matrices of the loop, row-major; n is the length of `b`.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Equations {
+pub struct Equations<S = f64> {
     /// State matrix A, n × n.
-    pub a: Vec<f64>,
+    pub a: Vec<S>,
     /// Input column B, n.
-    pub b: Vec<f64>,
+    pub b: Vec<S>,
     /// Reference column E, n.
-    pub e: Vec<f64>,
+    pub e: Vec<S>,
     /// Feedback row K, n.
-    pub k: Vec<f64>,
+    pub k: Vec<S>,
     /// Feedback L of the delayed command.
-    pub l: f64,
+    pub l: S,
     /// Gain M of the reference.
-    pub m: f64,
+    pub m: S,
     /// Output row C, n.
-    pub c: Vec<f64>,
+    pub c: Vec<S>,
     /// Feedthrough D.
-    pub d: f64,
+    pub d: S,
     /// Weight of the impulse in u per unit jump of the reference: the gain of an ideal derivative
     /// of r. A limited or sampled command does not see it.
-    pub impulse: f64,
+    pub impulse: S,
 }
 
-impl Equations {
+impl<S: Scalar> Equations<S> {
     /// Number of states.
     pub fn states(&self) -> usize {
         self.b.len()
     }
 
     /// u before the limit.
-    pub(crate) fn command(&self, x: &[f64], w: f64, r: f64) -> f64 {
-        dot(&self.k, x) + self.l * w + self.m * r
+    pub(crate) fn command(&self, x: &[S], w: S, r: f64) -> S {
+        dot(&self.k, x) + self.l * w + self.m * S::from(r)
     }
 
     /// y.
-    pub(crate) fn output(&self, x: &[f64], w: f64) -> f64 {
+    pub(crate) fn output(&self, x: &[S], w: S) -> S {
         dot(&self.c, x) + self.d * w
     }
 }
 
 /// A validated loop.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LinearLoop {
-    equations: Equations,
-    delay: f64,
-    sample_time: Option<f64>,
-    limit: Option<f64>,
+pub struct LinearLoop<S = f64> {
+    equations: Equations<S>,
+    delay: S,
+    sample_time: Option<S>,
+    limit: Option<S>,
 }
 
 /// State of affairs when a run begins, at time 0.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Start {
+pub struct Start<S = f64> {
     /// x(0), n.
-    pub state: Vec<f64>,
+    pub state: Vec<S>,
     /// The command before time 0, constant.
-    pub command: f64,
+    pub command: S,
     /// Sampled loops: commands issued at the samples before time 0, latest last; `command`
     /// stands for all earlier ones.
     pub command_history: Vec<f64>,
@@ -187,24 +189,24 @@ impl Cursor<'_> {
 
 /// What a run returns.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Trajectory {
+pub struct Trajectory<S = f64> {
     /// y at the output times.
-    pub outputs: Vec<f64>,
+    pub outputs: Vec<S>,
     /// The command after the limit at the input times.
-    pub inputs: Vec<f64>,
+    pub inputs: Vec<S>,
     /// Times at which y or a low derivative of it jumps.
     pub output_breaks: Vec<f64>,
     /// Times at which the command or a low derivative of it jumps.
     pub input_breaks: Vec<f64>,
 }
 
-impl LinearLoop {
+impl<S: Scalar> LinearLoop<S> {
     /// Check and keep.
     pub fn new(
-        equations: Equations,
-        delay: f64,
-        sample_time: Option<f64>,
-        limit: Option<f64>,
+        equations: Equations<S>,
+        delay: S,
+        sample_time: Option<S>,
+        limit: Option<S>,
     ) -> Result<Self, Error> {
         let n = equations.states();
         let lengths = [
@@ -229,23 +231,26 @@ impl LinearLoop {
             "L, M, D, impulse",
             &[equations.l, equations.m, equations.d, equations.impulse],
         )?;
-        if !(delay.is_finite() && delay >= 0.0) {
+        if !(delay.is_finite() && delay.value() >= 0.0) {
             return Err(Error::argument(format!(
-                "delay={delay}: give a finite number of seconds, zero or more"
+                "delay={}: give a finite number of seconds, zero or more",
+                delay.value()
             )));
         }
         if let Some(ts) = sample_time
-            && !(ts.is_finite() && ts > 0.0)
+            && !(ts.is_finite() && ts.value() > 0.0)
         {
             return Err(Error::argument(format!(
-                "sample_time={ts}: give a positive number of seconds, or none for continuous time"
+                "sample_time={}: give a positive number of seconds, or none for continuous time",
+                ts.value()
             )));
         }
         if let Some(limit) = limit
-            && (limit.is_nan() || limit <= 0.0)
+            && (limit.value().is_nan() || limit.value() <= 0.0)
         {
             return Err(Error::argument(format!(
-                "limit={limit}: give a positive bound of the command, or none for no limit"
+                "limit={}: give a positive bound of the command, or none for no limit",
+                limit.value()
             )));
         }
         Ok(Self {
@@ -257,36 +262,48 @@ impl LinearLoop {
     }
 
     /// The matrices.
-    pub fn equations(&self) -> &Equations {
+    pub fn equations(&self) -> &Equations<S> {
         &self.equations
     }
 
     /// Td, s.
-    pub fn delay(&self) -> f64 {
+    pub fn delay(&self) -> S {
         self.delay
     }
 
     /// Ts, s; none in continuous time.
-    pub fn sample_time(&self) -> Option<f64> {
+    pub fn sample_time(&self) -> Option<S> {
         self.sample_time
     }
 
     /// Bound of |u|; none where there is no bound.
-    pub fn limit(&self) -> Option<f64> {
+    pub fn limit(&self) -> Option<S> {
         self.limit
     }
 
     /// y at `output_times` and the limited command at `input_times` (both increasing, ≥ 0, s).
     pub fn simulate(
         &self,
-        start: &Start,
+        start: &Start<S>,
         reference: &Reference,
         output_times: &[f64],
         input_times: &[f64],
         task: &Task,
-    ) -> Result<Trajectory, Error> {
+    ) -> Result<Trajectory<S>, Error> {
+        let wanted = Wanted::new(output_times, input_times, S::default());
+        self.serve(start, reference, wanted, task)
+    }
+
+    /// Run until everything wanted is served.
+    pub(crate) fn serve(
+        &self,
+        start: &Start<S>,
+        reference: &Reference,
+        wanted: Wanted<'_, S>,
+        task: &Task,
+    ) -> Result<Trajectory<S>, Error> {
         self.check_start(start)?;
-        for times in [output_times, input_times] {
+        for times in wanted.times() {
             finite("time", times)?;
             if let Some(&first) = times.first()
                 && first < 0.0
@@ -302,14 +319,13 @@ impl LinearLoop {
                 )));
             }
         }
-        let wanted = Wanted::new(output_times, input_times);
         match self.sample_time {
             Some(ts) => sampled::run(self, ts, start, reference, wanted, task),
             None => continuous::run(self, start, reference, wanted, task),
         }
     }
 
-    fn check_start(&self, start: &Start) -> Result<(), Error> {
+    fn check_start(&self, start: &Start<S>) -> Result<(), Error> {
         let n = self.equations.states();
         if start.state.len() != n {
             return Err(Error::argument(format!(
@@ -321,10 +337,13 @@ impl LinearLoop {
         finite("command before the start", &[start.command])?;
         finite("command_history", &start.command_history)?;
         match self.sample_time {
-            Some(ts) if !(0.0..ts).contains(&start.sample_phase) => Err(Error::argument(format!(
-                "sample_phase={}: the first sample lies in [0, {ts}) s after the start",
-                start.sample_phase
-            ))),
+            Some(ts) if !(0.0..ts.value()).contains(&start.sample_phase) => {
+                Err(Error::argument(format!(
+                    "sample_phase={}: the first sample lies in [0, {}) s after the start",
+                    start.sample_phase,
+                    ts.value()
+                )))
+            }
             None if !start.command_history.is_empty() || start.sample_phase != 0.0 => {
                 Err(Error::argument(
                     "command_history and sample_phase belong to sampled loops: give the loop a \
@@ -336,106 +355,50 @@ impl LinearLoop {
     }
 }
 
-/// Output and input times of a run, and how many of each are served.
-#[derive(Debug)]
-pub(crate) struct Wanted<'a> {
-    output_times: &'a [f64],
-    input_times: &'a [f64],
-    pub(crate) trajectory: Trajectory,
-}
-
-impl<'a> Wanted<'a> {
-    fn new(output_times: &'a [f64], input_times: &'a [f64]) -> Self {
-        Self {
-            output_times,
-            input_times,
-            trajectory: Trajectory {
-                outputs: Vec::with_capacity(output_times.len()),
-                inputs: Vec::with_capacity(input_times.len()),
-                ..Trajectory::default()
-            },
-        }
-    }
-
-    /// The last time asked for, 0 if none is.
-    pub(crate) fn last(&self) -> f64 {
-        let last = |times: &[f64]| times.last().copied().unwrap_or(0.0);
-        last(self.output_times).max(last(self.input_times))
-    }
-
-    /// Serve the output times before `end`.
-    pub(crate) fn outputs_before(&mut self, end: f64, mut value: impl FnMut(f64) -> f64) {
-        while let Some(&t) = self.output_times.get(self.trajectory.outputs.len()) {
-            if t >= end {
-                break;
-            }
-            self.trajectory.outputs.push(value(t));
-        }
-    }
-
-    /// Serve the input times before `end`.
-    pub(crate) fn inputs_before(&mut self, end: f64, mut value: impl FnMut(f64) -> f64) {
-        while let Some(&t) = self.input_times.get(self.trajectory.inputs.len()) {
-            if t >= end {
-                break;
-            }
-            self.trajectory.inputs.push(value(t));
-        }
-    }
-
-    /// Note a break of y at `t` unless it lies after the last output time.
-    pub(crate) fn output_break(&mut self, t: f64) {
-        if self.output_times.last().is_some_and(|&last| t <= last) {
-            self.trajectory.output_breaks.push(t);
-        }
-    }
-
-    /// Note a break of the command at `t` unless it lies after the last input time.
-    pub(crate) fn input_break(&mut self, t: f64) {
-        if self.input_times.last().is_some_and(|&last| t <= last) {
-            self.trajectory.input_breaks.push(t);
-        }
-    }
-
-    /// Is every time served?
-    pub(crate) fn is_done(&self) -> bool {
-        self.trajectory.outputs.len() == self.output_times.len()
-            && self.trajectory.inputs.len() == self.input_times.len()
-    }
-}
-
 /// Clip to [−limit, limit].
-pub(crate) fn saturate(u: f64, limit: Option<f64>) -> f64 {
-    limit.map_or(u, |limit| u.clamp(-limit, limit))
+pub(crate) fn saturate<S: Scalar>(u: S, limit: Option<S>) -> S {
+    match limit {
+        Some(limit) if u.value() > limit.value() => limit,
+        Some(limit) if u.value() < -limit.value() => -limit,
+        _ => u,
+    }
 }
 
 /// Two times closer than this are one: rounding of sums of delays and samples.
-pub(crate) fn slack(t: f64, delay: f64) -> f64 {
-    16.0 * f64::EPSILON * (t.abs() + delay)
+pub(crate) fn slack<S: Scalar>(t: S, delay: S) -> f64 {
+    16.0 * f64::EPSILON * (t.value().abs() + delay.value())
 }
 
 /// The error of a response that has grown out of bounds.
-pub(crate) fn check_growth(x: &[f64], u: f64, t: f64) -> Result<(), Error> {
-    let sound = |v: &f64| v.abs() <= DIVERGED;
+pub(crate) fn check_growth<S: Scalar>(x: &[S], u: S, t: S) -> Result<(), Error> {
+    let sound = |v: &S| v.value().abs() <= DIVERGED;
     if x.iter().all(sound) && sound(&u) {
         Ok(())
     } else {
-        Err(Error::argument(format!(
-            "the response exceeds {DIVERGED:e} at t = {t} s after the start: the loop is unstable, \
-             end the simulation earlier, lower the gain or give it a limit"
-        )))
+        Err(Error::Diverges {
+            bound: DIVERGED,
+            time: t.value(),
+        })
     }
 }
 
 /// Σ a_i b_i.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+pub(crate) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
+    let products = a.iter().zip(b).map(|(&a, &b)| a * b);
+    products
+        .reduce(|sum, product| sum + product)
+        .unwrap_or_default()
 }
 
-fn finite(name: &str, values: &[f64]) -> Result<(), Error> {
+fn finite<S: Scalar>(name: &str, values: &[S]) -> Result<(), Error> {
     match values.iter().find(|value| !value.is_finite()) {
         Some(value) => Err(Error::argument(format!(
-            "{name} holds {value}: give finite numbers"
+            "{name} holds {}: give finite numbers",
+            if value.value().is_finite() {
+                value.slope()
+            } else {
+                value.value()
+            }
         ))),
         None => Ok(()),
     }

@@ -6,15 +6,27 @@
 //!   matrix, poles, grids of poles;
 //! * [`continuous`]: the loop in continuous time, exact to rounding by the method of steps;
 //! * [`fixed_step`]: the loop in fixed steps, with the errors of block-diagram tools;
-//! * [`propagator`]: the response of x′ = A x + g to constant g (matrix exponential).
+//! * [`propagator`]: the response of x′ = A x + g to constant g (matrix exponential);
+//! * [`ensemble`]: many loops at once, their responses or figures of merit;
+//! * [`sensitivity`]: derivatives of a response with respect to numbers of the loop;
+//! * [`scalar`]: the numbers all of these compute with, plain or with a slope.
 
 pub mod continuous;
+pub mod ensemble;
+mod figures;
 pub mod fixed_step;
+mod gauge;
 pub mod linear;
 pub mod propagator;
+mod row;
 pub mod sampled;
+pub mod scalar;
+pub mod sensitivity;
+mod wanted;
 
 #[cfg(test)]
 mod tests;
 
+pub use figures::{Criteria, Figures};
 pub use linear::{Equations, LinearLoop, Reference, Start, Trajectory};
+pub use scalar::{Dual, Scalar};

@@ -12,28 +12,30 @@
 //! Guaranteed: the truncated series is below rounding. Not guaranteed: full relative accuracy of
 //! entries far below ‖Φ‖ for strongly non-normal A.
 
+use super::scalar::Scalar;
+
 /// Φ and the Γ_i of one step length.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Propagator {
+pub struct Propagator<S = f64> {
     n: usize,
     /// Φ − I, row-major.
-    growth: Vec<f64>,
+    growth: Vec<S>,
     /// Γ_i, one after the other.
-    gamma: Vec<f64>,
+    gamma: Vec<S>,
 }
 
-impl Propagator {
+impl<S: Scalar> Propagator<S> {
     /// For A (n × n row-major), input columns g_i (n each) and step length `h` ≥ 0.
-    pub fn new(a: &[f64], inputs: &[&[f64]], h: f64) -> Self {
+    pub fn new(a: &[S], inputs: &[&[S]], h: S) -> Self {
         let n = inputs.first().map_or_else(|| side(a), |g| g.len());
-        let doublings = doublings(balanced_norm(a, n) * h);
-        let step = h * 0.5_f64.powi(doublings);
-        let mut growth = vec![0.0; n * n];
-        let mut gamma = vec![0.0; n * inputs.len()];
+        let doublings = doublings(balanced_norm(a, n) * h.value());
+        let step = h * S::from(0.5_f64.powi(doublings));
+        let mut growth = vec![S::default(); n * n];
+        let mut gamma = vec![S::default(); n * inputs.len()];
         // Columns are independent: F by A^j step^j / j! applied to A step, Γ_i by the same
         // series of (e^z − 1)/z applied to g_i step.
-        let mut term = vec![0.0; n];
-        let mut next = vec![0.0; n];
+        let mut term = vec![S::default(); n];
+        let mut next = vec![S::default(); n];
         for column in 0..n {
             for row in 0..n {
                 term[row] = a[row * n + column] * step;
@@ -59,27 +61,32 @@ impl Propagator {
     }
 
     /// Φ, row-major.
-    pub fn phi(&self) -> Vec<f64> {
+    pub fn phi(&self) -> Vec<S> {
         let mut phi = self.growth.clone();
         for i in 0..self.n {
-            phi[i * self.n + i] += 1.0;
+            phi[i * self.n + i] += S::from(1.0);
         }
         phi
     }
 
+    /// Φ − I, row-major.
+    pub(crate) fn growth(&self) -> &[S] {
+        &self.growth
+    }
+
     /// Γ of input `i`.
-    pub fn gamma(&self, i: usize) -> &[f64] {
+    pub fn gamma(&self, i: usize) -> &[S] {
         &self.gamma[i * self.n..(i + 1) * self.n]
     }
 
     /// `out` = Φ x + Σ Γ_i v_i.
-    pub fn apply(&self, x: &[f64], inputs: &[f64], out: &mut [f64]) {
+    pub fn apply(&self, x: &[S], inputs: &[S], out: &mut [S]) {
         for (row, out) in out.iter_mut().enumerate() {
-            let mut change = 0.0;
-            for (f, x) in self.growth[row * self.n..(row + 1) * self.n].iter().zip(x) {
+            let mut change = S::default();
+            for (&f, &x) in self.growth[row * self.n..(row + 1) * self.n].iter().zip(x) {
                 change += f * x;
             }
-            for (i, v) in inputs.iter().enumerate() {
+            for (i, &v) in inputs.iter().enumerate() {
                 change += self.gamma[i * self.n + row] * v;
             }
             *out = x[row] + change;
@@ -91,18 +98,18 @@ impl Propagator {
         for gamma in self.gamma.chunks_exact_mut(n.max(1)) {
             let old = gamma.to_vec();
             multiply_add(&self.growth, &old, gamma);
-            for (new, old) in gamma.iter_mut().zip(&old) {
+            for (new, &old) in gamma.iter_mut().zip(&old) {
                 *new += old;
             }
         }
         let old = self.growth.clone();
         for column in 0..n {
             for row in 0..n {
-                let mut sum = 0.0;
+                let mut sum = S::default();
                 for inner in 0..n {
                     sum += old[row * n + inner] * old[inner * n + column];
                 }
-                self.growth[row * n + column] = sum + 2.0 * old[row * n + column];
+                self.growth[row * n + column] = sum + S::from(2.0) * old[row * n + column];
             }
         }
     }
@@ -126,16 +133,16 @@ fn doublings(size: f64) -> i32 {
 }
 
 /// `sum` += Σ_{j ≥ 1} (A step)^j term / (j + 1)!, the first term being in `sum` already.
-fn accumulate(a: &[f64], step: f64, term: &mut [f64], next: &mut [f64], sum: &mut [f64]) {
+fn accumulate<S: Scalar>(a: &[S], step: S, term: &mut [S], next: &mut [S], sum: &mut [S]) {
     for j in 2..=TERMS {
-        next.fill(0.0);
+        next.fill(S::default());
         multiply_add(a, term, next);
-        let factor = step / f64::from(j);
+        let factor = step / S::from(f64::from(j));
         let mut alive = false;
         for ((term, next), sum) in term.iter_mut().zip(next.iter()).zip(sum.iter_mut()) {
-            *term = next * factor;
+            *term = *next * factor;
             *sum += *term;
-            alive |= *term != 0.0;
+            alive |= !term.is_nothing();
         }
         if !alive {
             break;
@@ -144,9 +151,9 @@ fn accumulate(a: &[f64], step: f64, term: &mut [f64], next: &mut [f64], sum: &mu
 }
 
 /// `out` += A x.
-pub(crate) fn multiply_add(a: &[f64], x: &[f64], out: &mut [f64]) {
+pub(crate) fn multiply_add<S: Scalar>(a: &[S], x: &[S], out: &mut [S]) {
     for (row, out) in a.chunks_exact(x.len().max(1)).zip(out) {
-        for (a, x) in row.iter().zip(x) {
+        for (&a, &x) in row.iter().zip(x) {
             *out += a * x;
         }
     }
@@ -160,8 +167,8 @@ const ROUNDS: usize = 100;
 /// Osborne 1960, in powers of two: each state in turn is scaled until its row and its column,
 /// diagonal left out, are of one size. A state that only drives or is only driven can be scaled
 /// at will, and is, until that no longer matters beside the diagonal.
-pub(crate) fn balanced_norm(a: &[f64], n: usize) -> f64 {
-    let mut a = a.to_vec();
+pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
+    let mut a: Vec<f64> = a.iter().map(|a| a.value()).collect();
     let diagonal = (0..n).fold(0.0_f64, |most, i| most.max(a[i * n + i].abs()));
     let floor = (0.125 * diagonal).max(f64::MIN_POSITIVE);
     for _ in 0..ROUNDS {
@@ -207,7 +214,7 @@ fn norm(a: &[f64], n: usize) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn side(a: &[f64]) -> usize {
+fn side<S>(a: &[S]) -> usize {
     (0..).find(|n| n * n >= a.len()).unwrap_or(0)
 }
 
@@ -291,7 +298,7 @@ mod tests {
         // A lag before an integrator: the integrator's unit is anyone's choice.
         assert!(balanced_norm(&[-1e-6, 1.0, 0.0, 0.0], 2) < 2e-6);
         assert_eq!(balanced_norm(&[0.0, 3.0, 0.0, 0.0], 2), 3.0);
-        assert_eq!(balanced_norm(&[], 0), 0.0);
+        assert_eq!(balanced_norm::<f64>(&[], 0), 0.0);
         // x₁ after a unit impulse on the last state, by partial fractions.
         let h: f64 = 0.0325;
         let found = Propagator::new(&a, &[&[0.0, 0.0, 1.0]], h).phi()[2];

@@ -5,6 +5,10 @@
 //! an interval with more is halved (de Casteljau) and one with a single change is bisected to the
 //! last bit. No crossing is missed; a touching that does not come clear of the limit within 2⁻⁴⁰
 //! of the interval is no crossing, and neither is rounding noise around the limit.
+//! Crossings are those of the values, and carry no slope: the limited command is continuous
+//! there, so where exactly a moving crossing is put changes the response in second order only.
+
+use crate::dde::scalar::Scalar;
 
 use super::series::{DEGREE, Series};
 
@@ -20,7 +24,7 @@ pub(super) enum Mode {
 }
 
 impl Mode {
-    fn of(u: f64, limit: f64) -> Self {
+    pub(super) fn of(u: f64, limit: f64) -> Self {
         if u > limit {
             Self::High
         } else if u < -limit {
@@ -43,15 +47,15 @@ pub(super) struct Stretch {
 const NARROWEST: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// The stretches of `u` on [0, 1], in order; neighbours differ in mode.
-pub(super) fn stretches(u: &Series, limit: f64, out: &mut Vec<Stretch>) {
+pub(super) fn stretches<S: Scalar>(u: &Series<S>, limit: f64, out: &mut Vec<Stretch>) {
     out.clear();
     let whole = |mode| Stretch {
         mode,
         start: 0.0,
         end: 1.0,
     };
-    let (mut low, mut high) = (u.coefficients[0], u.coefficients[0]);
-    for &c in &u.terms()[1..] {
+    let (mut low, mut high) = (u.coefficients[0].value(), u.coefficients[0].value());
+    for c in u.terms()[1..].iter().map(|c| c.value()) {
         if c > 0.0 {
             high += c;
         } else {
@@ -77,7 +81,7 @@ pub(super) fn stretches(u: &Series, limit: f64, out: &mut Vec<Stretch>) {
         if end <= start {
             continue;
         }
-        let mode = Mode::of(u.at(0.5 * (start + end)), limit);
+        let mode = Mode::of(value_at(u, 0.5 * (start + end)), limit);
         match out.last_mut() {
             Some(last) if last.mode == mode => last.end = end,
             _ => out.push(Stretch { mode, start, end }),
@@ -86,13 +90,19 @@ pub(super) fn stretches(u: &Series, limit: f64, out: &mut Vec<Stretch>) {
     }
 }
 
+/// The value of `u` at σ.
+fn value_at<S: Scalar>(u: &Series<S>, sigma: f64) -> f64 {
+    let terms = u.terms().iter().rev();
+    terms.fold(0.0, |sum, c| sum * sigma + c.value())
+}
+
 /// Zeros of `u` − `level` in (0, 1) at which the sign may change.
-fn crossings(u: &Series, level: f64, zeros: &mut Vec<f64>) {
+pub(crate) fn crossings<S: Scalar>(u: &Series<S>, level: f64, zeros: &mut Vec<f64>) {
     let noise = 4.0
         * f64::EPSILON
         * u.terms()
             .iter()
-            .fold(level.abs(), |m, c| f64::max(m, c.abs()));
+            .fold(level.abs(), |m, c| f64::max(m, c.value().abs()));
     let degree = u.degree;
     let mut root = Bernstein {
         b: from_powers(u, level),
@@ -156,9 +166,9 @@ impl Bernstein {
 }
 
 /// b_i = Σ_{j ≤ i} C(i, j)/C(d, j) c_j, by sums of c_j/C(d, j) as in Pascal's triangle.
-fn from_powers(u: &Series, level: f64) -> [f64; DEGREE + 1] {
+fn from_powers<S: Scalar>(u: &Series<S>, level: f64) -> [f64; DEGREE + 1] {
     let degree = u.degree;
-    let mut b = u.coefficients;
+    let mut b = u.coefficients.map(S::value);
     b[0] -= level;
     let mut binomial = 1.0;
     for (j, b) in b.iter_mut().enumerate().take(degree + 1) {
@@ -188,7 +198,7 @@ fn sign_changes(terms: &[f64]) -> usize {
 }
 
 /// The one crossing in an interval with one sign change.
-fn bisect(u: &Series, level: f64, interval: &Bernstein, degree: usize) -> f64 {
+fn bisect<S: Scalar>(u: &Series<S>, level: f64, interval: &Bernstein, degree: usize) -> f64 {
     let (mut low, mut high) = (interval.low, interval.high);
     let rising = interval.b[..=degree]
         .iter()
@@ -199,7 +209,7 @@ fn bisect(u: &Series, level: f64, interval: &Bernstein, degree: usize) -> f64 {
         if mid <= low || mid >= high || high - low < f64::EPSILON * 0.25 {
             return mid;
         }
-        if (u.at(mid) < level) == rising {
+        if (value_at(u, mid) < level) == rising {
             low = mid;
         } else {
             high = mid;

@@ -8,8 +8,10 @@
 //! ever, in steps of time too short to change the state.
 
 use crate::dde::linear::{
-    LinearLoop, Reference, Start, Trajectory, Wanted, check_growth, dot, saturate, slack,
+    LinearLoop, Reference, Start, Trajectory, check_growth, dot, saturate, slack,
 };
+use crate::dde::scalar::Scalar;
+use crate::dde::wanted::Wanted;
 use crate::{Error, Task};
 
 use super::crossing::{Mode, Stretch, stretches};
@@ -26,9 +28,16 @@ const MARGIN: f64 = 0.95;
 const NOISE: f64 = 16.0 * f64::EPSILON;
 
 /// Does v get more than `noise` beyond the limit that `mode` and the mode of the stretch share?
-fn is_clear(v: &Series, stretch: &Stretch, mode: Mode, limit: f64, noise: f64) -> bool {
+fn is_clear<S: Scalar>(
+    v: &Series<S>,
+    stretch: &Stretch,
+    mode: Mode,
+    limit: f64,
+    noise: f64,
+) -> bool {
     [0.25, 0.5, 0.75, 1.0].into_iter().any(|part| {
-        let v = v.at(stretch.start + part * (stretch.end - stretch.start));
+        let sigma = stretch.start + part * (stretch.end - stretch.start);
+        let v = v.at(S::from(sigma)).value();
         match (mode, stretch.mode) {
             (Mode::High, _) => v < limit - noise,
             (Mode::Low, _) => v > -limit + noise,
@@ -38,18 +47,18 @@ fn is_clear(v: &Series, stretch: &Stretch, mode: Mode, limit: f64, noise: f64) -
     })
 }
 
-pub(super) fn run(
-    plant: &LinearLoop,
-    start: &Start,
+pub(super) fn run<S: Scalar>(
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
     reference: &Reference,
-    mut wanted: Wanted<'_>,
+    mut wanted: Wanted<'_, S>,
     task: &Task,
-) -> Result<Trajectory, Error> {
+) -> Result<Trajectory<S>, Error> {
     let closed = Closed::new(plant)?;
     let equations = plant.equations();
     let limit = plant.limit();
     let horizon = 1.0 + 2.0 * wanted.last();
-    let nothing = Series::constant(0.0);
+    let nothing = Series::constant(S::default());
     let n = equations.states();
     let mut free = Expansion::new(&closed.a, n);
     let mut driven = Expansion::new(&equations.a, n);
@@ -57,29 +66,29 @@ pub(super) fn run(
     cursor.advance(0.0, -f64::MIN_POSITIVE);
     let mut modes: Vec<Stretch> = Vec::new();
     let mut x = start.state.clone();
-    let mut forcing = vec![0.0; n];
+    let mut forcing = vec![S::default(); n];
     let mut mode = Mode::Free;
     let mut changes = 0;
-    let mut t = 0.0;
+    let mut t = S::default();
     let mut elements = 0;
     while !wanted.is_done() {
         watch(elements, task)?;
         elements += 1;
-        let tolerance = slack(t, 0.0);
-        let jumps = elements == 1 || cursor.next_jump() <= t + tolerance;
+        let tolerance = slack(t, S::default());
+        let jumps = elements == 1 || cursor.next_jump() <= t.value() + tolerance;
         let before = cursor.value();
-        let r = cursor.advance(t, tolerance);
+        let r = cursor.advance(t.value(), tolerance);
         if jumps {
             wanted.input_break(t);
-            let struck = closed.impulse * (r - before);
-            if struck != 0.0 {
+            let struck = closed.impulse * S::from(r - before);
+            if !struck.is_nothing() {
                 wanted.output_break(t);
-                for (x, b) in x.iter_mut().zip(&equations.b) {
+                for (x, &b) in x.iter_mut().zip(&equations.b) {
                     *x += b * struck;
                 }
             }
-            let v = dot(&closed.k, &x) + closed.m * r;
-            mode = match limit {
+            let v = (dot(&closed.k, &x) + closed.m * S::from(r)).value();
+            mode = match limit.map(S::value) {
                 Some(limit) if v > limit => Mode::High,
                 Some(limit) if v < -limit => Mode::Low,
                 _ => Mode::Free,
@@ -96,27 +105,28 @@ pub(super) fn run(
         };
         for (i, forcing) in forcing.iter_mut().enumerate() {
             *forcing = match held {
-                None => closed.e[i] * r,
-                Some(w) => equations.e[i] * r + equations.b[i] * w,
+                None => closed.e[i] * S::from(r),
+                Some(w) => equations.e[i] * S::from(r) + equations.b[i] * w,
             };
         }
-        let mut h = (cursor.next_jump().min(horizon) - t).max(tolerance);
+        let left = S::from(cursor.next_jump().min(horizon)) - t;
+        let mut h = left.pinned(left.value().max(tolerance));
         let mut next = t + h;
-        if h > expansion.trial {
-            h = expansion.trial;
+        if h.value() > expansion.trial {
+            h = S::from(expansion.trial);
             next = t + h;
         }
         let part = MARGIN * expansion.expand(a, &equations.b, &forcing, &x, &nothing, h);
         if part < MARGIN {
             expansion.shorten(part);
-            h *= part;
+            h *= S::from(part);
             next = t + h;
         }
-        let v = expansion.combine(&closed.k, 0.0, &nothing, closed.m * r);
+        let v = expansion.combine(&closed.k, S::default(), &nothing, closed.m * S::from(r));
         let mut end = 1.0;
-        if let Some(limit) = limit {
+        if let Some(limit) = limit.map(S::value) {
             stretches(&v, limit, &mut modes);
-            let noise = NOISE * (expansion.size(&closed.k) + (closed.m * r).abs() + limit);
+            let noise = NOISE * (expansion.size(&closed.k) + (closed.m.value() * r).abs() + limit);
             let leaves = |stretch: &&Stretch| {
                 stretch.mode != mode
                     && (stretch.start > 0.0 || changes < MOST_CHANGES)
@@ -124,64 +134,66 @@ pub(super) fn run(
             };
             if let Some(other) = modes.iter().find(leaves).copied() {
                 end = other.start;
-                next = t + end * h;
+                next = t + S::from(end) * h;
                 mode = other.mode;
             }
         }
-        if next <= t {
+        if next.value() <= t.value() {
             changes += 1;
             continue;
         }
         changes = 0;
         let y = match held {
-            None => expansion.combine(&closed.c, 0.0, &nothing, closed.d * r),
-            Some(w) => expansion.combine(&equations.c, 0.0, &nothing, equations.d * w),
+            None => expansion.combine(&closed.c, S::default(), &nothing, closed.d * S::from(r)),
+            Some(w) => expansion.combine(&equations.c, S::default(), &nothing, equations.d * w),
         };
-        wanted.outputs_before(next - tolerance, |time| y.at((time - t) / h));
-        wanted.inputs_before(next - tolerance, |time| {
+        wanted.measure(t, h, end, &y);
+        wanted.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
+        wanted.inputs_before(next.value() - tolerance, |time| {
             held.unwrap_or_else(|| saturate(v.at((time - t) / h), limit))
         });
         if end < 1.0 {
             wanted.input_break(next);
             wanted.output_break(next);
         }
-        expansion.end(end, &mut x);
-        check_growth(&x, 0.0, next)?;
+        expansion.end(S::from(end), &mut x);
+        check_growth(&x, S::default(), next)?;
         t = next;
     }
     Ok(wanted.trajectory)
 }
 
 /// The loop with w = v substituted.
-struct Closed {
-    a: Vec<f64>,
+struct Closed<S> {
+    a: Vec<S>,
     /// Gain of r in x′.
-    e: Vec<f64>,
-    k: Vec<f64>,
-    m: f64,
-    c: Vec<f64>,
-    d: f64,
+    e: Vec<S>,
+    k: Vec<S>,
+    m: S,
+    c: Vec<S>,
+    d: S,
     /// Weight of the impulse in w per unit jump of r.
-    impulse: f64,
+    impulse: S,
 }
 
-impl Closed {
-    fn new(plant: &LinearLoop) -> Result<Self, Error> {
+impl<S: Scalar> Closed<S> {
+    fn new(plant: &LinearLoop<S>) -> Result<Self, Error> {
         let equations = plant.equations();
-        let denominator = 1.0 - equations.l;
-        if denominator == 0.0 || (denominator < 0.0 && plant.limit().is_some()) {
+        let denominator = S::from(1.0) - equations.l;
+        let sign = denominator.value();
+        if sign == 0.0 || (sign < 0.0 && plant.limit().is_some()) {
             return Err(Error::argument(format!(
                 "without a delay the command depends on itself with gain L = {}, which {}: give \
                  the loop a delay or filter the derivative",
-                equations.l,
-                if denominator == 0.0 {
+                equations.l.value(),
+                if sign == 0.0 {
                     "no command satisfies"
                 } else {
                     "several limited commands satisfy"
                 }
             )));
         }
-        let k: Vec<f64> = equations.k.iter().map(|k| k / denominator).collect();
+        let k: Vec<S> = equations.k.iter().map(|&k| k / denominator).collect();
         let m = equations.m / denominator;
         let n = equations.states();
         let mut a = equations.a.clone();
@@ -190,8 +202,9 @@ impl Closed {
                 a[i * n + j] += equations.b[i] * k[j];
             }
         }
-        let along = |base: &[f64], gain: f64| -> Vec<f64> {
-            base.iter().zip(&k).map(|(c, k)| c + gain * k).collect()
+        let along = |base: &[S], gain: S| -> Vec<S> {
+            let pairs = base.iter().zip(&k);
+            pairs.map(|(&c, &k)| c + gain * k).collect()
         };
         Ok(Self {
             a,
@@ -199,14 +212,14 @@ impl Closed {
                 .e
                 .iter()
                 .zip(&equations.b)
-                .map(|(e, b)| e + b * m)
+                .map(|(&e, &b)| e + b * m)
                 .collect(),
             c: along(&equations.c, equations.d),
             d: equations.d * m,
             impulse: if plant.limit().is_none() {
                 equations.impulse / denominator
             } else {
-                0.0
+                S::default()
             },
             k,
             m,

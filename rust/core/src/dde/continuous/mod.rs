@@ -18,7 +18,12 @@ mod pieces;
 mod run;
 mod series;
 
-use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory, Wanted};
+pub(crate) use crossing::crossings;
+pub(crate) use series::{Expansion, Series};
+
+use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory};
+use crate::dde::scalar::Scalar;
+use crate::dde::wanted::Wanted;
 use crate::{Error, Task};
 
 /// Elements between two looks at the task.
@@ -27,16 +32,16 @@ const CHECK_EVERY: u64 = 1024;
 /// More elements than anyone waits for.
 const MOST_ELEMENTS: u64 = 20_000_000;
 
-pub(crate) fn run(
-    plant: &LinearLoop,
-    start: &Start,
+pub(crate) fn run<S: Scalar>(
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
     reference: &Reference,
-    wanted: Wanted<'_>,
+    wanted: Wanted<'_, S>,
     task: &Task,
-) -> Result<Trajectory, Error> {
-    if plant.delay() > 0.0 {
+) -> Result<Trajectory<S>, Error> {
+    if plant.delay().value() > 0.0 {
         // No element is longer than the delay: work without end is refused before it starts.
-        if wanted.last() / plant.delay() >= MOST_ELEMENTS as f64 {
+        if wanted.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
             return Err(endless());
         }
         run::run(plant, start, reference, wanted, task)

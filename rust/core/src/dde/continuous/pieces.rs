@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 
 use crate::Error;
 use crate::dde::linear::slack;
+use crate::dde::scalar::{Scalar, is_reached, part_ways};
 
 use super::series::Series;
 
@@ -28,41 +29,45 @@ pub(super) const REPORTED: Order = 10;
 /// sum, are one.
 const SAME: f64 = 4.0 * f64::EPSILON;
 
+/// The same of their slopes, which carry the rounding of products with values: slopes are those
+/// with respect to a parameter in units of its own size, so that both are of one kind.
+const SAME_SLOPE: f64 = 256.0 * f64::EPSILON;
+
 /// What is left, one piece later, of the length of the longest.
 const FORGET: f64 = 0.998;
 
 /// w(t) = series((t − origin)/scale) from `start` to `end`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Piece {
-    pub(super) start: f64,
-    pub(super) end: f64,
-    pub(super) origin: f64,
-    pub(super) scale: f64,
-    pub(super) series: Series,
+pub(super) struct Piece<S = f64> {
+    pub(super) start: S,
+    pub(super) end: S,
+    pub(super) origin: S,
+    pub(super) scale: S,
+    pub(super) series: Series<S>,
     /// Order of the break at the start of the piece.
     pub(super) order: Order,
 }
 
-impl Piece {
-    pub(super) fn constant(value: f64, end: f64) -> Self {
+impl<S: Scalar> Piece<S> {
+    pub(super) fn constant(value: S, end: S) -> Self {
         Self {
-            start: 0.0,
+            start: S::default(),
             end,
-            origin: 0.0,
-            scale: 1.0,
+            origin: S::default(),
+            scale: S::from(1.0),
             series: Series::constant(value),
             order: SMOOTH,
         }
     }
 
     /// w over [t, t + h] in σ ∈ [0, 1].
-    pub(super) fn local(&self, t: f64, h: f64) -> Series {
+    pub(super) fn local(&self, t: S, h: S) -> Series<S> {
         if self.series.degree == 0 {
             return self.series;
         }
         let offset = (t - self.origin) / self.scale;
-        let offset = if offset.abs() <= f64::EPSILON {
-            0.0
+        let offset = if offset.value().abs() <= f64::EPSILON {
+            offset.pinned(0.0)
         } else {
             offset
         };
@@ -75,21 +80,24 @@ impl Piece {
         let mine = self.local(other.start, length);
         let theirs = other.local(other.start, length);
         let (mut difference, mut largest) = (0.0, 0.0_f64);
-        for (mine, theirs) in mine.coefficients.iter().zip(&theirs.coefficients) {
-            difference += (mine - theirs).abs();
-            largest = largest.max(theirs.abs());
+        let (mut apart, mut steepest) = (0.0, 0.0_f64);
+        for (&mine, &theirs) in mine.coefficients.iter().zip(&theirs.coefficients) {
+            difference += (mine - theirs).value().abs();
+            largest = largest.max(theirs.value().abs());
+            apart += (mine - theirs).slope().abs();
+            steepest = steepest.max(theirs.slope().abs());
         }
-        difference <= SAME * largest
+        difference <= SAME * largest && apart <= SAME_SLOPE * (steepest + largest)
     }
 }
 
 /// The pieces not yet used up, first one first; never empty.
 #[derive(Debug)]
-pub(super) struct Pieces {
-    front: Piece,
-    rest: VecDeque<Piece>,
-    end: f64,
-    delay: f64,
+pub(super) struct Pieces<S = f64> {
+    front: Piece<S>,
+    rest: VecDeque<Piece<S>>,
+    end: S,
+    delay: S,
     /// Length of the longest of the latest pieces: two that are longer together would only be
     /// cut again.
     longest: f64,
@@ -97,9 +105,9 @@ pub(super) struct Pieces {
     dropped: Order,
 }
 
-impl Pieces {
+impl<S: Scalar> Pieces<S> {
     /// Constant `command` until the first command of the run arrives.
-    pub(super) fn new(command: f64, delay: f64) -> Self {
+    pub(super) fn new(command: S, delay: S) -> Self {
         Self {
             front: Piece::constant(command, delay),
             rest: VecDeque::new(),
@@ -110,14 +118,14 @@ impl Pieces {
         }
     }
 
-    pub(super) fn front(&self) -> &Piece {
+    pub(super) fn front(&self) -> &Piece<S> {
         &self.front
     }
 
     /// Leave behind what ends at `t`; the order of the break passed.
-    pub(super) fn reach(&mut self, t: f64) -> Order {
+    pub(super) fn reach(&mut self, t: S) -> Order {
         let mut order = SMOOTH;
-        while self.front.end <= t + slack(t, self.delay) {
+        while is_reached(self.front.end, t, slack(t, self.delay)) {
             let Some(next) = self.rest.pop_front() else {
                 break;
             };
@@ -129,10 +137,11 @@ impl Pieces {
 
     /// Append a piece; one shorter than rounding is left to its neighbour, and equal constants
     /// become one piece.
-    pub(super) fn push(&mut self, mut piece: Piece) -> Result<(), Error> {
-        self.longest = (FORGET * self.longest).max(piece.end - piece.start);
+    pub(super) fn push(&mut self, mut piece: Piece<S>) -> Result<(), Error> {
+        self.longest = (FORGET * self.longest).max((piece.end - piece.start).value());
         piece.order = piece.order.min(self.dropped);
-        let is_dust = piece.end - self.end <= slack(piece.end, self.delay);
+        let is_dust = (piece.end - self.end).value() <= slack(piece.end, self.delay)
+            && !part_ways(piece.end, self.end);
         let last = self.rest.back_mut().unwrap_or(&mut self.front);
         let is_same = last.series.degree == 0 && last.series == piece.series;
         self.end = piece.end;
@@ -142,7 +151,7 @@ impl Pieces {
             return Ok(());
         }
         self.dropped = SMOOTH;
-        let is_faded = piece.order > REPORTED && piece.end - last.start <= self.longest;
+        let is_faded = piece.order > REPORTED && (piece.end - last.start).value() <= self.longest;
         if is_same || (is_faded && last.continues_as(&piece)) {
             last.end = piece.end;
             return Ok(());

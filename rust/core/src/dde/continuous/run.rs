@@ -1,8 +1,8 @@
 //! Method of steps for a positive delay.
 
-use crate::dde::linear::{
-    LinearLoop, Reference, Start, Trajectory, Wanted, check_growth, saturate, slack,
-};
+use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory, check_growth, saturate, slack};
+use crate::dde::scalar::{Scalar, is_reached};
+use crate::dde::wanted::Wanted;
 use crate::{Error, Task};
 
 use super::crossing::{Mode, Stretch, stretches};
@@ -14,80 +14,97 @@ use super::watch;
 /// Room left when an element is shortened, so that the bound on its series holds with margin.
 const MARGIN: f64 = 0.95;
 
-pub(super) fn run(
-    plant: &LinearLoop,
-    start: &Start,
+pub(super) fn run<S: Scalar>(
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
     reference: &Reference,
-    mut wanted: Wanted<'_>,
+    mut wanted: Wanted<'_, S>,
     task: &Task,
-) -> Result<Trajectory, Error> {
+) -> Result<Trajectory<S>, Error> {
     let equations = plant.equations();
     let (delay, limit) = (plant.delay(), plant.limit());
     let orders = Orders::new(plant);
     let mut pieces = Pieces::new(start.command, delay);
     let mut impulses = Impulses::default();
     let mut cursor = reference.cursor();
-    cursor.advance(0.0, -slack(0.0, delay));
+    cursor.advance(0.0, -slack(S::default(), delay));
     let mut x = start.state.clone();
-    let mut forcing = vec![0.0; x.len()];
+    let mut forcing = vec![S::default(); x.len()];
     let mut expansion = Expansion::new(&equations.a, x.len());
     let mut modes: Vec<Stretch> = Vec::new();
     let mut mode = Mode::Free;
-    let mut t = 0.0;
+    let mut t = S::default();
     let mut elements = 0;
     while !wanted.is_done() {
         watch(elements, task)?;
         let tolerance = slack(t, delay);
         let arriving = pieces.reach(t);
-        let jumps = elements == 0 || cursor.next_jump() <= t + tolerance;
+        let jumps = elements == 0 || is_reached(S::from(cursor.next_jump()), t, tolerance);
         let before = cursor.value();
-        let r = cursor.advance(t, tolerance);
-        let struck = impulses.arrived(t + tolerance);
-        for (x, b) in x.iter_mut().zip(&equations.b) {
+        let r = if jumps {
+            cursor.advance(t.value(), tolerance)
+        } else {
+            before
+        };
+        let struck = impulses.arrived(t, tolerance);
+        for (x, &b) in x.iter_mut().zip(&equations.b) {
             *x += b * struck;
         }
         let made = if limit.is_none() {
-            equations.impulse * (r - before)
+            equations.impulse * S::from(r - before)
         } else {
-            0.0
+            S::default()
         };
         impulses.push(t + delay, made + equations.l * struck);
-        let state_jumps = struck != 0.0;
-        for (forcing, e) in forcing.iter_mut().zip(&equations.e) {
-            *forcing = e * r;
+        let state_jumps = !struck.is_nothing();
+        for (forcing, &e) in forcing.iter_mut().zip(&equations.e) {
+            *forcing = e * S::from(r);
         }
         let piece = pieces.front();
-        let stop = piece.end.min(cursor.next_jump()).min(impulses.next());
+        let jump = S::from(cursor.next_jump());
+        let stop = piece.end.earlier(jump).earlier(impulses.next());
         let mut h = stop - t;
         let mut next = stop;
-        if h > expansion.trial {
-            h = expansion.trial;
+        // Events at one time that move at different speeds: an element of no length, but for
+        // its slope. It hands on the command and serves no output.
+        let is_instant = S::MOVES && h.value() <= tolerance;
+        if is_instant {
+            h = h.pinned(0.0);
+        } else if h.value() > expansion.trial {
+            h = S::from(expansion.trial);
             next = t + h;
         }
         let mut w = piece.local(t, h);
         let part = MARGIN * expansion.expand(&equations.a, &equations.b, &forcing, &x, &w, h);
-        if part < MARGIN {
+        if part < MARGIN && !is_instant {
             expansion.shorten(part);
-            w = w.shifted(0.0, part);
-            h *= part;
+            w = w.shifted(S::default(), S::from(part));
+            h *= S::from(part);
             next = t + h;
         }
-        let u = expansion.command(equations, &w, r);
+        let mut u = expansion.command(equations, &w, r);
+        let mut scale = h;
+        if is_instant {
+            (u, scale) = (Series::constant(u.coefficients[0]), S::from(1.0));
+        }
         let y = expansion.output(equations, &w);
 
         if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
             wanted.output_break(t);
         }
-        wanted.outputs_before(next - tolerance, |time| y.at((time - t) / h));
-        wanted.inputs_before(next - tolerance, |time| {
+        if !is_instant {
+            wanted.measure(t, h, 1.0, &y);
+        }
+        wanted.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
+        wanted.inputs_before(next.value() - tolerance, |time| {
             saturate(u.at((time - t) / h), limit)
         });
 
         modes.clear();
         match limit {
-            Some(limit) => stretches(&u, limit, &mut modes),
-            None => modes.push(Stretch {
-                mode: Mode::Free,
+            Some(limit) if !is_instant => stretches(&u, limit.value(), &mut modes),
+            _ => modes.push(Stretch {
+                mode: at_start(&u, limit),
                 start: 0.0,
                 end: 1.0,
             }),
@@ -103,20 +120,25 @@ pub(super) fn run(
                 mode = stretch.mode;
             }
             if order <= REPORTED {
-                wanted.input_break(t + stretch.start * h);
+                wanted.input_break(t + S::from(stretch.start) * h);
             }
             let last = stretch.end >= 1.0;
             pieces.push(Piece {
-                start: delay + t + stretch.start * h,
-                end: delay + if last { next } else { t + stretch.end * h },
+                start: delay + t + S::from(stretch.start) * h,
+                end: delay
+                    + if last {
+                        next
+                    } else {
+                        t + S::from(stretch.end) * h
+                    },
                 origin: t + delay,
-                scale: h,
+                scale,
                 series: clipped(&u, stretch.mode, limit),
                 order,
             })?;
         }
-        expansion.end(1.0, &mut x);
-        check_growth(&x, u.at(1.0), next)?;
+        expansion.end(S::from(1.0), &mut x);
+        check_growth(&x, u.at(S::from(1.0)), next)?;
         t = next;
         elements += 1;
     }
@@ -124,12 +146,19 @@ pub(super) fn run(
 }
 
 /// The command after the limit.
-fn clipped(u: &Series, mode: Mode, limit: Option<f64>) -> Series {
+fn clipped<S: Scalar>(u: &Series<S>, mode: Mode, limit: Option<S>) -> Series<S> {
     match (mode, limit) {
         (Mode::High, Some(limit)) => Series::constant(limit),
         (Mode::Low, Some(limit)) => Series::constant(-limit),
         _ => *u,
     }
+}
+
+/// How the command stands to its limit at σ = 0.
+fn at_start<S: Scalar>(u: &Series<S>, limit: Option<S>) -> Mode {
+    limit.map_or(Mode::Free, |limit| {
+        Mode::of(u.coefficients[0].value(), limit.value())
+    })
 }
 
 /// How breaks pass through the loop: an integration raises the order by one, a direct path keeps
@@ -142,13 +171,13 @@ struct Orders {
 }
 
 impl Orders {
-    fn new(plant: &LinearLoop) -> Self {
+    fn new<S: Scalar>(plant: &LinearLoop<S>) -> Self {
         let equations = plant.equations();
-        let reaches_states = equations.e.iter().any(|e| *e != 0.0);
+        let reaches_states = !equations.e.iter().all(|e| e.is_nothing());
         Self {
-            command_is_direct: equations.l != 0.0,
-            output_is_direct: equations.d != 0.0,
-            reference_in_command: match (equations.m != 0.0, reaches_states) {
+            command_is_direct: !equations.l.is_nothing(),
+            output_is_direct: !equations.d.is_nothing(),
+            reference_in_command: match (!equations.m.is_nothing(), reaches_states) {
                 (true, _) => 0,
                 (false, true) => 1,
                 (false, false) => SMOOTH,

@@ -1,10 +1,11 @@
 //! Taylor polynomials in a local coordinate σ ∈ [0, 1], and the state's expansion in them.
 
 use crate::dde::linear::Equations;
+use crate::dde::scalar::Scalar;
 
 /// Degree of the polynomials. With the elements as long as [`NEGLIGIBLE`] allows, about 1.9 over
 /// the fastest rate of the loop, 24 terms cost least per unit of time.
-pub(super) const DEGREE: usize = 24;
+pub(crate) const DEGREE: usize = 24;
 
 /// A last coefficient below this part of the largest one is below rounding, with the remainder
 /// of the series behind it.
@@ -20,14 +21,14 @@ const TRIAL: f64 = 16.0;
 
 /// Coefficients of σ^j; those above `degree` are zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Series {
-    pub(super) coefficients: [f64; DEGREE + 1],
-    pub(super) degree: usize,
+pub(crate) struct Series<S = f64> {
+    pub(crate) coefficients: [S; DEGREE + 1],
+    pub(crate) degree: usize,
 }
 
-impl Series {
-    pub(super) const fn constant(value: f64) -> Self {
-        let mut coefficients = [0.0; DEGREE + 1];
+impl<S: Scalar> Series<S> {
+    pub(crate) fn constant(value: S) -> Self {
+        let mut coefficients = [S::default(); DEGREE + 1];
         coefficients[0] = value;
         Self {
             coefficients,
@@ -35,37 +36,62 @@ impl Series {
         }
     }
 
-    pub(super) fn terms(&self) -> &[f64] {
+    pub(crate) fn terms(&self) -> &[S] {
         &self.coefficients[..=self.degree]
     }
 
     /// Value at σ.
-    pub(super) fn at(&self, sigma: f64) -> f64 {
+    pub(crate) fn at(&self, sigma: S) -> S {
         self.terms()
             .iter()
             .rev()
-            .fold(0.0, |sum, c| sum * sigma + c)
+            .fold(S::default(), |sum, &c| sum * sigma + c)
+    }
+
+    /// The polynomial's values alone.
+    pub(crate) fn values(&self) -> Series {
+        Series {
+            coefficients: self.coefficients.map(S::value),
+            degree: self.degree,
+        }
+    }
+
+    /// d/dσ.
+    pub(crate) fn derivative(&self) -> Self {
+        let mut out = Self::constant(S::default());
+        out.degree = self.degree.saturating_sub(1);
+        for j in 1..=self.degree {
+            out.coefficients[j - 1] = S::from(j as f64) * self.coefficients[j];
+        }
+        out
     }
 
     /// Set `degree` to the last coefficient that matters.
-    pub(super) fn trim(&mut self) {
-        let largest = self.terms().iter().fold(0.0, |m, c| f64::max(m, c.abs()));
-        while self.degree > 0 && self.coefficients[self.degree].abs() <= 1e-3 * NEGLIGIBLE * largest
+    pub(crate) fn trim(&mut self) {
+        let largest = |part: fn(S) -> f64| {
+            let sizes = self.terms().iter().map(|&c| part(c).abs());
+            1e-3 * NEGLIGIBLE * sizes.fold(0.0, f64::max)
+        };
+        let (value, slope) = (largest(S::value), largest(S::slope));
+        while self.degree > 0
+            && self.coefficients[self.degree].value().abs() <= value
+            && self.coefficients[self.degree].slope().abs() <= slope
         {
-            self.coefficients[self.degree] = 0.0;
+            self.coefficients[self.degree] = S::default();
             self.degree -= 1;
         }
     }
 
     /// The polynomial in σ′ with σ = `offset` + `ratio` σ′.
-    pub(super) fn shifted(&self, offset: f64, ratio: f64) -> Self {
+    pub(crate) fn shifted(&self, offset: S, ratio: S) -> Self {
         let mut out = *self;
-        if offset != 0.0 {
+        if !offset.is_nothing() {
             // Repeated synthetic division by σ − offset.
             let terms = &mut out.coefficients[..=self.degree];
             for first in 0..self.degree {
                 for j in (first..self.degree).rev() {
-                    terms[j] += offset * terms[j + 1];
+                    let above = terms[j + 1];
+                    terms[j] += offset * above;
                 }
             }
         }
@@ -73,8 +99,8 @@ impl Series {
         out
     }
 
-    fn stretch(&mut self, ratio: f64) {
-        let mut power = 1.0;
+    fn stretch(&mut self, ratio: S) {
+        let mut power = S::from(1.0);
         for c in &mut self.coefficients[..=self.degree] {
             *c *= power;
             power *= ratio;
@@ -84,22 +110,22 @@ impl Series {
 
 /// x on one element, and how long the element is.
 #[derive(Debug)]
-pub(super) struct Expansion {
+pub(crate) struct Expansion<S = f64> {
     n: usize,
     /// Coefficient j of state i at j n + i.
-    terms: Vec<f64>,
+    terms: Vec<S>,
     degree: usize,
     /// Longest element to try, s.
-    pub(super) trial: f64,
+    pub(crate) trial: f64,
 }
 
-impl Expansion {
+impl<S: Scalar> Expansion<S> {
     /// For x′ = A x + …, A being the equations' own or a closed-loop one.
-    pub(super) fn new(a: &[f64], n: usize) -> Self {
+    pub(crate) fn new(a: &[S], n: usize) -> Self {
         let norm = crate::dde::propagator::balanced_norm(a, n);
         Self {
             n,
-            terms: vec![0.0; (DEGREE + 1) * n],
+            terms: vec![S::default(); (DEGREE + 1) * n],
             degree: 0,
             trial: if norm > 0.0 {
                 TRIAL / norm
@@ -111,14 +137,14 @@ impl Expansion {
 
     /// Expand x′ = A x + B w + g over an element of length `h` that starts at `x`; the part of
     /// the element, in (0, 1], on which the truncated series is exact to rounding.
-    pub(super) fn expand(
+    pub(crate) fn expand(
         &mut self,
-        a: &[f64],
-        b: &[f64],
-        g: &[f64],
-        x: &[f64],
-        w: &Series,
-        h: f64,
+        a: &[S],
+        b: &[S],
+        g: &[S],
+        x: &[S],
+        w: &Series<S>,
+        h: S,
     ) -> f64 {
         let n = self.n;
         self.terms[..n].copy_from_slice(x);
@@ -126,19 +152,19 @@ impl Expansion {
         for j in 0..DEGREE {
             let (known, rest) = self.terms.split_at_mut((j + 1) * n);
             let (old, new) = (&known[j * n..], &mut rest[..n]);
-            let factor = h / (j + 1) as f64;
+            let factor = h / S::from((j + 1) as f64);
             let input = w.coefficients[j];
             let mut alive = j < w.degree;
             for (i, new) in new.iter_mut().enumerate() {
                 let mut slope = b[i] * input;
-                for (a, x) in a[i * n..(i + 1) * n].iter().zip(old) {
+                for (&a, &x) in a[i * n..(i + 1) * n].iter().zip(old) {
                     slope += a * x;
                 }
                 if j == 0 {
                     slope += g[i];
                 }
                 *new = slope * factor;
-                alive |= *new != 0.0;
+                alive |= !new.is_nothing();
             }
             self.degree = j + 1;
             if !alive {
@@ -149,17 +175,27 @@ impl Expansion {
     }
 
     /// Largest part of the element on which the last coefficients are negligible beside the
-    /// largest one; both shrink with the element, so the bound is approached in a few rounds.
+    /// largest one, and the same of their slopes.
     fn sound_part(&self) -> f64 {
-        let mut part = 1.0_f64;
         if self.degree < DEGREE - 1 {
-            return part;
+            return 1.0;
         }
+        let part = self.shortened(1.0, S::value);
+        if S::MOVES {
+            self.shortened(part, S::slope)
+        } else {
+            part
+        }
+    }
+
+    /// What remains of `part` of the element when the last coefficients are made negligible;
+    /// both they and the largest shrink with the element, so the bound takes a few rounds.
+    fn shortened(&self, mut part: f64, read: impl Fn(S) -> f64) -> f64 {
         for i in 0..self.n {
             loop {
                 let (mut largest, mut power, mut ratio) = (0.0_f64, 1.0_f64, 1.0_f64);
                 for j in 0..=self.degree {
-                    let size = self.terms[j * self.n + i].abs() * power;
+                    let size = read(self.terms[j * self.n + i]).abs() * power;
                     if j >= DEGREE - 1 && largest > NOTHING && size > NEGLIGIBLE * largest {
                         ratio = ratio.min((NEGLIGIBLE * largest / size).powf(1.0 / j as f64));
                     }
@@ -177,37 +213,37 @@ impl Expansion {
     }
 
     /// Shorten the element to `part` of its length.
-    pub(super) fn shorten(&mut self, part: f64) {
+    pub(crate) fn shorten(&mut self, part: f64) {
         let mut power = 1.0;
         for row in self.terms.chunks_exact_mut(self.n.max(1)) {
             for c in row {
-                *c *= power;
+                *c *= S::from(power);
             }
             power *= part;
         }
     }
 
     /// x at the end of `part` of the element.
-    pub(super) fn end(&self, part: f64, x: &mut [f64]) {
-        x.fill(0.0);
+    pub(crate) fn end(&self, part: S, x: &mut [S]) {
+        x.fill(S::default());
         for j in (0..=self.degree).rev() {
-            for (x, c) in x.iter_mut().zip(&self.terms[j * self.n..]) {
+            for (x, &c) in x.iter_mut().zip(&self.terms[j * self.n..]) {
                 *x = *x * part + c;
             }
         }
     }
 
     /// The series of `row` x + `gain` w + `constant`.
-    pub(super) fn combine(&self, row: &[f64], gain: f64, w: &Series, constant: f64) -> Series {
+    pub(crate) fn combine(&self, row: &[S], gain: S, w: &Series<S>, constant: S) -> Series<S> {
         let mut out = Series::constant(constant);
-        out.degree = if gain == 0.0 {
+        out.degree = if gain.is_nothing() {
             self.degree
         } else {
             self.degree.max(w.degree)
         };
         for j in 0..=out.degree {
             if j <= self.degree {
-                for (k, x) in row.iter().zip(&self.terms[j * self.n..]) {
+                for (&k, &x) in row.iter().zip(&self.terms[j * self.n..]) {
                     out.coefficients[j] += k * x;
                 }
             }
@@ -218,23 +254,23 @@ impl Expansion {
     }
 
     /// Σ |k_i| max |x_i| on the element, or somewhat more: what rounding of `row` x is relative to.
-    pub(super) fn size(&self, row: &[f64]) -> f64 {
+    pub(crate) fn size(&self, row: &[S]) -> f64 {
         (0..=self.degree)
             .map(|j| {
                 let terms = row.iter().zip(&self.terms[j * self.n..]);
-                terms.map(|(k, x)| (k * x).abs()).sum::<f64>()
+                terms.map(|(&k, &x)| (k * x).value().abs()).sum::<f64>()
             })
             .sum()
     }
 
     /// u on the element.
-    pub(super) fn command(&self, equations: &Equations, w: &Series, r: f64) -> Series {
-        self.combine(&equations.k, equations.l, w, equations.m * r)
+    pub(crate) fn command(&self, equations: &Equations<S>, w: &Series<S>, r: f64) -> Series<S> {
+        self.combine(&equations.k, equations.l, w, equations.m * S::from(r))
     }
 
     /// y on the element.
-    pub(super) fn output(&self, equations: &Equations, w: &Series) -> Series {
-        self.combine(&equations.c, equations.d, w, 0.0)
+    pub(crate) fn output(&self, equations: &Equations<S>, w: &Series<S>) -> Series<S> {
+        self.combine(&equations.c, equations.d, w, S::default())
     }
 }
 

@@ -6,6 +6,8 @@
 //! s = ln(z)/Ts. Everything here is exact to rounding. A delay within rounding of a whole number
 //! of samples is taken as that number.
 
+use super::scalar::Scalar;
+
 mod grid;
 mod run;
 mod transition;
@@ -16,30 +18,32 @@ pub use transition::{poles, transition_matrix};
 
 /// How a delay lies on the sample grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Timing {
+pub struct Timing<S = f64> {
     /// m, the whole samples in the delay.
     pub samples: usize,
     /// δ, what remains of the delay, in [0, Ts).
-    pub early: f64,
+    pub early: S,
     /// Ts − δ.
-    pub late: f64,
+    pub late: S,
 }
 
-impl Timing {
+impl<S: Scalar> Timing<S> {
     /// Of `delay` seconds at `sample_time` seconds.
-    pub fn new(delay: f64, sample_time: f64) -> Self {
-        let ratio = delay / sample_time;
+    pub fn new(delay: S, sample_time: S) -> Self {
+        let ratio = delay.value() / sample_time.value();
         let nearest = ratio.round();
         if (ratio - nearest).abs() <= 8.0 * f64::EPSILON * nearest.max(1.0) {
+            let early = S::from(-nearest).mul_add(sample_time, delay).pinned(0.0);
             return Self {
                 samples: nearest as usize,
-                early: 0.0,
-                late: sample_time,
+                early,
+                late: (sample_time - early).pinned(sample_time.value()),
             };
         }
         let whole = ratio.floor();
         // One rounding: the product of whole and Ts is not rounded on its own.
-        let early = (-whole).mul_add(sample_time, delay).clamp(0.0, sample_time);
+        let early = S::from(-whole).mul_add(sample_time, delay);
+        let early = early.pinned(early.value().clamp(0.0, sample_time.value()));
         Self {
             samples: whole as usize,
             early,

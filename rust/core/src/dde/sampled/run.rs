@@ -1,9 +1,10 @@
 //! Response of a sampled loop: sample by sample, exact, with output at any time.
 
-use crate::dde::linear::{
-    LinearLoop, Reference, Start, Trajectory, Wanted, check_growth, saturate, slack,
-};
+use crate::dde::continuous::{Expansion, Series};
+use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory, check_growth, saturate, slack};
 use crate::dde::propagator::Propagator;
+use crate::dde::scalar::Scalar;
+use crate::dde::wanted::Wanted;
 use crate::{Error, Task};
 
 use super::Timing;
@@ -14,18 +15,18 @@ const CHECK_EVERY: u64 = 1024;
 /// More samples than anyone waits for.
 const MOST_SAMPLES: u64 = 100_000_000;
 
-pub(crate) fn run(
-    plant: &LinearLoop,
-    sample_time: f64,
-    start: &Start,
+pub(crate) fn run<S: Scalar>(
+    plant: &LinearLoop<S>,
+    sample_time: S,
+    start: &Start<S>,
     reference: &Reference,
-    wanted: Wanted<'_>,
+    wanted: Wanted<'_, S>,
     task: &Task,
-) -> Result<Trajectory, Error> {
+) -> Result<Trajectory<S>, Error> {
     let equations = plant.equations();
     let timing = Timing::new(plant.delay(), sample_time);
     let columns = [equations.b.as_slice(), equations.e.as_slice()];
-    let hold = |h: f64| Propagator::new(&equations.a, &columns, h);
+    let hold = |h: S| Propagator::new(&equations.a, &columns, h);
     let mut walk = Walk {
         plant,
         timing,
@@ -34,15 +35,15 @@ pub(crate) fn run(
         commands: Commands::new(start),
         x: start.state.clone(),
         scratch: start.state.clone(),
-        held: 0.0,
+        held: S::default(),
         wanted,
     };
     let phase = start.sample_phase;
     let mut cursor = reference.cursor();
     if phase > 0.0 {
         // The run begins inside the interval that follows sample −1.
-        walk.held = cursor.value();
-        walk.partial(-1, sample_time - phase, 0.0);
+        walk.held = S::from(cursor.value());
+        walk.partial(-1, sample_time - S::from(phase), S::default());
     }
     let mut k = 0_u64;
     while !walk.wanted.is_done() {
@@ -57,11 +58,11 @@ pub(crate) fn run(
                 advice: "shorten the time or lengthen the sample time".to_owned(),
             });
         }
-        let now = (k as f64).mul_add(sample_time, phase);
-        walk.held = cursor.advance(now, slack(now, sample_time));
+        let now = S::from(k as f64).mul_add(sample_time, S::from(phase));
+        walk.held = S::from(cursor.advance(now.value(), slack(now, sample_time)));
         let index = k as i64;
         let arrived = walk.commands.at(index - walk.lag() - 1);
-        let u = equations.command(&walk.x, arrived, walk.held);
+        let u = equations.command(&walk.x, arrived, walk.held.value());
         check_growth(&walk.x, u, now)?;
         walk.commands.issue(saturate(u, plant.limit()));
         walk.wanted.input_break(now);
@@ -71,58 +72,62 @@ pub(crate) fn run(
     Ok(walk.wanted.trajectory)
 }
 
+/// Room left when an element is shortened, so that the bound on its series holds with margin.
+const MARGIN: f64 = 0.95;
+
 /// The commands issued, by sample number; negative numbers are those before the start.
-struct Commands<'a> {
-    start: &'a Start,
-    issued: Vec<f64>,
+struct Commands<'a, S> {
+    start: &'a Start<S>,
+    issued: Vec<S>,
 }
 
-impl<'a> Commands<'a> {
-    fn new(start: &'a Start) -> Self {
+impl<'a, S: Scalar> Commands<'a, S> {
+    fn new(start: &'a Start<S>) -> Self {
         Self {
             start,
             issued: Vec::new(),
         }
     }
 
-    fn issue(&mut self, u: f64) {
+    fn issue(&mut self, u: S) {
         self.issued.push(u);
     }
 
-    fn at(&self, k: i64) -> f64 {
+    fn at(&self, k: i64) -> S {
         let history = &self.start.command_history;
         let found = match usize::try_from(k) {
-            Ok(k) => self.issued.get(k),
+            Ok(k) => self.issued.get(k).copied(),
             Err(_) => usize::try_from(-k)
                 .ok()
                 .and_then(|back| history.len().checked_sub(back))
-                .and_then(|place| history.get(place)),
+                .and_then(|place| history.get(place))
+                .map(|&u| S::from(u)),
         };
-        found.copied().unwrap_or(self.start.command)
+        found.unwrap_or(self.start.command)
     }
 }
 
-struct Walk<'a> {
-    plant: &'a LinearLoop,
-    timing: Timing,
-    early: Propagator,
-    late: Propagator,
-    commands: Commands<'a>,
-    x: Vec<f64>,
-    scratch: Vec<f64>,
+struct Walk<'a, S> {
+    plant: &'a LinearLoop<S>,
+    timing: Timing<S>,
+    early: Propagator<S>,
+    late: Propagator<S>,
+    commands: Commands<'a, S>,
+    x: Vec<S>,
+    scratch: Vec<S>,
     /// The reference as held since the last sample.
-    held: f64,
-    wanted: Wanted<'a>,
+    held: S,
+    wanted: Wanted<'a, S>,
 }
 
-impl Walk<'_> {
+impl<S: Scalar> Walk<'_, S> {
     /// m as a sample number.
     fn lag(&self) -> i64 {
         self.timing.samples as i64
     }
 
     /// From sample `k` at time `now` to the next one.
-    fn interval(&mut self, k: i64, now: f64) {
+    fn interval(&mut self, k: i64, now: S) {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
         let (before, after) = (
@@ -131,9 +136,11 @@ impl Walk<'_> {
         );
         let u = self.commands.at(k);
         self.wanted
-            .inputs_before(now + early + late - tolerance, |_| u);
-        if early > 0.0 {
-            self.serve(before, now, now + early - tolerance);
+            .inputs_before((now + early + late).value() - tolerance, |_| u);
+        // An instant that grows with the parameter counts as well.
+        if !early.is_nothing() {
+            self.measure(before, now, early);
+            self.serve(before, now, (now + early).value() - tolerance);
             self.early
                 .apply(&self.x, &[before, self.held], &mut self.scratch);
             std::mem::swap(&mut self.x, &mut self.scratch);
@@ -141,14 +148,15 @@ impl Walk<'_> {
         if before != after {
             self.wanted.output_break(now + early);
         }
-        self.serve(after, now + early, now + early + late - tolerance);
+        self.measure(after, now + early, late);
+        self.serve(after, now + early, (now + early + late).value() - tolerance);
         self.late
             .apply(&self.x, &[after, self.held], &mut self.scratch);
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 
     /// From `into` seconds after sample `k` (at time `now`) to the next one.
-    fn partial(&mut self, k: i64, into: f64, now: f64) {
+    fn partial(&mut self, k: i64, into: S, now: S) {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
         let (before, after) = (
@@ -157,21 +165,23 @@ impl Walk<'_> {
         );
         let u = self.commands.at(k);
         let end = now + (early + late - into);
-        self.wanted.inputs_before(end - tolerance, |_| u);
+        self.wanted.inputs_before(end.value() - tolerance, |_| u);
         let mut at = now;
-        if into < early - tolerance {
+        if into.value() < early.value() - tolerance {
             let switch = now + (early - into);
-            self.serve(before, at, switch - tolerance);
+            self.measure(before, at, switch - at);
+            self.serve(before, at, switch.value() - tolerance);
             self.jump(switch - at, before);
             self.wanted.output_break(switch);
             at = switch;
         }
-        self.serve(after, at, end - tolerance);
+        self.measure(after, at, end - at);
+        self.serve(after, at, end.value() - tolerance);
         self.jump(end - at, after);
     }
 
     /// x over a step of any length under constant w.
-    fn jump(&mut self, h: f64, w: f64) {
+    fn jump(&mut self, h: S, w: S) {
         let equations = self.plant.equations();
         Propagator::new(&equations.a, &[&equations.b, &equations.e], h).apply(
             &self.x,
@@ -181,15 +191,47 @@ impl Walk<'_> {
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 
+    /// Have the output measured over `length` from `from`, where the state is x, under constant w.
+    fn measure(&mut self, w: S, from: S, length: S) {
+        if !self.wanted.is_measured() {
+            return;
+        }
+        let equations = self.plant.equations();
+        let nothing = Series::constant(S::default());
+        let mut expansion = Expansion::new(&equations.a, self.x.len());
+        let mut x = self.x.clone();
+        let columns = equations.b.iter().zip(&equations.e);
+        let forcing: Vec<S> = columns.map(|(&b, &e)| b * w + e * self.held).collect();
+        let mut at = S::default();
+        while at.value() < length.value() {
+            let left = (length - at).value();
+            let mut h = S::from(left.min(expansion.trial));
+            let part = expansion.expand(&equations.a, &equations.b, &forcing, &x, &nothing, h);
+            if part < 1.0 {
+                expansion.shorten(MARGIN * part);
+                h *= S::from(MARGIN * part);
+            }
+            let y = expansion.combine(&equations.c, S::default(), &nothing, equations.d * w);
+            self.wanted.measure(from + at, h, 1.0, &y);
+            expansion.end(S::from(1.0), &mut x);
+            at += h;
+            if h.value() >= left {
+                break;
+            }
+        }
+    }
+
     /// Outputs from `from`, where the state is x, to `end` under constant w.
-    fn serve(&mut self, w: f64, from: f64, end: f64) {
+    fn serve(&mut self, w: S, from: S, end: f64) {
         let equations = self.plant.equations();
         let (x, scratch, held) = (&self.x, &mut self.scratch, self.held);
         self.wanted.outputs_before(end, |t| {
-            if t <= from {
+            let h = t - from;
+            let h = h.pinned(h.value().max(0.0));
+            if h.is_nothing() {
                 return equations.output(x, w);
             }
-            Propagator::new(&equations.a, &[&equations.b, &equations.e], t - from).apply(
+            Propagator::new(&equations.a, &[&equations.b, &equations.e], h).apply(
                 x,
                 &[w, held],
                 scratch,

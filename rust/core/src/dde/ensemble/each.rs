@@ -1,0 +1,91 @@
+//! One set by the engine of a single loop.
+
+use crate::dde::figures::{Criteria, Figures};
+use crate::dde::gauge::Gauge;
+use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory};
+use crate::dde::wanted::Wanted;
+use crate::{Error, Task};
+
+use super::{Outcome, Sets};
+
+/// Figures of one set.
+pub(super) fn figures(
+    sets: &Sets<'_>,
+    set: usize,
+    steady: f64,
+    span: f64,
+    criteria: &Criteria,
+    task: &Task,
+) -> Result<(Figures, Outcome), Error> {
+    let Some((plant, ahead)) = loop_of(sets, set)? else {
+        return Ok((Figures::UNKNOWN, Outcome::Refused));
+    };
+    let end = [ahead + span];
+    let mut steady = steady;
+    if steady.is_nan() {
+        match run(sets, &plant, Wanted::new(&end, &[], 0.0), task)? {
+            Ok(found) => steady = found.outputs.last().copied().unwrap_or(f64::NAN),
+            Err(outcome) => return Ok((Figures::UNKNOWN, outcome)),
+        }
+    }
+    let mut gauge = Gauge::new(ahead, ahead + span, steady, *criteria);
+    let wanted = Wanted::new(&end, &[], 0.0).measured_by(&mut gauge);
+    Ok(match run(sets, &plant, wanted, task)? {
+        Ok(_) => judged(gauge.figures()),
+        Err(outcome) => (Figures::UNKNOWN, outcome),
+    })
+}
+
+/// Outputs of one set.
+pub(super) fn response(
+    sets: &Sets<'_>,
+    set: usize,
+    times: &[f64],
+    task: &Task,
+) -> Result<(Vec<f64>, Outcome), Error> {
+    let Some((plant, ahead)) = loop_of(sets, set)? else {
+        return Ok((Vec::new(), Outcome::Refused));
+    };
+    let times: Vec<f64> = times.iter().map(|t| t + ahead).collect();
+    Ok(
+        match run(sets, &plant, Wanted::new(&times, &[], 0.0), task)? {
+            Ok(found) => (found.outputs, Outcome::Ok),
+            Err(outcome) => (Vec::new(), outcome),
+        },
+    )
+}
+
+/// Figures with the outcome that they show.
+pub(super) fn judged(figures: Figures) -> (Figures, Outcome) {
+    let outcome = if figures.settling_time.is_nan() {
+        Outcome::Unsettled
+    } else {
+        Outcome::Ok
+    };
+    (figures, outcome)
+}
+
+/// The loop, and the time by which its output runs ahead; none where the numbers make no loop.
+fn loop_of(sets: &Sets<'_>, set: usize) -> Result<Option<(LinearLoop, f64)>, Error> {
+    let row = sets.row(set)?;
+    Ok(row.checked().ok().map(|plant| (plant, sets.ahead(&row))))
+}
+
+fn run(
+    sets: &Sets<'_>,
+    plant: &LinearLoop,
+    wanted: Wanted<'_>,
+    task: &Task,
+) -> Result<Result<Trajectory, Outcome>, Error> {
+    let start = Start {
+        state: vec![0.0; sets.states],
+        ..Start::default()
+    };
+    let reference = Reference::step(0.0, sets.amplitude)?;
+    match plant.serve(&start, &reference, wanted, task) {
+        Ok(found) => Ok(Ok(found)),
+        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(Error::Diverges { .. }) => Ok(Err(Outcome::Diverged)),
+        Err(_) => Ok(Err(Outcome::Refused)),
+    }
+}
