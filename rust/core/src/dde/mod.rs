@@ -5,12 +5,18 @@
 //! * [`sampled`]: the same loop with the command held between samples: exact response, transition
 //!   matrix, poles, grids of poles;
 //! * [`continuous`]: the loop in continuous time, exact to rounding by the method of steps;
+//! * [`spectral`]: any equation with constant delays, by collocation on elements that end on
+//!   breaking points, with its [`history`] and its [`breaks`];
 //! * [`propagator`]: the response of x′ = A x + g to constant g (matrix exponential).
 
+pub mod breaks;
+mod chebyshev;
 pub mod continuous;
+pub mod history;
 pub mod linear;
 pub mod propagator;
 pub mod sampled;
+pub mod spectral;
 
 #[cfg(test)]
 mod tests;
