@@ -10,6 +10,7 @@ from deadtime._certificate import Certificate
 from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime._crossings import Crossings, crossings, delay_margin
+from deadtime._delay_solution import DelayResult, DelaySolution
 from deadtime._design import Design, design
 from deadtime._errors import (
     CertificateError,
@@ -41,6 +42,7 @@ from deadtime._robust import RobustMap, robust_map
 from deadtime._rootset import RootSet
 from deadtime._scalar_delay import dde_roots, rightmost_branches
 from deadtime._sensitivity import Sensitivity
+from deadtime._solve_dde import solve_dde
 from deadtime._special import lambertw, lambertw0, lambertwm1
 from deadtime._special_forms import (
     OffsetW,
@@ -71,6 +73,8 @@ __all__ = [
     "Crossings",
     "DeadtimeError",
     "DelayEstimate",
+    "DelayResult",
+    "DelaySolution",
     "DelaySystem",
     "DerivativeFilter",
     "Design",
@@ -123,6 +127,7 @@ __all__ = [
     "rightmost_branches",
     "robust_map",
     "s",
+    "solve_dde",
     "stability_map",
     "stability_radius",
     "wrightomega",

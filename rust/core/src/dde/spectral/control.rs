@@ -42,7 +42,10 @@ pub(super) fn judge(element: &Element, nodes: &Nodes) -> Verdict {
         // Rounding of values, spread over coefficients and multiplied by k² in the slope.
         let rounding = f64::EPSILON * largest;
         let last = c[n - 1].abs().max(LAST_BUT_ONE * c[n - 2].abs());
-        let (third, fourth) = (largest_of(&c[n / 2..3 * n / 4]), largest_of(&c[3 * n / 4..]));
+        let (third, fourth) = (
+            largest_of(&c[n / 2..3 * n / 4]),
+            largest_of(&c[3 * n / 4..]),
+        );
         let sum = n as f64 * fourth * (fourth / third.max(f64::MIN_POSITIVE)).min(1.0);
         let tail = last.max(if fourth > 4.0 * rounding { sum } else { 0.0 }) - 4.0 * rounding;
         let slope: f64 = (1..n)

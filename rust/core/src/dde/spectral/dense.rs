@@ -64,6 +64,24 @@ impl Factors {
     }
 }
 
+impl Factors {
+    /// The inverse, row-major: worth its making where many right-hand sides follow.
+    pub(super) fn inverse(&self) -> Vec<f64> {
+        let n = self.n;
+        let mut inverse = vec![0.0; n * n];
+        let mut column = vec![0.0; n];
+        for j in 0..n {
+            column.fill(0.0);
+            column[j] = 1.0;
+            self.solve(&mut column);
+            for (row, entry) in inverse.chunks_exact_mut(n).zip(&column) {
+                row[j] = *entry;
+            }
+        }
+        inverse
+    }
+}
+
 /// Σ a_i b_i in four partial sums.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a4, a1) = a.as_chunks::<4>();

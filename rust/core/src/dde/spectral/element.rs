@@ -21,6 +21,15 @@ const MOST: u32 = 40;
 /// Margin on a ratio seen at an earlier element.
 const MARGIN: f64 = 10.0;
 
+/// Step, in tolerances, up to which a ratio seen at an earlier element is believed.
+const BELIEVED: f64 = 300.0;
+/// Ratio that two steps alone do not prove to be smaller: the first of them may be anything.
+const SLOWEST: f64 = 1e-3;
+/// Place on the last piece, which ends at 1, beyond which extrapolation is idle.
+const FARTHEST: f64 = 5.0;
+/// Terms of an extrapolation this much above the smallest one are noise.
+const GROWN: f64 = 4.0;
+
 /// How the sweeps ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Sweeps {
@@ -48,6 +57,7 @@ pub(super) struct Element {
     /// Tolerance of each component.
     pub(super) scale: Vec<f64>,
     residual: Vec<f64>,
+    table: Vec<f64>,
     delayed: Delayed,
     pub(super) newton: Newton,
     /// Ratio of the steps and first step, as last seen with Newton.
@@ -117,7 +127,6 @@ impl Element {
 
     /// The last piece extrapolated, as many terms of it as still fall at the far end.
     fn guess(&mut self, n: usize, begin: Begin<'_>) {
-        let dim = begin.initial.len();
         self.y.clear();
         for initial in begin.initial {
             self.y.extend(std::iter::repeat_n(*initial, n));
@@ -126,22 +135,18 @@ impl Element {
             return;
         };
         let far = piece.place(self.end);
-        for d in 0..dim {
-            let c = &piece.coefficients[d * piece.terms..(d + 1) * piece.terms];
-            let (mut below, mut here) = (1.0, far);
-            let mut best = (f64::INFINITY, 1);
-            for (k, c) in c.iter().enumerate().skip(1) {
-                let size = (c * here).abs();
-                if size < best.0 {
-                    best = (size, k + 1);
-                }
-                (below, here) = (here, 2.0 * far * here - below);
-            }
-            let c = &c[..best.1];
-            let shift = begin.initial[d] - chebyshev::value(c, 1.0);
-            for (y, t) in self.y[d * n + 1..(d + 1) * n].iter_mut().zip(&self.t[1..]) {
-                *y = shift + chebyshev::value(c, piece.place(*t));
-            }
+        if far > FARTHEST {
+            return;
+        }
+        let places: Vec<f64> = self.t.iter().map(|t| piece.place(*t)).collect();
+        chebyshev::basis(&places, piece.terms, &mut self.table);
+        let rows = piece.coefficients.chunks_exact(piece.terms);
+        for ((y, initial), c) in self.y.chunks_exact_mut(n).zip(begin.initial).zip(rows) {
+            let terms = falling(c, far);
+            chebyshev::combine(&c[..terms], &self.table, n, y);
+            let shift = initial - y[0];
+            y.iter_mut().for_each(|y| *y += shift);
+            y[0] = *initial;
         }
     }
 
@@ -295,10 +300,31 @@ impl Element {
         if count == 1 {
             return self.newton.is_on()
                 && !self.delayed.overlaps()
+                && size <= BELIEVED
                 && self.seen.is_some_and(|(ratio, first)| {
                     size * ratio * MARGIN * (size / first).max(1.0) <= LEFT
                 });
         }
+        let ratio = ratio.max(SLOWEST);
         ratio < 0.5 && size * ratio / (1.0 - ratio) <= LEFT
     }
+}
+
+/// How many terms of a sum fall at `far`, which lies beyond its interval.
+fn falling(coefficients: &[f64], far: f64) -> usize {
+    let (mut below, mut here) = (1.0, far);
+    // Even and odd functions have every other term zero: pairs are compared.
+    let (mut best, mut last) = ((f64::INFINITY, 1), 0.0);
+    for (k, c) in coefficients.iter().enumerate().skip(1) {
+        let term = (c * here).abs();
+        let size = term.max(last);
+        if size <= best.0 {
+            best = (size, k + 1);
+        } else if size > GROWN * best.0 {
+            break;
+        }
+        last = term;
+        (below, here) = (here, 2.0 * far * here - below);
+    }
+    best.1
 }

@@ -229,7 +229,12 @@ mod tests {
 
     fn error(found: &Approximation, function: impl Fn(f64) -> f64) -> f64 {
         let mut worst: f64 = 0.0;
-        for piece in &found.pieces {
+        // A piece that holds a jump is as short as numbers allow.
+        for piece in found
+            .pieces
+            .iter()
+            .filter(|piece| piece.end - piece.start > 1e-9)
+        {
             for i in 1..10 {
                 let t = piece.start + 0.1 * f64::from(i) * (piece.end - piece.start);
                 let mut value = [0.0];

@@ -7,7 +7,7 @@
 //! Factors serve all sweeps, and all elements of the same length and order.
 
 use super::delayed::Delayed;
-use super::dense::Factors;
+use super::dense::{Factors, dot};
 use super::nodes::Nodes;
 use super::{Columns, Equation};
 use crate::{Error, Task};
@@ -17,6 +17,9 @@ const FULL: usize = 320;
 /// Off-diagonal part of J, relative to its diagonal, that is left to the sweeps.
 const OFF_DIAGONAL: f64 = 1e-3;
 
+/// Components with one system from which on its inverse pays.
+const SHARED: usize = 14;
+
 /// The linearisation of a run as it stands.
 #[derive(Debug, Default)]
 pub(super) struct Newton {
@@ -25,11 +28,21 @@ pub(super) struct Newton {
     /// (h/2, order) of the factors.
     key: Option<(f64, usize)>,
     full: Option<Factors>,
-    /// Entry of the diagonal and its factors.
-    single: Vec<(f64, Factors)>,
+    /// One system for each different entry of the diagonal.
+    single: Vec<Single>,
+    known: Vec<f64>,
     /// Elements since J was evaluated.
     pub(super) age: u32,
     scratch: Columned,
+}
+
+/// The system of all components with one entry of the diagonal.
+#[derive(Debug)]
+struct Single {
+    slope: f64,
+    factors: Factors,
+    /// Where many share it.
+    inverse: Option<Vec<f64>>,
 }
 
 /// Arguments for the differences: one column a component.
@@ -140,9 +153,17 @@ impl Newton {
         let dim = residual.len() / order;
         for (d, residual) in residual.chunks_exact_mut(order).enumerate() {
             let entry = self.jacobian[d * dim + d];
-            let factors = self.single.iter().find(|(known, _)| close(*known, entry));
-            if let Some((_, factors)) = factors {
-                factors.solve(residual);
+            let single = self.single.iter().find(|one| close(one.slope, entry));
+            match single.map(|one| (&one.factors, &one.inverse)) {
+                Some((_, Some(inverse))) => {
+                    self.known.clear();
+                    self.known.extend_from_slice(residual);
+                    for (step, row) in residual.iter_mut().zip(inverse.chunks_exact(order)) {
+                        *step = dot(row, &self.known);
+                    }
+                }
+                Some((factors, None)) => factors.solve(residual),
+                None => {}
             }
         }
         true
@@ -160,15 +181,22 @@ impl Newton {
         if self.diagonal {
             for d in 0..dim {
                 let slope = self.jacobian[d * dim + d];
-                if self.single.iter().any(|(known, _)| close(*known, slope)) {
+                if self.single.iter().any(|one| close(one.slope, slope)) {
                     continue;
                 }
+                let diagonal = self.jacobian.iter().step_by(dim + 1);
+                let sharing = diagonal.filter(|other| close(**other, slope)).count();
                 let size = order * order;
                 let matrix = (0..size).map(|at| entry(at / order, at % order, slope));
                 let Some(factors) = Factors::new(order, matrix.collect()) else {
                     return false;
                 };
-                self.single.push((slope, factors));
+                let inverse = (sharing > SHARED).then(|| factors.inverse());
+                self.single.push(Single {
+                    slope,
+                    factors,
+                    inverse,
+                });
             }
         } else {
             let size = dim * order;

@@ -88,19 +88,8 @@ fn inverse_of_basis(points: &[f64], n: usize) -> Vec<f64> {
     let mut table = Vec::new();
     chebyshev::basis(points, n, &mut table);
     let rows = (0..n * n).map(|at| table[(at % n) * n + at / n]).collect();
-    let mut inverse = vec![0.0; n * n];
     // Distinct points make a regular matrix.
-    if let Some(factors) = Factors::new(n, rows) {
-        for j in 0..n {
-            let mut column = vec![0.0; n];
-            column[j] = 1.0;
-            factors.solve(&mut column);
-            for k in 0..n {
-                inverse[k * n + j] = column[k];
-            }
-        }
-    }
-    inverse
+    Factors::new(n, rows).map_or_else(|| vec![0.0; n * n], |factors| factors.inverse())
 }
 
 /// P_{n−1} and P_n at x.

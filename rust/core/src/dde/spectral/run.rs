@@ -22,6 +22,11 @@ const MANY_SWEEPS: u32 = 12;
 const STALE_SWEEPS: u32 = 4;
 /// Shortening where sweeps stall or the right-hand side is not finite.
 const RETREAT: f64 = 0.3;
+/// An element that holds its own delayed values takes many sweeps: it must be this many delays long
+/// to be worth them.
+const OVERLAP: f64 = 12.0;
+/// Elements to wait after one of that kind failed, at most.
+const PATIENCE: u32 = 4096;
 /// A neutral jump below this part of the tolerance is not followed.
 const FAINT: f64 = 0.02;
 
@@ -59,6 +64,8 @@ struct Run<'a> {
     order: usize,
     preferred: usize,
     shortest_delay: f64,
+    /// Elements until one longer than a delay is tried, and how many it was last time.
+    wait: (u32, u32),
     output: usize,
 }
 
@@ -105,6 +112,7 @@ impl<'a> Run<'a> {
             order: preferred,
             preferred,
             shortest_delay: delays.fold(f64::INFINITY, f64::min),
+            wait: (0, 1),
             output: 0,
         };
         if problem.times.is_none() {
@@ -135,6 +143,7 @@ impl<'a> Run<'a> {
             };
             self.element.set(self.problem, nodes, (start, end), begin)?;
             let ended = self.element.sweep(self.problem, nodes, equation, task)?;
+            let before = self.solution.refused;
             match ended {
                 Sweeps::Converged(count) => {
                     nodes.coefficients(&self.element.y, &mut self.element.coefficients);
@@ -165,16 +174,30 @@ impl<'a> Run<'a> {
                     self.solution.refused += 1;
                 }
             }
+            if self.solution.refused > before && end - start > self.shortest_delay {
+                let patience = (2 * self.wait.1).min(PATIENCE);
+                self.wait = (patience, patience);
+            }
+        }
+    }
+
+    /// The largest length that is allowed now.
+    fn longest(&self) -> f64 {
+        let longest = self.problem.longest;
+        let overlaps = !self.problem.neutral
+            && self.wait.0 == 0
+            && self.length.min(longest) >= OVERLAP * self.shortest_delay;
+        if overlaps {
+            longest
+        } else {
+            longest.min(self.shortest_delay)
         }
     }
 
     /// Where the next element ends: at a breaking point, at the end, or in step with the past.
     fn next_end(&self) -> f64 {
         let start = self.solution.end;
-        let mut length = self.length.min(self.problem.longest);
-        if self.problem.neutral || length < 2.0 * self.shortest_delay {
-            length = length.min(self.shortest_delay);
-        }
+        let length = self.length.min(self.longest());
         let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
         let stop = ahead.min(self.problem.end);
         let room = stop - start;
@@ -322,20 +345,21 @@ impl<'a> Run<'a> {
     fn plan(&mut self, verdict: Verdict, length: f64) {
         let factor = control::factor(verdict.error, self.order);
         let wanted = length * factor;
-        let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
-        let room = (ahead - self.solution.end).min(self.problem.longest);
-        let room = if self.problem.neutral {
-            room.min(self.shortest_delay)
+        self.wait.0 = self.wait.0.saturating_sub(1);
+        // Held back by a delay, the wish to be longer adds up.
+        self.length = if wanted > self.shortest_delay && !self.problem.neutral {
+            wanted.max(self.length.min(OVERLAP * self.shortest_delay) * factor)
         } else {
-            room
+            wanted
         };
+        let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
+        let room = (ahead - self.solution.end).min(self.longest());
         // Fewer nodes where it is not the error that limits the length.
         self.order = if wanted > 1.5 * room.min(length) && wanted > room {
             control::order_for(verdict.terms + 2, self.preferred)
         } else {
             self.preferred
         };
-        self.length = wanted;
     }
 
     /// Output of the element just accepted.
