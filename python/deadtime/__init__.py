@@ -10,6 +10,7 @@ from deadtime._certificate import Certificate
 from deadtime._chains import Chain
 from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime._crossings import Crossings, crossings, delay_margin
+from deadtime._delay_solution import DelayResult, DelaySolution
 from deadtime._design import Design, design
 from deadtime._errors import (
     CertificateError,
@@ -42,6 +43,7 @@ from deadtime._robust import RobustMap, robust_map
 from deadtime._rootset import RootSet
 from deadtime._scalar_delay import dde_roots, rightmost_branches
 from deadtime._sensitivity import Sensitivity
+from deadtime._solve_dde import solve_dde
 from deadtime._special import lambertw, lambertw0, lambertwm1
 from deadtime._special_forms import (
     OffsetW,
@@ -73,6 +75,8 @@ __all__ = [
     "Crossings",
     "DeadtimeError",
     "DelayEstimate",
+    "DelayResult",
+    "DelaySolution",
     "DelaySystem",
     "DerivativeFilter",
     "Design",
@@ -128,6 +132,7 @@ __all__ = [
     "robust_map",
     "s",
     "simulate_fixed_step",
+    "solve_dde",
     "stability_map",
     "stability_radius",
     "sweep",

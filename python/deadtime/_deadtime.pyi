@@ -329,3 +329,57 @@ def sampled_abscissa_grid(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]: ...
+
+@final
+class DelayPieces:
+    @property
+    def span(self) -> tuple[float, float]: ...
+    @property
+    def count(self) -> int: ...
+    def evaluate(self, times: NDArray[np.float64], nu: int) -> NDArray[np.float64]: ...
+
+@final
+class DelayRun:
+    @property
+    def times(self) -> NDArray[np.float64]: ...
+    @property
+    def values(self) -> NDArray[np.float64]: ...
+    @property
+    def event_times(self) -> list[NDArray[np.float64]]: ...
+    @property
+    def event_values(self) -> list[NDArray[np.float64]]: ...
+    @property
+    def breaks(self) -> NDArray[np.float64]: ...
+    @property
+    def calls(self) -> int: ...
+    @property
+    def nodes(self) -> int: ...
+    @property
+    def elements(self) -> int: ...
+    @property
+    def refused(self) -> int: ...
+    @property
+    def outcome(self) -> int: ...
+    @property
+    def place(self) -> float: ...
+    @property
+    def pieces(self) -> DelayPieces: ...
+
+def solve_delay_equation(
+    fun: Callable[..., Any] | tuple[int, int],
+    args: tuple[Any, ...],
+    vectorized: bool,
+    span: tuple[float, float],
+    initial: NDArray[np.float64],
+    delays: NDArray[np.float64],
+    neutral: bool,
+    history: Any,
+    history_slope: Callable[[float], Any] | None,
+    history_breaks: NDArray[np.float64],
+    tolerances: tuple[float, NDArray[np.float64]],
+    longest: float,
+    times: NDArray[np.float64] | None,
+    keep: bool,
+    events: list[tuple[Any, int, int]],
+    jumps: list[tuple[float, Any]],
+) -> DelayRun: ...

@@ -9,6 +9,7 @@ mod matrix;
 mod pointers;
 mod quasipoly;
 mod runtime;
+mod solver;
 mod special;
 mod stability;
 mod sweeps;
@@ -31,6 +32,8 @@ mod _deadtime {
     use super::quasipoly::QuasiPolynomial;
     #[pymodule_export]
     use super::runtime::{spin, thread_count};
+    #[pymodule_export]
+    use super::solver::{DelayPieces, DelayRun, solve_delay_equation};
     #[pymodule_export]
     use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]

@@ -139,7 +139,26 @@ where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
-    let refused = Arc::new(Mutex::new(None));
+    let (task, refused) = listening();
+    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task))));
+    settle(Some(result), refusal(&refused))
+}
+
+/// [`run_here`] for work that calls Python all the time: the interpreter is kept.
+pub(crate) fn run_attached<T, F>(_py: Python<'_>, work: F) -> PyResult<T>
+where
+    F: FnOnce(&Task) -> Result<T, Error>,
+{
+    let (task, refused) = listening();
+    let result = catch_unwind(AssertUnwindSafe(|| work(&task)));
+    settle(Some(result), refusal(&refused))
+}
+
+type Refusal = Arc<Mutex<Option<PyErr>>>;
+
+/// A task that looks for signals by itself, and where it puts the exception they raise.
+fn listening() -> (Task, Refusal) {
+    let refused = Refusal::default();
     let keep = Arc::clone(&refused);
     let task = Task::asking(POLL, move || match attached(|py| py.check_signals()) {
         Ok(()) => true,
@@ -150,9 +169,11 @@ where
             false
         }
     });
-    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task))));
-    let refused = refused.lock().ok().and_then(|mut place| place.take());
-    settle(Some(result), refused)
+    (task, refused)
+}
+
+fn refusal(refused: &Refusal) -> Option<PyErr> {
+    refused.lock().ok().and_then(|mut place| place.take())
 }
 
 fn look_up(py: Python<'_>, task: &Task, progress: Option<&Py<PyAny>>) -> PyResult<()> {

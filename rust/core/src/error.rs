@@ -25,6 +25,10 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
 
+    /// A function of the caller failed; what it said is the caller's to tell.
+    #[error("a function given by the caller failed")]
+    Caller,
+
     /// An iteration used up its budget; `best` is the last iterate.
     #[error("{what} did not converge from {best}: {advice}")]
     Convergence {

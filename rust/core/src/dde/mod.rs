@@ -9,19 +9,25 @@
 //! * [`propagator`]: the response of x′ = A x + g to constant g (matrix exponential);
 //! * [`ensemble`]: many loops at once, their responses or figures of merit;
 //! * [`sensitivity`]: derivatives of a response with respect to numbers of the loop;
-//! * [`scalar`]: the numbers all of these compute with, plain or with a slope.
+//! * [`scalar`]: the numbers all of these compute with, plain or with a slope;
+//! * [`spectral`]: any equation with constant delays, by collocation on elements that end on
+//!   breaking points, with its [`history`] and its [`breaks`].
 
+pub mod breaks;
+mod chebyshev;
 pub mod continuous;
 pub mod ensemble;
 mod figures;
 pub mod fixed_step;
 mod gauge;
+pub mod history;
 pub mod linear;
 pub mod propagator;
 mod row;
 pub mod sampled;
 pub mod scalar;
 pub mod sensitivity;
+pub mod spectral;
 mod wanted;
 
 #[cfg(test)]

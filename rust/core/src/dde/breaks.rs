@@ -1,0 +1,221 @@
+//! Breaking points: where a derivative of the solution jumps, and where that goes from there.
+//!
+//! A jump of the p-th derivative at ξ reaches y through the delay τ at ξ + τ, where the derivative
+//! of order p + 1 jumps; through a delayed derivative the p-th itself does, and at least the first
+//! (Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, section 2.1.2).
+//! Points that agree to rounding are one, with the smaller order. They are followed up to the
+//! order that the method can see, which falls with the number of delays so that no more than about
+//! a hundred descend from one point; what is not followed is left to the error estimate. A neutral
+//! jump never ends: whoever finds it negligible says so by raising its order.
+
+use std::collections::BTreeMap;
+
+/// Descendants of one point that are worth an element of their own.
+const DESCENDANTS: f64 = 100.0;
+/// Order from which on a jump is below what elements of the largest order see.
+const SMOOTH: u32 = 12;
+/// Points kept ahead of time; the least important ones go first.
+const MOST: usize = 4096;
+/// Points closer than this, relative to their time, are one.
+const SAME: f64 = 1e-13;
+
+/// A time at which a derivative of the solution jumps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BreakingPoint {
+    /// When.
+    pub time: f64,
+    /// The lowest derivative that jumps: 0 for the solution itself.
+    pub order: u32,
+}
+
+/// Breaking points still ahead, for constant delays.
+#[derive(Debug, Clone)]
+pub struct Breaks {
+    delays: Vec<f64>,
+    neutral: bool,
+    smooth: u32,
+    /// Key: the bits of the distance from `origin`, which sort as positive distances do.
+    ahead: BTreeMap<u64, BreakingPoint>,
+    origin: f64,
+}
+
+impl Breaks {
+    /// No points yet; all that come are later than `origin`.
+    pub fn new(origin: f64, delays: &[f64], neutral: bool) -> Self {
+        Self {
+            delays: delays.to_vec(),
+            neutral,
+            smooth: followed(delays.len()),
+            ahead: BTreeMap::new(),
+            origin,
+        }
+    }
+
+    /// The order from which on a point is not followed.
+    pub fn smooth(&self) -> u32 {
+        self.smooth
+    }
+
+    /// Add one point ahead, or lower the order of one that is there.
+    pub fn add(&mut self, point: BreakingPoint) {
+        let distance = point.time - self.origin;
+        if point.order >= self.smooth
+            || distance.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater)
+        {
+            return;
+        }
+        let width = SAME * point.time.abs().max(self.origin.abs()).max(distance);
+        let low = (distance - width).max(0.0).to_bits();
+        let high = (distance + width).to_bits();
+        if let Some((_, known)) = self.ahead.range_mut(low..=high).next() {
+            if point.order < known.order {
+                *known = point;
+            }
+            return;
+        }
+        self.ahead.insert(distance.to_bits(), point);
+        if self.ahead.len() > MOST {
+            let least = self
+                .ahead
+                .iter()
+                .max_by_key(|(key, point)| (point.order, **key));
+            if let Some(key) = least.map(|(key, _)| *key) {
+                self.ahead.remove(&key);
+            }
+        }
+    }
+
+    /// Add what descends from a point.
+    pub fn follow(&mut self, point: BreakingPoint) {
+        let order = if self.neutral {
+            point.order.max(1)
+        } else {
+            point.order + 1
+        };
+        for index in 0..self.delays.len() {
+            let time = point.time + self.delays[index];
+            self.add(BreakingPoint { time, order });
+        }
+    }
+
+    /// The next point.
+    pub fn next(&self) -> Option<BreakingPoint> {
+        self.ahead.first_key_value().map(|(_, point)| *point)
+    }
+
+    /// Take the points up to `time`, the lowest order of them.
+    pub fn reach(&mut self, time: f64) -> Option<BreakingPoint> {
+        let mut order = None;
+        while let Some(point) = self.next() {
+            if point.time > time {
+                break;
+            }
+            self.ahead.pop_first();
+            order = Some(order.map_or(point.order, |old: u32| old.min(point.order)));
+        }
+        order.map(|order| BreakingPoint { time, order })
+    }
+
+    /// Number of points ahead.
+    pub fn len(&self) -> usize {
+        self.ahead.len()
+    }
+
+    /// Whether none are ahead.
+    pub fn is_empty(&self) -> bool {
+        self.ahead.is_empty()
+    }
+}
+
+/// The largest K with C(m + K, m) ≤ DESCENDANTS for m delays, at least 3.
+fn followed(delays: usize) -> u32 {
+    let mut count = 1.0;
+    let mut order = 0;
+    while order < SMOOTH {
+        let next = count * (delays as f64 + f64::from(order) + 1.0) / (f64::from(order) + 1.0);
+        if next > DESCENDANTS && order >= 3 {
+            break;
+        }
+        count = next;
+        order += 1;
+    }
+    order + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all(breaks: &mut Breaks, until: f64) -> Vec<(f64, u32)> {
+        let mut found = Vec::new();
+        while let Some(point) = breaks.next() {
+            if point.time > until {
+                break;
+            }
+            let point = breaks.reach(point.time).unwrap();
+            breaks.follow(point);
+            found.push((point.time, point.order));
+        }
+        found
+    }
+
+    #[test]
+    fn retarded_points_lose_an_order_each_delay_and_end() {
+        let mut breaks = Breaks::new(0.0, &[0.36], false);
+        breaks.follow(BreakingPoint {
+            time: 0.0,
+            order: 1,
+        });
+        let found = all(&mut breaks, 100.0);
+        assert_eq!(found.len() as u32, breaks.smooth() - 2);
+        for (k, (time, order)) in found.iter().enumerate() {
+            assert!((time - 0.36 * (k + 1) as f64).abs() < 1e-14);
+            assert_eq!(*order as usize, k + 2);
+        }
+    }
+
+    #[test]
+    fn neutral_points_keep_their_order() {
+        let mut breaks = Breaks::new(1.0, &[0.5], true);
+        breaks.follow(BreakingPoint {
+            time: 1.0,
+            order: 0,
+        });
+        let found = all(&mut breaks, 50.9);
+        assert_eq!(found.len(), 99);
+        assert!(found.iter().all(|(_, order)| *order == 1));
+    }
+
+    #[test]
+    fn points_of_two_delays_merge() {
+        // 1/3 and 1/5: 2/5 and 1/3 + 1/5 by two ways each, all multiples of 1/15.
+        let mut breaks = Breaks::new(0.0, &[1.0 / 3.0, 0.2], false);
+        breaks.follow(BreakingPoint {
+            time: 0.0,
+            order: 0,
+        });
+        let times: Vec<f64> = all(&mut breaks, 1.01)
+            .iter()
+            .map(|(t, _)| 15.0 * t)
+            .collect();
+        let known = [3.0, 5.0, 6.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+        assert_eq!(times.len(), known.len());
+        assert!(times.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-11));
+    }
+
+    #[test]
+    fn many_delays_stay_bounded() {
+        let delays: Vec<f64> = (1..=40).map(|k| f64::from(k).sqrt()).collect();
+        let mut breaks = Breaks::new(0.0, &delays, true);
+        breaks.follow(BreakingPoint {
+            time: 0.0,
+            order: 1,
+        });
+        for _ in 0..2000 {
+            let point = breaks.next().unwrap();
+            let point = breaks.reach(point.time).unwrap();
+            breaks.follow(point);
+            assert!(breaks.len() <= MOST);
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Error estimate of an element, and what length and order come next.
+//!
+//! The error of the polynomial is judged by its last coefficients and by its defect at the start,
+//! (h/2) |Y′ − f| times what the integral of the defect's shape can reach. Coefficients of smooth
+//! solutions fall like C ρ^(−k), where the last one bounds what follows; around a kink they fall
+//! like a power of k, and N of the size of the last quarter follow. The two cases are told by how
+//! much the last quarter is below the one before. As ρ is inversely proportional to the length,
+//! an element longer by a factor s has an error s^N times as large.
+
+use super::element::Element;
+use super::nodes::{Nodes, ORDERS};
+
+/// Part of the tolerance that an element may use.
+const SHARE: f64 = 0.2;
+/// Last but one coefficient, as a part: in an even or odd function the last one vanishes.
+const LAST_BUT_ONE: f64 = 0.2;
+/// Coefficients below this part of the tolerance are not missed.
+const NEGLIGIBLE: f64 = 0.02;
+const LONGER: f64 = 2.0;
+const SHORTER: f64 = 0.1;
+
+/// What an element is worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Verdict {
+    /// Error over what is allowed.
+    pub(super) error: f64,
+    /// Coefficients that are not negligible.
+    pub(super) terms: usize,
+}
+
+/// Judge an element whose coefficients are known.
+pub(super) fn judge(element: &Element, nodes: &Nodes) -> Verdict {
+    let n = nodes.order + 1;
+    let half = 0.5 * (element.end - element.start);
+    let mut verdict = Verdict {
+        error: 0.0,
+        terms: 1,
+    };
+    for (d, c) in element.coefficients.chunks_exact(n).enumerate() {
+        let scale = element.scale[d];
+        let largest = largest_of(c);
+        // Rounding of values, spread over coefficients and multiplied by k² in the slope.
+        let rounding = f64::EPSILON * largest;
+        let last = c[n - 1].abs().max(LAST_BUT_ONE * c[n - 2].abs());
+        let (third, fourth) = (
+            largest_of(&c[n / 2..3 * n / 4]),
+            largest_of(&c[3 * n / 4..]),
+        );
+        let sum = n as f64 * fourth * (fourth / third.max(f64::MIN_POSITIVE)).min(1.0);
+        let tail = last.max(if fourth > 4.0 * rounding { sum } else { 0.0 }) - 4.0 * rounding;
+        let slope: f64 = (1..n)
+            .map(|k| {
+                let square = (k * k) as f64;
+                if k.is_multiple_of(2) {
+                    -square * c[k]
+                } else {
+                    square * c[k]
+                }
+            })
+            .sum();
+        let noise = (n * n) as f64 * rounding;
+        let defect = ((slope - half * element.f[d * n]).abs() - noise) * nodes.spread;
+        let error = tail.max(defect).max(0.0) / (SHARE * scale);
+        verdict.error = verdict.error.max(error);
+        let above = c.iter().rposition(|c| c.abs() > NEGLIGIBLE * scale);
+        verdict.terms = verdict.terms.max(above.map_or(1, |k| k + 1));
+    }
+    verdict
+}
+
+fn largest_of(coefficients: &[f64]) -> f64 {
+    coefficients.iter().fold(0.0, |size, c| size.max(c.abs()))
+}
+
+/// Factor for the length after an element with this error.
+pub(super) fn factor(error: f64, order: usize) -> f64 {
+    let wanted = (0.5 / error.max(1e-300)).powf(1.0 / order as f64);
+    (0.95 * wanted).clamp(SHORTER, LONGER)
+}
+
+/// The smallest order that is at least `wanted`, no more than `most`.
+pub(super) fn order_for(wanted: usize, most: usize) -> usize {
+    let found = ORDERS.iter().copied().find(|order| *order >= wanted);
+    found.unwrap_or(most).min(most)
+}
+
+/// The largest order worth its nodes: where calls cost much, nodes are nearly free.
+pub(super) fn preferred(rtol: f64, costly: bool) -> usize {
+    let digits = -rtol.log10();
+    let wanted = if costly {
+        6.0 + 2.0 * digits
+    } else {
+        4.0 + 1.4 * digits
+    };
+    order_for(wanted.ceil() as usize, 24)
+}

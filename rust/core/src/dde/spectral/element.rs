@@ -1,0 +1,330 @@
+//! One element: nodes, delayed values, first guess, sweeps.
+//!
+//! A sweep evaluates the right-hand side at all nodes of the iterate and improves it by a step of
+//! Picard's or Newton's. It ends when what is left, |δ| θ / (1 − θ) by the ratio θ of the last two
+//! steps, is a small part of the tolerance. Where the Jacobian has served before, the ratio it
+//! showed last stands in for the second step, with a margin.
+
+use super::super::history::History;
+use super::delayed::{Delayed, Place};
+use super::dense::dot;
+use super::newton::Newton;
+use super::nodes::Nodes;
+use super::{Columns, Equation, Problem};
+use crate::dde::chebyshev;
+use crate::{Error, Task};
+
+/// What iteration may leave, in tolerances.
+const LEFT: f64 = 0.02;
+/// Sweeps of one element.
+const MOST: u32 = 40;
+/// Margin on a ratio seen at an earlier element.
+const MARGIN: f64 = 10.0;
+
+/// Step, in tolerances, up to which a ratio seen at an earlier element is believed.
+const BELIEVED: f64 = 300.0;
+/// Ratio that two steps alone do not prove to be smaller: the first of them may be anything.
+const SLOWEST: f64 = 1e-3;
+/// Place on the last piece, which ends at 1, beyond which extrapolation is idle.
+const FARTHEST: f64 = 5.0;
+/// Terms of an extrapolation this much above the smallest one are noise.
+const GROWN: f64 = 4.0;
+
+/// How the sweeps ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Sweeps {
+    /// Converged after so many.
+    Converged(u32),
+    /// Not converging.
+    Stalled,
+    /// The right-hand side is not finite at this node.
+    NotFinite(usize),
+}
+
+/// Workspace for elements of a run.
+#[derive(Debug, Default)]
+pub(super) struct Element {
+    pub(super) start: f64,
+    pub(super) end: f64,
+    pub(super) t: Vec<f64>,
+    /// Values, component by component, at the N + 1 points.
+    pub(super) y: Vec<f64>,
+    z: Vec<f64>,
+    dz: Vec<f64>,
+    /// The right-hand side there, as last evaluated.
+    pub(super) f: Vec<f64>,
+    pub(super) coefficients: Vec<f64>,
+    /// Tolerance of each component.
+    pub(super) scale: Vec<f64>,
+    residual: Vec<f64>,
+    table: Vec<f64>,
+    delayed: Delayed,
+    pub(super) newton: Newton,
+    /// Ratio of the steps and first step, as last seen with Newton.
+    seen: Option<(f64, f64)>,
+    pub(super) calls: u64,
+    pub(super) evaluated: u64,
+}
+
+/// What an element starts from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Begin<'a> {
+    pub(super) initial: &'a [f64],
+    pub(super) history: &'a History,
+    /// Whether the last piece goes on smoothly enough to be extrapolated.
+    pub(super) smooth: bool,
+    /// Whether the right-hand side jumps at the start and at the end.
+    pub(super) jumps: (bool, bool),
+}
+
+impl Element {
+    /// Place the element and read its past.
+    pub(super) fn set(
+        &mut self,
+        problem: &Problem,
+        nodes: &'static Nodes,
+        (start, end): (f64, f64),
+        begin: Begin<'_>,
+    ) -> Result<(), Error> {
+        let (n, dim) = (nodes.order + 1, problem.dim());
+        (self.start, self.end) = (start, end);
+        let half = 0.5 * (end - start);
+        self.t.clear();
+        self.t
+            .extend(nodes.points.iter().map(|x| start + half * (1.0 + x)));
+        self.t[n - 1] = end;
+        let size = problem.delays.len() * dim * n;
+        self.z.resize(size, 0.0);
+        self.dz.resize(if problem.neutral { size } else { 0 }, 0.0);
+        self.f.resize(dim * n, 0.0);
+        self.coefficients.resize(dim * n, 0.0);
+        self.residual.resize(dim * nodes.order, 0.0);
+        let place = Place {
+            start,
+            end,
+            t: &self.t,
+            nodes,
+        };
+        let (z, dz) = (&mut self.z, &mut self.dz);
+        let overlapped = self.delayed.overlaps();
+        self.delayed
+            .gather(begin.history, &problem.delays, place, dim, z, dz)?;
+        if self.delayed.overlaps() != overlapped {
+            // What the Jacobian is made of has changed.
+            self.newton.turn_off();
+            self.seen = None;
+        }
+        self.guess(n, begin);
+        // What the caller sees as the time of a jump must lie on the side of the element.
+        if begin.jumps.0 {
+            self.t[0] = start.next_up();
+        }
+        if begin.jumps.1 {
+            self.t[n - 1] = end.next_down();
+        }
+        Ok(())
+    }
+
+    /// The last piece extrapolated, as many terms of it as still fall at the far end.
+    fn guess(&mut self, n: usize, begin: Begin<'_>) {
+        self.y.clear();
+        for initial in begin.initial {
+            self.y.extend(std::iter::repeat_n(*initial, n));
+        }
+        let Some(piece) = begin.history.latest().filter(|_| begin.smooth) else {
+            return;
+        };
+        let far = piece.place(self.end);
+        if far > FARTHEST {
+            return;
+        }
+        let places: Vec<f64> = self.t.iter().map(|t| piece.place(*t)).collect();
+        chebyshev::basis(&places, piece.terms, &mut self.table);
+        let rows = piece.coefficients.chunks_exact(piece.terms);
+        for ((y, initial), c) in self.y.chunks_exact_mut(n).zip(begin.initial).zip(rows) {
+            let terms = falling(c, far);
+            chebyshev::combine(&c[..terms], &self.table, n, y);
+            let shift = initial - y[0];
+            y.iter_mut().for_each(|y| *y += shift);
+            y[0] = *initial;
+        }
+    }
+
+    /// Sweep until converged.
+    pub(super) fn sweep<E: Equation + ?Sized>(
+        &mut self,
+        problem: &Problem,
+        nodes: &'static Nodes,
+        equation: &mut E,
+        task: &Task,
+    ) -> Result<Sweeps, Error> {
+        let n = nodes.order + 1;
+        let half = 0.5 * (self.end - self.start);
+        let mut last = f64::INFINITY;
+        let mut first = 0.0;
+        let mut growing = 0;
+        for count in 1..=MOST {
+            task.check()?;
+            if self.delayed.overlaps() {
+                nodes.coefficients(&self.y, &mut self.coefficients);
+                self.delayed.renew(&self.coefficients, n, &mut self.z);
+            }
+            let at = Columns {
+                t: &self.t,
+                y: &self.y,
+                z: &self.z,
+                dz: &self.dz,
+            };
+            equation.slope(at, &mut self.f, task)?;
+            self.calls += 1;
+            self.evaluated += n as u64;
+            if let Some(bad) = self.f.iter().position(|f| !f.is_finite()) {
+                return Ok(Sweeps::NotFinite(bad % n));
+            }
+            if count == 1 && !self.newton.is_on() && equation.is_costly() {
+                self.linearise(equation, task)?;
+            }
+            self.residual(nodes, half);
+            if self.newton.is_on() && !self.newton.solve(nodes, half, &mut self.residual) {
+                return Ok(Sweeps::Stalled);
+            }
+            self.step(problem, n);
+            let size = self.size(n - 1);
+            if count == 1 {
+                first = size;
+            }
+            let ratio = size / last;
+            if self.settled(count, size, ratio) {
+                if count > 1 && self.newton.is_on() {
+                    self.seen = Some((ratio, first));
+                }
+                self.newton.age += 1;
+                return Ok(Sweeps::Converged(count));
+            }
+            growing = if ratio > 1.0 { growing + 1 } else { 0 };
+            if !size.is_finite() || growing > 2 || (count > 8 && ratio > 0.8) {
+                return Ok(Sweeps::Stalled);
+            }
+            last = size;
+        }
+        Ok(Sweeps::Stalled)
+    }
+
+    /// Evaluate the Jacobian at the middle node of what was last evaluated.
+    pub(super) fn linearise<E: Equation + ?Sized>(
+        &mut self,
+        equation: &mut E,
+        task: &Task,
+    ) -> Result<bool, Error> {
+        self.linearise_at(self.t.len() / 2, equation, task)
+    }
+
+    fn linearise_at<E: Equation + ?Sized>(
+        &mut self,
+        node: usize,
+        equation: &mut E,
+        task: &Task,
+    ) -> Result<bool, Error> {
+        let at = Columns {
+            t: &self.t,
+            y: &self.y,
+            z: &self.z,
+            dz: &self.dz,
+        };
+        self.calls += 1;
+        self.evaluated += (self.y.len() / self.t.len()) as u64;
+        self.seen = None;
+        self.newton
+            .evaluate(equation, at, &self.f, node, &self.delayed, task)
+    }
+
+    /// Evaluate the Jacobian at the start, where the iterate is right whatever became of the sweeps.
+    pub(super) fn linearise_at_start<E: Equation + ?Sized>(
+        &mut self,
+        equation: &mut E,
+        task: &Task,
+    ) -> Result<bool, Error> {
+        self.linearise_at(0, equation, task)
+    }
+
+    /// y_0 + (h/2) B F − Y.
+    fn residual(&mut self, nodes: &Nodes, half: f64) {
+        let order = nodes.order;
+        let rows = self.residual.chunks_exact_mut(order);
+        let values = self.y.chunks_exact(order + 1);
+        for ((residual, y), f) in rows.zip(values).zip(self.f.chunks_exact(order + 1)) {
+            let weights = nodes.integrate.chunks_exact(order);
+            for ((residual, weights), value) in residual.iter_mut().zip(weights).zip(&y[1..]) {
+                *residual = y[0] + half * dot(weights, &f[1..]) - value;
+            }
+        }
+    }
+
+    /// Add the step, and measure what its size is to be compared with.
+    fn step(&mut self, problem: &Problem, n: usize) {
+        self.scale.clear();
+        let rows = self.y.chunks_exact_mut(n);
+        for (d, (y, step)) in rows.zip(self.residual.chunks_exact(n - 1)).enumerate() {
+            let mut size = y[0].abs();
+            for (y, step) in y[1..].iter_mut().zip(step) {
+                *y += step;
+                size = size.max(y.abs());
+            }
+            let atol = problem.atol.get(d).or(problem.atol.first());
+            let scale = atol.copied().unwrap_or(0.0) + problem.rtol * size;
+            self.scale.push(scale.max(f64::MIN_POSITIVE));
+        }
+    }
+
+    /// Largest entry of the step, in tolerances.
+    fn size(&self, order: usize) -> f64 {
+        let rows = self.residual.chunks_exact(order).zip(&self.scale);
+        rows.fold(0.0, |worst: f64, (row, scale)| {
+            let sum = row.iter().fold(0.0, |worst: f64, step| {
+                // NaN must not be lost as `max` would lose it.
+                if step.is_finite() {
+                    worst.max(step.abs())
+                } else {
+                    f64::INFINITY
+                }
+            });
+            worst.max(sum / scale)
+        })
+    }
+
+    /// Whether what is left after a step is small enough.
+    fn settled(&self, count: u32, size: f64, ratio: f64) -> bool {
+        if size <= LEFT {
+            return true;
+        }
+        if count == 1 {
+            return self.newton.is_on()
+                && !self.delayed.overlaps()
+                && size <= BELIEVED
+                && self.seen.is_some_and(|(ratio, first)| {
+                    size * ratio * MARGIN * (size / first).max(1.0) <= LEFT
+                });
+        }
+        let ratio = ratio.max(SLOWEST);
+        ratio < 0.5 && size * ratio / (1.0 - ratio) <= LEFT
+    }
+}
+
+/// How many terms of a sum fall at `far`, which lies beyond its interval.
+fn falling(coefficients: &[f64], far: f64) -> usize {
+    let (mut below, mut here) = (1.0, far);
+    // Even and odd functions have every other term zero: pairs are compared.
+    let (mut best, mut last) = ((f64::INFINITY, 1), 0.0);
+    for (k, c) in coefficients.iter().enumerate().skip(1) {
+        let term = (c * here).abs();
+        let size = term.max(last);
+        if size <= best.0 {
+            best = (size, k + 1);
+        } else if size > GROWN * best.0 {
+            break;
+        }
+        last = term;
+        (below, here) = (here, 2.0 * far * here - below);
+    }
+    best.1
+}

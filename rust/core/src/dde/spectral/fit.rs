@@ -1,0 +1,304 @@
+//! Polynomial pieces for a history that is given as a function.
+//!
+//! Each piece is interpolated at 20 Chebyshev points of the first kind, which leave out its ends,
+//! so that what happens exactly at a jump does not matter. Where the last coefficients are not
+//! below the tolerance the piece is halved. Around a kink or jump that nobody declared the pieces
+//! become tiny, and a run of them is a breaking point, at the tiniest; where halving meets it by
+//! chance, values or slopes of the two pieces differ at the joint.
+
+use super::super::breaks::BreakingPoint;
+use super::Piece;
+use crate::Error;
+use crate::dde::chebyshev;
+
+const POINTS: usize = 20;
+/// Coefficients at the end that must be small.
+const TAIL: usize = 4;
+/// Halvings of a stretch: below this a jump is located to rounding.
+const DEEPEST: u32 = 44;
+/// Halvings from which on a piece tells of a kink.
+const KINKED: u32 = 14;
+/// Differences at a joint, in tolerances, that are no noise.
+const LOUD: f64 = 100.0;
+/// Breaking points closer than this part of the history are one.
+const SAME: f64 = 1e-4;
+/// Pieces of one history.
+const MOST: usize = 20_000;
+
+/// Pieces of a function, and the breaking points found in it.
+#[derive(Debug, Clone, Default)]
+pub struct Approximation {
+    /// In the order of time.
+    pub pieces: Vec<Piece>,
+    /// Kinks and jumps.
+    pub breaks: Vec<BreakingPoint>,
+}
+
+/// Approximate `function`, which writes `dim` values, on [start, end] to `tolerance`, with joints
+/// at the `breaks` in between.
+pub fn approximate(
+    start: f64,
+    end: f64,
+    breaks: &[f64],
+    dim: usize,
+    tolerance: impl Fn(usize, f64) -> f64,
+    mut function: impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+) -> Result<Approximation, Error> {
+    let mut joints = vec![start];
+    joints.extend(breaks.iter().filter(|time| **time > start && **time < end));
+    joints.push(end);
+    joints.sort_by(f64::total_cmp);
+    joints.dedup();
+    let mut found = Approximation::default();
+    let mut fitter = Fitter::new(dim);
+    // Largest values seen of each component: around a zero, a function is no better than they are.
+    let mut sizes = vec![0.0; dim];
+    for pair in joints.windows(2) {
+        if pair[0] > start {
+            found.breaks.push(BreakingPoint {
+                time: pair[0],
+                order: 0,
+            });
+        }
+        // (start, end, depth), the earliest on top.
+        let mut open = vec![(pair[0], pair[1], 0)];
+        let mut tiniest: Option<(u32, f64)> = None;
+        while let Some((start, end, depth)) = open.pop() {
+            let piece = fitter.piece(start, end, &mut function)?;
+            let middle = 0.5 * (start + end);
+            let splits = depth < DEEPEST && start < middle && middle < end;
+            for (largest, c) in sizes
+                .iter_mut()
+                .zip(piece.coefficients.chunks_exact(POINTS))
+            {
+                *largest = f64::max(*largest, size(c));
+            }
+            if splits && !resolved(&piece, &sizes, &tolerance) {
+                if found.pieces.len() + open.len() > MOST {
+                    return Err(Error::TooMuch {
+                        what: "the history",
+                        limit: MOST as u64,
+                        unit: "polynomial pieces",
+                        advice: format!(
+                            "it is too rough near t = {middle}; give history_breaks at its kinks \
+                             and jumps, smooth it, or raise rtol and atol"
+                        ),
+                    });
+                }
+                open.push((middle, end, depth + 1));
+                open.push((start, middle, depth + 1));
+                continue;
+            }
+            match tiniest {
+                Some((deepest, _)) if depth >= KINKED && depth > deepest => {
+                    tiniest = Some((depth, start));
+                }
+                Some((_, time)) if depth < KINKED => {
+                    found.breaks.push(BreakingPoint { time, order: 0 });
+                    tiniest = None;
+                }
+                None if depth >= KINKED => tiniest = Some((depth, start)),
+                _ => {}
+            }
+            found.pieces.push(piece);
+        }
+        if let Some((_, time)) = tiniest.filter(|(_, time)| *time > start) {
+            found.breaks.push(BreakingPoint { time, order: 0 });
+        }
+    }
+    for pair in found.pieces.windows(2) {
+        if joins(&pair[0], &pair[1], &sizes, &tolerance) {
+            continue;
+        }
+        let time = pair[1].start;
+        let near = |point: &BreakingPoint| (point.time - time).abs() < SAME * (end - start);
+        if !found.breaks.iter().any(near) {
+            found.breaks.push(BreakingPoint { time, order: 0 });
+        }
+    }
+    Ok(found)
+}
+
+/// Whether two neighbours agree at their joint, in value and slope, as parts of one smooth
+/// function approximated to the tolerance do.
+fn joins(
+    left: &Piece,
+    right: &Piece,
+    sizes: &[f64],
+    tolerance: &impl Fn(usize, f64) -> f64,
+) -> bool {
+    let ends = |c: &[f64], x: f64| {
+        let mut slopes = vec![0.0; c.len()];
+        chebyshev::derivative(c, 1.0, &mut slopes);
+        (chebyshev::value(c, x), chebyshev::value(&slopes, x))
+    };
+    let rows = left.coefficients.chunks_exact(POINTS);
+    let pairs = rows.zip(right.coefficients.chunks_exact(POINTS)).zip(sizes);
+    let (before, after) = (left.end - left.start, right.end - right.start);
+    let shorter = before.min(after);
+    pairs.enumerate().all(|(component, ((a, b), &size))| {
+        let noise = LOUD * tolerance(component, size).max(1e-15 * size);
+        let ((value, slope), (next, beyond)) = (ends(a, 1.0), ends(b, -1.0));
+        let turn = (slope / before - beyond / after).abs() * shorter;
+        (value - next).abs() <= noise && turn <= noise * (POINTS * POINTS) as f64
+    })
+}
+
+/// A bound on the values of a polynomial.
+fn size(coefficients: &[f64]) -> f64 {
+    coefficients.iter().map(|c| c.abs()).sum()
+}
+
+/// Whether the last coefficients are below the tolerance for values of these sizes.
+fn resolved(piece: &Piece, sizes: &[f64], tolerance: &impl Fn(usize, f64) -> f64) -> bool {
+    let rows = piece.coefficients.chunks_exact(piece.terms).zip(sizes);
+    rows.enumerate().all(|(component, (c, &size))| {
+        let tail = c[POINTS - TAIL..]
+            .iter()
+            .map(|c| c.abs())
+            .fold(0.0, f64::max);
+        tail <= tolerance(component, size).max(1e-15 * size)
+    })
+}
+
+/// Interpolation at the Chebyshev points, with its tables.
+struct Fitter {
+    dim: usize,
+    points: Vec<f64>,
+    basis: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Fitter {
+    fn new(dim: usize) -> Self {
+        let points: Vec<f64> = (0..POINTS)
+            .map(|i| {
+                let angle = std::f64::consts::PI * (i as f64 + 0.5) / POINTS as f64;
+                -angle.cos()
+            })
+            .collect();
+        let mut basis = Vec::new();
+        chebyshev::basis(&points, POINTS, &mut basis);
+        Self {
+            dim,
+            points,
+            basis,
+            values: vec![0.0; dim * POINTS],
+        }
+    }
+
+    fn piece(
+        &mut self,
+        start: f64,
+        end: f64,
+        function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+    ) -> Result<Piece, Error> {
+        for (x, values) in self
+            .points
+            .iter()
+            .zip(self.values.chunks_exact_mut(self.dim.max(1)))
+        {
+            let time = 0.5 * (start + end) + 0.5 * (end - start) * x;
+            function(time, values)?;
+        }
+        let mut coefficients = vec![0.0; self.dim * POINTS];
+        for (component, out) in coefficients.chunks_exact_mut(POINTS).enumerate() {
+            for (k, out) in out.iter_mut().enumerate() {
+                let row = &self.basis[k * POINTS..(k + 1) * POINTS];
+                let values = self.values[component..].iter().step_by(self.dim);
+                let sum: f64 = row.iter().zip(values).map(|(t, value)| t * value).sum();
+                *out = sum * if k == 0 { 1.0 } else { 2.0 } / POINTS as f64;
+            }
+        }
+        Ok(Piece::new(start, end, POINTS, coefficients))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fitted(breaks: &[f64], function: impl Fn(f64) -> f64) -> Approximation {
+        let tolerance = |_, size: f64| 1e-10 * size;
+        approximate(-1.0, 0.0, breaks, 1, tolerance, |t, out| {
+            out[0] = function(t);
+            Ok(())
+        })
+        .unwrap()
+    }
+
+    fn error(found: &Approximation, function: impl Fn(f64) -> f64) -> f64 {
+        let mut worst: f64 = 0.0;
+        // A piece that holds a jump is as short as numbers allow.
+        for piece in found
+            .pieces
+            .iter()
+            .filter(|piece| piece.end - piece.start > 1e-9)
+        {
+            for i in 1..10 {
+                let t = piece.start + 0.1 * f64::from(i) * (piece.end - piece.start);
+                let mut value = [0.0];
+                piece.value(t, &mut value);
+                worst = worst.max((value[0] - function(t)).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn a_smooth_function_needs_few_pieces_and_has_no_breaks() {
+        let found = fitted(&[], |t| (5.0 * t).sin());
+        assert!(found.pieces.len() <= 2 && found.breaks.is_empty());
+        assert!(error(&found, |t| (5.0 * t).sin()) < 1e-10);
+    }
+
+    #[test]
+    fn kinks_and_jumps_are_found() {
+        for kink in [-0.3, -0.5, -std::f64::consts::FRAC_1_PI] {
+            for function in [
+                Box::new(move |t: f64| (t - kink).abs()) as Box<dyn Fn(f64) -> f64>,
+                Box::new(move |t: f64| if t < kink { 1.0 } else { 2.0 }),
+            ] {
+                let found = fitted(&[], &function);
+                assert!(error(&found, &function) < 1e-8);
+                for point in &found.breaks {
+                    assert!((point.time - kink).abs() < 1e-6, "{point:?} {kink}");
+                }
+                assert_eq!(found.breaks.len(), 1);
+            }
+        }
+    }
+
+    #[test]
+    fn declared_breaks_are_joints() {
+        let found = fitted(&[-0.3, 4.0], |t| (t + 0.3).abs());
+        assert_eq!(found.pieces.len(), 2);
+        assert_eq!(
+            found.breaks,
+            [BreakingPoint {
+                time: -0.3,
+                order: 0
+            }]
+        );
+    }
+
+    #[test]
+    fn noise_is_refused() {
+        let mut state = 1_u64;
+        let refused = approximate(
+            -1.0,
+            0.0,
+            &[],
+            1,
+            |_, _| 1e-10,
+            |_, out| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                out[0] = (state >> 40) as f64;
+                Ok(())
+            },
+        );
+        assert!(matches!(refused, Err(Error::TooMuch { .. })));
+    }
+}

@@ -1,0 +1,415 @@
+//! A run from the start to the end: elements one after the other.
+
+use super::super::breaks::{BreakingPoint, Breaks};
+use super::super::history::Piece;
+use super::control::{self, Verdict};
+use super::element::{Begin, Element, Sweeps};
+use super::events::Watch;
+use super::nodes::{Nodes, nodes};
+use super::{Equation, Outcome, Problem, Solution};
+use crate::dde::chebyshev;
+use crate::{Error, Task};
+
+/// Elements shorter than this part of their time are rounding.
+const SHORTEST: f64 = 64.0 * f64::EPSILON;
+/// An element may end this part earlier than wanted to keep in step with the past.
+const IN_STEP: f64 = 0.45;
+/// Elements between two breaking points are made equal up to this many.
+const EQUAL: f64 = 4.0;
+/// Sweeps by Picard's from which on a Jacobian pays even where calls are cheap.
+const MANY_SWEEPS: u32 = 12;
+/// Sweeps from which on a Jacobian is evaluated anew.
+const STALE_SWEEPS: u32 = 4;
+/// Shortening where sweeps stall or the right-hand side is not finite.
+const RETREAT: f64 = 0.3;
+/// An element that holds its own delayed values takes many sweeps: it must be this many delays long
+/// to be worth them.
+const OVERLAP: f64 = 12.0;
+/// Elements to wait after one of that kind failed, at most.
+const PATIENCE: u32 = 4096;
+/// A neutral jump below this part of the tolerance is not followed.
+const FAINT: f64 = 0.02;
+
+/// Solve to the end of the interval or a terminal event.
+pub fn solve<E: Equation + ?Sized>(
+    problem: &Problem,
+    equation: &mut E,
+    task: &Task,
+) -> Result<Solution, Error> {
+    problem.check()?;
+    let mut run = Run::new(problem, equation)?;
+    while run.solution.end < problem.end {
+        task.check()?;
+        if let Some(outcome) = run.advance(equation, task)? {
+            run.solution.outcome = outcome;
+            break;
+        }
+        task.advance(1);
+    }
+    Ok(run.finished())
+}
+
+struct Run<'a> {
+    problem: &'a Problem,
+    solution: Solution,
+    breaks: Breaks,
+    /// Jumps ahead.
+    jump: usize,
+    watch: Watch,
+    element: Element,
+    state: Vec<f64>,
+    /// The point at which the next element starts, if it is a breaking point not yet followed.
+    fresh: Option<BreakingPoint>,
+    length: f64,
+    order: usize,
+    preferred: usize,
+    shortest_delay: f64,
+    /// Elements until one longer than a delay is tried, and how many it was last time.
+    wait: (u32, u32),
+    output: usize,
+}
+
+impl<'a> Run<'a> {
+    fn new<E: Equation + ?Sized>(problem: &'a Problem, equation: &mut E) -> Result<Self, Error> {
+        let mut breaks = Breaks::new(problem.start, &problem.delays, problem.neutral);
+        for point in &problem.breaks {
+            breaks.follow(*point);
+        }
+        for jump in &problem.jumps {
+            let order = u32::from(!jump.changes);
+            let time = jump.time;
+            breaks.add(BreakingPoint { time, order });
+        }
+        let first = problem
+            .jumps
+            .iter()
+            .position(|jump| jump.time > problem.start);
+        let preferred = control::preferred(problem.rtol, equation.is_costly());
+        let delays = problem.delays.iter().copied();
+        let mut run = Self {
+            problem,
+            solution: Solution {
+                times: Vec::new(),
+                values: Vec::new(),
+                history: problem.history.clone(),
+                end: problem.start,
+                event_times: Vec::new(),
+                event_values: Vec::new(),
+                breaks: Vec::new(),
+                calls: 0,
+                nodes: 0,
+                elements: 0,
+                refused: 0,
+                outcome: Outcome::Finished,
+            },
+            breaks,
+            jump: first.unwrap_or(problem.jumps.len()),
+            watch: Watch::new(&problem.events, equation, problem.start, &problem.initial)?,
+            element: Element::default(),
+            state: problem.initial.clone(),
+            fresh: None,
+            length: (problem.end - problem.start).min(problem.longest),
+            order: preferred,
+            preferred,
+            shortest_delay: delays.fold(f64::INFINITY, f64::min),
+            wait: (0, 1),
+            output: 0,
+        };
+        if problem.times.is_none() {
+            run.put(problem.start);
+        }
+        Ok(run)
+    }
+
+    /// Try elements until one is accepted; an outcome ends the run.
+    fn advance<E: Equation + ?Sized>(
+        &mut self,
+        equation: &mut E,
+        task: &Task,
+    ) -> Result<Option<Outcome>, Error> {
+        let start = self.solution.end;
+        let mut retried = false;
+        loop {
+            let end = self.next_end();
+            if end - start <= SHORTEST * start.abs().max(end.abs()) {
+                return Ok(Some(Outcome::Shrunk(start)));
+            }
+            let nodes = nodes(self.order);
+            let begin = Begin {
+                initial: &self.state,
+                history: &self.solution.history,
+                smooth: self.fresh.is_none_or(|point| point.order > 1),
+                jumps: (self.jumps_at(start), self.jumps_at(end)),
+            };
+            self.element.set(self.problem, nodes, (start, end), begin)?;
+            let ended = self.element.sweep(self.problem, nodes, equation, task)?;
+            let before = self.solution.refused;
+            match ended {
+                Sweeps::Converged(count) => {
+                    nodes.coefficients(&self.element.y, &mut self.element.coefficients);
+                    let verdict = control::judge(&self.element, nodes);
+                    if verdict.error <= 1.0 {
+                        self.renew_jacobian(count, equation, task)?;
+                        return self.accept(verdict, nodes, equation);
+                    }
+                    self.refuse(verdict);
+                }
+                Sweeps::Stalled => {
+                    // With a Jacobian of this place once more, then shorter.
+                    let age = self.element.newton.age;
+                    let known = self.element.newton.is_on() && age == 0;
+                    if retried || known || !self.element.linearise_at_start(equation, task)? {
+                        self.length = RETREAT * (end - start);
+                        retried = false;
+                    } else {
+                        retried = true;
+                    }
+                    self.solution.refused += 1;
+                }
+                Sweeps::NotFinite(node) => {
+                    if end - start <= 1e3 * SHORTEST * start.abs().max(end.abs()) {
+                        return Ok(Some(Outcome::NotFinite(self.element.t[node])));
+                    }
+                    self.length = RETREAT * (end - start);
+                    self.solution.refused += 1;
+                }
+            }
+            if self.solution.refused > before && end - start > self.shortest_delay {
+                let patience = (2 * self.wait.1).min(PATIENCE);
+                self.wait = (patience, patience);
+            }
+        }
+    }
+
+    /// The largest length that is allowed now.
+    fn longest(&self) -> f64 {
+        let longest = self.problem.longest;
+        let overlaps = !self.problem.neutral
+            && self.wait.0 == 0
+            && self.length.min(longest) >= OVERLAP * self.shortest_delay;
+        if overlaps {
+            longest
+        } else {
+            longest.min(self.shortest_delay)
+        }
+    }
+
+    /// Where the next element ends: at a breaking point, at the end, or in step with the past.
+    fn next_end(&self) -> f64 {
+        let start = self.solution.end;
+        let length = self.length.min(self.longest());
+        let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
+        let stop = ahead.min(self.problem.end);
+        let room = stop - start;
+        if room <= length * (1.0 + 1e-10) {
+            return stop;
+        }
+        let parts = (room / length * (1.0 - 1e-10)).ceil();
+        if parts <= EQUAL {
+            return start + room / parts;
+        }
+        let latest = start + length;
+        let joints = self.problem.delays.iter().filter_map(|delay| {
+            let history = &self.solution.history;
+            let index = history.locate(latest - delay)?;
+            let joint = history.piece(index)?.start + delay;
+            (joint > start + IN_STEP * length && joint <= latest).then_some(joint)
+        });
+        let joint = joints.fold(f64::NEG_INFINITY, f64::max);
+        if joint.is_finite() { joint } else { latest }
+    }
+
+    fn jumps_at(&self, time: f64) -> bool {
+        let near = self.jump.saturating_sub(1)..(self.jump + 1).min(self.problem.jumps.len());
+        self.problem.jumps[near]
+            .iter()
+            .any(|jump| jump.time == time)
+    }
+
+    /// A larger order or a shorter element.
+    fn refuse(&mut self, verdict: Verdict) {
+        let length = self.element.end - self.element.start;
+        self.solution.refused += 1;
+        if self.order < self.preferred {
+            self.order = control::order_for(self.order + 3, self.preferred);
+            self.length = length;
+        } else {
+            self.length = length * control::factor(verdict.error, self.order).min(0.8);
+        }
+    }
+
+    /// Have a Jacobian where sweeps were many, a new one where it is stale.
+    fn renew_jacobian<E: Equation + ?Sized>(
+        &mut self,
+        sweeps: u32,
+        equation: &mut E,
+        task: &Task,
+    ) -> Result<(), Error> {
+        let most = if self.element.newton.is_on() {
+            STALE_SWEEPS
+        } else {
+            MANY_SWEEPS
+        };
+        if sweeps > most && (self.element.newton.age > 1 || !self.element.newton.is_on()) {
+            self.element.linearise(equation, task)?;
+        }
+        Ok(())
+    }
+
+    fn accept<E: Equation + ?Sized>(
+        &mut self,
+        verdict: Verdict,
+        nodes: &Nodes,
+        equation: &mut E,
+    ) -> Result<Option<Outcome>, Error> {
+        let n = nodes.order + 1;
+        let (start, end) = (self.element.start, self.element.end);
+        let mut piece = Piece::new(start, end, n, self.element.coefficients.clone());
+        if self.problem.neutral {
+            piece = piece.with_slopes();
+        }
+        self.follow(&piece);
+        let (y, t) = (&self.element.y, &self.element.t);
+        let stop = self.watch.scan(equation, &piece, y, t)?;
+        let until = stop.unwrap_or(end);
+        self.solution.history.push(piece);
+        self.solution.elements += 1;
+        self.solution.end = until;
+        self.give(until, stop.is_some(), n);
+        for (state, row) in self.state.iter_mut().zip(self.element.y.chunks_exact(n)) {
+            *state = row[n - 1];
+        }
+        if stop.is_some() {
+            return Ok(Some(Outcome::Event));
+        }
+        self.fresh = self.breaks.reach(end);
+        self.solution
+            .breaks
+            .extend(self.fresh.filter(|_| end < self.problem.end));
+        self.jump_at(end, equation)?;
+        if !self.problem.keep {
+            self.solution.history.forget(end - self.problem.memory());
+        }
+        self.plan(verdict, end - start);
+        Ok(None)
+    }
+
+    /// Send the breaking point at the start of the element just accepted on its way.
+    fn follow(&mut self, piece: &Piece) {
+        let Some(point) = self.fresh.take() else {
+            return;
+        };
+        if self.problem.neutral
+            && point.order > 0
+            && let Some(before) = self.solution.history.latest()
+        {
+            let length = piece.end - piece.start;
+            let slope = |piece: &Piece, d: usize, x: f64| {
+                let row = &piece.slopes[d * piece.terms..(d + 1) * piece.terms];
+                chebyshev::value(row, x)
+            };
+            let scale = self.element.scale.iter().enumerate();
+            let turn = scale.map(|(d, scale)| {
+                length * (slope(piece, d, -1.0) - slope(before, d, 1.0)).abs() / scale
+            });
+            if turn.fold(0.0, f64::max) < FAINT {
+                return;
+            }
+        }
+        self.breaks.follow(point);
+    }
+
+    /// What a jump does at `time`.
+    fn jump_at<E: Equation + ?Sized>(&mut self, time: f64, equation: &mut E) -> Result<(), Error> {
+        let mut changed = false;
+        while let Some(jump) = self.problem.jumps.get(self.jump) {
+            if jump.time > time {
+                break;
+            }
+            if jump.changes {
+                equation.change(self.jump, time, &mut self.state)?;
+                changed = true;
+            }
+            self.jump += 1;
+        }
+        if changed {
+            self.watch.restart(equation, time, &self.state)?;
+            if self.problem.times.is_none() {
+                self.put(time);
+            }
+        }
+        Ok(())
+    }
+
+    /// Length and order of the next element.
+    fn plan(&mut self, verdict: Verdict, length: f64) {
+        let factor = control::factor(verdict.error, self.order);
+        let wanted = length * factor;
+        self.wait.0 = self.wait.0.saturating_sub(1);
+        // Held back by a delay, the wish to be longer adds up.
+        self.length = if wanted > self.shortest_delay && !self.problem.neutral {
+            wanted.max(self.length.min(OVERLAP * self.shortest_delay) * factor)
+        } else {
+            wanted
+        };
+        let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
+        let room = (ahead - self.solution.end).min(self.longest());
+        // Fewer nodes where it is not the error that limits the length.
+        self.order = if wanted > 1.5 * room.min(length) && wanted > room {
+            control::order_for(verdict.terms + 2, self.preferred)
+        } else {
+            self.preferred
+        };
+    }
+
+    /// Output of the element just accepted.
+    fn give(&mut self, until: f64, cut: bool, n: usize) {
+        let Some(times) = &self.problem.times else {
+            for node in 1..n {
+                let time = self.element.t[node];
+                if time < until || (time == until && !cut) {
+                    self.solution.times.push(time);
+                    let rows = self.element.y.chunks_exact(n);
+                    self.solution.values.extend(rows.map(|row| row[node]));
+                }
+            }
+            if cut {
+                self.value_at(until);
+            }
+            return;
+        };
+        // A time at the end belongs to the next element, if there is one: after the jump.
+        let last = cut || until >= self.problem.end;
+        while let Some(&time) = times.get(self.output) {
+            if time > until || (time == until && !last) {
+                break;
+            }
+            self.output += 1;
+            self.value_at(time);
+        }
+    }
+
+    /// The value of the last piece.
+    fn value_at(&mut self, time: f64) {
+        let mut value = vec![0.0; self.state.len()];
+        if let Some(piece) = self.solution.history.latest() {
+            piece.value(time, &mut value);
+        }
+        self.solution.times.push(time);
+        self.solution.values.extend(value);
+    }
+
+    /// The state itself.
+    fn put(&mut self, time: f64) {
+        self.solution.times.push(time);
+        self.solution.values.extend_from_slice(&self.state);
+    }
+
+    fn finished(mut self) -> Solution {
+        self.solution.calls = self.element.calls;
+        self.solution.nodes = self.element.evaluated;
+        self.solution.event_times = self.watch.times;
+        self.solution.event_values = self.watch.values;
+        self.solution
+    }
+}

@@ -1,0 +1,233 @@
+//! Runs against closed forms, bounds of memory, hostile equations.
+
+use super::super::breaks::BreakingPoint;
+use super::super::history::{History, Piece};
+use super::*;
+
+/// A right-hand side node by node: f(t, y, z, dz, out).
+struct Plain<F> {
+    function: F,
+    delays: usize,
+}
+
+impl<F: FnMut(f64, &[f64], &[f64], &[f64], &mut [f64])> Equation for Plain<F> {
+    fn slope(&mut self, at: Columns<'_>, out: &mut [f64], _task: &Task) -> Result<(), Error> {
+        let n = at.t.len();
+        let dim = at.y.len() / n;
+        let column = |values: &[f64], node: usize| -> Vec<f64> {
+            values.chunks_exact(n).map(|row| row[node]).collect()
+        };
+        assert_eq!(at.z.len(), self.delays * dim * n);
+        let mut f = vec![0.0; dim];
+        for node in 0..n {
+            let (y, z, dz) = (column(at.y, node), column(at.z, node), column(at.dz, node));
+            (self.function)(at.t[node], &y, &z, &dz, &mut f);
+            for (row, f) in out.chunks_exact_mut(n).zip(&f) {
+                row[node] = *f;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn constant(value: f64, start: f64, memory: f64) -> History {
+    History::new(vec![
+        Piece::new(start - memory, start, 1, vec![value]).with_slopes(),
+    ])
+}
+
+fn scalar(delay: f64, end: f64, rtol: f64) -> Problem {
+    Problem {
+        end,
+        initial: vec![1.0],
+        delays: vec![delay],
+        history: constant(0.0, 0.0, delay),
+        breaks: vec![BreakingPoint {
+            time: 0.0,
+            order: 0,
+        }],
+        rtol,
+        atol: vec![1e-2 * rtol],
+        longest: f64::INFINITY,
+        times: Some(vec![end]),
+        ..Problem::default()
+    }
+}
+
+/// y′ = −y(t − 1) from y = 0 before and 1 at 0: Σ (−1)^k (t − k)^k / k!.
+fn steps(t: f64) -> f64 {
+    let mut sum = 1.0;
+    let mut factorial = 1.0;
+    for k in 1..100 {
+        let base = t - f64::from(k);
+        if base <= 0.0 {
+            break;
+        }
+        factorial *= f64::from(k);
+        sum += (-1.0_f64).powi(k) * base.powi(k) / factorial;
+    }
+    sum
+}
+
+fn linear_decay() -> impl Equation {
+    Plain {
+        function: |_, _: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| out[0] = -z[0],
+        delays: 1,
+    }
+}
+
+#[test]
+fn the_tolerance_is_kept() {
+    for rtol in [1e-4, 1e-6, 1e-9, 1e-12] {
+        for end in [0.7, 1.0, 3.3, 10.0] {
+            let problem = scalar(1.0, end, rtol);
+            let found = solve(&problem, &mut linear_decay(), &Task::new()).unwrap();
+            let error = (found.values[0] - steps(end)).abs();
+            assert!(error < rtol, "{rtol} {end}: {error}");
+        }
+    }
+}
+
+#[test]
+fn memory_is_bounded_where_nobody_asks_for_the_past() {
+    // At this gain the solution oscillates for ever.
+    let mut equation = Plain {
+        function: |_, _: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| {
+            out[0] = -std::f64::consts::FRAC_PI_2 * z[0];
+        },
+        delays: 1,
+    };
+    let mut problem = scalar(1.0, 2000.0, 1e-8);
+    let most = solve(&problem, &mut equation, &Task::new()).unwrap();
+    assert!(most.elements > 300 && most.history.len() < 10);
+    problem.keep = true;
+    let all = solve(&problem, &mut equation, &Task::new()).unwrap();
+    assert_eq!(all.values, most.values);
+    assert_eq!(all.history.len() as u64, all.elements + 1);
+}
+
+#[test]
+fn a_delay_far_shorter_than_the_elements_costs_no_more() {
+    // y′ = −y(t − τ) decays like e^{st} with s = −e^{−sτ}; started on that solution.
+    let delay = 1e-4;
+    let mut s = -1.0_f64;
+    for _ in 0..50 {
+        s = -(-s * delay).exp();
+    }
+    let mut problem = scalar(delay, 10.0, 1e-9);
+    let past = approximate(
+        -delay,
+        0.0,
+        &[],
+        1,
+        |_, _| 1e-14,
+        |t, out| {
+            out[0] = (s * t).exp();
+            Ok(())
+        },
+    );
+    problem.history = History::new(past.unwrap().pieces);
+    let found = solve(&problem, &mut linear_decay(), &Task::new()).unwrap();
+    assert!((found.values[0] - (10.0 * s).exp()).abs() < 1e-9);
+    assert!(found.elements < 100, "{}", found.elements);
+}
+
+#[test]
+fn stiff_equations_take_long_elements() {
+    let mut equation = Plain {
+        function: |t: f64, y: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| {
+            out[0] = -1e6 * (y[0] - t.cos()) - t.sin() + 5e5 * (z[0] - (t - 1.0).cos());
+        },
+        delays: 1,
+    };
+    let mut problem = scalar(1.0, 5.0, 1e-8);
+    let past = approximate(
+        -1.0,
+        0.0,
+        &[],
+        1,
+        |_, _| 1e-13,
+        |t, out| {
+            out[0] = t.cos();
+            Ok(())
+        },
+    );
+    problem.history = History::new(past.unwrap().pieces);
+    let found = solve(&problem, &mut equation, &Task::new()).unwrap();
+    assert!((found.values[0] - 5.0_f64.cos()).abs() < 1e-8);
+    assert!(found.elements < 150, "{}", found.elements);
+}
+
+#[test]
+fn what_cannot_go_on_says_where() {
+    // y′ = y² + z ends at a finite time; the square root leaves its domain.
+    let mut explosive = Plain {
+        function: |_, y: &[f64], _: &[f64], _: &[f64], out: &mut [f64]| out[0] = y[0] * y[0],
+        delays: 1,
+    };
+    let found = solve(&scalar(1.0, 3.0, 1e-6), &mut explosive, &Task::new()).unwrap();
+    assert!(found.outcome != Outcome::Finished && (found.end - 1.0).abs() < 1e-3);
+    let mut root = Plain {
+        function: |t: f64, _: &[f64], _: &[f64], _: &[f64], out: &mut [f64]| {
+            out[0] = (0.5 - t).sqrt();
+        },
+        delays: 1,
+    };
+    let found = solve(&scalar(1.0, 3.0, 1e-6), &mut root, &Task::new()).unwrap();
+    assert!(found.outcome != Outcome::Finished && (found.end - 0.5).abs() < 1e-3);
+}
+
+#[test]
+fn bad_problems_are_refused() {
+    let good = scalar(1.0, 3.0, 1e-6);
+    let bad = [
+        Problem {
+            delays: vec![0.0],
+            ..good.clone()
+        },
+        Problem {
+            delays: vec![-1.0],
+            ..good.clone()
+        },
+        Problem {
+            delays: vec![f64::NAN],
+            ..good.clone()
+        },
+        Problem {
+            delays: vec![1e-20],
+            ..good.clone()
+        },
+        Problem {
+            end: -1.0,
+            ..good.clone()
+        },
+        Problem {
+            initial: vec![f64::NAN],
+            ..good.clone()
+        },
+        Problem {
+            rtol: 0.0,
+            ..good.clone()
+        },
+        Problem {
+            atol: vec![-1.0],
+            ..good.clone()
+        },
+        Problem {
+            longest: 0.0,
+            ..good.clone()
+        },
+        Problem {
+            times: Some(vec![4.0]),
+            ..good.clone()
+        },
+        Problem {
+            history: History::default(),
+            ..good
+        },
+    ];
+    for problem in bad {
+        let refused = solve(&problem, &mut linear_decay(), &Task::new());
+        assert!(matches!(refused, Err(Error::Argument(_))), "{problem:?}");
+    }
+}
