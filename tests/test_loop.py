@@ -191,7 +191,7 @@ def test_wrong_types_are_refused():
     [
         (lambda loop: loop.simulate([0.0, 1.0, 1.0]), "increasing"),
         (lambda loop: loop.simulate([]), "empty"),
-        (lambda loop: loop.simulate([0.0, math.nan]), "time holds nan"),
+        (lambda loop: loop.simulate([0.0, math.nan]), "time holds NaN"),
         (lambda loop: loop.simulate([[0.0]]), "one-dimensional"),
         (lambda loop: loop.simulate([0.0], [1.0, 2.0]), "one value for"),
         (lambda loop: loop.simulate([0.0], 1.0, reference_time=[0.0]), "reference_time"),

@@ -243,6 +243,9 @@ def fixed_step_run(
     command: float,
     reference: tuple[float, NDArray[np.float64], NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def on_samples(
+    since: NDArray[np.float64], start: float, sample_time: float, sample_phase: float
+) -> NDArray[np.float64]: ...
 
 @final
 class LinearLoop:
@@ -268,6 +271,20 @@ class LinearLoop:
         state: NDArray[np.float64],
         command: float,
         reference_before: float,
+        reference_times: NDArray[np.float64],
+        reference_values: NDArray[np.float64],
+        command_history: NDArray[np.float64],
+        sample_phase: float,
+    ) -> tuple[
+        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+    ]: ...
+    def respond(
+        self,
+        time: NDArray[np.float64],
+        ahead: float,
+        state: NDArray[np.float64],
+        command: float,
+        before: float,
         reference_times: NDArray[np.float64],
         reference_values: NDArray[np.float64],
         command_history: NDArray[np.float64],

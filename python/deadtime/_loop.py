@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._controllers import Controller
-from deadtime._loop_model import LoopModel
+from deadtime._loop_model import LoopModel, state_at_rest
 from deadtime._loop_run import settled_step, simulate_loop
 from deadtime._loop_stability import (
     characteristic,
@@ -573,6 +573,16 @@ class ControlLoop:
     @cached_property
     def _native(self) -> LinearLoop:
         return self._model.native(self._known_delay(), self.sample_time, self.limit)
+
+    @cached_property
+    def _rest_at_zero(self) -> tuple[NDArray[np.float64], float]:
+        return state_at_rest(self.plant, self.controller, self.parameters, 0.0, 0.0)
+
+    def _at_rest(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
+        """State in which the plant rests at `output`, and the command that keeps it there."""
+        if output == 0.0 and reference == 0.0:
+            return self._rest_at_zero
+        return state_at_rest(self.plant, self.controller, self.parameters, output, reference)
 
     def _refuse_hold(self, why: str) -> None:
         if self.is_sampled:

@@ -7,13 +7,13 @@ delay, so outputs are asked for that much later and their breaks are moved back.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._loop_model import state_at_rest
+from deadtime._deadtime import on_samples
 from deadtime._loop_sensitivities import output_and_input_slopes, slope_names
 from deadtime._response import Response
 from deadtime._validation import finite, real_array
@@ -50,7 +50,8 @@ class _Again:
 
     def __call__(self, times: Vector) -> Vector:
         since = times - self.start + self.ahead
-        return self.loop._native.simulate(since, np.empty(0), *self.arguments)[0]
+        arguments = _since_start(self.loop, self.start, self.arguments)
+        return self.loop._native.simulate(since, np.empty(0), *arguments)[0]
 
 
 class _Jumps(NamedTuple):
@@ -63,6 +64,10 @@ class _Jumps(NamedTuple):
     def at(self, times: Vector) -> Vector:
         place = np.searchsorted(self.times, times, side="right")
         return np.concatenate([[self.before], self.values])[place]
+
+    def just_before(self, time: float) -> float:
+        """The value from which it jumps, if it does, at `time`."""
+        return float(self.at(np.array([np.nextafter(time, -np.inf)]))[0])
 
 
 def simulate_loop(
@@ -78,48 +83,61 @@ def simulate_loop(
     sensitivities: Sequence[str] = (),
 ) -> Response:
     """Check the arguments of `ControlLoop.simulate` and run it."""
-    times = increasing("time", time)
+    times = _one_dimensional("time", time)
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
-    names = slope_names(loop, sensitivities)
-    start = float(times[0])
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
     jumps = reference_jumps(times, reference, reference_time, before)
-    past = jumps.at(np.array([np.nextafter(start, -np.inf)]))[0]
-    state, command = state_at_rest(
-        loop.plant, loop.controller, loop.parameters, initial, float(past)
-    )
-    native = loop._native
+    past = before if jumps.times[0] >= times[0] else jumps.just_before(float(times[0]))
     delay = loop._known_delay()
     ahead = delay if loop.delay_path == "measurement" else 0.0
     arguments = (
-        state,
-        command,
+        *loop._at_rest(initial, past),
         jumps.before,
-        _on_samples(jumps.times - start, start, loop.sample_time, sample_phase),
+        jumps.times,
         jumps.values,
-        np.ravel(real_array("command_history", command_history)),
+        _one_dimensional("command_history", command_history),
         finite("sample_phase", sample_phase),
     )
-    since = _on_samples(times - start, start, loop.sample_time, sample_phase)
-    outputs, inputs, output_breaks, input_breaks = native.simulate(since + ahead, since, *arguments)
-    slopes, input_slopes = output_and_input_slopes(
-        loop, names, (initial, float(past)), since, arguments
-    )
-
-    breaks = np.concatenate([output_breaks - ahead, input_breaks])
-    return Response(
-        time=times,
+    # The times are the caller's; what is kept must not change with them.
+    kept = times.copy()
+    outputs, inputs, breaks, seen = loop._native.respond(kept, ahead, *arguments)
+    response = Response._of_fresh(
+        time=kept,
         outputs=outputs,
         inputs=inputs,
-        breaks=_distinct(breaks[breaks >= 0.0], delay) + start,
-        reference=jumps.at(times),
+        breaks=breaks,
+        reference=seen,
         steady_state=steady_state(loop, float(jumps.values[-1])),
-        sensitivities=slopes,
-        input_sensitivities=input_slopes,
-        _dense=_Again(loop, start, ahead, arguments),
+        _dense=_Again(loop, float(kept[0]), ahead, arguments),
     )
+    if not sensitivities:
+        return response
+    names = slope_names(loop, sensitivities)
+    start = float(kept[0])
+    slopes, input_slopes = output_and_input_slopes(
+        loop,
+        names,
+        (initial, past),
+        _moved(loop, kept - start, start, arguments[-1]),
+        _since_start(loop, start, arguments),
+    )
+    return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
+
+
+def _since_start(loop: ControlLoop, start: float, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Arguments of the stepper, whose clock is zero at the start, from those in the caller's."""
+    state, command, before, times, values, history, phase = arguments
+    since = _moved(loop, times - start, start, phase)
+    return state, command, before, since, values, history, phase
+
+
+def _moved(loop: ControlLoop, since: Vector, start: float, phase: float) -> Vector:
+    """Times since the start, moved onto the samples they miss by rounding only."""
+    if loop.sample_time is None:
+        return since
+    return on_samples(since, start, loop.sample_time, phase)
 
 
 def settled_step(loop: ControlLoop, amplitude: float) -> Response:
@@ -150,6 +168,7 @@ def steady_state(loop: ControlLoop, reference: float) -> float | None:
 def reference_jumps(
     times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
 ) -> _Jumps:
+    """The reference as jumps: one number steps at the first of `times`."""
     values = real_array("reference", reference)
     if values.ndim == 0:
         if reference_time is not None:
@@ -167,11 +186,18 @@ def reference_jumps(
     return _Jumps(where, values, before)
 
 
+def _one_dimensional(name: str, given: ArrayLike) -> Vector:
+    array = real_array(name, given)
+    if array.ndim == 1:
+        return array
+    if array.ndim == 0:
+        return array.reshape(1)
+    raise ValueError(f"{name} has shape {array.shape}: give a one-dimensional array")
+
+
 def increasing(name: str, given: ArrayLike) -> Vector:
     """Return the times as an array, or raise where they do not increase."""
-    times = np.atleast_1d(real_array(name, given))
-    if times.ndim != 1:
-        raise ValueError(f"{name} has shape {times.shape}: give a one-dimensional array")
+    times = _one_dimensional(name, given)
     if not np.isfinite(times).all():
         raise ValueError(f"{name} holds {times[~np.isfinite(times)][0]}: give finite times")
     steps = np.diff(times)
@@ -182,19 +208,3 @@ def increasing(name: str, given: ArrayLike) -> Vector:
             "increasing times"
         )
     return times
-
-
-def _on_samples(since: Vector, start: float, sample_time: float | None, phase: float) -> Vector:
-    """Move times that miss a sample only by the rounding of the clock onto it."""
-    if sample_time is None:
-        return since
-    samples = phase + np.rint((since - phase) / sample_time) * sample_time
-    rounding = 4.0 * np.finfo(float).eps * (abs(start) + np.abs(since))
-    return np.where(np.abs(since - samples) <= rounding, samples, since)
-
-
-def _distinct(times: Vector, delay: float) -> Vector:
-    """Sorted times, those within rounding of one another as one."""
-    times = np.unique(times)
-    apart = np.diff(times) > 64 * np.finfo(float).eps * (times[1:] + delay)
-    return np.asarray(times[np.append(True, apart)[: times.size]])

@@ -80,6 +80,15 @@ class Response(ReadOnlyArrays):
         read_only(self.sensitivities)
         read_only(self.input_sensitivities)
 
+    @classmethod
+    def _of_fresh(cls, **fields: Any) -> Response:
+        """Of arrays that nobody else holds: nothing is copied or converted."""
+        for value in fields.values():
+            read_only(value)
+        response = object.__new__(cls)
+        response.__dict__.update(sensitivities={}, input_sensitivities={}, **fields)
+        return response
+
     def __repr__(self) -> str:
         rests = "" if self.steady_state is None else f", steady state {self.steady_state:g}"
         return (

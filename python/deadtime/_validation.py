@@ -53,6 +53,8 @@ def non_zero(name: str, value: SupportsFloat) -> float:
 
 def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return `values` as an array of floats, or raise where they are no real numbers."""
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values
     try:
         array = np.asarray(values)
     except ValueError as error:

@@ -1,9 +1,9 @@
 //! Bindings of `deadtime::dde`.
 
 use deadtime::dde::sampled::{self, LoopCells};
-use deadtime::dde::{Equations, LinearLoop, Reference, Start};
+use deadtime::dde::{Equations, LinearLoop, Reference, Request, Start, on_sample};
 use num_complex::Complex64;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::arrays::in_order;
@@ -105,6 +105,50 @@ impl PyLinearLoop {
         ))
     }
 
+    /// Output, command, breaking points of both and reference at `time`, in the caller's clock.
+    #[expect(
+        clippy::too_many_arguments,
+        clippy::type_complexity,
+        reason = "the start of a run and its reference; four arrays"
+    )]
+    fn respond<'py>(
+        &self,
+        py: Python<'py>,
+        time: Floats<'py>,
+        ahead: f64,
+        state: Floats<'py>,
+        command: f64,
+        before: f64,
+        reference_times: Floats<'py>,
+        reference_values: Floats<'py>,
+        command_history: Floats<'py>,
+        sample_phase: f64,
+    ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, Vector<'py>)> {
+        let start = Start {
+            state: in_order(&state).into_owned(),
+            command,
+            command_history: in_order(&command_history).into_owned(),
+            sample_phase,
+        };
+        let times = in_order(&time);
+        let (reference_times, reference_values) =
+            (in_order(&reference_times), in_order(&reference_values));
+        let request = Request {
+            times: &times,
+            ahead,
+            before,
+            reference_times: &reference_times,
+            reference_values: &reference_values,
+        };
+        let found = run_here(py, |task| self.inner.respond(&start, &request, task))?;
+        Ok((
+            found.outputs.into_pyarray(py),
+            found.inputs.into_pyarray(py),
+            found.breaks.into_pyarray(py),
+            found.reference.into_pyarray(py),
+        ))
+    }
+
     /// The transition matrix of a sampled loop, limit left out.
     fn transition_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (matrix, size) = run_here(py, |_| sampled::transition_matrix(&self.inner))?;
@@ -170,4 +214,21 @@ pub(crate) fn sampled_abscissa_grid<'py>(
         unstable.to_pyarray(py),
         status.to_pyarray(py),
     ))
+}
+
+/// Times since the start of a run at `start`, moved onto samples they miss by rounding only.
+#[pyfunction]
+pub(crate) fn on_samples<'py>(
+    py: Python<'py>,
+    since: Floats<'py>,
+    start: f64,
+    sample_time: f64,
+    sample_phase: f64,
+) -> Vector<'py> {
+    let sample = Some((sample_time, sample_phase));
+    let moved = in_order(&since)
+        .iter()
+        .map(|&t| on_sample(t, start, sample))
+        .collect::<Vec<_>>();
+    moved.into_pyarray(py)
 }

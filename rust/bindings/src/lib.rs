@@ -23,7 +23,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::boxes::{largest_stable_box, proved_boxes, robust_map, stability_radius};
     #[pymodule_export]
-    use super::dde::{PyLinearLoop, sampled_abscissa_grid};
+    use super::dde::{PyLinearLoop, on_samples, sampled_abscissa_grid};
     #[pymodule_export]
     use super::fixed_step::fixed_step_run;
     #[pymodule_export]

@@ -23,6 +23,7 @@ mod gauge;
 pub mod history;
 pub mod linear;
 pub mod propagator;
+mod response;
 mod row;
 pub mod sampled;
 pub mod scalar;
@@ -35,4 +36,5 @@ mod tests;
 
 pub use figures::{Criteria, Figures};
 pub use linear::{Equations, LinearLoop, Reference, Start, Trajectory};
+pub use response::{Request, Response, on_sample};
 pub use scalar::{Dual, Scalar};

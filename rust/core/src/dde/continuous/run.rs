@@ -87,15 +87,15 @@ pub(super) fn run<S: Scalar>(
         if is_instant {
             (u, scale) = (Series::constant(u.coefficients[0]), S::from(1.0));
         }
-        let y = expansion.output(equations, &w);
-
         if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
             wanted.output_break(t);
         }
-        if !is_instant {
-            wanted.measure(t, h, 1.0, &y);
+        if wanted.is_measured() && !is_instant {
+            wanted.measure(t, h, 1.0, &expansion.output(equations, &w));
         }
-        wanted.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
+        wanted.outputs_before(next.value() - tolerance, |time| {
+            expansion.output_at(equations, &w, (time - t) / h)
+        });
         wanted.inputs_before(next.value() - tolerance, |time| {
             saturate(u.at((time - t) / h), limit)
         });
@@ -138,7 +138,7 @@ pub(super) fn run<S: Scalar>(
             })?;
         }
         expansion.end(S::from(1.0), &mut x);
-        check_growth(&x, u.at(S::from(1.0)), next)?;
+        check_growth(&x, u.coefficients[0], next)?;
         t = next;
         elements += 1;
     }

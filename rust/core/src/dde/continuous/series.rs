@@ -19,6 +19,33 @@ const NOTHING: f64 = 1e-280;
 /// from overflowing.
 const TRIAL: f64 = 16.0;
 
+/// 1/1, 1/2, …: what an integration divides by.
+const PARTS: [f64; DEGREE] = {
+    let mut parts = [1.0; DEGREE];
+    let mut j = 1;
+    while j < DEGREE {
+        parts[j] = 1.0 / (j + 1) as f64;
+        j += 1;
+    }
+    parts
+};
+
+/// Σ c_j σ^j, c_j at `offset` + `stride` j of `terms`: even and odd powers apart, since each step
+/// of one sum waits for the step before.
+#[inline]
+fn horner<S: Scalar>(terms: &[S], offset: usize, stride: usize, degree: usize, sigma: S) -> S {
+    let square = sigma * sigma;
+    let (mut even, mut odd) = (S::default(), S::default());
+    for j in (0..=degree / 2).rev() {
+        let place = offset + 2 * j * stride;
+        even = even * square + terms[place];
+        if 2 * j < degree {
+            odd = odd * square + terms[place + stride];
+        }
+    }
+    even + odd * sigma
+}
+
 /// Coefficients of σ^j; those above `degree` are zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Series<S = f64> {
@@ -42,10 +69,7 @@ impl<S: Scalar> Series<S> {
 
     /// Value at σ.
     pub(crate) fn at(&self, sigma: S) -> S {
-        self.terms()
-            .iter()
-            .rev()
-            .fold(S::default(), |sum, &c| sum * sigma + c)
+        horner(&self.coefficients, 0, 1, self.degree, sigma)
     }
 
     /// The polynomial's values alone.
@@ -70,9 +94,11 @@ impl<S: Scalar> Series<S> {
     pub(crate) fn trim(&mut self) {
         let largest = |part: fn(S) -> f64| {
             let sizes = self.terms().iter().map(|&c| part(c).abs());
-            1e-3 * NEGLIGIBLE * sizes.fold(0.0, f64::max)
+            // No `f64::max`, whose rule for NaN costs more than all the rest.
+            1e-3 * NEGLIGIBLE * sizes.fold(0.0, |m, size| if size > m { size } else { m })
         };
-        let (value, slope) = (largest(S::value), largest(S::slope));
+        let value = largest(S::value);
+        let slope = if S::MOVES { largest(S::slope) } else { 0.0 };
         while self.degree > 0
             && self.coefficients[self.degree].value().abs() <= value
             && self.coefficients[self.degree].slope().abs() <= slope
@@ -146,7 +172,38 @@ impl<S: Scalar> Expansion<S> {
         w: &Series<S>,
         h: S,
     ) -> f64 {
-        let n = self.n;
+        // The same code for every n; the small ones are compiled with n known.
+        match self.n {
+            1 if a[0].is_nothing() => self.integrate(b[0], g[0], x[0], w, h),
+            1 => self.fill(1, a, b, g, x, w, h),
+            2 => self.fill(2, a, b, g, x, w, h),
+            3 => self.fill(3, a, b, g, x, w, h),
+            n => self.fill(n, a, b, g, x, w, h),
+        }
+        self.sound_part()
+    }
+
+    /// The recursion of one state without feedback: no term waits for the one before.
+    fn integrate(&mut self, b: S, g: S, x: S, w: &Series<S>, h: S) {
+        self.degree = (w.degree + 1).min(DEGREE);
+        let input = b * h;
+        self.terms[0] = x;
+        for ((term, &w), part) in self.terms[1..=self.degree]
+            .iter_mut()
+            .zip(&w.coefficients)
+            .zip(&PARTS)
+        {
+            *term = input * w * S::from(*part);
+        }
+        self.terms[1] += g * h;
+    }
+
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one argument a symbol of the recursion"
+    )]
+    #[inline(always)]
+    fn fill(&mut self, n: usize, a: &[S], b: &[S], g: &[S], x: &[S], w: &Series<S>, h: S) {
         self.terms[..n].copy_from_slice(x);
         self.degree = 0;
         for j in 0..DEGREE {
@@ -171,7 +228,6 @@ impl<S: Scalar> Expansion<S> {
                 break;
             }
         }
-        self.sound_part()
     }
 
     /// Largest part of the element on which the last coefficients are negligible beside the
@@ -225,12 +281,31 @@ impl<S: Scalar> Expansion<S> {
 
     /// x at the end of `part` of the element.
     pub(crate) fn end(&self, part: S, x: &mut [S]) {
-        x.fill(S::default());
-        for j in (0..=self.degree).rev() {
-            for (x, &c) in x.iter_mut().zip(&self.terms[j * self.n..]) {
-                *x = *x * part + c;
+        for (i, x) in x.iter_mut().enumerate() {
+            *x = self.state(i, part);
+        }
+    }
+
+    /// State `i` at σ.
+    fn state(&self, i: usize, sigma: S) -> S {
+        match self.n {
+            1 => horner(&self.terms, 0, 1, self.degree, sigma),
+            n => horner(&self.terms, i, n, self.degree, sigma),
+        }
+    }
+
+    /// y at σ.
+    pub(crate) fn output_at(&self, equations: &Equations<S>, w: &Series<S>, sigma: S) -> S {
+        let mut y = S::default();
+        for (i, &c) in equations.c.iter().enumerate() {
+            if !c.is_nothing() {
+                y += c * self.state(i, sigma);
             }
         }
+        if !equations.d.is_nothing() {
+            y += equations.d * w.at(sigma);
+        }
+        y
     }
 
     /// The series of `row` x + `gain` w + `constant`.
@@ -241,16 +316,30 @@ impl<S: Scalar> Expansion<S> {
         } else {
             self.degree.max(w.degree)
         };
-        for j in 0..=out.degree {
-            if j <= self.degree {
-                for (&k, &x) in row.iter().zip(&self.terms[j * self.n..]) {
-                    out.coefficients[j] += k * x;
-                }
+        match self.n {
+            1 => self.weigh(1, row, &mut out),
+            2 => self.weigh(2, row, &mut out),
+            3 => self.weigh(3, row, &mut out),
+            n => self.weigh(n, row, &mut out),
+        }
+        if !gain.is_nothing() {
+            for (sum, &w) in out.coefficients.iter_mut().zip(w.terms()) {
+                *sum += gain * w;
             }
-            out.coefficients[j] += gain * w.coefficients[j];
         }
         out.trim();
         out
+    }
+
+    /// Add `row` x to `out`.
+    #[inline(always)]
+    fn weigh(&self, n: usize, row: &[S], out: &mut Series<S>) {
+        let terms = self.terms[..(self.degree + 1) * n].chunks_exact(n.max(1));
+        for (sum, x) in out.coefficients.iter_mut().zip(terms) {
+            for (&k, &x) in row[..n].iter().zip(x) {
+                *sum += k * x;
+            }
+        }
     }
 
     /// Σ |k_i| max |x_i| on the element, or somewhat more: what rounding of `row` x is relative to.
