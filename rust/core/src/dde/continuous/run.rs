@@ -92,8 +92,8 @@ pub(super) fn run<S: Scalar>(
         if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
             wanted.output_break(t);
         }
-        if !is_instant {
-            wanted.measure(t, h, 1.0, &y);
+        if wanted.is_measured() {
+            wanted.measure(t.value(), h.value(), 1.0, &y.values());
         }
         wanted.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
         wanted.inputs_before(next.value() - tolerance, |time| {
