@@ -1,11 +1,12 @@
-//! The linear stepper: one simulation of ten seconds each, and the poles of a sampled loop.
+//! The linear stepper: one simulation of ten seconds each, the poles of a sampled loop, and sweeps.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
+use deadtime::dde::ensemble::{self, Sets};
 use deadtime::dde::sampled::{self, LoopCells};
-use deadtime::dde::{Equations, LinearLoop, Reference, Start};
+use deadtime::dde::{Criteria, Equations, LinearLoop, Reference, Start};
 
 const DELAY: f64 = 0.36;
 const SAMPLE_TIME: f64 = 0.065;
@@ -109,5 +110,45 @@ fn poles(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, simulations, poles);
+/// Metrics of ten seconds of many limited, sampled loops.
+fn sweeps(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("sweep 10 s, metrics");
+    group.sample_size(10);
+    let count = 10_000;
+    for (name, equations) in [("p", drone(1.0, 0.0)), ("pv filtered", filtered(1.0, 0.3))] {
+        let states = equations.states();
+        let mut rows = Vec::new();
+        for i in 0..count {
+            let part = f64::from(i) / f64::from(count);
+            let gain = 0.5 + 2.0 * part;
+            rows.extend_from_slice(&equations.a);
+            rows.extend_from_slice(&equations.b);
+            rows.extend_from_slice(&equations.e);
+            rows.push(-gain);
+            rows.extend_from_slice(&equations.k[1..]);
+            rows.extend_from_slice(&equations.c);
+            rows.extend([equations.l, gain, 0.0, 0.0]);
+            rows.extend([0.1 + 0.4 * part, SAMPLE_TIME, 1.0]);
+        }
+        let sets = Sets {
+            states,
+            rows: &rows,
+            amplitude: 1.0,
+            is_ahead: false,
+        };
+        let steady = vec![1.0; count as usize];
+        let criteria = Criteria {
+            rise: (0.1, 0.9),
+            settling: 0.02,
+        };
+        group.throughput(Throughput::Elements(count as u64));
+        group.bench_function(name, |bencher| {
+            let task = Task::new();
+            bencher.iter(|| ensemble::figures(black_box(&sets), &steady, 10.0, &criteria, &task));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, simulations, poles, sweeps);
 criterion_main!(benches);

@@ -294,13 +294,19 @@ def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int
 
 def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
     """Have the loop itself refuse what lies outside its ranges; the loop with numbers of all."""
+    gains = loop.controller.gains
     for name, array in arrays.items():
         flat = array.ravel()
-        if flat.size:
+        if flat.size and name not in gains:
             for place in {int(flat.argmin()), int(flat.argmax()), int(np.abs(flat).argmin())}:
                 loop = loop.replace(**{name: float(flat[place])})
-    if "delay" not in arrays or not arrays["delay"].size:
-        loop._known_delay()
+    loop._known_delay()
+    sizes = [np.abs(arrays.get(name, gain)) for name, gain in gains.items()]
+    if np.any(sum(sizes) == 0.0):
+        raise ValueError(
+            f"a set has {', '.join(gains)} of zero: its loop is open, give it a gain other than "
+            "zero"
+        )
     return loop
 
 

@@ -8,6 +8,7 @@
 
 use super::continuous::{Series, crossings};
 use super::figures::{Criteria, Figures, Levels, Record};
+use super::linear::slack;
 
 /// The measurements of one response between two times.
 #[derive(Debug, Clone)]
@@ -50,6 +51,10 @@ impl Gauge {
 
     /// The response is `y` of (t − `start`)/`length`, from 0 to `end`.
     pub(crate) fn segment(&mut self, start: f64, length: f64, end: f64, y: &Series) {
+        // What ends with the start may end in a jump there.
+        if start + end * length <= self.start + slack(self.start, self.start) {
+            return;
+        }
         let from = ((self.start - start) / length).max(0.0);
         let to = ((self.end - start) / length).min(end);
         if from > to || from.is_nan() || to.is_nan() {
@@ -69,7 +74,7 @@ impl Gauge {
 
         // The places where the output may be greatest or least, in order.
         zeros.clear();
-        if y.degree > 1 && self.concerns(&levels, low, high) {
+        if may_turn(y) && self.concerns(&levels, low, high) {
             crossings(&y.derivative(), 0.0, &mut zeros);
             zeros.retain(|&sigma| sigma > from && sigma < to);
             zeros.sort_by(f64::total_cmp);
@@ -162,6 +167,13 @@ impl Gauge {
             self.record.after = (value, value);
         }
     }
+}
+
+/// May the derivative change its sign on [0, 1]?
+fn may_turn(y: &Series) -> bool {
+    let slopes = y.terms().iter().enumerate().skip(2);
+    let others: f64 = slopes.map(|(j, c)| j as f64 * c.abs()).sum();
+    y.degree > 1 && others >= y.coefficients[1].abs()
 }
 
 /// Bounds of a polynomial on [0, 1].

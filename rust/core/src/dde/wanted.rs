@@ -44,10 +44,10 @@ impl<'a, S: Scalar> Wanted<'a, S> {
         self.gauge.is_some()
     }
 
-    /// y((t − `start`)/`length`) for local coordinates from 0 to `end`.
-    pub(crate) fn measure(&mut self, start: S, length: S, end: f64, y: &Series<S>) {
+    /// The output is `y` of (t − `start`)/`length`, from 0 to `end`.
+    pub(crate) fn measure(&mut self, start: f64, length: f64, end: f64, y: &Series) {
         if let Some(gauge) = &mut self.gauge {
-            gauge.segment(start.value(), length.value(), end, &y.values());
+            gauge.segment(start, length, end, y);
         }
     }
 

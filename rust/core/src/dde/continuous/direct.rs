@@ -147,7 +147,9 @@ pub(super) fn run<S: Scalar>(
             None => expansion.combine(&closed.c, S::default(), &nothing, closed.d * S::from(r)),
             Some(w) => expansion.combine(&equations.c, S::default(), &nothing, equations.d * w),
         };
-        wanted.measure(t, h, end, &y);
+        if wanted.is_measured() {
+            wanted.measure(t.value(), h.value(), end, &y.values());
+        }
         wanted.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
         wanted.inputs_before(next.value() - tolerance, |time| {
             held.unwrap_or_else(|| saturate(v.at((time - t) / h), limit))

@@ -19,7 +19,7 @@ mod run;
 mod series;
 
 pub(crate) use crossing::crossings;
-pub(crate) use series::{Expansion, Series};
+pub(crate) use series::{DEGREE, Series};
 
 use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory};
 use crate::dde::scalar::Scalar;

@@ -90,8 +90,9 @@ pub(super) fn run<S: Scalar>(
         if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
             wanted.output_break(t);
         }
-        if wanted.is_measured() && !is_instant {
-            wanted.measure(t, h, 1.0, &expansion.output(equations, &w));
+        if wanted.is_measured() {
+            let y = expansion.output(equations, &w);
+            wanted.measure(t.value(), h.value(), 1.0, &y.values());
         }
         wanted.outputs_before(next.value() - tolerance, |time| {
             expansion.output_at(equations, &w, (time - t) / h)

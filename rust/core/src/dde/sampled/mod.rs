@@ -11,6 +11,7 @@ use super::scalar::Scalar;
 mod grid;
 mod run;
 mod transition;
+mod window;
 
 pub use grid::{CellPoles, LoopCells, abscissa_grid};
 pub(crate) use run::run;

@@ -1,6 +1,5 @@
 //! Response of a sampled loop: sample by sample, exact, with output at any time.
 
-use crate::dde::continuous::{Expansion, Series};
 use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory, check_growth, saturate, slack};
 use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
@@ -8,6 +7,7 @@ use crate::dde::wanted::Wanted;
 use crate::{Error, Task};
 
 use super::Timing;
+use super::window::{Window, Windows};
 
 /// Samples between two looks at the task.
 const CHECK_EVERY: u64 = 1024;
@@ -36,6 +36,9 @@ pub(crate) fn run<S: Scalar>(
         x: start.state.clone(),
         scratch: start.state.clone(),
         held: S::default(),
+        windows: wanted
+            .is_measured()
+            .then(|| Windows::new(equations, timing.early, timing.late)),
         wanted,
     };
     let phase = start.sample_phase;
@@ -71,9 +74,6 @@ pub(crate) fn run<S: Scalar>(
     }
     Ok(walk.wanted.trajectory)
 }
-
-/// Room left when an element is shortened, so that the bound on its series holds with margin.
-const MARGIN: f64 = 0.95;
 
 /// The commands issued, by sample number; negative numbers are those before the start.
 struct Commands<'a, S> {
@@ -117,6 +117,8 @@ struct Walk<'a, S> {
     scratch: Vec<S>,
     /// The reference as held since the last sample.
     held: S,
+    /// For measurements, which begin with the first sample.
+    windows: Option<Windows>,
     wanted: Wanted<'a, S>,
 }
 
@@ -139,7 +141,7 @@ impl<S: Scalar> Walk<'_, S> {
             .inputs_before((now + early + late).value() - tolerance, |_| u);
         // An instant that grows with the parameter counts as well.
         if !early.is_nothing() {
-            self.measure(before, now, early);
+            self.measure(before, now, |windows| &windows.early);
             self.serve(before, now, (now + early).value() - tolerance);
             self.early
                 .apply(&self.x, &[before, self.held], &mut self.scratch);
@@ -148,7 +150,7 @@ impl<S: Scalar> Walk<'_, S> {
         if before != after {
             self.wanted.output_break(now + early);
         }
-        self.measure(after, now + early, late);
+        self.measure(after, now + early, |windows| &windows.late);
         self.serve(after, now + early, (now + early + late).value() - tolerance);
         self.late
             .apply(&self.x, &[after, self.held], &mut self.scratch);
@@ -169,13 +171,11 @@ impl<S: Scalar> Walk<'_, S> {
         let mut at = now;
         if into.value() < early.value() - tolerance {
             let switch = now + (early - into);
-            self.measure(before, at, switch - at);
             self.serve(before, at, switch.value() - tolerance);
             self.jump(switch - at, before);
             self.wanted.output_break(switch);
             at = switch;
         }
-        self.measure(after, at, end - at);
         self.serve(after, at, end.value() - tolerance);
         self.jump(end - at, after);
     }
@@ -191,33 +191,12 @@ impl<S: Scalar> Walk<'_, S> {
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 
-    /// Have the output measured over `length` from `from`, where the state is x, under constant w.
-    fn measure(&mut self, w: S, from: S, length: S) {
-        if !self.wanted.is_measured() {
-            return;
-        }
-        let equations = self.plant.equations();
-        let nothing = Series::constant(S::default());
-        let mut expansion = Expansion::new(&equations.a, self.x.len());
-        let mut x = self.x.clone();
-        let columns = equations.b.iter().zip(&equations.e);
-        let forcing: Vec<S> = columns.map(|(&b, &e)| b * w + e * self.held).collect();
-        let mut at = S::default();
-        while at.value() < length.value() {
-            let left = (length - at).value();
-            let mut h = S::from(left.min(expansion.trial));
-            let part = expansion.expand(&equations.a, &equations.b, &forcing, &x, &nothing, h);
-            if part < 1.0 {
-                expansion.shorten(MARGIN * part);
-                h *= S::from(MARGIN * part);
-            }
-            let y = expansion.combine(&equations.c, S::default(), &nothing, equations.d * w);
-            self.wanted.measure(from + at, h, 1.0, &y);
-            expansion.end(S::from(1.0), &mut x);
-            at += h;
-            if h.value() >= left {
-                break;
-            }
+    /// Have the output measured over one part of a sample, under constant w.
+    fn measure(&mut self, w: S, from: S, part: impl Fn(&Windows) -> &Window) {
+        if let Some(windows) = &self.windows {
+            let inputs = [w.value(), self.held.value()];
+            let equations = windows.equations();
+            part(windows).measure(equations, &self.x, inputs, from.value(), &mut self.wanted);
         }
     }
 
