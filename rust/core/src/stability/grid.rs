@@ -9,6 +9,7 @@
 
 use rayon::prelude::*;
 
+use super::blocks;
 use super::cell::{Cell, judge};
 use super::chart::Chart;
 use super::curves::{Vertex, join};
@@ -80,7 +81,10 @@ pub fn map(
     }
     match Rows::of(&map) {
         Some(rows) => rows.chart(),
-        None => map.cell_by_cell(),
+        None => match blocks::grid(&map).filter(|_| !question.abscissa) {
+            Some(grid) => grid.chart(task),
+            None => map.cell_by_cell(),
+        },
     }
 }
 

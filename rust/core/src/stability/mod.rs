@@ -15,6 +15,8 @@
 //! move, `robust` maps what holds over an interval.
 
 mod along;
+mod block;
+mod blocks;
 mod boxes;
 mod branch;
 mod cell;

@@ -1,0 +1,87 @@
+//! Counts of a map whose family is affine in neither of its parameters.
+//!
+//! The map is cut into blocks of a fixed size, so that results do not depend on the number of threads; each is
+//! divided as far as its boundaries demand (`block`). The cost grows with the length of the boundaries and with the
+//! number of blocks, not of cells.
+
+use rayon::prelude::*;
+
+use super::block::{Block, Grid};
+use super::chart::Chart;
+use super::grid::{Axis, Map};
+use super::reduced::Reduced;
+use crate::status::CellStatus;
+use crate::{Error, Task};
+
+/// Cells a side of a block.
+const SIDE: usize = 64;
+
+/// The family of a map over its grid; `None` where points are in disorder, or a root stays on the edge.
+pub(super) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
+    let [first, second] = map.axes;
+    let places = [first.parameter, second.parameter];
+    let demand = map.question.demand;
+    let reduced = Reduced::new(map.family, map.values, &places).demanding(demand);
+    let stays = demand.decay == 0.0 && reduced.refuse_root_at_zero().is_err();
+    let sorted = |axis: Axis<'_>| axis.points.is_sorted();
+    (sorted(first) && sorted(second) && !stays).then(|| Grid {
+        reduced,
+        points: [first.points, second.points],
+    })
+}
+
+impl Grid<'_, 2> {
+    /// The counts of all cells.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    pub(super) fn chart(&self, task: &Task) -> Result<Chart, Error> {
+        let (height, width) = (self.points[0].len(), self.points[1].len());
+        let mut chart = Chart::stable(height * width);
+        let bands = chart
+            .unstable
+            .par_chunks_mut(SIDE * width)
+            .zip(chart.status.par_chunks_mut(SIDE * width));
+        bands
+            .enumerate()
+            .try_for_each(|(band, (unstable, status))| {
+                let top = band * SIDE;
+                let bottom = top + unstable.len() / width;
+                let found: Result<Vec<_>, Error> = (0..width.div_ceil(SIDE))
+                    .into_par_iter()
+                    .map(|index| {
+                        let left = index * SIDE;
+                        let block = Block {
+                            start: [top, left],
+                            end: [bottom, (left + SIDE).min(width)],
+                        };
+                        let mut own = Grid {
+                            reduced: self.reduced.clone(),
+                            points: self.points,
+                        };
+                        own.refer_to_middle(&block);
+                        let cells = own.cells(block, task)?;
+                        task.advance(block.cells() as u64);
+                        Ok(cells)
+                    })
+                    .collect();
+                for (block, cell) in found?.into_iter().flatten() {
+                    for line in block.start[0] - top..block.end[0] - top {
+                        let places = line * width + block.start[1]..line * width + block.end[1];
+                        if cell.unstable != 0
+                            && let Some(places) = unstable.get_mut(places.clone())
+                        {
+                            places.fill(cell.unstable);
+                        }
+                        if cell.status != CellStatus::Ok
+                            && let Some(places) = status.get_mut(places)
+                        {
+                            places.fill(cell.status);
+                        }
+                    }
+                }
+                Ok(())
+            })?;
+        Ok(chart)
+    }
+}
