@@ -90,7 +90,8 @@ class StabilityMap(ReadOnlyArrays):
         Raises
         ------
         ValueError
-            If the family is affine in neither parameter, or the map is that of a sampled loop.
+            If the map is that of a sampled loop, or the family is affine in neither parameter and
+            a root stays at 0 whatever they are.
 
         Examples
         --------
@@ -304,7 +305,8 @@ def stability_map(
         How cells are proved: by all crossings of the boundary along each row of cells and one
         count for every row, or each cell by itself. Both give the same counts; the second is a
         check of the first, hundreds of times slower. Where the family is affine in neither
-        parameter, every cell is judged by itself anyway.
+        parameter, blocks of cells are proved to have no boundary in them, and the abscissa is
+        searched in each cell by itself.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
     progress : callable, optional

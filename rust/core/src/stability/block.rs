@@ -122,9 +122,17 @@ impl<const D: usize> Grid<'_, D> {
     ///
     /// # Errors
     /// [`Error::Interrupted`] alone.
-    pub(super) fn judge(&self, cell: &[usize; D], task: &Task) -> Result<Cell, Error> {
+    fn judge(&self, cell: &[usize; D], task: &Task) -> Result<Cell, Error> {
+        self.judge_at(self.point(cell), task)
+    }
+
+    /// The member at some values of the varying parameters.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    pub(super) fn judge_at(&self, point: [f64; D], task: &Task) -> Result<Cell, Error> {
         task.check()?;
-        let values = self.reduced.values_at(&self.point(cell));
+        let values = self.reduced.values_at(&point);
         match self.reduced.family.at(&values) {
             Ok(h) => judge(&h, self.reduced.demand, false, task),
             Err(_) => Ok(Cell::UNDECIDED),

@@ -1,14 +1,15 @@
-//! Counts of a map whose family is affine in neither of its parameters.
+//! Counts and boundaries of a map whose family is affine in neither of its parameters.
 //!
 //! The map is cut into blocks of a fixed size, so that results do not depend on the number of threads; each is
 //! divided as far as its boundaries demand (`block`). The cost grows with the length of the boundaries and with the
-//! number of blocks, not of cells.
+//! number of blocks, not of cells. Boundaries are the crossings of its rows (`transect`), joined as those of any map.
 
 use rayon::prelude::*;
 
 use super::block::{Block, Grid};
 use super::chart::Chart;
-use super::grid::{Axis, Map};
+use super::crossing::Crossing;
+use super::grid::{Axis, Map, put};
 use super::reduced::Reduced;
 use crate::status::CellStatus;
 use crate::{Error, Task};
@@ -28,6 +29,40 @@ pub(super) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
         reduced,
         points: [first.points, second.points],
     })
+}
+
+/// The crossings of the edge along every row, which runs along the axis with more points, and the index of that.
+///
+/// # Errors
+/// [`Error::Interrupted`] alone.
+pub(super) fn crossings(map: &Map<'_>) -> Result<Option<(usize, Vec<Vec<Crossing>>)>, Error> {
+    if grid(map).is_none() {
+        return Ok(None);
+    }
+    let [first, second] = map.axes;
+    let (along, axis, across) = if first.points.len() > second.points.len() {
+        (0, first, second)
+    } else {
+        (1, second, first)
+    };
+    let rows = (0..across.points.len()).into_par_iter().map(|index| {
+        let mut values = map.values.to_vec();
+        put(&mut values, across, index);
+        let reduced = Reduced::new(map.family, &values, &[axis.parameter]);
+        let mut row = Grid {
+            reduced: reduced.demanding(map.question.demand),
+            points: [axis.points],
+        };
+        row.refer_to_middle(&Block {
+            start: [0],
+            end: [axis.points.len()],
+        });
+        let found = row.crossings(map.task)?;
+        map.task.advance(axis.points.len() as u64);
+        Ok(found)
+    });
+    let rows: Result<_, Error> = rows.collect();
+    Ok(Some((along, rows?)))
 }
 
 impl Grid<'_, 2> {

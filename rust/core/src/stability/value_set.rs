@@ -270,6 +270,16 @@ pub(super) fn look<const D: usize>(local: &Local<D>, piece: &Piece, from: f64, t
     Look::Long
 }
 
+/// h, its slopes along the parameters and along the edge, at one place of a piece.
+pub(super) fn tangent<const D: usize>(
+    local: &Local<D>,
+    piece: &Piece,
+    t: f64,
+) -> (Complex64, [Complex64; D], Complex64) {
+    let own = Expansion::new(local, &Stretch::new(piece, t, t));
+    (own.value, own.slopes, own.turn)
+}
+
 /// A stretch on which h moves less than this many times what the box does is not divided if a
 /// member may well have a root in its middle.
 const COARSE: f64 = 0.3;
