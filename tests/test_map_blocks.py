@@ -44,7 +44,7 @@ def assert_same(family, ranges, shape, **options):
 
 
 @names
-@pytest.mark.parametrize("shape", [(75, 70), (1, 40), (40, 1), (2, 3)])
+@pytest.mark.parametrize("shape", [(75, 70), (2, 40), (40, 2), (2, 3)])
 def test_every_cell_is_the_one_counted_alone(name, shape):
     assert_same(*FAMILIES[name], shape)
 
@@ -66,7 +66,7 @@ def test_so_it_is_for_decay_and_damping(name, options):
 def test_points_need_not_be_even_nor_in_order():
     family, _ = FAMILIES["two delays"]
     uneven = np.geomspace(0.01, 3.0, 40)
-    chart = assert_same(family, {"T1": uneven, "T2": uneven}, None)
+    chart = assert_same(family, {"T1": uneven, "T2": uneven}, (9, 9))
     assert set(np.unique(chart.unstable)) >= {0, 2}
 
 
@@ -90,9 +90,9 @@ def test_a_root_that_stays_at_0_is_on_the_boundary_everywhere():
 def test_chains_make_infinitely_many():
     family, ranges = FAMILIES["chains vary"]
     chart = assert_same(family, ranges, (61, 20))
-    led = np.abs(chart.axes["a"]) > 1.0
-    assert (chart.unstable[led] == -1).all()
-    assert (chart.unstable[~led] >= 0).all()
+    modulus = np.abs(chart.axes["a"])
+    assert (chart.unstable[modulus > 1.0 + 1e-12] == -1).all()
+    assert (chart.unstable[modulus < 1.0 - 1e-12] >= 0).all()
 
 
 terms = st.tuples(
@@ -142,7 +142,7 @@ def test_boundaries_are_roots_on_the_axis(name):
 
 
 @pytest.mark.parametrize("options", [{}, {"decay": 0.2}, {"damping": (0.2, 0.5)}])
-def test_rows_that_meet_no_boundary_have_one_count(options):
+def test_counts_along_a_row_differ_by_what_crosses(options):
     family, ranges = FAMILIES["sum of delays"]
     chart = assert_same(family, ranges, (60, 61), **options)
     (across,) = (name for name in chart.names if name != chart.boundaries[0].along)

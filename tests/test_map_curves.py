@@ -252,8 +252,18 @@ def test_families_without_curves():
     sampled = dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, (4, 3))
     with pytest.raises(ValueError, match="sampled"):
         _ = sampled.boundaries
-    with pytest.raises(ValueError, match="unit circle"):
-        dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, decay=0.1)
+    with pytest.raises(ValueError, match="by a circle"):
+        dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, damping=(0.4, 2.0))
+
+
+def test_decay_of_sampled_loops_is_that_of_their_abscissa():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1), delay=LAG, sample_time=0.065)
+    chart = dtm.stability_map(loop, {"Kp": (0.1, 4), "Kv": (0, 0.5)}, (14, 13), decay=0.5)
+    np.testing.assert_array_equal(chart.stable, chart.abscissa < -0.5)
+    assert 0 < chart.stable.sum() < chart.stable.size
+    plain = dtm.stability_map(loop, {"Kp": (0.1, 4), "Kv": (0, 0.5)}, (14, 13))
+    np.testing.assert_array_equal(chart.abscissa, plain.abscissa)
+    assert (chart.unstable >= plain.unstable).all()
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,10 @@ impl Grid<'_, 1> {
             let zero = stretches
                 .as_ref()
                 .and_then(|stretches| self.zero(&claim.range, stretches, near, local));
-            let Some(stretches) = stretches.filter(|_| high - low > 2.0 * near) else {
+            // Numbers too close to each other cannot be parted.
+            let parts =
+                high - low > 2.0 * near && near > 4.0 * f64::EPSILON * low.abs().max(high.abs());
+            let Some(stretches) = stretches.filter(|_| parts) else {
                 intervals.push(keep(low, high, Known::Gap(zero.into_iter().collect())));
                 continue;
             };
