@@ -25,17 +25,20 @@ pub(super) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
     let reduced = Reduced::new(map.family, map.values, &places).demanding(demand);
     let stays = demand.decay == 0.0 && reduced.refuse_root_at_zero().is_err();
     let sorted = |axis: Axis<'_>| axis.points.is_sorted();
-    (sorted(first) && sorted(second) && !stays).then(|| Grid {
+    (sorted(first) && sorted(second) && !stays).then_some(Grid {
         reduced,
         points: [first.points, second.points],
     })
 }
 
+/// The index of the axis along the rows, and the crossings of each.
+pub(super) type Crossed = (usize, Vec<Vec<Crossing>>);
+
 /// The crossings of the edge along every row, which runs along the axis with more points, and the index of that.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.
-pub(super) fn crossings(map: &Map<'_>) -> Result<Option<(usize, Vec<Vec<Crossing>>)>, Error> {
+pub(super) fn crossings(map: &Map<'_>) -> Result<Option<Crossed>, Error> {
     if grid(map).is_none() {
         return Ok(None);
     }

@@ -8,7 +8,6 @@
 use rayon::prelude::*;
 
 use crate::dde::linear::{Equations, LinearLoop};
-use crate::elementary::exp;
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
@@ -216,7 +215,7 @@ impl AllRows<'_> {
             .map(|z| z.norm())
             .collect();
         let largest = sizes.iter().copied().fold(0.0, f64::max);
-        let circle = exp(-decay * self.sample_time.number(cell));
+        let circle = (-decay * self.sample_time.number(cell)).exp();
         let outside = sizes.iter().filter(|&&size| size > circle).count();
         let touching = sizes
             .iter()
