@@ -1,8 +1,8 @@
-//! Stability maps of five families, one thread: counts alone on a picture of 1000 by 1000 cells, with abscissa on
+//! Stability maps of six families, one thread: counts alone on a picture of 1000 by 1000 cells, with abscissa on
 //! 100 by 100, and how counts grow with the picture: 500, 1000 and 2000 cells a side.
 //!
 //! The velocity loop is neutral, with a filter on the derivative it is retarded of degree 3; the pendulum
-//! is unstable without control, the two gains of the last one have a delay each.
+//! is unstable without control, the two gains of the fifth have a delay each; the last one is a family over both delays.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
@@ -93,6 +93,30 @@ fn cases() -> Vec<Case> {
     ]
 }
 
+/// s + 1.2 e^(−s T1) + 0.8 e^(−s T2), affine in neither delay.
+fn delays_free() -> Case {
+    let term = |coefficient, power, slopes: [f64; 2]| Term {
+        coefficient,
+        exponents: vec![0; 2],
+        power,
+        delay: Affine {
+            constant: 0.0,
+            slopes: slopes.to_vec(),
+        },
+    };
+    let terms = vec![
+        term(1.0, 1, [0.0, 0.0]),
+        term(1.2, 0, [1.0, 0.0]),
+        term(0.8, 0, [0.0, 1.0]),
+    ];
+    let names = vec!["first".to_owned(), "second".to_owned()];
+    Case {
+        name: "delays_free",
+        family: Family::new(names, terms).expect("a good family"),
+        ranges: [(0.01, 6.0), (0.01, 6.0)],
+    }
+}
+
 /// Both ends included, as from Python.
 fn points((low, high): (f64, f64), side: u32) -> Vec<f64> {
     (0..side)
@@ -125,7 +149,7 @@ fn maps(criterion: &mut Criterion) {
             },
         );
     };
-    for case in cases() {
+    for case in cases().into_iter().chain([delays_free()]) {
         for side in [500, 1000, 2000] {
             measure("counts", &case, side, false);
         }

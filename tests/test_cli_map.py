@@ -113,7 +113,7 @@ def test_pictures(tmp_path, more):
         (["--along", "Kp", "--at", "nan"], "nan"),
         (["--along", "Kv", "--at", "1"], "chains"),
         (["--along", "Kp", "--at", "0", "--sample-time", "0.1"], "sample_time"),
-        (["--sample-time", "0.1", "--decay", "1"], "unit circle"),
+        (["--sample-time", "0.1", "--damping", "0.4", "2"], "circle"),
         (["--proof", "none"], "none"),
     ],
 )

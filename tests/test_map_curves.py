@@ -248,18 +248,22 @@ def test_demands_that_make_no_sense_are_refused(options, error, word):
 
 
 def test_families_without_curves():
-    T, L = dtm.parameters("T L")
-    family = s + 1.5 * delay(T) + 0.5 * delay(L)
-    chart = dtm.stability_map(family, {"T": (0.1, 2.0), "L": (0.1, 2.0)}, (8, 9), abscissa=False)
-    assert (chart.status == MapStatus.OK).all()
-    with pytest.raises(ValueError, match="affine in neither"):
-        _ = chart.boundaries
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1), delay=LAG, sample_time=0.065)
     sampled = dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, (4, 3))
     with pytest.raises(ValueError, match="sampled"):
         _ = sampled.boundaries
-    with pytest.raises(ValueError, match="unit circle"):
-        dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, decay=0.1)
+    with pytest.raises(ValueError, match="by a circle"):
+        dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, damping=(0.4, 2.0))
+
+
+def test_decay_of_sampled_loops_is_that_of_their_abscissa():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1), delay=LAG, sample_time=0.065)
+    chart = dtm.stability_map(loop, {"Kp": (0.1, 4), "Kv": (0, 0.5)}, (14, 13), decay=0.5)
+    np.testing.assert_array_equal(chart.stable, chart.abscissa < -0.5)
+    assert 0 < chart.stable.sum() < chart.stable.size
+    plain = dtm.stability_map(loop, {"Kp": (0.1, 4), "Kv": (0, 0.5)}, (14, 13))
+    np.testing.assert_array_equal(chart.abscissa, plain.abscissa)
+    assert (chart.unstable >= plain.unstable).all()
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ Ranges = dict[str, tuple[float, float]]
 Region = tuple[float, float, float, float]
 Count = Callable[[dtm.QuasiPolynomial, Region], int]
 
-Kp, Kv, Ki, Kd, K1, K2, T = dtm.parameters("Kp Kv Ki Kd K1 K2 T")
+Kp, Kv, Ki, Kd, K1, K2, T, T1 = dtm.parameters("Kp Kv Ki Kd K1 K2 T T1")
 CORNER = s**2 + 76.0 * s + 1444.0
 
 #: The neutral one within the gains for which its chains are stable, clear of those that touch them.
@@ -51,6 +51,10 @@ FAMILIES: dict[str, tuple[ParametricQuasiPolynomial, Ranges]] = {
     "two delays": (
         s + K1 * delay(0.3) + K2 * delay(1.1),
         {"K1": (-6.0, 6.0), "K2": (-6.0, 6.003)},
+    ),
+    "both delays free": (
+        s + 1.2 * delay(T1) + 0.8 * delay(T),
+        {"T1": (0.01, 6.0), "T": (0.01, 6.0)},
     ),
     "P, delay free": (s + Kp * delay(T), {"Kp": (0.011, 20.0), "T": (0.013, 2.0)}),
 }

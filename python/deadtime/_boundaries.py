@@ -68,8 +68,8 @@ def boundaries_of(
     found = family._family.boundaries(*_grid(family, axes), decay, damping, threads)
     if found is None:
         raise ValueError(
-            f"the family is affine in neither {names[0]} nor {names[1]}: its boundaries are known "
-            "only cell by cell, from the counts"
+            f"the family is affine in neither {names[0]} nor {names[1]}, and a root of all its "
+            "members stays at 0: cancel the factor s to see where the others cross"
         )
     along, curves = found
     across = axes[names[1 - along]]

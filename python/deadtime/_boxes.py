@@ -7,11 +7,10 @@ infinity; both are excluded for all members of a box at once, and the roots of o
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +29,7 @@ from deadtime._intervals import (
     ranges_of,
     side,
 )
-from deadtime._validation import finite, positive, real_array, thread_number
+from deadtime._validation import finite, positive, real_array, thread_number, whole_number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -247,7 +246,7 @@ def proved_boxes(
         native,
         placed(ends, places),
         share,
-        _number("max_boxes", max_boxes),
+        whole_number("max_boxes", max_boxes),
         thread_number(threads),
         progress,
     )
@@ -328,16 +327,6 @@ def largest_stable_box(
             + ": try other ranges"
         )
     return {name: found[place] for name, place in zip(names, places, strict=True)}
-
-
-def _number(name: str, value: SupportsIndex) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError as error:
-        raise TypeError(f"{name}={value!r}: give a whole number") from error
-    if not 1 <= number < 2**40:
-        raise ValueError(f"{name}={number}: give a whole number of at least 1")
-    return number
 
 
 def _named(

@@ -343,6 +343,7 @@ def sampled_abscissa_grid(
     scale: NDArray[np.float64],
     delay: NDArray[np.float64],
     sample_time: NDArray[np.float64],
+    decay: float,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]: ...

@@ -162,10 +162,11 @@ def sampled_grid(
     plant: Plant,
     controller: Controller,
     values: Mapping[str, ArrayLike],
+    decay: float = 0.0,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
-    """Abscissa, number of unstable poles and status of many sampled loops of one structure.
+    """Abscissa, number of poles outside exp(-decay Ts) and status of loops of one structure.
 
     `values` names every number of the loop; each is one for all cells or an array with one entry
     a cell. The feedback is linear in the controller's gains and the plant's input in its gain, so
@@ -192,7 +193,7 @@ def sampled_grid(
         size = cells if isinstance(group, slice) else len(group)
         report = None if progress is None else lambda n, done=done: progress(done + n)
         abscissa[group], unstable[group], status[group] = _grid_of_gains(
-            plant, controller, part, size, threads, report
+            plant, controller, part, size, decay, threads, report
         )
         done += size
     return abscissa, unstable, status
@@ -203,6 +204,7 @@ def _grid_of_gains(
     controller: Controller,
     arrays: Mapping[str, NDArray[np.float64]],
     cells: int,
+    decay: float,
     threads: int | None,
     progress: Callable[[int], object] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
@@ -227,6 +229,7 @@ def _grid_of_gains(
         scale,
         arrays["delay"],
         arrays["sample_time"],
+        decay,
         threads,
         progress,
     )

@@ -90,7 +90,8 @@ class StabilityMap(ReadOnlyArrays):
         Raises
         ------
         ValueError
-            If the family is affine in neither parameter, or the map is that of a sampled loop.
+            If the map is that of a sampled loop, or the family is affine in neither parameter and
+            a root stays at 0 whatever they are.
 
         Examples
         --------
@@ -304,7 +305,8 @@ def stability_map(
         How cells are proved: by all crossings of the boundary along each row of cells and one
         count for every row, or each cell by itself. Both give the same counts; the second is a
         check of the first, hundreds of times slower. Where the family is affine in neither
-        parameter, every cell is judged by itself anyway.
+        parameter, blocks of cells are proved to have no boundary in them, and the abscissa is
+        searched in each cell by itself.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
     progress : callable, optional
@@ -330,8 +332,8 @@ def stability_map(
     delays [1]_.
 
     Sampled: the poles are the eigenvalues of the transition matrix of the loop, hold and delay
-    included; unstable is outside the unit circle, and the abscissa is ln(rho)/Ts with rho the
-    spectral radius.
+    included; unstable is outside the circle of radius exp(-decay Ts), and the abscissa is
+    ln(rho)/Ts with rho the spectral radius.
 
     References
     ----------
@@ -353,12 +355,13 @@ def stability_map(
     question = _Question(bool(abscissa), finite("decay", decay), damping_demand(damping), proof)
     cells = len(axes[names[0]]) * len(axes[names[1]])
     if isinstance(family, ControlLoop) and family.is_sampled:
-        if question.decay != 0.0 or question.damping is not None:
+        if question.damping is not None:
             raise ValueError(
-                f"decay={question.decay}, damping={question.damping}: a sampled loop is judged by "
-                "the unit circle; use its abscissa, which is always computed"
+                f"damping={question.damping}: a sampled loop is judged by a circle; ask for decay="
             )
-        found = _map_sampled(family, numbers_of(family, names), names, axes, threads, progress)
+        found = _map_sampled(
+            family, numbers_of(family, names), names, axes, question.decay, threads, progress
+        )
     else:
         found = _map_family(family_of(family, names), names, axes, question, threads, progress)
     if progress is not None:
@@ -420,6 +423,7 @@ def _map_sampled(
     values: dict[str, Any],
     names: tuple[str, str],
     axes: dict[str, _Floats],
+    decay: float,
     threads: int | None,
     progress: _Progress | None,
 ) -> _Found:
@@ -431,7 +435,9 @@ def _map_sampled(
         if low < 0.0 or (name == "sample_time" and low == 0.0):
             raise ValueError(f"{name}={low}: delays are zero or more, sample times above zero")
     cells = values | {name: np.ravel(grid) for name, grid in grids.items()}
-    abscissa, unstable, status = sampled_grid(loop.plant, loop.controller, cells, threads, progress)
+    abscissa, unstable, status = sampled_grid(
+        loop.plant, loop.controller, cells, decay, threads, progress
+    )
     unsure = (status == MapStatus.BOUNDARY) | (status == MapStatus.UNDECIDED)
     unstable = np.where(unsure, np.int32(-2), unstable)
     shape = first.shape

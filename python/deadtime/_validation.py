@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import SupportsFloat
+from typing import SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["finite", "non_negative", "non_zero", "positive", "real_array", "thread_number"]
+__all__ = [
+    "finite",
+    "non_negative",
+    "non_zero",
+    "positive",
+    "real_array",
+    "thread_number",
+    "whole_number",
+]
 
 
 def finite(name: str, value: SupportsFloat) -> float:
@@ -64,14 +72,26 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array.astype(np.float64, copy=False)
 
 
+def whole_number(
+    name: str,
+    value: SupportsIndex,
+    *,
+    least: int = 1,
+    limit: int = 2**40,
+    otherwise: str = "",
+) -> int:
+    """Return `value` as an integer of at least `least` and below `limit`, or raise."""
+    try:
+        number = operator.index(value)
+    except TypeError as error:
+        raise TypeError(f"{name}={value!r}: give a whole number{otherwise}") from error
+    if not least <= number < limit:
+        raise ValueError(f"{name}={number}: give a whole number of at least 1{otherwise}")
+    return number
+
+
 def thread_number(threads: int | None) -> int | None:
     """Return `threads` as the native part takes it, or raise; it refuses zero and too many."""
     if threads is None:
         return None
-    try:
-        number = operator.index(threads)
-    except TypeError as error:
-        raise TypeError(f"threads={threads!r}: give a whole number, or None") from error
-    if not 0 <= number < 2**31:
-        raise ValueError(f"threads={number}: give a whole number of at least 1, or None")
-    return number
+    return whole_number("threads", threads, least=0, limit=2**31, otherwise=", or None")

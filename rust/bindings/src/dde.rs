@@ -161,11 +161,11 @@ impl PyLinearLoop {
     }
 }
 
-/// Abscissa, number of unstable poles and status of many sampled loops.
+/// Abscissa, number of poles slower than the decay and status of many sampled loops.
 ///
 /// Every array holds one entry for all cells or one entry a cell.
 #[pyfunction]
-#[pyo3(signature = (cells, states, a, b, k, l, scale, delay, sample_time, threads=None,
+#[pyo3(signature = (cells, states, a, b, k, l, scale, delay, sample_time, decay, threads=None,
     progress=None))]
 #[expect(
     clippy::too_many_arguments,
@@ -183,6 +183,7 @@ pub(crate) fn sampled_abscissa_grid<'py>(
     scale: Floats<'py>,
     delay: Floats<'py>,
     sample_time: Floats<'py>,
+    decay: f64,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(
@@ -204,7 +205,7 @@ pub(crate) fn sampled_abscissa_grid<'py>(
         sample_time: &sample_time,
     };
     let found = run(py, threads, progress.as_ref(), |task| {
-        sampled::abscissa_grid(&models, task)
+        models.judge(decay, task)
     })?;
     let abscissa: Vec<f64> = found.iter().map(|cell| cell.abscissa).collect();
     let unstable: Vec<i32> = found.iter().map(|cell| cell.unstable).collect();

@@ -94,8 +94,7 @@ impl PyFamily {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Charted<'py>> {
         let (first, second) = (in_order(&first), in_order(&second));
-        let axis = |parameter, points| Axis { parameter, points };
-        let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
+        let axes = axes(parameters, &first, &second);
         let question = Question {
             demand: demand(decay, damping),
             abscissa,
@@ -127,8 +126,7 @@ impl PyFamily {
         second: Floats<'py>,
     ) -> PyResult<Table<'py, f64>> {
         let (first, second) = (in_order(&first), in_order(&second));
-        let axis = |parameter, points| Axis { parameter, points };
-        let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
+        let axes = axes(parameters, &first, &second);
         let family = &self.inner;
         let found = run(py, None, None, |task| {
             stability::chains(family, &values, axes, task)
@@ -154,8 +152,7 @@ impl PyFamily {
         threads: Option<usize>,
     ) -> PyResult<Option<(usize, Vec<Curve<'py>>)>> {
         let (first, second) = (in_order(&first), in_order(&second));
-        let axis = |parameter, points| Axis { parameter, points };
-        let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
+        let axes = axes(parameters, &first, &second);
         let family = &self.inner;
         let found = run(py, threads, None, |task| {
             stability::boundaries(family, &values, axes, demand(decay, damping), task)
@@ -198,6 +195,11 @@ impl PyFamily {
             jumps.into_pyarray(py),
         ))
     }
+}
+
+fn axes<'a>(parameters: (usize, usize), first: &'a [f64], second: &'a [f64]) -> [Axis<'a>; 2] {
+    let axis = |parameter, points| Axis { parameter, points };
+    [axis(parameters.0, first), axis(parameters.1, second)]
 }
 
 /// Decay, and (damping ratio, horizon).

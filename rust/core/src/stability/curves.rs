@@ -27,8 +27,9 @@ const WINDOW: usize = 3;
 /// Two points further apart than this share of the range, in k or in ω relative to the largest, are not joined.
 const FARTHEST: f64 = 0.2;
 
-/// Arms that turn back are joined if the gap between them is no more than this many of their last steps.
-const TURN: f64 = 4.0;
+/// Arms that turn back are joined if the gap between them is no more than this many of their last steps: for a parabola whose
+/// top lies less than a row, h, above the last one, by δ, it is 2√δ/(√(δ + h) − √δ) ≤ 2/(√2 − 1) = 4.83 of them.
+const TURN: f64 = 5.5;
 
 /// A curve as it grows: its last two points in (k, ω).
 struct Arm {

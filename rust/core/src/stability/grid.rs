@@ -2,13 +2,15 @@
 //!
 //! Counts: if the family is affine in one of the two, every value of the other makes a row, whose
 //! crossings of the line give all its cells (`row`); the cost grows with the number of rows and of crossings, not
-//! of cells. Otherwise, and with `Proof::Cells`, every cell is counted alone. Either way a cell
+//! of cells. Otherwise blocks of cells are divided along the boundaries (`blocks`). With `Proof::Cells`, and for the
+//! abscissa of a family that is affine in neither, every cell is judged alone. Either way a cell
 //! equals [`judge`] of the family's member there, and results have the same bits for any number of threads.
 //! What cannot be formed (an overflow of a coefficient) is an undecided cell; delays that become negative
 //! are refused before any work is done.
 
 use rayon::prelude::*;
 
+use super::blocks;
 use super::cell::{Cell, judge};
 use super::chart::Chart;
 use super::curves::{Vertex, join};
@@ -33,7 +35,7 @@ pub struct Axis<'a> {
 /// How the count of a cell is proved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Proof {
-    /// By all crossings of its row, and one count for every run of them.
+    /// By all crossings of its row, or the proof that a block of cells has none, and one count for all in between.
     #[default]
     Curves,
     /// By a count of its own.
@@ -80,7 +82,10 @@ pub fn map(
     }
     match Rows::of(&map) {
         Some(rows) => rows.chart(),
-        None => map.cell_by_cell(),
+        None => match blocks::grid(&map).filter(|_| !question.abscissa) {
+            Some(grid) => grid.chart(task),
+            None => map.cell_by_cell(),
+        },
     }
 }
 
@@ -93,7 +98,8 @@ pub struct Boundaries {
     pub curves: Vec<Vec<Vertex>>,
 }
 
-/// The curves on which roots lie on the edge of what is demanded; `None` where the family is affine in neither parameter.
+/// The curves on which roots lie on the edge of what is demanded; `None` where the family is affine in neither parameter
+/// and a root of all members stays at 0, or points are in disorder.
 ///
 /// # Errors
 /// As for [`map`].
@@ -116,16 +122,19 @@ pub fn boundaries(
         },
         task,
     };
-    let Some(rows) = Rows::of(&map) else {
-        return Ok(None);
+    let (along, crossings) = match Rows::of(&map) {
+        Some(rows) => (rows.along, rows.crossings()?),
+        None => match blocks::crossings(&map)? {
+            Some(found) => found,
+            None => return Ok(None),
+        },
     };
-    let points = rows.axis().points;
+    let points = axes.get(along).map_or(&[][..], |axis| axis.points);
     let (Some(low), Some(high)) = (points.first(), points.last()) else {
         return Ok(None);
     };
-    let crossings = rows.crossings()?;
     Ok(Some(Boundaries {
-        along: rows.along,
+        along,
         curves: join(&crossings, (*low, *high)),
     }))
 }

@@ -119,6 +119,8 @@ pub(super) struct LocalRow<const D: usize> {
     pub(super) slopes: [f64; D],
     /// |∂_i d_j|.
     pub(super) rates: [f64; D],
+    /// How far d_j may be from that.
+    pub(super) spread: f64,
     /// Majorant of |d_j|.
     pub(super) longest: f64,
     /// What `delay` was added up from, in moduli: at least `longest`.
@@ -151,6 +153,7 @@ impl<const D: usize> Local<D> {
                     delay: 0.0,
                     slopes: row.slopes,
                     rates: row.slopes.map(f64::abs),
+                    spread: 0.0,
                     longest: 0.0,
                     size: 0.0,
                     coefficients: vec![Coefficient::ZERO; degree + 1],
@@ -183,7 +186,8 @@ impl<const D: usize> Local<D> {
                 own.size += row.slope_sizes[i] * reach[i];
                 spread += own.rates[i] * self.half[i];
             }
-            own.longest = own.delay.abs() + spread + 8.0 * f64::EPSILON * own.size;
+            own.spread = spread + 8.0 * f64::EPSILON * own.size;
+            own.longest = own.delay.abs() + own.spread;
             own.coefficients.fill(Coefficient::ZERO);
             for monomial in &row.monomials {
                 if let Some(slot) = own.coefficients.get_mut(monomial.power) {

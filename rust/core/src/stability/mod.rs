@@ -6,15 +6,18 @@
 //! Maps: `grid` judges the members over two parameters, by `rows` along which one gain varies. `row` is one of them, `pencil` its functions,
 //! `crossing` says where its roots cross the edge, `curves` joins the crossings of all rows to the boundaries;
 //! `branch` follows one root along a row and `leading` the rightmost. `along` lists the crossings of the imaginary
-//! axis as a single gain varies.
+//! axis as a single gain varies. Where a family is affine in neither parameter, `blocks` cuts the map into
+//! pieces, `block` divides one of them by the proofs of boxes, and `transect` finds the crossings of a row.
 //!
 //! Whole boxes of parameters: `reduced` is the family with its fixed parameters put in, `local` what
-//! a box knows of it, `value_set` the proof that h(iw) has no zero over a box and a stretch of w,
+//! a box knows of it, `value_set` the proof that h has no zero over a box and a stretch of the edge,
 //! `tail` that nothing comes from infinity, `prove` both together with a count. `boxes` divides ranges
 //! into proved boxes, `largest` looks for one large stable box, `radius` asks how far parameters may
 //! move, `robust` maps what holds over an interval.
 
 mod along;
+mod block;
+mod blocks;
 mod boxes;
 mod branch;
 mod cell;
@@ -35,6 +38,7 @@ mod robust;
 mod row;
 mod rows;
 mod tail;
+mod transect;
 mod value_set;
 
 pub use along::{Place, crossings_along};

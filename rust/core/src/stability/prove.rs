@@ -1,19 +1,22 @@
-//! One box of parameters: has every member the same number of unstable roots?
+//! One box of parameters: has every member the same number of offending roots?
 //!
-//! If no member has a root on the imaginary axis and none comes from infinity, the number of roots
-//! right of it is that at the centre, where it is counted. The axis up to the frequency W of `tail`
+//! If no member has a root on the edge of what is demanded and none comes from infinity, the number of roots
+//! right of it is that at the centre, where it is counted. The edge up to the radius W of `tail`
 //! is divided into stretches, each in halves until `value_set` proves it clear of roots or the box is
 //! too large for that. What a box has proved holds for its parts: a part looks only at the stretches
 //! that are left.
 
 use std::collections::VecDeque;
 
-use super::cell::ENDLESS;
+use num_complex::Complex64;
+
+use super::cell::{ENDLESS, judge};
+use super::demand::Piece;
 use super::local::{Local, Range};
 use super::reduced::Reduced;
 use super::tail::{Tail, tail};
 use super::value_set::{Look, look};
-use crate::roots::count_right_of;
+use crate::status::CellStatus;
 use crate::{Error, Task};
 
 /// Stretches that a box may fail on before it is divided.
@@ -26,17 +29,36 @@ const LOOKS: usize = 20_000;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Claim<const D: usize> {
     pub(super) range: Range<D>,
-    /// Stretches of the axis not known to be clear, the hardest last; `None` where no W is known.
-    pub(super) stretches: Option<Vec<(f64, f64)>>,
+    /// Stretches of the edge not known to be clear, the hardest last; `None` where no W is known.
+    pub(super) stretches: Option<Vec<Stretch>>,
+}
+
+/// A stretch of a piece of the edge, by the index of the piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stretch {
+    pub(super) piece: usize,
+    pub(super) from: f64,
+    pub(super) to: f64,
+}
+
+/// What is known of a box before its members are counted.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Examined {
+    /// No member has a root on the edge, none comes from infinity.
+    Clear,
+    /// Every member has infinitely many offending roots.
+    Endless,
+    /// Not known: the parameter that stands most in the way, and the stretches that are left.
+    Open(Option<usize>, Option<Vec<Stretch>>),
 }
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Verdict {
-    /// All members have so many unstable roots, or [`ENDLESS`].
+    /// All members have so many offending roots, or [`ENDLESS`].
     Proved(i32),
     /// The box is to be halved along the parameter, its halves inherit the stretches.
-    Halve(usize, Option<Vec<(f64, f64)>>),
+    Halve(usize, Option<Vec<Stretch>>),
     /// No parameter makes a difference to what is missing.
     Stuck,
 }
@@ -57,40 +79,70 @@ pub(super) fn judge_box<const D: usize>(
     local: &mut Local<D>,
     task: &Task,
 ) -> Result<Verdict, Error> {
+    let (parameter, left) = match examine(reduced, claim, local, task)? {
+        Examined::Endless => return Ok(Verdict::Proved(ENDLESS)),
+        Examined::Open(parameter, left) => (parameter, left),
+        Examined::Clear => {
+            let centre = reduced.values_at(&claim.range.centre());
+            if let Ok(h) = reduced.family.at(&centre) {
+                let cell = judge(&h, reduced.demand, false, task)?;
+                if cell.status == CellStatus::Ok {
+                    return Ok(Verdict::Proved(cell.unstable));
+                }
+            }
+            // The centre is beyond double precision.
+            (largest(&local.half), Some(Vec::new()))
+        }
+    };
+    Ok(parameter.map_or(Verdict::Stuck, |i| Verdict::Halve(i, left)))
+}
+
+/// Is a box clear of roots on the edge?
+pub(super) fn examine<const D: usize>(
+    reduced: &Reduced<'_, D>,
+    claim: &Claim<D>,
+    local: &mut Local<D>,
+    task: &Task,
+) -> Result<Examined, Error> {
     task.check()?;
     local.adopt(reduced, &claim.range);
     let mut left = match &claim.stretches {
         Some(stretches) => stretches.clone(),
-        None => match tail(local, reduced.degree) {
-            Tail::Endless => return Ok(Verdict::Proved(ENDLESS)),
-            Tail::Bounded(frequency) => vec![(0.0, frequency)],
-            Tail::Open(shares) => {
-                return Ok(largest(&shares).map_or(Verdict::Stuck, |i| Verdict::Halve(i, None)));
-            }
+        None => match tail(local, reduced.degree, reduced.demand.leftmost()) {
+            Tail::Endless => return Ok(Examined::Endless),
+            Tail::Bounded(radius) => stretches_within(&reduced.edge, radius),
+            Tail::Open(shares) => return Ok(Examined::Open(largest(&shares), None)),
         },
     };
-    let mut failed: Vec<(f64, f64)> = Vec::new();
+    let mut failed: Vec<Stretch> = Vec::new();
     let mut shares = None;
     for step in 0.. {
-        let Some((from, to)) = left.pop() else {
+        let Some(stretch) = left.pop() else {
             break;
         };
-        if from == to {
+        let Stretch { piece, from, to } = stretch;
+        let Some(along) = reduced.edge.get(piece).filter(|_| from < to) else {
             continue;
-        }
+        };
         if step % 256 == 255 {
             task.check()?;
         }
-        match look(local, from, to) {
+        match look(local, along, from, to) {
             Look::Clear => {}
             Look::Wide(parts) => {
                 shares.get_or_insert(parts);
-                failed.push((from, to));
+                failed.push(stretch);
             }
             Look::Long => {
                 let middle = from + 0.5 * (to - from);
-                left.push((middle, to));
-                left.push((from, middle));
+                left.push(Stretch {
+                    from: middle,
+                    ..stretch
+                });
+                left.push(Stretch {
+                    to: middle,
+                    ..stretch
+                });
             }
         }
         if failed.len() >= FAILURES || step >= LOOKS {
@@ -98,21 +150,32 @@ pub(super) fn judge_box<const D: usize>(
         }
     }
     if failed.is_empty() && left.is_empty() {
-        let centre = reduced.values_at(&claim.range.centre());
-        let counted = reduced
-            .family
-            .at(&centre)
-            .and_then(|h| count_right_of(&h, 0.0, task));
-        match counted.map(i32::try_from) {
-            Ok(Ok(count)) => return Ok(Verdict::Proved(count)),
-            Err(Error::Interrupted) => return Err(Error::Interrupted),
-            _ => {}
-        }
+        return Ok(Examined::Clear);
     }
     left.extend(failed);
-    // Where nothing failed, the work was too much, or the centre is beyond double precision.
-    let shares = shares.unwrap_or(local.half);
-    Ok(largest(&shares).map_or(Verdict::Stuck, |i| Verdict::Halve(i, Some(left))))
+    // Where nothing failed, the work was too much.
+    Ok(Examined::Open(
+        largest(&shares.unwrap_or(local.half)),
+        Some(left),
+    ))
+}
+
+/// The pieces of the edge as far as they lie within a radius.
+fn stretches_within(edge: &[Piece], radius: f64) -> Vec<Stretch> {
+    let pieces = edge.iter().enumerate().rev();
+    let stretches = pieces.map(|(piece, own)| {
+        let top = if own.from == Complex64::ZERO {
+            radius
+        } else {
+            own.within(radius)
+        };
+        Stretch {
+            piece,
+            from: 0.0,
+            to: own.length.min(top),
+        }
+    });
+    stretches.filter(|stretch| stretch.to > 0.0).collect()
 }
 
 /// The index of the largest share, if there is one above zero.

@@ -4,6 +4,7 @@
 //! imaginary axis, its modulus. What the sums and products below lose is counted by `digits`, in
 //! units of u = 2⁻⁵³ relative to the moduli of the summands: one for each factor and summand.
 
+use super::demand::{Demand, Piece};
 use super::family::{Affine, Family};
 use crate::Error;
 
@@ -19,6 +20,9 @@ pub(super) struct Reduced<'a, const D: usize> {
     pub(super) rows: Vec<Row<D>>,
     /// The highest power of s.
     pub(super) degree: usize,
+    /// What is demanded of its roots, and the edge of that.
+    pub(super) demand: Demand,
+    pub(super) edge: Vec<Piece>,
     /// Roundings that a coefficient may have seen.
     pub(super) digits: f64,
 }
@@ -94,10 +98,21 @@ impl<'a, const D: usize> Reduced<'a, D> {
             places: own,
             rows,
             degree,
+            demand: Demand::default(),
+            edge: Demand::default().pieces(),
             digits,
         };
         reduced.merge();
         reduced
+    }
+
+    /// The same family, this being demanded of its roots.
+    pub(super) fn demanding(self, demand: Demand) -> Self {
+        Self {
+            demand,
+            edge: demand.pieces(),
+            ..self
+        }
     }
 
     /// Rows of one delay become one.

@@ -51,7 +51,7 @@ impl<'a> Rows<'a> {
             .map(|(_, rows)| rows)
     }
 
-    pub(super) fn axis(&self) -> Axis<'a> {
+    fn axis(&self) -> Axis<'a> {
         let [first, second] = self.map.axes;
         if self.along == 0 { first } else { second }
     }

@@ -1,22 +1,24 @@
-//! No root comes from infinity, and none lies on the axis beyond a frequency W.
+//! No root right of a line Re s = x comes from infinity, and none has |s| beyond a radius W.
 //!
 //! Let n be the highest degree, a(p) the coefficient of sⁿ in the row of the smallest delay, b_j(p)
-//! those of the others, d_j(p) ≥ 0 their delays relative to it.
-//! 1. If min |a| > Σ max |b_j| over the box, the leading term of that row exceeds all others outside
-//!    one disc, for Re s ≥ 0 and all p: the roots there are bounded, and as p moves their number
-//!    changes only through roots on the axis.
-//! 2. On s = iw, powers of the same parity are collinear, the others perpendicular:
+//! those of the others, d_j(p) ≥ 0 their delays relative to it, e_j = e^(−x d_j).
+//! 1. If min |a| > Σ max |b_j e_j| over the box, the leading term of that row exceeds all others outside
+//!    one disc, for Re s ≥ x and all p: the roots there are bounded, and as p moves their number
+//!    changes only through roots on the edge of what is demanded. W is a radius for which
+//!    min |a| > Σ max |a_k| W^(k−n) + Σ max |b_jk e_j| W^(k−n).
+//! 2. For x = 0, only roots on the axis matter. On s = iw, powers of the same parity are collinear, the others perpendicular:
 //!    |P_j| / wⁿ ≤ (A_j² + B_j²)^(1/2) with A_j, B_j the sums of |b_jk| w^(k−n) over n − k even and odd,
 //!    and the first row is at least |a| − Σ |a_k| w^(k−n), n − k = 2, 4, …. The one rises with w,
 //!    the others fall: an inequality at W holds beyond. (Comparing moduli of whole rows, it holds
 //!    from a far smaller W than one between the terms where chains lie close to the axis.)
-//! 3. If Σ min |b_j| > max |a|, all d_j > 0 and no two of them equal, infinitely many roots lie right
-//!    of the axis for every p, robustly: under arbitrarily small changes of the delays (Avellar and
+//! 3. If Σ min |b_j e_j| > max |a|, all d_j > 0 and no two of them equal, infinitely many roots lie right
+//!    of the line for every p, robustly: under arbitrarily small changes of the delays (Avellar and
 //!    Hale 1980); with one b_j that exceeds all others and a, as it stands.
 //!
 //! Inequalities are tested with a relative margin of 1e-9, far above the rounding of such sums.
 
 use super::local::{Local, LocalRow};
+use crate::elementary::exp;
 
 const MARGIN: f64 = 1e-9;
 
@@ -25,7 +27,7 @@ const MARGIN: f64 = 1e-9;
 pub(super) enum Tail<const D: usize> {
     /// All members have infinitely many unstable roots.
     Endless,
-    /// No member has a root on the axis beyond this frequency, nor one from infinity.
+    /// No member has a root on the edge beyond this |s|, nor one from infinity.
     Bounded(f64),
     /// Neither is proved; the part of each parameter in what is missing.
     Open([f64; D]),
@@ -56,8 +58,20 @@ impl<const D: usize> LocalRow<D> {
     }
 }
 
-/// Judge the tail of a box.
-pub(super) fn tail<const D: usize>(local: &Local<D>, degree: usize) -> Tail<D> {
+/// Bounds on e^(−x d) for delays within a gap.
+fn weights(line: f64, gap: (f64, f64)) -> (f64, f64) {
+    if line == 0.0 {
+        return (1.0, 1.0);
+    }
+    let ends = (exp(-line * gap.0), exp(-line * gap.1));
+    (
+        ends.0.min(ends.1) * (1.0 - MARGIN),
+        ends.0.max(ends.1) * (1.0 + MARGIN),
+    )
+}
+
+/// Judge the tail of a box, roots right of Re s = `line` being looked for.
+pub(super) fn tail<const D: usize>(local: &Local<D>, degree: usize, line: f64) -> Tail<D> {
     let half = &local.half;
     let smallest = local
         .rows
@@ -76,23 +90,28 @@ pub(super) fn tail<const D: usize>(local: &Local<D>, degree: usize) -> Tail<D> {
     let mut ordered = true;
     let mut apart = true;
     let mut chains: Vec<&LocalRow<D>> = Vec::new();
+    let mut heaviest = vec![1.0; local.rows.len()];
     for (index, row) in local.rows.iter().enumerate() {
         if index == own {
             continue;
         }
-        let nearest = gap(first, row, half).0;
-        ordered &= nearest >= 0.0;
+        let away = gap(first, row, half);
+        ordered &= away.0 >= 0.0;
         let (low, high) = leading(row);
+        let (lightest, heavy) = weights(line, away);
+        if let Some(weight) = heaviest.get_mut(index) {
+            *weight = heavy;
+        }
         if high > 0.0 {
-            apart &= nearest > 0.0;
-            others_least += low;
-            others_most += high;
+            apart &= away.0 > 0.0;
+            others_least += low * lightest;
+            others_most += high * heavy;
             chains.push(row);
         }
     }
     if least * (1.0 - MARGIN) > others_most * (1.0 + MARGIN) && ordered {
-        return match frequency(local, own, degree) {
-            Some(frequency) => Tail::Bounded(frequency),
+        return match radius(local, own, degree, &heaviest, line == 0.0) {
+            Some(radius) => Tail::Bounded(radius),
             None => Tail::Open(shares(local, degree)),
         };
     }
@@ -127,23 +146,30 @@ fn shares<const D: usize>(local: &Local<D>, degree: usize) -> [f64; D] {
     std::array::from_fn(|i| local.rows.iter().map(|row| row.rates[i]).sum::<f64>() * local.half[i])
 }
 
-/// The frequency W of 2., within some percent of the least one.
-fn frequency<const D: usize>(local: &Local<D>, own: usize, degree: usize) -> Option<f64> {
+/// The radius W, on the `axis` that of 2., within some percent of the least one.
+fn radius<const D: usize>(
+    local: &Local<D>,
+    own: usize,
+    degree: usize,
+    heaviest: &[f64],
+    axis: bool,
+) -> Option<f64> {
     let holds = |w: f64| {
         let (mut first, mut others) = (0.0, 0.0);
-        for (index, row) in local.rows.iter().enumerate() {
-            // Sums over the powers of the parity of n and of the other one.
+        for (index, (row, weight)) in local.rows.iter().zip(heaviest).enumerate() {
+            // Sums over the powers that are collinear, and over those perpendicular to them.
             let (mut same, mut other) = (0.0, 0.0);
             for (k, c) in row.coefficients.iter().enumerate() {
                 let (low, high) = c.modulus(&local.half);
                 let power = (k..degree).fold(1.0, |power, _| power / w);
-                let part = match (index == own, (degree - k) % 2) {
-                    (true, 0) if k == degree => low,
-                    (true, 0) => -high * power,
-                    (true, _) => 0.0,
-                    (false, _) => high * power,
+                let collinear = !axis || (degree - k).is_multiple_of(2);
+                let part = match (index == own, collinear) {
+                    (true, true) if k == degree => low,
+                    (true, true) => -high * power,
+                    (true, false) => 0.0,
+                    (false, _) => weight * high * power,
                 };
-                if (degree - k).is_multiple_of(2) {
+                if collinear {
                     same += part;
                 } else {
                     other += part;

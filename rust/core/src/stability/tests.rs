@@ -3,8 +3,8 @@ use std::f64::consts::PI;
 use proptest::prelude::*;
 
 use super::{
-    Affine, Axis, Damping, Demand, ENDLESS, Family, Proof, Question, Term, UNKNOWN, boundaries,
-    judge, map,
+    Affine, Axis, Damping, Demand, ENDLESS, Family, Proof, Question, Term, UNKNOWN, Vertex,
+    boundaries, judge, map,
 };
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{count_right_of, spectral_abscissa};
@@ -429,7 +429,8 @@ fn boundaries_are_closed_forms_in_order() {
 
 #[test]
 fn a_curve_that_turns_back_is_one() {
-    // The pendulum s² − 1 + (Kp + Kd s) e^(−0.3 s): the gains of one row meet its curve twice.
+    // The pendulum s² − 1 + (Kp + Kd s) e^(−0.3 s): Kp = (1 + w²) cos 0.3w, Kd = (w + 1/w) sin 0.3w, which grows up to
+    // 6.2 at w = 6.8 and comes back to 0, so that most rows meet the curve twice.
     let none = [0.0, 0.0];
     let terms = vec![
         term(1.0, &[0, 0], 2, 0.0, &none),
@@ -438,20 +439,48 @@ fn a_curve_that_turns_back_is_one() {
         term(1.0, &[0, 1], 1, 0.3, &none),
     ];
     let family = Family::new(names("Kp Kd"), terms).unwrap();
-    let range = |low: f64, high: f64, count: u32| -> Vec<f64> {
-        (0..count)
-            .map(|i| low + (high - low) * f64::from(i) / f64::from(count - 1))
-            .collect()
-    };
-    let (first, second) = (range(1.5, 8.0, 131), range(0.0, 6.0, 5));
+    let (first, second) = (range(-130.0, 20.0, 31), range(0.02, 8.0, 400));
     let axes =
         [(0, &first[..]), (1, &second[..])].map(|(parameter, points)| Axis { parameter, points });
     let found = boundaries(&family, &none, axes, Demand::default(), &Task::new());
-    let curves = found.unwrap().unwrap().curves;
-    assert!(!curves.is_empty());
-    for curve in &curves {
-        for pair in curve.windows(2) {
-            assert!(pair[0].row.abs_diff(pair[1].row) <= 1);
-        }
+    let found = found.unwrap().unwrap();
+    // The real root crosses the other way where the pair comes down to it, at Kd = 0.3.
+    assert_eq!((found.along, found.curves.len()), (0, 3));
+    let curves = &found.curves;
+    let (real, pairs): (Vec<_>, Vec<_>) = curves.iter().partition(|curve| curve[0].omega == 0.0);
+    let mut real = real.into_iter().flatten();
+    assert!(real.all(|vertex| (vertex.gain - 1.0).abs() < 1e-12));
+    assert_eq!(pairs.len(), 1);
+    let curve = pairs[0];
+    for Vertex {
+        gain, row, omega, ..
+    } in curve
+    {
+        let (sine, cosine) = (0.3 * omega).sin_cos();
+        assert!((gain - (1.0 + omega * omega) * cosine).abs() < 1e-9);
+        assert!((second[*row] - (omega + 1.0 / omega) * sine).abs() < 1e-9);
     }
+    // Once through all frequencies, rows and directions turning in one place.
+    let up = curve[0].omega < curve[1].omega;
+    assert!(
+        curve
+            .windows(2)
+            .all(|pair| (pair[0].omega < pair[1].omega) == up)
+    );
+    let turns: Vec<_> = curve
+        .windows(2)
+        .filter(|pair| pair[0].row == pair[1].row)
+        .collect();
+    assert_eq!(turns.len(), 1);
+    assert_eq!(turns[0][0].jump, -turns[0][1].jump);
+    let top = turns[0][0].row;
+    assert!(second[top] < 6.21 && second[top + 1] > 6.19);
+    for row in second.iter().position(|kd| *kd > 0.31).unwrap()..=top {
+        assert_eq!(curve.iter().filter(|vertex| vertex.row == row).count(), 2);
+    }
+}
+
+fn range(low: f64, high: f64, count: u32) -> Vec<f64> {
+    let point = |i| low + (high - low) * f64::from(i) / f64::from(count - 1);
+    (0..count).map(point).collect()
 }

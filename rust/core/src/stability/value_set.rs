@@ -1,24 +1,26 @@
-//! Is h(iw; p) ≠ 0 for all p in a box and all w in a stretch?
+//! Is h(s; p) ≠ 0 for all p in a box and all s in a stretch of the edge?
 //!
-//! With centre c, w_0 and p = c + δ, w = w_0 + η, |δ_i| ≤ r_i, |η| ≤ ρ, Taylor's theorem gives
-//!     h = h_0 + Σ δ_i ∂_i h + η ∂_w h + E,  |E| ≤ ½ Σ_ab x_a x_b max |∂_a ∂_b h|,  x = (r, ρ),
+//! With centres c, s_0 and p = c + δ, s = s_0 + ηe, |δ_i| ≤ r_i, |η| ≤ ρ, |e| = 1, Taylor's theorem gives
+//!     h = h_0 + Σ δ_i ∂_i h + η ∂_η h + E,  |E| ≤ ½ Σ_ab x_a x_b max |∂_a ∂_b h|,  x = (r, ρ),
 //! the first part of which fills a zonotope. It lies clear of 0 by more than |E| if, for some n,
 //!     |Re n̄ h_0| − Σ_a |Re n̄ ∂_a h| x_a > |n| max |E|.
 //! Tried are the normals of the edges, one of which separates 0 from a polygon if any line does, and
-//! h_0 itself (for the disc around it). With f = P e^(−iwd), P = P(iw; p), dashes for ∂/∂s:
-//!     ∂_i f = (P_i − iw d_i P) e^(…),  ∂_w f = i (P′ − d P) e^(…),
-//!     |∂_w² f| ≤ |P″| + 2|d P′| + d²|P|,  |∂_w ∂_i f| ≤ |P_i′| + |d P_i| + |d_i| (|P| + w|P′| + w|d P|),
-//!     |∂_i ∂_l f| ≤ |P_il| + w (|d_i P_l| + |d_l P_i|) + w² |d_i d_l P|,
-//! bounded by majorants at the upper end of the stretch. Or, whatever the delays are, one row outweighs
-//! the others: |P_j| stays within max |P_j′| ρ + Σ max |P_i| r_i of its value at w_0. Rounding: as in `quasipoly::probe`, a value
-//! or slope of degree n is wrong by at most u (16 (n + 1) + 4 m + 16 wS) of its majorant for m rows, S
+//! h_0 itself (for the disc around it). With f = P e^(−sd), dashes for ∂/∂s, w = |s|, W = |e^(−sd)|:
+//!     ∂_i f = (P_i − s d_i P) e^(…),  ∂_η f = e (P′ − d P) e^(…),
+//!     |∂_η² f| ≤ W (|P″| + 2|d P′| + d²|P|),  |∂_η ∂_i f| ≤ W (|P_i′| + |d P_i| + |d_i| (|P| + w|P′| + w|d P|)),
+//!     |∂_i ∂_l f| ≤ W (|P_il| + w (|d_i P_l| + |d_l P_i|) + w² |d_i d_l P|),
+//! bounded by majorants at the upper end of the stretch. Or one row outweighs the others: |f_j| stays within
+//! max W ((|P_j′| + |Re e| |d P_j|) ρ + Σ (|P_i| + |Re s| |d_i P_j|) r_i) of its value at s_0. Rounding: as in `quasipoly::probe`,
+//! a value or slope of degree n is wrong by at most u (16 (n + 1) + 4 m + 16 wS) of its majorant for m rows, S
 //! the sum of the moduli that make up d, plus `digits` of the coefficients; directions and products with them
 //! lose 32 u more. The same again is left for a member being formed in double precision.
 
 use num_complex::Complex64;
 
+use super::demand::Piece;
 use super::local::{Local, LocalRow};
-use crate::elementary::sin_cos;
+use crate::elementary::{exp, sin_cos};
+use crate::quasipoly::modulus;
 
 /// Half an ulp of 1, with room for what the bounds lose in being computed.
 const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
@@ -29,7 +31,7 @@ const FLOOR: f64 = 1e-150;
 /// Below this nothing is claimed.
 const SMALLEST: f64 = 1e-140;
 
-/// What a look at one stretch of the axis says.
+/// What a look at one stretch of the edge says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Look<const D: usize> {
     /// No member has a root there.
@@ -40,12 +42,70 @@ pub(super) enum Look<const D: usize> {
     Wide([f64; D]),
 }
 
+/// A stretch of the edge: s_0 + η e, |η| ≤ ρ.
+struct Stretch {
+    middle: Complex64,
+    along: Complex64,
+    rho: f64,
+    /// The largest |s|.
+    far: f64,
+    /// Least and largest Re s.
+    reals: (f64, f64),
+}
+
+/// s z; on the imaginary axis with half the work.
+#[inline(always)]
+fn times<const AXIS: bool>(s: Complex64, z: Complex64) -> Complex64 {
+    if AXIS {
+        Complex64::new(-s.im * z.im, s.im * z.re)
+    } else {
+        s * z
+    }
+}
+
+impl Stretch {
+    fn new(piece: &Piece, from: f64, to: f64) -> Self {
+        let t = from + 0.5 * (to - from);
+        let rho = (t - from).max(to - t) * (1.0 + 2.0 * f64::EPSILON);
+        let middle = piece.from + piece.along * t;
+        let (lean, room) = (
+            piece.along.re.abs() * rho,
+            8.0 * f64::EPSILON * middle.re.abs(),
+        );
+        Self {
+            middle,
+            along: piece.along,
+            rho,
+            far: if middle.re == 0.0 && lean == 0.0 {
+                to
+            } else {
+                (modulus(middle) + rho) * (1.0 + 8.0 * f64::EPSILON)
+            },
+            reals: (middle.re - lean - room, middle.re + lean + room),
+        }
+    }
+
+    fn is_on_axis(&self) -> bool {
+        self.reals == (0.0, 0.0)
+    }
+
+    /// Bound on |e^(−sd)| for delays up to `spread` around `delay`.
+    fn heaviest(&self, delay: f64, spread: f64) -> f64 {
+        let (low, high) = self.reals;
+        let products = [delay - spread, delay + spread].map(|d| (-d * low).max(-d * high));
+        exp(products[0].max(products[1])) * ROOM
+    }
+}
+
+/// Room for the rounding of a bound.
+const ROOM: f64 = 1.0 + 1e-9;
+
 /// First and second order of h around the middle of a stretch.
 struct Expansion<const D: usize> {
     value: Complex64,
     slopes: [Complex64; D],
     turn: Complex64,
-    /// |∂_w² h|, |∂_w ∂_i h| and |∂_i ∂_l h|.
+    /// |∂_η² h|, |∂_η ∂_i h| and |∂_i ∂_l h|.
     bend: f64,
     mixed: [f64; D],
     bends: [[f64; D]; D],
@@ -55,7 +115,7 @@ struct Expansion<const D: usize> {
     rounding: f64,
 }
 
-/// Majorants of a polynomial over the box at one frequency: P, P′, P″.
+/// Majorants of a polynomial over the box up to one |s|: P, P′, P″.
 #[inline(always)]
 fn majorants<const D: usize>(row: &LocalRow<D>, w: f64) -> (f64, f64, f64) {
     let (mut p, mut dp, mut ddp) = (0.0, 0.0, 0.0);
@@ -68,8 +128,19 @@ fn majorants<const D: usize>(row: &LocalRow<D>, w: f64) -> (f64, f64, f64) {
 }
 
 impl<const D: usize> Expansion<D> {
-    fn new(local: &Local<D>, w: f64, rho: f64, top: f64) -> Self {
+    fn new(local: &Local<D>, stretch: &Stretch) -> Self {
+        if stretch.is_on_axis() {
+            Self::at::<true>(local, stretch)
+        } else {
+            Self::at::<false>(local, stretch)
+        }
+    }
+
+    fn at<const AXIS: bool>(local: &Local<D>, stretch: &Stretch) -> Self {
         let half = &local.half;
+        let (s, top, rho) = (stretch.middle, stretch.far, stretch.rho);
+        let lean = stretch.along.re.abs();
+        let leftmost = stretch.reals.0.abs().max(stretch.reals.1.abs());
         let mut own = Self {
             value: Complex64::ZERO,
             slopes: [Complex64::ZERO; D],
@@ -83,46 +154,52 @@ impl<const D: usize> Expansion<D> {
         let (mut largest, mut all) = (0.0f64, 0.0);
         for row in &local.rows {
             let (mut p, mut dp) = (Complex64::ZERO, Complex64::ZERO);
-            let times_iw = |z: Complex64| Complex64::new(-w * z.im, w * z.re);
             for c in row.coefficients.iter().rev() {
-                dp = times_iw(dp) + p;
-                p = times_iw(p) + c.value;
+                dp = times::<AXIS>(s, dp) + p;
+                p = times::<AXIS>(s, p) + c.value;
             }
             let turned = if row.delay == 0.0 {
                 Complex64::ONE
             } else {
-                let (sine, cosine) = sin_cos(row.delay * w);
-                Complex64::new(cosine, -sine)
+                let (sine, cosine) = sin_cos(row.delay * s.im);
+                let weight = if AXIS { 1.0 } else { exp(-row.delay * s.re) };
+                Complex64::new(weight * cosine, -weight * sine)
             };
             let value = p * turned;
             let slope = dp * turned - value * row.delay;
             own.value += value;
-            own.turn += Complex64::new(-slope.im, slope.re);
+            own.turn += times::<AXIS>(stretch.along, slope);
+            let heaviest = if AXIS {
+                1.0
+            } else {
+                stretch.heaviest(row.delay, row.spread)
+            };
             let (most, most_slope, most_bend) = majorants(row, top);
             let d = row.longest;
             let pace = most_slope + d * most;
-            own.bend += most_bend + d * (most_slope + pace);
+            own.bend += heaviest * (most_bend + d * (most_slope + pace));
             let mut sizes = most + pace * rho;
-            let size = p.norm_sqr().sqrt();
+            let size = modulus(value);
             largest = largest.max(size);
-            all += size + most_slope * rho;
+            let mut moved = (most_slope + lean * d * most) * rho;
             if row.moves {
                 for (i, r) in half.iter().enumerate() {
                     let mut p_i = Complex64::ZERO;
                     let (mut most_i, mut most_slope_i) = (0.0, 0.0);
                     for c in row.coefficients.iter().rev() {
-                        p_i = times_iw(p_i) + c.slopes[i];
+                        p_i = times::<AXIS>(s, p_i) + c.slopes[i];
                         most_slope_i = most_slope_i * top + most_i;
                         most_i = most_i * top + c.most_slopes[i];
                     }
                     let rate = row.rates[i];
                     own.slopes[i] += p_i * turned;
                     if rate != 0.0 {
-                        own.slopes[i] -= times_iw(value) * row.slopes[i];
+                        own.slopes[i] -= times::<AXIS>(s, value) * row.slopes[i];
                     }
                     sizes += (most_i + top * rate * most) * r;
-                    all += most_i * r;
-                    own.mixed[i] += most_slope_i + d * most_i + rate * (most + top * pace);
+                    moved += (most_i + leftmost * rate * most) * r;
+                    own.mixed[i] +=
+                        heaviest * (most_slope_i + d * most_i + rate * (most + top * pace));
                     for l in 0..D {
                         let (mut bend, mut most_l) = (0.0, 0.0);
                         for c in row.coefficients.iter().rev() {
@@ -130,14 +207,16 @@ impl<const D: usize> Expansion<D> {
                             most_l = most_l * top + c.most_slopes[l];
                         }
                         let other = row.rates[l];
-                        own.bends[i][l] +=
-                            bend + top * (rate * most_l + other * (most_i + top * rate * most));
+                        own.bends[i][l] += heaviest
+                            * (bend + top * (rate * most_l + other * (most_i + top * rate * most)));
                     }
                 }
             }
-            own.rounding += 2.0 * ROUNDING * (local.roundings + 16.0 * top * row.size) * sizes;
+            all += size + heaviest * moved;
+            own.rounding +=
+                2.0 * ROUNDING * (local.roundings + 16.0 * top * row.size) * heaviest * sizes;
         }
-        own.excess = 2.0 * largest - all * (1.0 + 1e-9);
+        own.excess = 2.0 * largest - all * ROOM;
         own
     }
 
@@ -149,11 +228,11 @@ impl<const D: usize> Expansion<D> {
         })
     }
 
-    /// Does a line separate 0 from all values, the frequency being within `rho`?
+    /// Does a line separate 0 from all values, s being within `rho`?
     fn is_clear(&self, half: &[f64; D], rho: f64, rest: f64) -> bool {
         let mixed: f64 = self.mixed.iter().zip(half).map(|(m, r)| m * r).sum();
         let rest = rest + rho * (mixed + 0.5 * rho * self.bend);
-        let rest = rest * (1.0 + 1e-9) + self.rounding;
+        let rest = rest * ROOM + self.rounding;
         let separates = |n: Complex64| {
             let along = |z: Complex64| (n.re * z.re + n.im * z.im).abs();
             let mut reach = along(self.turn) * rho;
@@ -165,7 +244,7 @@ impl<const D: usize> Expansion<D> {
             let size = n.norm_sqr();
             excess > SMALLEST
                 && size > SMALLEST * SMALLEST
-                && excess * excess > size * rest * rest * (1.0 + 1e-9)
+                && excess * excess > size * rest * rest * ROOM
         };
         let normal = |z: Complex64| Complex64::new(-z.im, z.re);
         separates(normal(self.turn))
@@ -174,18 +253,18 @@ impl<const D: usize> Expansion<D> {
     }
 }
 
-/// Look at the stretch from `from` to `to`.
-pub(super) fn look<const D: usize>(local: &Local<D>, from: f64, to: f64) -> Look<D> {
-    let w = from + 0.5 * (to - from);
-    let rho = (w - from).max(to - w) * (1.0 + 2.0 * f64::EPSILON);
-    let own = Expansion::new(local, w, rho, to);
+/// Look at the stretch of a piece of the edge from `from` to `to`.
+pub(super) fn look<const D: usize>(local: &Local<D>, piece: &Piece, from: f64, to: f64) -> Look<D> {
+    let stretch = Stretch::new(piece, from, to);
+    let rho = stretch.rho;
+    let own = Expansion::new(local, &stretch);
     let half = &local.half;
     let remainder = own.remainder(half);
     let rest: f64 = remainder.iter().sum();
     if own.is_clear(half, rho, rest) || own.excess > own.rounding {
         return Look::Clear;
     }
-    // Seen along the way on which h moves with w, only the parameters can lead away from 0.
+    // Seen along the way on which h moves with s, only the parameters can lead away from 0.
     let along = |z: &Complex64| {
         let size = own.turn.norm_sqr().sqrt();
         if size > 0.0 {
@@ -199,7 +278,8 @@ pub(super) fn look<const D: usize>(local: &Local<D>, from: f64, to: f64) -> Look
         std::array::from_fn(|i| (along(&own.slopes[i]) + mixed(i)) * half[i] + remainder[i]);
     let spread: f64 = shares.iter().sum();
     let pace = own.turn.norm_sqr().sqrt() * rho;
-    let finest = rho <= 1e-13 * to || pace <= own.rounding;
+    // Nothing is to be learnt where an exponential overflows.
+    let finest = rho <= 1e-13 * to || pace <= own.rounding || !own.rounding.is_finite();
     if finest || (pace < COARSE * spread && !own.is_clear(half, 0.0, rest)) {
         return Look::Wide(shares);
     }
@@ -207,6 +287,16 @@ pub(super) fn look<const D: usize>(local: &Local<D>, from: f64, to: f64) -> Look
         return Look::Wide(shares);
     }
     Look::Long
+}
+
+/// h, its slopes along the parameters and along the edge, at one place of a piece.
+pub(super) fn tangent<const D: usize>(
+    local: &Local<D>,
+    piece: &Piece,
+    t: f64,
+) -> (Complex64, [Complex64; D], Complex64) {
+    let own = Expansion::new(local, &Stretch::new(piece, t, t));
+    (own.value, own.slopes, own.turn)
 }
 
 /// A stretch on which h moves less than this many times what the box does is not divided if a

@@ -2,7 +2,8 @@
 //!
 //! A cell is one loop. Its model is read from arrays that hold either one entry for all cells
 //! or one entry a cell, so that a map over gains shares A, B and the delay. Each cell is computed
-//! alone, so results have the same bits for any number of threads.
+//! alone, so results have the same bits for any number of threads. A pole offends against a decay σ
+//! outside the circle |z| = e^(−σ Ts).
 
 use rayon::prelude::*;
 
@@ -12,7 +13,7 @@ use crate::{Error, Task};
 
 use super::transition::{Sample, check_size, eigenvalues};
 
-/// |z| closer to 1 than this is neither inside nor outside: rounding of the eigenvalues.
+/// |z| closer to the circle than this, relative to the larger of it and 1, is neither inside nor outside: rounding of the eigenvalues.
 const ON_THE_CIRCLE: f64 = 1e-12;
 
 /// Cells handed to a thread at a time.
@@ -46,14 +47,22 @@ pub struct LoopCells<'a> {
 pub struct CellPoles {
     /// ln(ρ)/Ts with ρ the largest |z|, 1/s.
     pub abscissa: f64,
-    /// Number of poles with |z| > 1.
+    /// Number of poles outside the circle.
     pub unstable: i32,
     /// Whether the count is sure.
     pub status: CellStatus,
 }
 
 /// Abscissa and number of unstable poles of every cell.
+///
+/// # Errors
+/// As for [`LoopCells::judge`].
 pub fn abscissa_grid(cells: &LoopCells<'_>, task: &Task) -> Result<Vec<CellPoles>, Error> {
+    cells.judge(0.0, task)
+}
+
+/// [`LoopCells::judge`].
+fn judge(cells: &LoopCells<'_>, decay: f64, task: &Task) -> Result<Vec<CellPoles>, Error> {
     let rows = cells.rows()?;
     let shared = if rows.model_is_shared() {
         Some(rows.sample(0)?)
@@ -74,7 +83,7 @@ pub fn abscissa_grid(cells: &LoopCells<'_>, task: &Task) -> Result<Vec<CellPoles
         .try_for_each(|(chunk, places)| {
             task.check()?;
             for (i, place) in places.iter_mut().enumerate() {
-                *place = rows.cell(chunk * CHUNK + i, shared.as_ref())?;
+                *place = rows.cell(chunk * CHUNK + i, decay, shared.as_ref())?;
             }
             task.advance(places.len() as u64);
             Ok(())
@@ -130,6 +139,14 @@ struct AllRows<'a> {
 }
 
 impl<'a> LoopCells<'a> {
+    /// Abscissa of every cell, and number of its poles that decay more slowly than e^(−`decay` t).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for arrays of other lengths or models without sense; [`Error::Interrupted`].
+    pub fn judge(&self, decay: f64, task: &Task) -> Result<Vec<CellPoles>, Error> {
+        judge(self, decay, task)
+    }
+
     fn rows(&self) -> Result<AllRows<'a>, Error> {
         let (n, cells) = (self.states, self.cells);
         Ok(AllRows {
@@ -173,7 +190,7 @@ impl AllRows<'_> {
         Ok(Sample::new(a, b, delay, sample_time))
     }
 
-    fn cell(&self, cell: usize, shared: Option<&Sample>) -> Result<CellPoles, Error> {
+    fn cell(&self, cell: usize, decay: f64, shared: Option<&Sample>) -> Result<CellPoles, Error> {
         let own;
         let sample = if let Some(sample) = shared {
             sample
@@ -198,8 +215,11 @@ impl AllRows<'_> {
             .map(|z| z.norm())
             .collect();
         let largest = sizes.iter().copied().fold(0.0, f64::max);
-        let outside = sizes.iter().filter(|&&size| size > 1.0).count();
-        let touching = sizes.iter().any(|size| (size - 1.0).abs() <= ON_THE_CIRCLE);
+        let circle = (-decay * self.sample_time.number(cell)).exp();
+        let outside = sizes.iter().filter(|&&size| size > circle).count();
+        let touching = sizes
+            .iter()
+            .any(|size| (size - circle).abs() <= ON_THE_CIRCLE * circle.max(1.0));
         Ok(CellPoles {
             abscissa: largest.ln() / self.sample_time.number(cell),
             unstable: i32::try_from(outside).unwrap_or(i32::MAX),
