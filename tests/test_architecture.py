@@ -44,6 +44,7 @@ FLOORS = [
         "_quasipolynomial",
         "_plants",
         "_controllers",
+        "_discretisation",
         "_response",
         "_loop",
         "_fixed_step",

@@ -1,10 +1,9 @@
-"""Loops with a delay beside what else Python offers: time of one simulation and largest error.
+"""Delay equations: time at equal true error, ours beside what else Python offers.
 
-Each case is run alternately by us and by a peer in one process; the times are medians. Errors are
-those of the values at twenty times, against the reference solutions of the tests. Peers: scipy's
-`solve_ivp` in a method of steps (restarted at every multiple of the delay, past values from its
-dense output), a plain Python loop for the sampled cases, and ddeint where it is installed. Run
-``python benches/peers/dde.py [--quick]``.
+Every solver runs over a ladder of settings, once each, against references that two unrelated
+methods agree on (`tests/reference`); for 1e-6 and for 1e-9 its fastest setting that keeps the true
+error below is timed, ours and the peer's in turn. Compilation (JiTCDDE, numba) is left out. The
+last lines are sweeps: time a trajectory. Run ``python benches/peers/dde.py [--quick]``.
 """
 
 from __future__ import annotations
@@ -13,175 +12,280 @@ import argparse
 import json
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import deadtime as dtm
 import numpy as np
-from scipy.integrate import solve_ivp
+from drivers import dde as peers
+from drivers.dde import Run, Values
 
 try:
-    from ddeint import ddeint
+    from numba import carray, cfunc, types
 except ImportError:
-    ddeint = None
+    cfunc = None
 
-REFERENCE = Path(__file__).parents[2] / "tests" / "reference" / "dde_problems.json"
+REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
 DELAY, SAMPLE_TIME = 0.36, 0.065
+TARGETS = (1e-6, 1e-9)
 
-Values = np.ndarray[Any, np.dtype[np.float64]]
+
+@dataclass
+class Problem:
+    """One problem: where the truth is known, and who solves it in which settings."""
+
+    name: str
+    times: Values
+    truth: Values
+    ours: dict[str, list[Run]]
+    peers: dict[str, list[Run]] = field(default_factory=dict)
 
 
-def steps(kp: float, kv: float, limit: float | None, tolerance: float) -> Callable[..., Values]:
-    """Method of steps on scipy's solve_ivp: z' = sat(kp (r - z(t - Td)) - kv z'(t - Td))."""
+def ladder(low: int, high: int) -> list[float]:
+    """Tolerances from 10^-low to 10^-high in half decades."""
+    return [10.0 ** (-0.5 * k) for k in range(2 * low, 2 * high + 1)]
 
-    def run(times: Values, r: float) -> Values:
-        pieces: list[tuple[float, Callable[[float], Any], Callable[[float], float]]] = []
 
-        def past(t: float) -> tuple[float, float]:
-            for start, value, slope in reversed(pieces):
-                if t >= start:
-                    return float(value(t)[0]), slope(t)
-            return 0.0, 0.0
+def known(file: str, name: str) -> tuple[Values, Values, dict[str, Any]]:
+    content = json.loads((REFERENCE / file).read_text())
+    entries = content["problems" if "problems" in content else "runs"]
+    entry = next(e for e in entries if e["id"] == name)
+    times = np.array([float(t) for t in entry["times"]])
+    return times, np.array([[float(x) for x in row] for row in entry["values"]]), entry
 
-        def slope(t: float) -> float:
-            z, dz = past(t - DELAY)
-            u = kp * (r - z) - kv * dz
-            return u if limit is None else min(max(u, -limit), limit)
 
-        z, start = 0.0, 0.0
-        while start < times[-1]:
-            solution = solve_ivp(
-                lambda t, _: [slope(t)],
-                (start, start + DELAY),
-                [z],
-                "DOP853",
+def loops() -> Iterable[Problem]:
+    def simulated(controller: Any, **fields: Any) -> Run:
+        def simulate(times: Values) -> Values:
+            # A loop built anew: what it keeps between calls would flatter us.
+            loop = dtm.ControlLoop(
+                dtm.Integrator(), controller, delay=DELAY, delay_path="measurement", **fields
+            )
+            return loop.simulate(np.append(0.0, times)).outputs[1:, None]
+
+        return simulate
+
+    start = np.zeros(1)
+    times, truth, _ = known("dde_problems.json", "drone_p_step")
+    problem = Problem("P loop, 10 s", times, truth, {"exact": [simulated(dtm.P(1.31))]})
+    fun = lambda t, y, z: 1.31 * (1.0 - z)  # noqa: E731
+    problem.ours["solve_dde"] = solve(fun, 0.0, DELAY, ladder(5, 11))
+    problem.peers["scipy steps"] = [
+        peers.scipy_steps(fun, start, DELAY, tol) for tol in ladder(5, 11)
+    ]
+    if peers.ddeint is not None:
+        problem.peers["ddeint"] = [peers.by_ddeint(fun, start, DELAY, n) for n in (301, 1001, 3001)]
+    if peers.jitcdde is not None:
+        y, t = peers.jitcdde.y, peers.jitcdde.t
+        compiled = peers.Jitcdde([1.31 * (1 - y(0, t - DELAY))], start, DELAY)
+        problem.peers["JiTCDDE"] = [compiled.run(tol, 6) for tol in ladder(5, 12)]
+    yield problem
+
+    times, truth, _ = known("dde_problems.json", "drone_pv_neutral")
+    problem = Problem("neutral PV, 10 s", times, truth, {"exact": [simulated(dtm.PV(2.0, 0.3))]})
+    if peers.jitcdde is not None:
+        y, t, dy = peers.jitcdde.y, peers.jitcdde.t, peers.jitcdde.dy
+        equation = 2.0 * (1 - y(0, t - DELAY)) - 0.3 * dy(0, t - DELAY)
+        compiled = peers.Jitcdde([equation], start, DELAY)
+        problem.peers["JiTCDDE"] = [compiled.run(tol, 27) for tol in ladder(5, 12)]
+    yield problem
+
+    times, truth, _ = known("dde_problems.json", "drone_p_sat_zoh")
+    held = simulated(dtm.P(1.31), limit=1.0, sample_time=SAMPLE_TIME)
+    problem = Problem("hold + limit, 10 s", times, truth, {"exact": [held]})
+    problem.peers["scipy a sample"] = [peers.scipy_samples(1.31, DELAY, SAMPLE_TIME, 1.0)]
+    yield problem
+
+
+def solve(
+    fun: Callable[..., Any], history: Any, delay: float, tolerances: list[float]
+) -> list[Run]:
+    """`solve_dde` over a ladder of tolerances; `fun` takes all nodes at once."""
+
+    def at(tolerance: float) -> Run:
+        def simulate(times: Values) -> Values:
+            found = dtm.solve_dde(
+                fun,
+                (0.0, float(times[-1])),
+                history,
+                [delay],
                 rtol=tolerance,
                 atol=tolerance,
-                dense_output=True,
+                t_eval=times,
+                vectorized=True,
             )
-            pieces.append((start, solution.sol, slope))
-            z, start = float(solution.y[0, -1]), start + DELAY
-        return np.array([past(t)[0] for t in times])
+            return found.y.T
 
-    return run
+        return simulate
 
-
-def plain_hold(kp: float) -> Callable[..., Values]:
-    """Sample by sample in plain Python, exact for the integrator."""
-
-    def run(times: Values, r: float) -> Values:
-        heights, commands = [0.0], []
-        for k in range(int(times[-1] / SAMPLE_TIME) + 1):
-            at = k - DELAY / SAMPLE_TIME
-            whole = int(np.floor(at))
-            seen = 0.0
-            if at > 0.0:
-                seen = heights[whole] + (at - whole) * SAMPLE_TIME * commands[whole]
-            commands.append(min(max(kp * (r - seen), -1.0), 1.0))
-            heights.append(heights[-1] + SAMPLE_TIME * commands[-1])
-        return np.interp(times, SAMPLE_TIME * np.arange(len(heights)), heights)
-
-    return run
+    return [at(tolerance) for tolerance in tolerances]
 
 
-def scipy_hold(kp: float, delay: float) -> Callable[..., Values]:
-    """Event by event with solve_ivp: one integration for each stretch of constant command."""
+def mackey_glass() -> Problem:
+    times, truth, _ = known("dde_long_runs.json", "mackey_glass_17")
+    fun = lambda t, y, z: 0.2 * z / (1.0 + z**10) - 0.1 * y  # noqa: E731
+    vectorised = lambda t, y, z: 0.2 * z[0] / (1.0 + z[0] ** 10) - 0.1 * y  # noqa: E731
+    problem = Problem("Mackey-Glass, t = 1000", times, truth, {})
+    problem.ours["numpy"] = solve(vectorised, 0.5, 17.0, ladder(7, 12))
+    if cfunc is not None:
+        pointer = types.CPointer(types.float64)
+        signature = types.void(types.float64, pointer, pointer, pointer, pointer, types.voidptr)
 
-    def run(times: Values, r: float) -> Values:
-        heights, height, commands = [], 0.0, []
-        lag = int(delay / SAMPLE_TIME)
-        early = delay - lag * SAMPLE_TIME
-        for k in range(int(times[-1] / SAMPLE_TIME) + 1):
-            heights.append(height)
-            commands.append(min(max(kp * (r - height), -1.0), 1.0))
-            for number, length in ((k - lag - 1, early), (k - lag, SAMPLE_TIME - early)):
-                w = commands[number] if number >= 0 else 0.0
-                height = float(solve_ivp(lambda t, z, w=w: [w], (0.0, length), [height]).y[0, -1])
-        return np.interp(times, SAMPLE_TIME * np.arange(len(heights)), heights)
+        @cfunc(signature)
+        def compiled_slope(t, y, z, dz, dy, user):  # type: ignore[no-untyped-def]
+            late = carray(z, 1)[0]
+            square = late * late
+            fourth = square * square
+            out = carray(dy, 1)
+            out[0] = 0.2 * late / (1.0 + fourth * fourth * square) - 0.1 * carray(y, 1)[0]
 
-    return run
-
-
-def sweeps(count: int) -> None:
-    """Print the time of a trajectory in a sweep beside that of solve_ivp, on one core."""
-    rng = np.random.default_rng(0)
-    gains, delays = rng.uniform(0.5, 2.5, count), rng.uniform(0.1, 0.5, count)
-    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=SAMPLE_TIME, limit=1.0)
-    times = SAMPLE_TIME * np.arange(154)
-    numbers = {"Kp": gains, "delay": delays}
-    metrics = seconds(lambda: dtm.sweep(loop, numbers, times[-1], threads=1)) / count
-    few = {name: array[:20] for name, array in numbers.items()}
-    ours = dtm.sweep(loop, few, times, responses=True).outputs
-    assert ours is not None
-    peers = [scipy_hold(kp, delay) for kp, delay in zip(*few.values(), strict=True)]
-    error = max(np.abs(peer(times, 1.0) - row).max() for peer, row in zip(peers, ours, strict=True))
-    theirs = seconds(lambda: [peer(times, 1.0) for peer in peers]) / len(peers)
-    print(
-        f"sweep of {count} limited, sampled loops: {1e6 * metrics:.2f} us a trajectory with its "
-        f"metrics; solve_ivp between events: {1e6 * theirs:.0f} us, {theirs / metrics:.0f} times "
-        f"as much; outputs differ by {error:.0e}"
-    )
+        problem.ours["compiled"] = solve_pointer(compiled_slope, ladder(7, 12))
+    start = np.array([0.5])
+    problem.peers["scipy steps"] = [
+        peers.scipy_steps(fun, start, 17.0, tol) for tol in ladder(7, 11)
+    ]
+    if peers.ddeint is not None:
+        problem.peers["ddeint"] = [peers.by_ddeint(fun, start, 17.0, 10001)]
+    if peers.jitcdde is not None:
+        y, t = peers.jitcdde.y, peers.jitcdde.t
+        late = y(0, t - 17)
+        compiled = peers.Jitcdde([0.2 * late / (1 + late**10) - 0.1 * y(0)], start, 17.0)
+        problem.peers["JiTCDDE"] = [compiled.run(tol, 8) for tol in ladder(7, 13)]
+    return problem
 
 
-def by_ddeint(kp: float, points: int) -> Callable[..., Values]:
-    def run(times: Values, r: float) -> Values:
-        grid = np.linspace(0.0, times[-1], points)
-        found = ddeint(lambda z, t: kp * (r - z(t - DELAY)), lambda t: 0.0, grid)
-        return np.interp(times, grid, np.ravel(found))
+def solve_pointer(function: Any, tolerances: list[float]) -> list[Run]:
+    """`solve_dde` of a compiled right-hand side with one delay of 17."""
 
-    return run
+    def at(tolerance: float) -> Run:
+        def simulate(times: Values) -> Values:
+            found = dtm.solve_dde(
+                function,
+                (0.0, float(times[-1])),
+                0.5,
+                [17.0],
+                rtol=tolerance,
+                atol=tolerance,
+                t_eval=times,
+            )
+            return found.y.T
+
+        return simulate
+
+    return [at(tolerance) for tolerance in tolerances]
 
 
-def seconds(call: Callable[[], object]) -> float:
+def network() -> Problem:
+    times, truth, _ = known("dde_long_runs.json", "network50_long")
+    data = known("dde_problems.json", "network50")[2]["parameters"]
+    weights = np.zeros((50, 50))
+    for i, (sources, row) in enumerate(zip(data["idx"], data["W"], strict=True)):
+        for j, weight in zip(sources, row, strict=True):
+            weights[i, j] += float(weight)
+    start = np.array([float(x) for x in data["y0"]])
+    fun = lambda t, y, z: np.tanh(weights @ z) - y  # noqa: E731
+    vectorised = lambda t, y, z: np.tanh(weights @ z[0]) - y  # noqa: E731
+    problem = Problem("network of 50, t = 50", times, truth, {})
+    problem.ours["numpy"] = solve(vectorised, start, 1.0, ladder(5, 11))
+    problem.peers["scipy steps"] = [
+        peers.scipy_steps(fun, start, 1.0, tol) for tol in ladder(5, 10)
+    ]
+    if peers.jitcdde is not None:
+        from symengine import tanh
+
+        y, t = peers.jitcdde.y, peers.jitcdde.t
+        equations = [
+            tanh(sum(float(w) * y(j, t - 1) for j, w in zip(sources, row, strict=True))) - y(i)
+            for i, (sources, row) in enumerate(zip(data["idx"], data["W"], strict=True))
+        ]
+        compiled = peers.Jitcdde(equations, start, 1.0)
+        problem.peers["JiTCDDE"] = [compiled.run(tol, 8) for tol in ladder(6, 12)]
+    return problem
+
+
+def seconds(call: Callable[..., object], *arguments: Any) -> float:
     start = time.perf_counter()
-    call()
+    call(*arguments)
     return time.perf_counter() - start
+
+
+def tried(problem: Problem, runs: list[Run]) -> list[tuple[float, float, Run]]:
+    """(seconds, true error, run) of every setting, once warm."""
+    found = []
+    for run in runs:
+        value = run(problem.times)
+        error = float(np.abs(value - problem.truth).max())
+        found.append((seconds(run, problem.times), error, run))
+    return found
+
+
+def compare(problem: Problem, rounds: int) -> None:
+    """Print one line for each target, each of our ways and each peer."""
+    ours = {name: tried(problem, runs) for name, runs in problem.ours.items()}
+    others = {name: tried(problem, runs) for name, runs in problem.peers.items()}
+    for target in TARGETS:
+        for name, mine in ours.items():
+            best = min((t for t in mine if t[1] <= target), default=None, key=lambda t: t[0])
+            if best is None:
+                print(f"{problem.name:24}{target:7.0e}  ours ({name}): not reached")
+                continue
+            for peer, theirs in others.items():
+                row = f"{problem.name:24}{target:7.0e}  {name:10}{peer:16}"
+                reached = [t for t in theirs if t[1] <= target]
+                if not reached:
+                    closest = min(t[1] for t in theirs)
+                    print(f"{row}{1e6 * best[0]:12.1f}   not reached (at best {closest:.0e})")
+                    continue
+                other = min(reached, key=lambda t: t[0])
+                a, b = [], []
+                for _ in range(rounds):
+                    a.append(min(seconds(best[2], problem.times) for _ in range(3)))
+                    b.append(seconds(other[2], problem.times))
+                mine_s, other_s = statistics.median(a), statistics.median(b)
+                print(
+                    f"{row}{1e6 * mine_s:12.1f}{1e6 * other_s:14.1f}{other_s / mine_s:10.0f}"
+                    f"{best[1]:10.0e}{other[1]:9.0e}"
+                )
+
+
+def sweeps(sets: int, rounds: int) -> None:
+    """Trajectories of the sampled loop with a limit, a hundred thousand at once."""
+    gains, delays = np.linspace(0.5, 2.0, sets), np.linspace(0.2, 0.4, sets)
+    loop = dtm.ControlLoop(
+        dtm.Integrator(), dtm.P(1.31), delay=DELAY, limit=1.0, sample_time=SAMPLE_TIME
+    )
+    varied = {"Kp": gains, "delay": delays}
+    times = np.linspace(0.0, 10.0, 11)
+    peer = peers.scipy_samples(1.31, DELAY, SAMPLE_TIME, 1.0)
+    other = statistics.median(seconds(peer, times) for _ in range(rounds))
+    for name, options in (("figures", {}), ("responses", {"responses": True})):
+        mine = statistics.median(
+            seconds(lambda options=options: dtm.sweep(loop, varied, times, threads=1, **options))
+            for _ in range(rounds)
+        )
+        print(
+            f"sweep of {sets} sets, {name}, one thread: {1e6 * mine / sets:.3f} us a trajectory; "
+            f"scipy a sample {1e6 * other:.0f} us: ratio {other / mine * sets:.0f}"
+        )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="few repetitions")
-    rounds = 2 if parser.parse_args().quick else 9
-    problems = {p["id"]: p for p in json.loads(REFERENCE.read_text())["problems"]}
-
-    def loop(controller: Any, **fields: Any) -> dtm.ControlLoop:
-        return dtm.ControlLoop(
-            dtm.Integrator(), controller, delay=DELAY, delay_path="measurement", **fields
-        )
-
-    free, limited = loop(dtm.P(1.31)), loop(dtm.P(1.31), limit=1.0)
-    held = loop(dtm.P(1.31), limit=1.0, sample_time=SAMPLE_TIME)
-    cases: list[tuple[str, dtm.ControlLoop, str, Callable[..., Values]]] = [
-        ("drone_p_step", free, "scipy steps 1e-9", steps(1.31, 0.0, None, 1e-9)),
-        ("drone_p_step", free, "scipy steps 1e-12", steps(1.31, 0.0, None, 1e-12)),
-        ("drone_p_sat_continuous", limited, "scipy steps 1e-9", steps(1.31, 0.0, 1.0, 1e-9)),
-        ("drone_p_sat_zoh", held, "plain Python", plain_hold(1.31)),
-    ]
-    if ddeint is not None:
-        cases.append(("drone_p_step", free, "ddeint", by_ddeint(1.31, 1001)))
-
-    print(f"{'problem':24}{'peer':20}{'ours us':>10}{'peer us':>12}{'ratio':>9}{'errors':>20}")
-    for name, ours, peer_name, peer in cases:
-        problem = problems[name]
-        times = np.array([float(t) for t in problem["times"]])
-        truth = np.array([float(row[0]) for row in problem["values"]])
-        r = float(problem["parameters"]["r"])
-        grid = np.concatenate([[0.0], times])
-        # A module-level cache of the loop would flatter us: build it anew each time.
-        mine: Callable[[], Values] = lambda o=ours, g=grid, r=r: o.replace().simulate(g, r).outputs  # noqa: E731
-        other: Callable[[], Values] = lambda p=peer, t=times, r=r: p(t, r)  # noqa: E731
-        errors = np.abs(mine()[1:] - truth).max(), np.abs(other() - truth).max()
-        our_times, peer_times = [], []
-        for _ in range(rounds):
-            our_times.append(min(seconds(mine) for _ in range(5)))
-            peer_times.append(seconds(other))
-        a, b = statistics.median(our_times), statistics.median(peer_times)
-        print(
-            f"{name:24}{peer_name:20}{1e6 * a:10.1f}{1e6 * b:12.1f}{b / a:9.0f}"
-            f"{errors[0]:11.1e}{errors[1]:9.1e}"
-        )
-    sweeps(10_000 if rounds == 2 else 100_000)
+    parser.add_argument("--quick", action="store_true", help="few settings and repetitions")
+    quick = parser.parse_args().quick
+    print(
+        f"{'problem':24}{'error':>7}  {'ours':10}{'peer':16}{'ours us':>12}{'peer us':>14}"
+        f"{'ratio':>10}{'true errors':>19}"
+    )
+    problems = [*loops(), mackey_glass(), network()]
+    for problem in problems:
+        if quick:
+            for runs in (*problem.ours.values(), *problem.peers.values()):
+                runs[:] = runs[-3:-2] or runs[:1]
+        compare(problem, 1 if quick else 7)
+    sweeps(1000 if quick else 100_000, 1 if quick else 3)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Signatures of the native part."""
 
 from collections.abc import Callable
-from typing import TypeAlias, final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -263,6 +263,7 @@ class LinearLoop:
         sample_time: float | None = None,
         limit: float | None = None,
         impulse: float = 0.0,
+        update: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> LinearLoop: ...
     def simulate(
         self,

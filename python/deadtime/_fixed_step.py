@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._deadtime import fixed_step_run
-from deadtime._loop_model import state_at_rest
+from deadtime._loop_model import refuse_discretised, state_at_rest
 from deadtime._loop_run import reference_jumps, steady_state
 from deadtime._plants import realise
 from deadtime._response import Response
@@ -109,6 +109,7 @@ def simulate_fixed_step(
     duration, length = finite("end", end), positive("step", step)
     if duration < 0.0:
         raise ValueError(f"end={duration} s lies before the start of the run at 0")
+    refuse_discretised(loop.controller, loop.sample_time, "a run in fixed steps")
     delay = loop._known_delay()
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
@@ -125,7 +126,7 @@ def simulate_fixed_step(
     steps = _steps(duration, length)
     outputs, inputs = fixed_step_run(
         (plant.A, plant.B, plant.C, plant.D),
-        loop.controller._equations(values),
+        loop.controller._equations(values)[:8],
         delay,
         loop.delay_path,
         loop.limit,

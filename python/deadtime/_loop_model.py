@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._batch import column, number, vector, zeros
-from deadtime._controllers import Controller
+from deadtime._controllers import Controller, FilterUpdate
 from deadtime._deadtime import LinearLoop
-from deadtime._plants import Plant, realise, rest
+from deadtime._plants import Plant, StateSpace, realise, rest
 
 __all__ = ["LoopModel", "rest_of", "state_at_rest"]
 
@@ -40,6 +40,8 @@ class LoopModel:
     C: Vector
     D: Any
     impulse: Any
+    #: J, G, H of x := J x + G w + H r at samples, where a discretised filter has states.
+    update: tuple[Vector, Vector, Vector] | None = None
 
     @classmethod
     def build(cls, plant: Plant, controller: Controller, values: Mapping[str, Any]) -> LoopModel:
@@ -67,6 +69,7 @@ class LoopModel:
             C=np.concatenate([p.C, np.zeros(m)]),
             D=p.D,
             impulse=number(c.impulse),
+            update=None if c.update is None else _update(p, c.update, n + m),
         )
 
     def row(self, delay: Any, sample_time: Any = None, limit: Any = None) -> NDArray[Any]:
@@ -101,6 +104,7 @@ class LoopModel:
             sample_time,
             limit,
             self.impulse,
+            self.update,
         )
 
     @cached_property
@@ -108,19 +112,45 @@ class LoopModel:
         """Output and command at rest under a unit reference, None where there is no such rest."""
         n = len(self.B)
         matrix = np.zeros((n + 1, n + 1))
-        matrix[:n, :n] = self.A
-        matrix[:n, n] = self.B
+        A, B, E = self.A, self.B, self.E
+        if self.update is not None:
+            # What a sample moves rests where the sample does not move it.
+            states, command, reference = self.update
+            A, B, E = A + states - np.eye(n), B + command, E + reference
+        matrix[:n, :n] = A
+        matrix[:n, n] = B
         matrix[n, :n] = self.K
         matrix[n, n] = self.L - 1.0
         scale = np.abs(matrix).sum(axis=1)
         if not scale.all():
             return None
         matrix /= scale[:, None]
-        right = -np.append(self.E, self.M) / scale
+        right = -np.append(E, self.M) / scale
         if np.linalg.cond(matrix) > 1e13:
             return None
         x = np.linalg.solve(matrix, right)
         return float(self.C @ x[:n] + self.D * x[n]), float(x[n])
+
+
+def _update(plant: StateSpace, update: FilterUpdate, size: int) -> tuple[Vector, Vector, Vector]:
+    """What a sample does to all states: the filter reads the output, its states come last."""
+    states, command, reference = np.eye(size), np.zeros(size), np.zeros(size)
+    n = len(plant.B)
+    states[-2:, -2:] = update.F
+    states[-2:, :n] = np.outer(update.G, plant.C)
+    command[-2:] = update.G * plant.D
+    reference[-2:] = update.H
+    return states, command, reference
+
+
+def refuse_discretised(controller: Controller, sample_time: float | None, what: str) -> None:
+    """Raise where a filter runs in samples, which `what` cannot do."""
+    smooth = controller._filter
+    if sample_time is not None and smooth is not None and smooth.discretisation is not None:
+        raise ValueError(
+            f"{what} cannot run a filter in samples (discretisation={smooth.discretisation!r}): "
+            "leave its discretisation out, or take loops one by one"
+        )
 
 
 def _joined(*parts: NDArray[Any]) -> NDArray[Any]:

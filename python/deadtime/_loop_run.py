@@ -25,6 +25,8 @@ __all__ = ["increasing", "reference_jumps", "settled_step", "simulate_loop", "st
 
 Vector = NDArray[np.float64]
 
+_NONE = np.empty(0)
+
 
 # The default time of a step response: at first so many times the slowest constant of the loop (at
 # least so many seconds), doubled until the last quarter is settled or the response has run away.
@@ -36,8 +38,7 @@ _SETTLED = 0.005
 _LOST = 20.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Again:
+class _Again(NamedTuple):
     """The output of one run at any times: the run is made again for them.
 
     Holds the loop rather than its native form, which does not pickle.
@@ -89,7 +90,9 @@ def simulate_loop(
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
     jumps = reference_jumps(times, reference, reference_time, before)
-    past = before if jumps.times[0] >= times[0] else jumps.just_before(float(times[0]))
+    past = before
+    if reference_time is not None and jumps.times[0] < times[0]:
+        past = jumps.just_before(float(times[0]))
     delay = loop._known_delay()
     ahead = delay if loop.delay_path == "measurement" else 0.0
     arguments = (
@@ -97,7 +100,9 @@ def simulate_loop(
         jumps.before,
         jumps.times,
         jumps.values,
-        _one_dimensional("command_history", command_history),
+        _NONE
+        if type(command_history) is tuple and not command_history
+        else _one_dimensional("command_history", command_history),
         finite("sample_phase", sample_phase),
     )
     # The times are the caller's; what is kept must not change with them.
@@ -169,6 +174,8 @@ def reference_jumps(
     times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
 ) -> _Jumps:
     """The reference as jumps: one number steps at the first of `times`."""
+    if type(reference) is float and reference_time is None:
+        return _Jumps(times[:1], np.array((reference,)), before)
     values = real_array("reference", reference)
     if values.ndim == 0:
         if reference_time is not None:

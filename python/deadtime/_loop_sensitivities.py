@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._deadtime import loop_sensitivities
-from deadtime._loop_model import LoopModel, state_at_rest
+from deadtime._loop_model import LoopModel, refuse_discretised, state_at_rest
 
 if TYPE_CHECKING:
     from deadtime._loop import ControlLoop
@@ -32,6 +32,7 @@ def slope_names(loop: ControlLoop, names: Sequence[str]) -> tuple[str, ...]:
     """Check the names of the numbers with respect to which slopes are asked for."""
     if isinstance(names, str):
         raise TypeError(f"sensitivities={names!r}: give a sequence of names, such as ({names!r},)")
+    refuse_discretised(loop.controller, loop.sample_time, "sensitivities")
     known = loop.parameters
     for name in names:
         if name not in known:

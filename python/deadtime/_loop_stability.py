@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from deadtime._controllers import Controller
 from deadtime._deadtime import sampled_abscissa_grid
-from deadtime._loop_model import LoopModel
+from deadtime._loop_model import LoopModel, refuse_discretised
 from deadtime._plants import Plant
 from deadtime._quasipolynomial import delay, s
 from deadtime._rootset import RootSet
@@ -173,6 +173,7 @@ def sampled_grid(
     these, the delay and the sample time vary inside one native call; every distinct combination
     of the other numbers makes a call of its own.
     """
+    refuse_discretised(controller, 1.0, "a map")
     arrays = {name: np.atleast_1d(np.asarray(v, dtype=np.float64)) for name, v in values.items()}
     cells = max(len(array) for array in arrays.values())
     inside = (*controller._gains(), "gain", "delay", "sample_time")

@@ -83,8 +83,8 @@ class Response(ReadOnlyArrays):
     @classmethod
     def _of_fresh(cls, **fields: Any) -> Response:
         """Of arrays that nobody else holds: nothing is copied or converted."""
-        for value in fields.values():
-            read_only(value)
+        for name in ("time", "outputs", "inputs", "breaks", "reference"):
+            fields[name].setflags(write=False)
         response = object.__new__(cls)
         response.__dict__.update(sensitivities={}, input_sensitivities={}, **fields)
         return response

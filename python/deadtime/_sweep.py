@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._deadtime import sweep_figures, sweep_responses
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
-from deadtime._loop_model import LoopModel, rest_of
+from deadtime._loop_model import LoopModel, refuse_discretised, rest_of
 from deadtime._loop_run import increasing
 from deadtime._validation import finite, positive, real_array, thread_number
 
@@ -232,6 +232,8 @@ def sweep(
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
     band = positive("settling", settling)
+    sampled = 1.0 if "sample_time" in values else common.sample_time
+    refuse_discretised(common.controller, sampled, "a sweep")
     parts = (finite("rise", rise[0]), finite("rise", rise[1]))
     if not 0.0 <= parts[0] < parts[1]:
         raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")

@@ -22,6 +22,8 @@ __all__ = [
 
 def finite(name: str, value: SupportsFloat) -> float:
     """Return `value` as a finite float, or raise."""
+    if type(value) is float and math.isfinite(value):
+        return value
     try:
         if isinstance(value, (str, bytes)):  # text that float() would read is still no number
             raise TypeError

@@ -1,7 +1,7 @@
 //! Bindings of `deadtime::dde`.
 
 use deadtime::dde::sampled::{self, LoopCells};
-use deadtime::dde::{Equations, LinearLoop, Reference, Request, Start, on_sample};
+use deadtime::dde::{Equations, LinearLoop, Reference, Request, Start, Update, on_sample};
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
@@ -22,7 +22,8 @@ pub(crate) struct PyLinearLoop {
 #[pymethods]
 impl PyLinearLoop {
     #[new]
-    #[pyo3(signature = (a, b, e, k, l, m, c, d, delay, sample_time=None, limit=None, impulse=0.0))]
+    #[pyo3(signature = (a, b, e, k, l, m, c, d, delay, sample_time=None, limit=None, impulse=0.0,
+        update=None))]
     #[expect(
         clippy::too_many_arguments,
         reason = "one argument a symbol of the equations"
@@ -41,6 +42,7 @@ impl PyLinearLoop {
         sample_time: Option<f64>,
         limit: Option<f64>,
         impulse: f64,
+        update: Option<(Floats<'_>, Floats<'_>, Floats<'_>)>,
     ) -> PyResult<Self> {
         let equations = Equations {
             a: in_order(&a).into_owned(),
@@ -53,7 +55,16 @@ impl PyLinearLoop {
             d,
             impulse,
         };
+        let update = update.map(|(states, command, reference)| Update {
+            states: in_order(&states).into_owned(),
+            command: in_order(&command).into_owned(),
+            reference: in_order(&reference).into_owned(),
+        });
         LinearLoop::new(equations, delay, sample_time, limit)
+            .and_then(|plain| match update {
+                Some(update) => plain.with_update(update),
+                None => Ok(plain),
+            })
             .map(|inner| Self { inner })
             .map_err(|error| to_python(py, error))
     }

@@ -61,6 +61,20 @@ impl<S: Scalar> Equations<S> {
     }
 }
 
+/// What a sample does to the states, once the command is computed: x becomes J x + G w + H r.
+///
+/// The states of a controller that runs in samples, such as a discretised filter, move so and
+/// hold in between; the rows of J of all other states are those of the identity.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Update {
+    /// J, n × n.
+    pub states: Vec<f64>,
+    /// G, n.
+    pub command: Vec<f64>,
+    /// H, n.
+    pub reference: Vec<f64>,
+}
+
 /// A validated loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearLoop<S = f64> {
@@ -68,6 +82,7 @@ pub struct LinearLoop<S = f64> {
     delay: S,
     sample_time: Option<S>,
     limit: Option<S>,
+    update: Option<Update>,
 }
 
 /// State of affairs when a run begins, at time 0.
@@ -258,7 +273,39 @@ impl<S: Scalar> LinearLoop<S> {
             delay,
             sample_time,
             limit: limit.filter(|limit| limit.is_finite()),
+            update: None,
         })
+    }
+
+    /// The same loop with states that move at samples.
+    pub fn with_update(mut self, update: Update) -> Result<Self, Error> {
+        let n = self.equations.states();
+        let lengths = (
+            update.states.len(),
+            update.command.len(),
+            update.reference.len(),
+        );
+        if lengths != (n * n, n, n) {
+            return Err(Error::argument(format!(
+                "the update of a sample has {lengths:?} elements, {:?} are needed for {n} states",
+                (n * n, n, n)
+            )));
+        }
+        if self.sample_time.is_none() {
+            return Err(Error::argument(
+                "states that move at samples need a sample_time",
+            ));
+        }
+        finite("the update of a sample", &update.states)?;
+        finite("the update of a sample", &update.command)?;
+        finite("the update of a sample", &update.reference)?;
+        self.update = Some(update);
+        Ok(self)
+    }
+
+    /// What a sample does to the states; nothing where there is none.
+    pub fn update(&self) -> Option<&Update> {
+        self.update.as_ref()
     }
 
     /// The matrices.

@@ -35,6 +35,6 @@ mod wanted;
 mod tests;
 
 pub use figures::{Criteria, Figures};
-pub use linear::{Equations, LinearLoop, Reference, Start, Trajectory};
+pub use linear::{Equations, LinearLoop, Reference, Start, Trajectory, Update};
 pub use response::{Request, Response, on_sample};
 pub use scalar::{Dual, Scalar};

@@ -1,6 +1,8 @@
 //! Response of a sampled loop: sample by sample, exact, with output at any time.
 
-use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory, check_growth, saturate, slack};
+use crate::dde::linear::{
+    LinearLoop, Reference, Start, Trajectory, Update, check_growth, saturate, slack,
+};
 use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
 use crate::dde::wanted::Wanted;
@@ -68,6 +70,9 @@ pub(crate) fn run<S: Scalar>(
         let u = equations.command(&walk.x, arrived, walk.held.value());
         check_growth(&walk.x, u, now)?;
         walk.commands.issue(saturate(u, plant.limit()));
+        if let Some(update) = plant.update() {
+            walk.update(update, arrived);
+        }
         walk.wanted.input_break(now);
         walk.interval(index, now);
         k += 1;
@@ -154,6 +159,19 @@ impl<S: Scalar> Walk<'_, S> {
         self.serve(after, now + early, (now + early + late).value() - tolerance);
         self.late
             .apply(&self.x, &[after, self.held], &mut self.scratch);
+        std::mem::swap(&mut self.x, &mut self.scratch);
+    }
+
+    /// Move the states that move at samples.
+    fn update(&mut self, update: &Update, arrived: S) {
+        let rows = update.states.chunks_exact(self.x.len().max(1));
+        let inputs = update.command.iter().zip(&update.reference);
+        for ((new, row), (&g, &h)) in self.scratch.iter_mut().zip(rows).zip(inputs) {
+            *new = S::from(g) * arrived + S::from(h) * self.held;
+            for (&weight, &x) in row.iter().zip(&self.x) {
+                *new += S::from(weight) * x;
+            }
+        }
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 

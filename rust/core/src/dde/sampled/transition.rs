@@ -3,14 +3,15 @@
 //!   x_{k+1} = Φ x_k + Γ₁ u_{k−m−1} + Γ₀ u_{k−m},   u_k = K x_k + L u_{k−m−1},
 //!
 //! Γ₀ = Γ(Ts − δ), Γ₁ = Φ(Ts − δ) Γ(δ); the state is (x_k, u_{k−1}, …, u_{k−m−1}), m + 1 commands
-//! behind x. Reference: Åström & Wittenmark, Computer-Controlled Systems (3rd ed. 1997), section
+//! behind x. Where a sample moves states, x_k is J x_k + G u_{k−m−1} in the first equation, with u_k
+//! computed before. Reference: Åström & Wittenmark, Computer-Controlled Systems (3rd ed. 1997), section
 //! 2.3, with the feedback closed. Eigenvalues by the QR algorithm (backward stable).
 
 use faer::MatRef;
 use num_complex::Complex64;
 
 use crate::Error;
-use crate::dde::linear::LinearLoop;
+use crate::dde::linear::{LinearLoop, Update};
 use crate::dde::propagator::{Propagator, multiply_add};
 
 use super::Timing;
@@ -41,6 +42,16 @@ impl Sample {
             past,
             lag: timing.samples,
         }
+    }
+
+    /// The same sample, which begins with an update of the states.
+    fn updated(mut self, update: &Update) -> Self {
+        let n = self.now.len();
+        multiply_add(&self.phi, &update.command, &mut self.past);
+        let mut phi = vec![0.0; n * n];
+        product(&self.phi, &update.states, n, &mut phi);
+        self.phi = phi;
+        self
     }
 
     /// Side of the transition matrix.
@@ -87,7 +98,10 @@ pub fn transition_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error>
     };
     let equations = plant.equations();
     check_size(equations.states(), plant.delay(), sample_time)?;
-    let sample = Sample::new(&equations.a, &equations.b, plant.delay(), sample_time);
+    let mut sample = Sample::new(&equations.a, &equations.b, plant.delay(), sample_time);
+    if let Some(update) = plant.update() {
+        sample = sample.updated(update);
+    }
     Ok((sample.close(&equations.k, equations.l, 1.0), sample.size()))
 }
 
