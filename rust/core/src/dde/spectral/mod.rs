@@ -199,7 +199,7 @@ impl Problem {
             return refuse("a delay is infinite: leave it out".to_owned());
         }
         if let Some(value) = self.initial.iter().find(|value| !value.is_finite()) {
-            return refuse(format!("y at the start is {value}: give finite numbers"));
+            return refuse(format!("y at the start is {value:?}: give finite numbers"));
         }
         if !(self.rtol >= 1e-14 && self.rtol < 1.0) {
             return refuse(format!("rtol={}: give a number from 1e-14 to 1", self.rtol));

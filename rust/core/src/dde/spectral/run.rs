@@ -166,8 +166,11 @@ impl<'a> Run<'a> {
                     }
                     self.solution.refused += 1;
                 }
+                Sweeps::NotFinite(0) if start == self.problem.start => {
+                    return Err(self.no_start());
+                }
                 Sweeps::NotFinite(node) => {
-                    if end - start <= 1e3 * SHORTEST * start.abs().max(end.abs()) {
+                    if node == 0 || end - start <= 1e3 * SHORTEST * start.abs().max(end.abs()) {
                         return Ok(Some(Outcome::NotFinite(self.element.t[node])));
                     }
                     self.length = RETREAT * (end - start);
@@ -179,6 +182,19 @@ impl<'a> Run<'a> {
                 self.wait = (patience, patience);
             }
         }
+    }
+
+    fn no_start(&self) -> Error {
+        let slopes: Vec<f64> = self
+            .element
+            .f
+            .chunks_exact(self.element.t.len())
+            .map(|row| row[0])
+            .collect();
+        Error::argument(format!(
+            "the right-hand side is not finite at t={:?}, y={:?}: it is {slopes:?}",
+            self.problem.start, self.problem.initial
+        ))
     }
 
     /// The largest length that is allowed now.
@@ -282,10 +298,7 @@ impl<'a> Run<'a> {
         if stop.is_some() {
             return Ok(Some(Outcome::Event));
         }
-        self.fresh = self.breaks.reach(end);
-        self.solution
-            .breaks
-            .extend(self.fresh.filter(|_| end < self.problem.end));
+        self.reach(end);
         self.jump_at(end, equation)?;
         if !self.problem.keep {
             self.solution.history.forget(end - self.problem.memory());
@@ -294,13 +307,25 @@ impl<'a> Run<'a> {
         Ok(None)
     }
 
-    /// Send the breaking point at the start of the element just accepted on its way.
+    /// Take the breaking point at the end of an element, if there is one.
+    fn reach(&mut self, time: f64) {
+        self.fresh = self.breaks.reach(time);
+        let Some(point) = self.fresh else { return };
+        if time < self.problem.end {
+            self.solution.breaks.push(point);
+        }
+        // A neutral one waits for the slope after it.
+        if !self.problem.neutral {
+            self.breaks.follow(point);
+        }
+    }
+
+    /// Send a neutral breaking point at the start of the element just accepted on its way.
     fn follow(&mut self, piece: &Piece) {
-        let Some(point) = self.fresh.take() else {
+        let Some(point) = self.fresh.filter(|_| self.problem.neutral) else {
             return;
         };
-        if self.problem.neutral
-            && point.order > 0
+        if point.order > 0
             && let Some(before) = self.solution.history.latest()
         {
             let length = piece.end - piece.start;
@@ -366,7 +391,12 @@ impl<'a> Run<'a> {
     fn give(&mut self, until: f64, cut: bool, n: usize) {
         let Some(times) = &self.problem.times else {
             for node in 1..n {
-                let time = self.element.t[node];
+                // The node at the end was moved off a jump.
+                let time = if node + 1 == n {
+                    until.max(self.element.t[node])
+                } else {
+                    self.element.t[node]
+                };
                 if time < until || (time == until && !cut) {
                     self.solution.times.push(time);
                     let rows = self.element.y.chunks_exact(n);
