@@ -64,7 +64,7 @@ impl Breaks {
         {
             return;
         }
-        let width = SAME * point.time.abs().max(self.origin.abs()).max(distance);
+        let width = self.width(point.time);
         let low = (distance - width).max(0.0).to_bits();
         let high = (distance + width).to_bits();
         if let Some((_, known)) = self.ahead.range_mut(low..=high).next() {
@@ -103,11 +103,17 @@ impl Breaks {
         self.ahead.first_key_value().map(|(_, point)| *point)
     }
 
-    /// Take the points up to `time`, the lowest order of them.
+    /// How far points at `time` may be from each other and still be one.
+    fn width(&self, time: f64) -> f64 {
+        SAME * time.abs().max(self.origin.abs())
+    }
+
+    /// Take the points at `time`, and any before it: the lowest order of them.
     pub fn reach(&mut self, time: f64) -> Option<BreakingPoint> {
+        let until = time + self.width(time);
         let mut order = None;
         while let Some(point) = self.next() {
-            if point.time > time {
+            if point.time > until {
                 break;
             }
             self.ahead.pop_first();

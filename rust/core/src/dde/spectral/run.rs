@@ -328,7 +328,7 @@ impl<'a> Run<'a> {
         if point.order > 0
             && let Some(before) = self.solution.history.latest()
         {
-            let length = piece.end - piece.start;
+            let length = self.shortest_delay;
             let slope = |piece: &Piece, d: usize, x: f64| {
                 let row = &piece.slopes[d * piece.terms..(d + 1) * piece.terms];
                 chebyshev::value(row, x)
