@@ -239,7 +239,7 @@ def test_all_nodes_are_given_by_default():
 
 
 def test_breaks_are_hit_exactly():
-    found = dtm.solve_dde(decay, (0, 3.7), 1.0, 0.36)
+    found = dtm.solve_dde(decay, (0, 3.7), 1.0, 0.36, rtol=1e-9)
     np.testing.assert_allclose(found.breaks, 0.36 * np.arange(1, 11), rtol=0, atol=1e-14)
     assert set(found.breaks) <= set(found.t)
 

@@ -18,6 +18,7 @@ mod events;
 mod fit;
 mod newton;
 mod nodes;
+mod output;
 mod run;
 #[cfg(test)]
 mod tests;
