@@ -78,7 +78,8 @@ impl<'py> Callbacks<'py> {
         let result = result.and_then(|()| match y.iter().find(|value| !value.is_finite()) {
             None => Ok(()),
             Some(value) => Err(PyValueError::new_err(format!(
-                "the change at t={t} returned {value}: give finite numbers"
+                "the change at t={t} returned {}: give finite numbers",
+                shown(*value)
             ))),
         });
         self.keep(result)
@@ -333,6 +334,15 @@ fn copy(array: &Bound<'_, PyArrayDyn<f64>>, out: &mut [f64]) -> PyResult<()> {
         }
     }
     Ok(())
+}
+
+/// A number as Python writes it.
+pub(super) fn shown(value: f64) -> String {
+    if value.is_nan() {
+        "nan".to_owned()
+    } else {
+        value.to_string()
+    }
 }
 
 /// A shape as Python writes it.

@@ -7,7 +7,7 @@ use deadtime::dde::spectral::{Problem, approximate};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::callback::numbers;
+use super::callback::{numbers, shown};
 use crate::errors::to_python;
 
 /// Error of the history as a part of the tolerance.
@@ -118,8 +118,8 @@ fn sample(name: &str, function: &Bound<'_, PyAny>, time: f64, out: &mut [f64]) -
     match out.iter().find(|value| !value.is_finite()) {
         None => Ok(()),
         Some(value) => Err(PyValueError::new_err(format!(
-            "{name} is {value} at t={time}: give finite values from t0 minus the largest delay to \
-             t0"
+            "{name} is {} at t={time}: give finite values from t0 minus the largest delay to t0",
+            shown(*value)
         ))),
     }
 }

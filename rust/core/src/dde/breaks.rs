@@ -5,8 +5,10 @@
 //! (Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, section 2.1.2).
 //! Points that agree to rounding are one, with the smaller order. They are followed up to the
 //! order that the method can see, which falls with the number of delays so that no more than about
-//! a hundred descend from one point; what is not followed is left to the error estimate. A neutral
-//! jump never ends: whoever finds it negligible says so by raising its order.
+//! a hundred descend from one point; what is not followed is left to the error estimate. In a
+//! neutral equation a jump of y′ never ends. Whoever finds it negligible says so by the order 2,
+//! from where on an order is gained each delay: what a delayed derivative hands on unchanged fades
+//! as the first one did.
 
 use std::collections::BTreeMap;
 
@@ -41,11 +43,13 @@ pub struct Breaks {
 
 impl Breaks {
     /// No points yet; all that come are later than `origin`.
-    pub fn new(origin: f64, delays: &[f64], neutral: bool) -> Self {
+    ///
+    /// Jumps of derivatives beyond the order `sight` are never followed.
+    pub fn new(origin: f64, delays: &[f64], neutral: bool, sight: u32) -> Self {
         Self {
             delays: delays.to_vec(),
             neutral,
-            smooth: followed(delays.len()),
+            smooth: followed(delays.len()).min(sight + 1),
             ahead: BTreeMap::new(),
             origin,
         }
@@ -64,7 +68,7 @@ impl Breaks {
         {
             return;
         }
-        let width = SAME * point.time.abs().max(self.origin.abs()).max(distance);
+        let width = self.width(point.time);
         let low = (distance - width).max(0.0).to_bits();
         let high = (distance + width).to_bits();
         if let Some((_, known)) = self.ahead.range_mut(low..=high).next() {
@@ -87,8 +91,8 @@ impl Breaks {
 
     /// Add what descends from a point.
     pub fn follow(&mut self, point: BreakingPoint) {
-        let order = if self.neutral {
-            point.order.max(1)
+        let order = if self.neutral && point.order < 2 {
+            1
         } else {
             point.order + 1
         };
@@ -103,11 +107,17 @@ impl Breaks {
         self.ahead.first_key_value().map(|(_, point)| *point)
     }
 
-    /// Take the points up to `time`, the lowest order of them.
+    /// How far points at `time` may be from each other and still be one.
+    fn width(&self, time: f64) -> f64 {
+        SAME * time.abs().max(self.origin.abs())
+    }
+
+    /// Take the points at `time`, and any before it: the lowest order of them.
     pub fn reach(&mut self, time: f64) -> Option<BreakingPoint> {
+        let until = time + self.width(time);
         let mut order = None;
         while let Some(point) = self.next() {
-            if point.time > time {
+            if point.time > until {
                 break;
             }
             self.ahead.pop_first();
@@ -161,7 +171,7 @@ mod tests {
 
     #[test]
     fn retarded_points_lose_an_order_each_delay_and_end() {
-        let mut breaks = Breaks::new(0.0, &[0.36], false);
+        let mut breaks = Breaks::new(0.0, &[0.36], false, 30);
         breaks.follow(BreakingPoint {
             time: 0.0,
             order: 1,
@@ -176,7 +186,7 @@ mod tests {
 
     #[test]
     fn neutral_points_keep_their_order() {
-        let mut breaks = Breaks::new(1.0, &[0.5], true);
+        let mut breaks = Breaks::new(1.0, &[0.5], true, 30);
         breaks.follow(BreakingPoint {
             time: 1.0,
             order: 0,
@@ -189,7 +199,7 @@ mod tests {
     #[test]
     fn points_of_two_delays_merge() {
         // 1/3 and 1/5: 2/5 and 1/3 + 1/5 by two ways each, all multiples of 1/15.
-        let mut breaks = Breaks::new(0.0, &[1.0 / 3.0, 0.2], false);
+        let mut breaks = Breaks::new(0.0, &[1.0 / 3.0, 0.2], false, 30);
         breaks.follow(BreakingPoint {
             time: 0.0,
             order: 0,
@@ -206,7 +216,7 @@ mod tests {
     #[test]
     fn many_delays_stay_bounded() {
         let delays: Vec<f64> = (1..=40).map(|k| f64::from(k).sqrt()).collect();
-        let mut breaks = Breaks::new(0.0, &delays, true);
+        let mut breaks = Breaks::new(0.0, &delays, true, 30);
         breaks.follow(BreakingPoint {
             time: 0.0,
             order: 1,

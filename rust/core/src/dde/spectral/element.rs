@@ -25,6 +25,8 @@ const MARGIN: f64 = 10.0;
 const BELIEVED: f64 = 300.0;
 /// Ratio that two steps alone do not prove to be smaller: the first of them may be anything.
 const SLOWEST: f64 = 1e-3;
+/// Growth of the iterate from one sweep to the next that no convergent iteration shows.
+const WILD: f64 = 30.0;
 /// Place on the last piece, which ends at 1, beyond which extrapolation is idle.
 const FARTHEST: f64 = 5.0;
 /// Terms of an extrapolation this much above the smallest one are noise.
@@ -188,10 +190,12 @@ impl Element {
             if self.newton.is_on() && !self.newton.solve(nodes, half, &mut self.residual) {
                 return Ok(Sweeps::Stalled);
             }
-            self.step(problem, n);
+            let grown = self.step(problem, n);
             let size = self.size(n - 1);
             if count == 1 {
                 first = size;
+            } else if grown > WILD {
+                return Ok(Sweeps::Stalled);
             }
             let ratio = size / last;
             if self.settled(count, size, ratio) {
@@ -260,9 +264,11 @@ impl Element {
         }
     }
 
-    /// Add the step, and measure what its size is to be compared with.
-    fn step(&mut self, problem: &Problem, n: usize) {
+    /// Add the step, and measure what its size is to be compared with; how much y has grown.
+    fn step(&mut self, problem: &Problem, n: usize) -> f64 {
         self.scale.clear();
+        let before = self.y.iter().fold(0.0_f64, |size, y| size.max(y.abs()));
+        let mut after = 0.0_f64;
         let rows = self.y.chunks_exact_mut(n);
         for (d, (y, step)) in rows.zip(self.residual.chunks_exact(n - 1)).enumerate() {
             let mut size = y[0].abs();
@@ -270,10 +276,12 @@ impl Element {
                 *y += step;
                 size = size.max(y.abs());
             }
+            after = after.max(size);
             let atol = problem.atol.get(d).or(problem.atol.first());
             let scale = atol.copied().unwrap_or(0.0) + problem.rtol * size;
             self.scale.push(scale.max(f64::MIN_POSITIVE));
         }
+        after / before
     }
 
     /// Largest entry of the step, in tolerances.

@@ -81,8 +81,8 @@ impl Watch {
                 *value = row[node];
             }
             equation.events(t[node], &column, &mut here)?;
-            for event in 0..here.len() {
-                let (before, after) = (self.last[event], here[event]);
+            for (event, &after) in here.iter().enumerate() {
+                let before = self.last[event];
                 if crosses(self.kinds[event].direction, before, after) {
                     let bracket = ((t[node - 1], before), (t[node], after));
                     let (time, value) = self.refine(equation, piece, event, bracket)?;

@@ -3,8 +3,8 @@
 //! Each piece is interpolated at 20 Chebyshev points of the first kind, which leave out its ends,
 //! so that what happens exactly at a jump does not matter. Where the last coefficients are not
 //! below the tolerance the piece is halved. Around a kink or jump that nobody declared the pieces
-//! become tiny, and a run of them is a breaking point, at the tiniest; where halving meets it by
-//! chance, values or slopes of the two pieces differ at the joint.
+//! become tiny, and a run of them is a breaking point, at the tiniest. Close to a joint, where there
+//! are no points, it shows in values or slopes that differ there; it is found by bisection.
 
 use super::super::breaks::BreakingPoint;
 use super::Piece;
@@ -21,7 +21,15 @@ const KINKED: u32 = 14;
 /// Differences at a joint, in tolerances, that are no noise.
 const LOUD: f64 = 100.0;
 /// Breaking points closer than this part of the history are one.
-const SAME: f64 = 1e-4;
+const SAME: f64 = 1e-9;
+/// Distance from the ends at which a piece is checked, as a part of it.
+const EDGE: f64 = 1e-7;
+/// Tolerances that it may be off there: the sum of what the tail leaves out.
+const NEAR: f64 = 20.0;
+/// Part of a piece at its ends without points.
+const MARGIN: f64 = 2e-3;
+/// Times the pieces are made anew with more breaking points.
+const ROUNDS: u32 = 3;
 /// Pieces of one history.
 const MOST: usize = 20_000;
 
@@ -32,6 +40,8 @@ pub struct Approximation {
     pub pieces: Vec<Piece>,
     /// Kinks and jumps.
     pub breaks: Vec<BreakingPoint>,
+    /// Bounds on the components.
+    sizes: Vec<f64>,
 }
 
 /// Approximate `function`, which writes `dim` values, on [start, end] to `tolerance`, with joints
@@ -43,6 +53,65 @@ pub fn approximate(
     dim: usize,
     tolerance: impl Fn(usize, f64) -> f64,
     mut function: impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+) -> Result<Approximation, Error> {
+    let mut breaks = breaks.to_vec();
+    for _ in 0..ROUNDS {
+        let found = divide(start, end, &breaks, dim, &tolerance, &mut function)?;
+        let known = breaks.len();
+        for pair in found.pieces.windows(2) {
+            if !joins(&pair[0], &pair[1], &found.sizes, &tolerance) {
+                let time = meeting(&pair[0], &pair[1], dim, &mut function)?;
+                if breaks
+                    .iter()
+                    .all(|other| (other - time).abs() > SAME * (end - start))
+                {
+                    breaks.push(time);
+                }
+            }
+        }
+        if breaks.len() == known {
+            return Ok(found);
+        }
+    }
+    divide(start, end, &breaks, dim, &tolerance, &mut function)
+}
+
+/// Where a function passes from one piece to the next, close to their joint: no point of either
+/// lies there.
+fn meeting(
+    left: &Piece,
+    right: &Piece,
+    dim: usize,
+    function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+) -> Result<f64, Error> {
+    let mut low = left.end - MARGIN * (left.end - left.start);
+    let mut high = right.start + MARGIN * (right.end - right.start);
+    let (mut value, mut before, mut after) = (vec![0.0; dim], vec![0.0; dim], vec![0.0; dim]);
+    let mut middle = left.end;
+    while low < middle && middle < high {
+        function(middle, &mut value)?;
+        left.value(middle, &mut before);
+        right.value(middle, &mut after);
+        let distance =
+            |to: &[f64]| -> f64 { value.iter().zip(to).map(|(a, b)| (a - b).abs()).sum() };
+        if distance(&before) <= distance(&after) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+        middle = 0.5 * (low + high);
+    }
+    Ok(high)
+}
+
+/// Halve until every piece is resolved.
+fn divide(
+    start: f64,
+    end: f64,
+    breaks: &[f64],
+    dim: usize,
+    tolerance: &impl Fn(usize, f64) -> f64,
+    function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
 ) -> Result<Approximation, Error> {
     let mut joints = vec![start];
     joints.extend(breaks.iter().filter(|time| **time > start && **time < end));
@@ -64,7 +133,7 @@ pub fn approximate(
         let mut open = vec![(pair[0], pair[1], 0)];
         let mut tiniest: Option<(u32, f64)> = None;
         while let Some((start, end, depth)) = open.pop() {
-            let piece = fitter.piece(start, end, &mut function)?;
+            let piece = fitter.piece(start, end, function)?;
             let middle = 0.5 * (start + end);
             let splits = depth < DEEPEST && start < middle && middle < end;
             for (largest, c) in sizes
@@ -73,7 +142,9 @@ pub fn approximate(
             {
                 *largest = f64::max(*largest, size(c));
             }
-            if splits && !resolved(&piece, &sizes, &tolerance) {
+            let good = resolved(&piece, &sizes, tolerance)
+                && holds_at_ends(&piece, &sizes, tolerance, function)?;
+            if splits && !good {
                 if found.pieces.len() + open.len() > MOST {
                     return Err(Error::TooMuch {
                         what: "the history",
@@ -106,16 +177,7 @@ pub fn approximate(
             found.breaks.push(BreakingPoint { time, order: 0 });
         }
     }
-    for pair in found.pieces.windows(2) {
-        if joins(&pair[0], &pair[1], &sizes, &tolerance) {
-            continue;
-        }
-        let time = pair[1].start;
-        let near = |point: &BreakingPoint| (point.time - time).abs() < SAME * (end - start);
-        if !found.breaks.iter().any(near) {
-            found.breaks.push(BreakingPoint { time, order: 0 });
-        }
-    }
+    found.sizes = sizes;
     Ok(found)
 }
 
@@ -159,6 +221,28 @@ fn resolved(piece: &Piece, sizes: &[f64], tolerance: &impl Fn(usize, f64) -> f64
             .fold(0.0, f64::max);
         tail <= tolerance(component, size).max(1e-15 * size)
     })
+}
+
+/// Whether the piece is right next to its ends too, where it has no points.
+fn holds_at_ends(
+    piece: &Piece,
+    sizes: &[f64],
+    tolerance: &impl Fn(usize, f64) -> f64,
+    function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+) -> Result<bool, Error> {
+    let inset = EDGE * (piece.end - piece.start);
+    let (mut value, mut found) = (vec![0.0; sizes.len()], vec![0.0; sizes.len()]);
+    for time in [piece.start + inset, piece.end - inset] {
+        function(time, &mut value)?;
+        piece.value(time, &mut found);
+        let pairs = value.iter().zip(&found).zip(sizes).enumerate();
+        for (component, ((value, found), &size)) in pairs {
+            if (value - found).abs() > NEAR * tolerance(component, size).max(1e-15 * size) {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
 }
 
 /// Interpolation at the Chebyshev points, with its tables.
@@ -254,7 +338,7 @@ mod tests {
 
     #[test]
     fn kinks_and_jumps_are_found() {
-        for kink in [-0.3, -0.5, -std::f64::consts::FRAC_1_PI] {
+        for kink in [-0.3, -0.5, -0.2500003, -std::f64::consts::FRAC_1_PI] {
             for function in [
                 Box::new(move |t: f64| (t - kink).abs()) as Box<dyn Fn(f64) -> f64>,
                 Box::new(move |t: f64| if t < kink { 1.0 } else { 2.0 }),

@@ -18,6 +18,7 @@ mod events;
 mod fit;
 mod newton;
 mod nodes;
+mod output;
 mod run;
 #[cfg(test)]
 mod tests;
@@ -183,7 +184,11 @@ impl Problem {
                  would decide its present; give delays above zero"
             ));
         }
-        if let Some(delay) = self.delays.iter().find(|delay| !(**delay > 0.0)) {
+        if let Some(delay) = self
+            .delays
+            .iter()
+            .find(|delay| **delay == 0.0 || delay.is_nan())
+        {
             return refuse(format!(
                 "the delay {delay} is not above zero: write y itself where the delay is 0"
             ));
@@ -198,8 +203,17 @@ impl Problem {
         if self.delays.iter().any(|delay| !delay.is_finite()) {
             return refuse("a delay is infinite: leave it out".to_owned());
         }
+        let first = self.history.pieces().next().map(|piece| piece.start);
+        let needed = self.start - self.memory() * (1.0 - 1e-12);
+        if let Some(first) = first.filter(|first| *first > needed) {
+            return refuse(format!(
+                "the history starts at {first}: give it from {} on, the start minus the largest \
+                 delay",
+                self.start - self.memory()
+            ));
+        }
         if let Some(value) = self.initial.iter().find(|value| !value.is_finite()) {
-            return refuse(format!("y at the start is {value}: give finite numbers"));
+            return refuse(format!("y at the start is {value:?}: give finite numbers"));
         }
         if !(self.rtol >= 1e-14 && self.rtol < 1.0) {
             return refuse(format!("rtol={}: give a number from 1e-14 to 1", self.rtol));
@@ -220,7 +234,7 @@ impl Problem {
                 self.dim()
             ));
         }
-        if !(self.longest > 0.0) {
+        if self.longest.is_nan() || self.longest <= 0.0 {
             return refuse(format!(
                 "max_step={}: give a number above zero",
                 self.longest

@@ -6,6 +6,7 @@ use super::control::{self, Verdict};
 use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
 use super::nodes::{Nodes, nodes};
+use super::output::Output;
 use super::{Equation, Outcome, Problem, Solution};
 use crate::dde::chebyshev;
 use crate::{Error, Task};
@@ -27,7 +28,9 @@ const RETREAT: f64 = 0.3;
 const OVERLAP: f64 = 12.0;
 /// Elements to wait after one of that kind failed, at most.
 const PATIENCE: u32 = 4096;
-/// A neutral jump below this part of the tolerance is not followed.
+/// Orders of a jump that matter beside one for each digit of the tolerance.
+const UNSEEN: u32 = 2;
+/// A jump of a neutral slope below this part of the tolerance is none.
 const FAINT: f64 = 0.02;
 
 /// Solve to the end of the interval or a terminal event.
@@ -66,12 +69,14 @@ struct Run<'a> {
     shortest_delay: f64,
     /// Elements until one longer than a delay is tried, and how many it was last time.
     wait: (u32, u32),
-    output: usize,
+    output: Output<'a>,
 }
 
 impl<'a> Run<'a> {
     fn new<E: Equation + ?Sized>(problem: &'a Problem, equation: &mut E) -> Result<Self, Error> {
-        let mut breaks = Breaks::new(problem.start, &problem.delays, problem.neutral);
+        let digits = -problem.rtol.log10();
+        let sight = UNSEEN + digits.ceil() as u32;
+        let mut breaks = Breaks::new(problem.start, &problem.delays, problem.neutral, sight);
         for point in &problem.breaks {
             breaks.follow(*point);
         }
@@ -113,11 +118,9 @@ impl<'a> Run<'a> {
             preferred,
             shortest_delay: delays.fold(f64::INFINITY, f64::min),
             wait: (0, 1),
-            output: 0,
+            output: Output::new(problem.times.as_deref()),
         };
-        if problem.times.is_none() {
-            run.put(problem.start);
-        }
+        run.output.start(problem.start, &run.state);
         Ok(run)
     }
 
@@ -166,8 +169,11 @@ impl<'a> Run<'a> {
                     }
                     self.solution.refused += 1;
                 }
+                Sweeps::NotFinite(0) if start == self.problem.start => {
+                    return Err(self.no_start());
+                }
                 Sweeps::NotFinite(node) => {
-                    if end - start <= 1e3 * SHORTEST * start.abs().max(end.abs()) {
+                    if node == 0 || end - start <= 1e3 * SHORTEST * start.abs().max(end.abs()) {
                         return Ok(Some(Outcome::NotFinite(self.element.t[node])));
                     }
                     self.length = RETREAT * (end - start);
@@ -179,6 +185,19 @@ impl<'a> Run<'a> {
                 self.wait = (patience, patience);
             }
         }
+    }
+
+    fn no_start(&self) -> Error {
+        let slopes: Vec<f64> = self
+            .element
+            .f
+            .chunks_exact(self.element.t.len())
+            .map(|row| row[0])
+            .collect();
+        Error::argument(format!(
+            "the right-hand side is not finite at t={:?}, y={:?}: it is {slopes:?}",
+            self.problem.start, self.problem.initial
+        ))
     }
 
     /// The largest length that is allowed now.
@@ -272,20 +291,18 @@ impl<'a> Run<'a> {
         let (y, t) = (&self.element.y, &self.element.t);
         let stop = self.watch.scan(equation, &piece, y, t)?;
         let until = stop.unwrap_or(end);
+        let last = stop.is_some() || end >= self.problem.end;
+        self.output.give(&piece, (y, t), until, last);
         self.solution.history.push(piece);
         self.solution.elements += 1;
         self.solution.end = until;
-        self.give(until, stop.is_some(), n);
         for (state, row) in self.state.iter_mut().zip(self.element.y.chunks_exact(n)) {
             *state = row[n - 1];
         }
         if stop.is_some() {
             return Ok(Some(Outcome::Event));
         }
-        self.fresh = self.breaks.reach(end);
-        self.solution
-            .breaks
-            .extend(self.fresh.filter(|_| end < self.problem.end));
+        self.reach(end);
         self.jump_at(end, equation)?;
         if !self.problem.keep {
             self.solution.history.forget(end - self.problem.memory());
@@ -294,16 +311,28 @@ impl<'a> Run<'a> {
         Ok(None)
     }
 
-    /// Send the breaking point at the start of the element just accepted on its way.
+    /// Take the breaking point at the end of an element, if there is one.
+    fn reach(&mut self, time: f64) {
+        self.fresh = self.breaks.reach(time);
+        let Some(point) = self.fresh else { return };
+        if time < self.problem.end {
+            self.solution.breaks.push(point);
+        }
+        // A neutral one waits for the slope after it.
+        if !self.problem.neutral {
+            self.breaks.follow(point);
+        }
+    }
+
+    /// Send a neutral breaking point at the start of the element just accepted on its way.
     fn follow(&mut self, piece: &Piece) {
-        let Some(point) = self.fresh.take() else {
+        let Some(mut point) = self.fresh.filter(|_| self.problem.neutral) else {
             return;
         };
-        if self.problem.neutral
-            && point.order > 0
+        if point.order == 1
             && let Some(before) = self.solution.history.latest()
         {
-            let length = piece.end - piece.start;
+            let length = self.shortest_delay;
             let slope = |piece: &Piece, d: usize, x: f64| {
                 let row = &piece.slopes[d * piece.terms..(d + 1) * piece.terms];
                 chebyshev::value(row, x)
@@ -313,7 +342,7 @@ impl<'a> Run<'a> {
                 length * (slope(piece, d, -1.0) - slope(before, d, 1.0)).abs() / scale
             });
             if turn.fold(0.0, f64::max) < FAINT {
-                return;
+                point.order = 2;
             }
         }
         self.breaks.follow(point);
@@ -334,9 +363,7 @@ impl<'a> Run<'a> {
         }
         if changed {
             self.watch.restart(equation, time, &self.state)?;
-            if self.problem.times.is_none() {
-                self.put(time);
-            }
+            self.output.start(time, &self.state);
         }
         Ok(())
     }
@@ -362,50 +389,9 @@ impl<'a> Run<'a> {
         };
     }
 
-    /// Output of the element just accepted.
-    fn give(&mut self, until: f64, cut: bool, n: usize) {
-        let Some(times) = &self.problem.times else {
-            for node in 1..n {
-                let time = self.element.t[node];
-                if time < until || (time == until && !cut) {
-                    self.solution.times.push(time);
-                    let rows = self.element.y.chunks_exact(n);
-                    self.solution.values.extend(rows.map(|row| row[node]));
-                }
-            }
-            if cut {
-                self.value_at(until);
-            }
-            return;
-        };
-        // A time at the end belongs to the next element, if there is one: after the jump.
-        let last = cut || until >= self.problem.end;
-        while let Some(&time) = times.get(self.output) {
-            if time > until || (time == until && !last) {
-                break;
-            }
-            self.output += 1;
-            self.value_at(time);
-        }
-    }
-
-    /// The value of the last piece.
-    fn value_at(&mut self, time: f64) {
-        let mut value = vec![0.0; self.state.len()];
-        if let Some(piece) = self.solution.history.latest() {
-            piece.value(time, &mut value);
-        }
-        self.solution.times.push(time);
-        self.solution.values.extend(value);
-    }
-
-    /// The state itself.
-    fn put(&mut self, time: f64) {
-        self.solution.times.push(time);
-        self.solution.values.extend_from_slice(&self.state);
-    }
-
     fn finished(mut self) -> Solution {
+        self.solution.times = self.output.times;
+        self.solution.values = self.output.values;
         self.solution.calls = self.element.calls;
         self.solution.nodes = self.element.evaluated;
         self.solution.event_times = self.watch.times;

@@ -1,5 +1,7 @@
 //! Runs against closed forms, bounds of memory, hostile equations.
 
+use proptest::prelude::*;
+
 use super::super::breaks::BreakingPoint;
 use super::super::history::{History, Piece};
 use super::*;
@@ -222,6 +224,10 @@ fn bad_problems_are_refused() {
             ..good.clone()
         },
         Problem {
+            history: constant(0.0, 0.0, 0.5),
+            ..good.clone()
+        },
+        Problem {
             history: History::default(),
             ..good
         },
@@ -229,5 +235,79 @@ fn bad_problems_are_refused() {
     for problem in bad {
         let refused = solve(&problem, &mut linear_decay(), &Task::new());
         assert!(matches!(refused, Err(Error::Argument(_))), "{problem:?}");
+    }
+}
+
+#[test]
+fn elements_have_the_order_of_radau_collocation() {
+    // y′ = cos(t) y z with z = 1: one element of four nodes, at its end and within.
+    let errors = |length: f64| {
+        let mut equation = Plain {
+            function: |t: f64, y: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| {
+                out[0] = t.cos() * y[0] * z[0];
+            },
+            delays: 1,
+        };
+        let mut problem = scalar(10.0, 8.0, 1e-13);
+        problem.history = constant(1.0, 0.0, 10.0);
+        let mut element = element::Element::default();
+        let begin = element::Begin {
+            initial: &problem.initial,
+            history: &problem.history,
+            smooth: false,
+            jumps: (false, false),
+        };
+        let nodes = nodes::nodes(4);
+        element.set(&problem, nodes, (0.0, length), begin).unwrap();
+        let task = Task::new();
+        let ended = element.sweep(&problem, nodes, &mut equation, &task);
+        assert!(matches!(ended, Ok(element::Sweeps::Converged(_))));
+        nodes.coefficients(&element.y, &mut element.coefficients);
+        let piece = Piece::new(0.0, length, 5, element.coefficients.clone());
+        let error = |time: f64| {
+            let mut value = [0.0];
+            piece.value(time, &mut value);
+            (value[0] - time.sin().exp()).abs()
+        };
+        let within = (1..20).map(|i| error(0.05 * f64::from(i) * length));
+        (error(length), within.fold(0.0, f64::max))
+    };
+    let (long, short) = (errors(0.8), errors(0.2));
+    // Two halvings of one element: 2N = 8 orders at its end, N + 1 = 5 within, the last not quite yet.
+    assert!((long.0 / short.0).log2() > 14.0, "{long:?} {short:?}");
+    assert!((long.1 / short.1).log2() > 8.0, "{long:?} {short:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn exponentials_are_solutions(delay in 0.01..3.0_f64, rate in -1.5..0.5_f64) {
+        // y′ = r e^{rτ} y(t − τ) has the solution e^{rt}.
+        let factor = rate * (rate * delay).exp();
+        let mut equation = Plain {
+            function: |_, _: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| out[0] = factor * z[0],
+            delays: 1,
+        };
+        let mut problem = scalar(delay, 4.0, 1e-9);
+        let past = approximate(-delay, 0.0, &[], 1, |_, _| 1e-13, |t, out| {
+            out[0] = (rate * t).exp();
+            Ok(())
+        });
+        problem.history = History::new(past.unwrap().pieces);
+        let found = solve(&problem, &mut equation, &Task::new()).unwrap();
+        prop_assert!((found.values[0] - (4.0 * rate).exp()).abs() < 1e-8 * (1.0 + (4.0 * rate).exp()));
+    }
+
+    #[test]
+    fn a_shift_of_time_changes_nothing(shift in -1e4..1e4_f64, delay in 0.1..2.0_f64) {
+        let run = |start: f64| {
+            let mut problem = scalar(delay, start + 5.0, 1e-8);
+            problem.start = start;
+            problem.history = constant(0.3, start, delay);
+            problem.breaks = vec![BreakingPoint { time: start, order: 0 }];
+            solve(&problem, &mut linear_decay(), &Task::new()).unwrap().values[0]
+        };
+        prop_assert!((run(shift) - run(0.0)).abs() < 1e-7);
     }
 }

@@ -1,0 +1,64 @@
+//! Which values of a run are given back.
+
+use super::super::history::Piece;
+
+/// Values at wanted times, or at all nodes.
+#[derive(Debug)]
+pub(super) struct Output<'a> {
+    wanted: Option<&'a [f64]>,
+    next: usize,
+    pub(super) times: Vec<f64>,
+    /// One time after the other.
+    pub(super) values: Vec<f64>,
+}
+
+impl<'a> Output<'a> {
+    /// Nothing yet.
+    pub(super) fn new(wanted: Option<&'a [f64]>) -> Self {
+        Self {
+            wanted,
+            next: 0,
+            times: Vec::new(),
+            values: Vec::new(),
+        }
+    }
+
+    /// The state at the start, or after it was changed: wanted times get it from the element that
+    /// follows.
+    pub(super) fn start(&mut self, time: f64, state: &[f64]) {
+        if self.wanted.is_none() {
+            self.times.push(time);
+            self.values.extend_from_slice(state);
+        }
+    }
+
+    /// An element up to `until`, with its nodes: values (component, node) and times. A wanted time
+    /// at its end belongs to the next element, unless this is the last one.
+    pub(super) fn give(&mut self, piece: &Piece, (y, t): (&[f64], &[f64]), until: f64, last: bool) {
+        if let Some(wanted) = self.wanted {
+            while let Some(&time) = wanted.get(self.next) {
+                if time > until || (time == until && !last) {
+                    break;
+                }
+                self.next += 1;
+                self.value(piece, time);
+            }
+            return;
+        }
+        let n = t.len();
+        for node in (1..n).filter(|node| t[*node] < until && node + 1 < n) {
+            self.times.push(t[node]);
+            self.values.extend(y.chunks_exact(n).map(|row| row[node]));
+        }
+        // The last node was perhaps moved off a jump, or lies beyond a terminal event.
+        self.value(piece, until);
+    }
+
+    fn value(&mut self, piece: &Piece, time: f64) {
+        let begin = self.values.len();
+        let dim = piece.coefficients.len() / piece.terms;
+        self.values.resize(begin + dim, 0.0);
+        piece.value(time, &mut self.values[begin..]);
+        self.times.push(time);
+    }
+}
