@@ -246,9 +246,9 @@ class ControlLoop:
         How the output answers to the delay and to the gain:
 
         >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.31), delay=0.36)
-        >>> response = loop.simulate([0.3, 0.5, 1.0], sensitivities=("delay", "Kp"))
+        >>> response = loop.simulate([0.0, 0.5, 1.0], sensitivities=("delay", "Kp"))
         >>> print(response.sensitivities["delay"])       # before 2 delays: y = Kp (t - delay)
-        [ 0.         -1.31       -0.35...]
+        [ 0.         -1.31       -0.348984]
         """
         return simulate_loop(
             self,
