@@ -78,8 +78,10 @@ def test_metrics_are_those_of_single_responses(loop):
                 found[name][i], info[name], atol=1e-7, err_msg=f"{name} of set {i}"
             )
         assert found["steady_state"][i] == pytest.approx(info["steady_state"], abs=1e-12)
-        at_peak = response._dense(np.array([found["peak_time"][i]]))[0]
-        assert abs(at_peak) == pytest.approx(info["peak"], abs=1e-9)
+        # On one side of it, where the output jumps.
+        around = found["peak_time"][i] + np.array([-1e-10, 0.0, 1e-10])
+        at_peak = np.abs(response._dense(np.clip(around, 0.0, 10.0))).max()
+        assert at_peak == pytest.approx(info["peak"], abs=1e-8)
         for name in ("settling_min", "settling_max"):
             np.testing.assert_allclose(found[name][i], info[name], atol=2e-2)
 

@@ -10,13 +10,14 @@ import scipy
 __all__ = ["addresses"]
 
 _capsule = ctypes.pythonapi
+_FunctionPointer: Any = ctypes.CFUNCTYPE(None).__base__
 
 
 def addresses(function: Any) -> tuple[int, int] | None:
     """Return the addresses of a C function and of its user data, None for a Python function."""
     if isinstance(function, scipy.LowLevelCallable):
         return _of_capsule(tuple.__getitem__(function, 0))
-    if isinstance(function, ctypes._CFuncPtr):
+    if isinstance(function, _FunctionPointer):
         address = ctypes.cast(function, ctypes.c_void_p).value
     else:
         address = getattr(function, "address", None)
@@ -34,5 +35,5 @@ def _of_capsule(capsule: object) -> tuple[int, int]:
 
 
 def _call(function: str, result: Any, capsule: object, *name: bytes) -> Any:
-    types = (ctypes.py_object, *(ctypes.c_char_p for _ in name))
+    types: Any = (ctypes.py_object, *(ctypes.c_char_p for _ in name))
     return ctypes.PYFUNCTYPE(result, *types)((function, _capsule))(capsule, *name)

@@ -286,9 +286,8 @@ class LinearLoop:
         state: NDArray[np.float64],
         command: float,
         before: float,
-        reference_times: NDArray[np.float64],
-        reference_values: NDArray[np.float64],
-        command_history: NDArray[np.float64],
+        reference: float | tuple[NDArray[np.float64], NDArray[np.float64]],
+        command_history: NDArray[np.float64] | None,
         sample_phase: float,
     ) -> tuple[
         NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]

@@ -11,7 +11,7 @@ The filter x' = F x + G v, d = C x, driven by the samples v_k of what it filters
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, TypeAlias, cast, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ def discretised(
 ) -> SampledFilter:
     """Return the filter of a sample time in s by one of the methods."""
     system = (F, G[:, None], C[None, :], np.zeros((1, 1)))
-    found = cont2discrete(system, sample_time, method=_SCIPY[method])
+    found = cast(Any, cont2discrete)(system, sample_time, method=_SCIPY[method])
     return SampledFilter(found[0], found[1][:, 0], found[2][0], float(found[3][0, 0]))
 
 

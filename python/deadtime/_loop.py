@@ -107,7 +107,8 @@ class ControlLoop:
             raise ValueError(
                 f"delay_path={self.delay_path!r}: give one of {', '.join(map(repr, _PATHS))}"
             )
-        LoopModel.build(self.plant, self.controller, self.parameters)
+        # Building the model checks that its parts fit; it is kept.
+        object.__setattr__(self, "_model", self._model)
 
     def __getstate__(self) -> dict[str, Any]:
         # Without what is kept for speed: the native loop does not pickle and is soon made again.
@@ -246,9 +247,9 @@ class ControlLoop:
         How the output answers to the delay and to the gain:
 
         >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.31), delay=0.36)
-        >>> response = loop.simulate([0.3, 0.5, 1.0], sensitivities=("delay", "Kp"))
+        >>> response = loop.simulate([0.0, 0.5, 1.0], sensitivities=("delay", "Kp"))
         >>> print(response.sensitivities["delay"])       # before 2 delays: y = Kp (t - delay)
-        [ 0.         -1.31       -0.35...]
+        [ 0.         -1.31       -0.348984]
         """
         return simulate_loop(
             self,
@@ -573,6 +574,12 @@ class ControlLoop:
     @cached_property
     def _native(self) -> LinearLoop:
         return self._model.native(self._known_delay(), self.sample_time, self.limit)
+
+    @cached_property
+    def _runner(self) -> tuple[LinearLoop, float]:
+        """What simulates the loop, and how much later than its clock the output is read."""
+        ahead = self._known_delay() if self.delay_path == "measurement" else 0.0
+        return self._native, ahead
 
     @cached_property
     def _rest_at_zero(self) -> tuple[NDArray[np.float64], float]:

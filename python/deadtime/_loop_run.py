@@ -7,7 +7,7 @@ delay, so outputs are asked for that much later and their breaks are moved back.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -46,13 +46,12 @@ class _Again(NamedTuple):
 
     loop: ControlLoop
     start: float
-    ahead: float
     arguments: tuple[Any, ...]
 
     def __call__(self, times: Vector) -> Vector:
-        since = times - self.start + self.ahead
+        native, ahead = self.loop._runner
         arguments = _since_start(self.loop, self.start, self.arguments)
-        return self.loop._native.simulate(since, np.empty(0), *arguments)[0]
+        return native.simulate(times - self.start + ahead, _NONE, *arguments)[0]
 
 
 class _Jumps(NamedTuple):
@@ -89,43 +88,42 @@ def simulate_loop(
         raise ValueError("time is empty: give at least one output time")
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
-    jumps = reference_jumps(times, reference, reference_time, before)
+    held: float | tuple[Vector, Vector]
     past = before
-    if reference_time is not None and jumps.times[0] < times[0]:
-        past = jumps.just_before(float(times[0]))
-    delay = loop._known_delay()
-    ahead = delay if loop.delay_path == "measurement" else 0.0
-    arguments = (
-        *loop._at_rest(initial, past),
-        jumps.before,
-        jumps.times,
-        jumps.values,
-        _NONE
-        if type(command_history) is tuple and not command_history
-        else _one_dimensional("command_history", command_history),
-        finite("sample_phase", sample_phase),
-    )
+    if type(reference) is float and reference_time is None:
+        held = last = finite("reference", reference)
+    else:
+        jumps = reference_jumps(times, reference, reference_time, before)
+        held, last = (jumps.times, jumps.values), float(jumps.values[-1])
+        if jumps.times[0] < times[0]:
+            past = jumps.just_before(float(times[0]))
+    history = None
+    if not isinstance(command_history, tuple) or command_history:
+        history = _one_dimensional("command_history", command_history)
+    phase = finite("sample_phase", sample_phase)
+    native, ahead = loop._runner
+    arguments = (*loop._at_rest(initial, past), before, held, history, phase)
     # The times are the caller's; what is kept must not change with them.
     kept = times.copy()
-    outputs, inputs, breaks, seen = loop._native.respond(kept, ahead, *arguments)
+    outputs, inputs, breaks, seen = native.respond(kept, ahead, *arguments)
+    start = float(kept[0])
     response = Response._of_fresh(
         time=kept,
         outputs=outputs,
         inputs=inputs,
         breaks=breaks,
         reference=seen,
-        steady_state=steady_state(loop, float(jumps.values[-1])),
-        _dense=_Again(loop, float(kept[0]), ahead, arguments),
+        steady_state=steady_state(loop, last),
+        _dense=_Again(loop, start, arguments),
     )
     if not sensitivities:
         return response
     names = slope_names(loop, sensitivities)
-    start = float(kept[0])
     slopes, input_slopes = output_and_input_slopes(
         loop,
         names,
         (initial, past),
-        _moved(loop, kept - start, start, arguments[-1]),
+        _moved(loop, kept - start, start, phase),
         _since_start(loop, start, arguments),
     )
     return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
@@ -133,9 +131,10 @@ def simulate_loop(
 
 def _since_start(loop: ControlLoop, start: float, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
     """Arguments of the stepper, whose clock is zero at the start, from those in the caller's."""
-    state, command, before, times, values, history, phase = arguments
+    state, command, before, held, history, phase = arguments
+    times, values = held if type(held) is tuple else (np.array([start]), np.array([held]))
     since = _moved(loop, times - start, start, phase)
-    return state, command, before, since, values, history, phase
+    return state, command, before, since, values, _NONE if history is None else history, phase
 
 
 def _moved(loop: ControlLoop, since: Vector, start: float, phase: float) -> Vector:
@@ -174,8 +173,6 @@ def reference_jumps(
     times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
 ) -> _Jumps:
     """The reference as jumps: one number steps at the first of `times`."""
-    if type(reference) is float and reference_time is None:
-        return _Jumps(times[:1], np.array((reference,)), before)
     values = real_array("reference", reference)
     if values.ndim == 0:
         if reference_time is not None:

@@ -84,7 +84,7 @@ class Sweep(ReadOnlyArrays):
     >>> found
     <Sweep: 3 sets over Kp, 1 unsettled>
     >>> found["overshoot"][:2].round(2)
-    array([ 0.03, 24.57])
+    array([ 0.03, 28.74])
     """
 
     values: dict[str, Vector]
@@ -217,13 +217,13 @@ def sweep(
     >>> gains, delays = np.ix_(np.linspace(0.5, 2.5, 5), [0.1, 0.2, 0.36])
     >>> found = dtm.sweep(loop, {"Kp": gains, "delay": delays}, 15.0)
     >>> found["settling_time"].round(2)
-    array([[8.06, 8.12, 8.22],
-           [4.22, 4.28, 4.37],
-           [3.06, 3.06, 2.95],
-           [2.47, 2.38, 4.02],
-           [2.07, 2.98, 4.68]])
+    array([[7.39, 7.07, 6.5 ],
+           [3.46, 3.09, 2.2 ],
+           [2.26, 1.85, 2.48],
+           [1.72, 1.35, 3.19],
+           [1.42, 1.78, 3.95]])
     >>> found.best()
-    {'Kp': 2.5, 'delay': 0.1}
+    {'Kp': 2.0, 'delay': 0.2}
     """
     arrays, shape = _sets(values)
     common = _checked(loop, arrays)

@@ -13,6 +13,13 @@ use crate::runtime::{run, run_here};
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
+/// A reference: one number, or times and values.
+#[derive(FromPyObject)]
+enum Jumps<'py> {
+    Step(f64),
+    Held(Floats<'py>, Floats<'py>),
+}
+
 /// The linear loop x' = A x + B w + E r, u = K x + L w + M r, y = C x + D w, w(t) = sat(u(t - Td)).
 #[pyclass(frozen, module = "deadtime._deadtime", name = "LinearLoop")]
 pub(crate) struct PyLinearLoop {
@@ -117,6 +124,9 @@ impl PyLinearLoop {
     }
 
     /// Output, command, breaking points of both and reference at `time`, in the caller's clock.
+    ///
+    /// The reference is a number, to which it steps at the first of the times, or times and the
+    /// values that hold from them on.
     #[expect(
         clippy::too_many_arguments,
         clippy::type_complexity,
@@ -130,26 +140,36 @@ impl PyLinearLoop {
         state: Floats<'py>,
         command: f64,
         before: f64,
-        reference_times: Floats<'py>,
-        reference_values: Floats<'py>,
-        command_history: Floats<'py>,
+        reference: Jumps<'py>,
+        command_history: Option<Floats<'py>>,
         sample_phase: f64,
     ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, Vector<'py>)> {
         let start = Start {
             state: in_order(&state).into_owned(),
             command,
-            command_history: in_order(&command_history).into_owned(),
+            command_history: command_history
+                .map(|history| in_order(&history).into_owned())
+                .unwrap_or_default(),
             sample_phase,
         };
         let times = in_order(&time);
-        let (reference_times, reference_values) =
-            (in_order(&reference_times), in_order(&reference_values));
+        let (step, jumps);
+        let (reference_times, reference_values) = match &reference {
+            Jumps::Step(value) => {
+                step = [*value];
+                (times.get(..1).unwrap_or_default(), &step[..])
+            }
+            Jumps::Held(at, values) => {
+                jumps = (in_order(at), in_order(values));
+                (&*jumps.0, &*jumps.1)
+            }
+        };
         let request = Request {
             times: &times,
             ahead,
             before,
-            reference_times: &reference_times,
-            reference_values: &reference_values,
+            reference_times,
+            reference_values,
         };
         let found = run_here(py, |task| self.inner.respond(&start, &request, task))?;
         Ok((

@@ -144,7 +144,7 @@ impl Gauge {
             let mut right = right;
             loop {
                 let mid = 0.5 * (left + right);
-                if mid <= left || mid >= right || right - left < f64::EPSILON {
+                if mid <= left || mid >= right || right - left < 0.5 * f64::EPSILON {
                     return Some(right);
                 }
                 if reached(mid, level) {

@@ -92,13 +92,13 @@ impl<S: Scalar> Series<S> {
 
     /// Set `degree` to the last coefficient that matters.
     pub(crate) fn trim(&mut self) {
-        let largest = |part: fn(S) -> f64| {
-            let sizes = self.terms().iter().map(|&c| part(c).abs());
-            // No `f64::max`, whose rule for NaN costs more than all the rest.
-            1e-3 * NEGLIGIBLE * sizes.fold(0.0, |m, size| if size > m { size } else { m })
+        // Slopes carry the rounding of products with values.
+        let value = 1e-3 * NEGLIGIBLE * largest(self.terms(), S::value);
+        let slope = if S::MOVES {
+            (1e-3 * NEGLIGIBLE * largest(self.terms(), S::slope)).max(1e4 * value)
+        } else {
+            0.0
         };
-        let value = largest(S::value);
-        let slope = if S::MOVES { largest(S::slope) } else { 0.0 };
         while self.degree > 0
             && self.coefficients[self.degree].value().abs() <= value
             && self.coefficients[self.degree].slope().abs() <= slope
@@ -132,6 +132,15 @@ impl<S: Scalar> Series<S> {
             power *= ratio;
         }
     }
+}
+
+/// The largest modulus of what `read` reads.
+fn largest<S: Scalar>(terms: &[S], read: impl Fn(S) -> f64) -> f64 {
+    // No `f64::max`, whose rule for NaN costs more than all the rest.
+    terms.iter().fold(0.0, |m, &c| {
+        let size = read(c).abs();
+        if size > m { size } else { m }
+    })
 }
 
 /// x on one element, and how long the element is.
@@ -236,26 +245,28 @@ impl<S: Scalar> Expansion<S> {
         if self.degree < DEGREE - 1 {
             return 1.0;
         }
-        let part = self.shortened(1.0, S::value);
+        let part = self.shortened(1.0, S::value, |c| c.value().abs());
         if S::MOVES {
-            self.shortened(part, S::slope)
+            self.shortened(part, S::slope, |c| c.value().abs().max(c.slope().abs()))
         } else {
             part
         }
     }
 
     /// What remains of `part` of the element when the last coefficients are made negligible;
-    /// both they and the largest shrink with the element, so the bound takes a few rounds.
-    fn shortened(&self, mut part: f64, read: impl Fn(S) -> f64) -> f64 {
+    /// both they and the largest shrink with the element, so the bound takes a few rounds. `read`
+    /// gives what is to be negligible `beside` what.
+    fn shortened(&self, mut part: f64, read: impl Fn(S) -> f64, beside: impl Fn(S) -> f64) -> f64 {
         for i in 0..self.n {
             loop {
                 let (mut largest, mut power, mut ratio) = (0.0_f64, 1.0_f64, 1.0_f64);
                 for j in 0..=self.degree {
-                    let size = read(self.terms[j * self.n + i]).abs() * power;
+                    let term = self.terms[j * self.n + i];
+                    let size = read(term).abs() * power;
                     if j >= DEGREE - 1 && largest > NOTHING && size > NEGLIGIBLE * largest {
                         ratio = ratio.min((NEGLIGIBLE * largest / size).powf(1.0 / j as f64));
                     }
-                    largest = largest.max(size);
+                    largest = largest.max(beside(term) * power);
                     power *= part;
                 }
                 // A step of a thousandth ends the approach from above.

@@ -1,14 +1,16 @@
 //! Many loops at once: step responses from rest, or their figures, one loop a set of numbers.
 //!
 //! Sampled loops whose output is a line between events (an integrator under any controller) run
-//! in lanes, one set in each (`held`); sets whose delays hold the same number of whole samples
+//! in lanes, one set in each (`walk`); sets whose delays hold the same number of whole samples
 //! share a block, so that its lanes read their delayed commands from the same place. All other
 //! sets run one by one by the engines of a single loop (`each`). A set's result has the same
 //! bits whatever its neighbours, the number of threads and the instruction set.
 
 mod block;
+mod corners;
 mod each;
-mod held;
+mod measured;
+mod through;
 mod walk;
 
 #[cfg(test)]
@@ -146,7 +148,7 @@ pub fn figures(
         task,
         |block, members| {
             let goals: Vec<f64> = members.iter().map(|&set| goal(set)).collect();
-            held::figures(block, &goals, span, criteria)
+            measured::figures(block, &goals, span, criteria)
         },
         |set| each::figures(sets, set, goal(set), span, criteria, task),
         |set, result| {
@@ -171,7 +173,7 @@ pub fn responses(
     sets.each(
         times.last().copied().unwrap_or(0.0),
         task,
-        |block, members| held::responses(block, members.len(), times),
+        |block, members| corners::responses(block, members.len(), times),
         |set| each::response(sets, set, times, task),
         |set, (values, outcome)| {
             if let Some(row) = outputs.get_mut(set * length..(set + 1) * length)
