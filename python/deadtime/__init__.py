@@ -41,6 +41,7 @@ from deadtime._robust import RobustMap, robust_map
 from deadtime._rootset import RootSet
 from deadtime._scalar_delay import dde_roots, rightmost_branches
 from deadtime._sensitivity import Sensitivity
+from deadtime._simulation import simulate
 from deadtime._special import lambertw, lambertw0, lambertwm1
 from deadtime._special_forms import (
     OffsetW,
@@ -51,6 +52,7 @@ from deadtime._special_forms import (
 )
 from deadtime._stability import MapStatus, StabilityMap, stability_map
 from deadtime._stability_radius import StabilityRadius, stability_radius
+from deadtime._system_response import SystemResponse
 from deadtime._systems import DelaySystem
 from deadtime._transfer import TransferFunction, feedback
 
@@ -97,6 +99,7 @@ __all__ = [
     "StabilityMap",
     "StabilityRadius",
     "Step",
+    "SystemResponse",
     "TransferFunction",
     "Whiteness",
     "crossings",
@@ -123,6 +126,7 @@ __all__ = [
     "rightmost_branches",
     "robust_map",
     "s",
+    "simulate",
     "stability_map",
     "stability_radius",
     "wrightomega",

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._loop_model import state_at_rest
 from deadtime._response import Response
-from deadtime._validation import finite, real_array
+from deadtime._validation import finite, increasing, real_array
 
 if TYPE_CHECKING:
     from deadtime._loop import ControlLoop
@@ -75,7 +75,7 @@ def simulate_loop(
     sample_phase: float,
 ) -> Response:
     """Check the arguments of `ControlLoop.simulate` and run it."""
-    times = _increasing("time", time)
+    times = increasing("time", time)
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
     start = float(times[0])
@@ -149,29 +149,13 @@ def _jumps(
                 "array of as many values as there are times"
             )
         return _Jumps(times[:1], values.reshape(1), before)
-    where = times if reference_time is None else _increasing("reference_time", reference_time)
+    where = times if reference_time is None else increasing("reference_time", reference_time)
     if values.shape != where.shape or values.size == 0:
         raise ValueError(
             f"reference has shape {values.shape} and its times {where.shape}: give one value for "
             "each element of reference_time (or of time, without reference_time), at least one"
         )
     return _Jumps(where, values, before)
-
-
-def _increasing(name: str, given: ArrayLike) -> Vector:
-    times = np.atleast_1d(real_array(name, given))
-    if times.ndim != 1:
-        raise ValueError(f"{name} has shape {times.shape}: give a one-dimensional array")
-    if not np.isfinite(times).all():
-        raise ValueError(f"{name} holds {times[~np.isfinite(times)][0]}: give finite times")
-    steps = np.diff(times)
-    if (steps <= 0.0).any():
-        at = int(np.argmax(steps <= 0.0))
-        raise ValueError(
-            f"{name}[{at + 1}]={times[at + 1]} does not come after {name}[{at}]={times[at]}: give "
-            "increasing times"
-        )
-    return times
 
 
 def _on_samples(since: Vector, start: float, sample_time: float | None, phase: float) -> Vector:

@@ -9,7 +9,15 @@ from typing import SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["finite", "non_negative", "non_zero", "positive", "real_array", "thread_number"]
+__all__ = [
+    "finite",
+    "increasing",
+    "non_negative",
+    "non_zero",
+    "positive",
+    "real_array",
+    "thread_number",
+]
 
 
 def finite(name: str, value: SupportsFloat) -> float:
@@ -60,6 +68,23 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     if array.size and array.dtype.kind not in "biuf":
         raise TypeError(f"{name} of dtype {array.dtype}: give real numbers")
     return array.astype(np.float64, copy=False)
+
+
+def increasing(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    """Return `given` as a vector of finite times that increase, or raise."""
+    times = np.atleast_1d(real_array(name, given))
+    if times.ndim != 1:
+        raise ValueError(f"{name} has shape {times.shape}: give a one-dimensional array")
+    if not np.isfinite(times).all():
+        raise ValueError(f"{name} holds {times[~np.isfinite(times)][0]}: give finite times")
+    steps = np.diff(times)
+    if (steps <= 0.0).any():
+        at = int(np.argmax(steps <= 0.0))
+        raise ValueError(
+            f"{name}[{at + 1}]={times[at + 1]} does not come after {name}[{at}]={times[at]}: give "
+            "increasing times"
+        )
+    return times
 
 
 def thread_number(threads: int | None) -> int | None:

@@ -10,6 +10,7 @@ mod quasipoly;
 mod runtime;
 mod special;
 mod stability;
+mod systems;
 mod ufunc;
 
 use pyo3::prelude::*;
@@ -31,6 +32,8 @@ mod _deadtime {
     use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]
     use super::stability::PyFamily;
+    #[pymodule_export]
+    use super::systems::{PyLinearSystem, PySignal, legendre_tables};
     #[pymodule_export]
     use super::ufunc::limit_threads;
     use pyo3::prelude::*;

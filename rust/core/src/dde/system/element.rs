@@ -1,0 +1,210 @@
+//! One element of time: forcing gathered, equation solved, resolution judged.
+//!
+//! Rounding of row i of x′ = A x + g is relative to F_i = Σ |a_ij| R_j + G_i, where G_i sums the
+//! moduli of all that makes up g_i and R_j is the size of x_j, but no less than an eighth of what
+//! F_j drives it to: a state that vanishes by cancellation is noise of that size and must not be
+//! resolved like a signal. Delayed noise drives noise in turn. It is followed three times round,
+//! by sizes of three kinds that each piece keeps: those of x, those with noise of its own, and
+//! those with noise from noise; followed for ever, it would grow where x does not.
+//! The element is resolved once the last coefficients of x′ are below [`RESOLVED`] F_i; those of
+//! x are smaller by another h/(4k).
+
+use super::legendre::{DEGREE, TERMS};
+use super::solver::Solver;
+use super::terms::Feed;
+use super::track::{Sizes, Track};
+
+/// Coefficients of x′ below this part of F are rounding: ten units, since each sums 25 values.
+const RESOLVED: f64 = 10.0 * f64::EPSILON;
+
+/// Coefficients of x′ below this part of F are not kept.
+const NOTHING: f64 = 0.25 * f64::EPSILON;
+
+/// Where the last coefficient that matters is no higher, an element twice as long may do.
+const ROOMY: usize = 12;
+
+/// The part of what drives it that a state is at least.
+const NOISE: f64 = 0.125;
+
+/// Rounds of F and R: each takes noise through one more integration.
+const ROUNDS: usize = 3;
+
+/// The equation, and the element in hand.
+#[derive(Debug)]
+pub(super) struct Element {
+    a: Vec<(usize, usize, f64)>,
+    /// Feeds of the state, its derivative and the input.
+    feeds: [Vec<Feed>; 3],
+    solver: Solver,
+    g: Vec<f64>,
+    x: Vec<f64>,
+    f: Vec<f64>,
+    state_size: Vec<f64>,
+    slope_size: Vec<f64>,
+    forcing_size: Vec<Sizes>,
+    /// Σ |a_ij| of each row.
+    rates: Vec<f64>,
+    /// What the pieces of state and slope keep.
+    state_sizes: Vec<Sizes>,
+    slope_sizes: Vec<Sizes>,
+    /// Last coefficient of x′ above [`RESOLVED`], and above [`NOTHING`].
+    needed: usize,
+    kept: usize,
+}
+
+impl Element {
+    pub(super) fn new(a: &[f64], n: usize, feeds: [Vec<Feed>; 3]) -> Self {
+        let entries = a.iter().enumerate().filter(|(_, a)| **a != 0.0);
+        Self {
+            a: entries.map(|(place, a)| (place / n, place % n, *a)).collect(),
+            feeds,
+            solver: Solver::new(a, n),
+            g: vec![0.0; n * TERMS],
+            x: vec![0.0; n * TERMS],
+            f: vec![0.0; n * TERMS],
+            state_size: vec![0.0; n],
+            slope_size: vec![0.0; n],
+            forcing_size: vec![[0.0; 3]; n],
+            rates: a
+                .chunks_exact(n.max(1))
+                .map(|row| row.iter().map(|a| a.abs()).sum())
+                .collect(),
+            state_sizes: vec![[0.0; 3]; n],
+            slope_sizes: vec![[0.0; 3]; n],
+            needed: 0,
+            kept: 0,
+        }
+    }
+
+    /// What rounding of x is relative to on the latest element.
+    pub(super) fn state_size(&self) -> &[f64] {
+        &self.state_size
+    }
+
+    /// The same of x′.
+    pub(super) fn slope_size(&self) -> &[f64] {
+        &self.slope_size
+    }
+
+    /// Solve over [t, t + h] from `start`; `tracks` as the feeds.
+    pub(super) fn solve(
+        &mut self,
+        start: &[f64],
+        t: f64,
+        h: f64,
+        slack: f64,
+        tracks: [&Track; 3],
+    ) {
+        self.g.fill(0.0);
+        self.forcing_size.fill([0.0; 3]);
+        let mut degree = 0;
+        for (feeds, track) in self.feeds.iter_mut().zip(tracks) {
+            for feed in feeds {
+                let added =
+                    feed.add_series(track, t, h, slack, &mut self.g, &mut self.forcing_size);
+                degree = degree.max(added);
+            }
+        }
+        self.solver
+            .solve(h, slack, start, (&self.g, degree), &mut self.x, &mut self.f);
+        self.judge(h);
+    }
+
+    fn judge(&mut self, h: f64) {
+        for (sizes, x) in self.state_sizes.iter_mut().zip(self.x.chunks_exact(TERMS)) {
+            sizes[0] = x.iter().fold(0.0, |m, c| f64::max(m, c.abs()));
+        }
+        for (sizes, f) in self.slope_sizes.iter_mut().zip(self.f.chunks_exact(TERMS)) {
+            sizes[0] = f.iter().fold(0.0, |m, c| f64::max(m, c.abs()));
+        }
+        for kind in 0..3 {
+            self.measure(kind, h);
+            if kind < 2 {
+                for i in 0..self.state_size.len() {
+                    self.state_sizes[i][kind + 1] = self.state_size[i];
+                    self.slope_sizes[i][kind + 1] = self.slope_size[i];
+                }
+            }
+        }
+        (self.needed, self.kept) = (0, 0);
+        for (f, size) in self.f.chunks_exact(TERMS).zip(&self.slope_size) {
+            let beyond = |part: f64| f.iter().rposition(|c| c.abs() > part * size).unwrap_or(0);
+            self.kept = self.kept.max(beyond(NOTHING));
+            if self.kept > self.needed {
+                self.needed = self.needed.max(beyond(RESOLVED));
+            }
+        }
+    }
+
+    /// F and R, from forcing sizes of one kind.
+    fn measure(&mut self, kind: usize, h: f64) {
+        for (size, own) in self.state_size.iter_mut().zip(&self.state_sizes) {
+            *size = own[0];
+        }
+        for _ in 0..ROUNDS {
+            for (slope, forcing) in self.slope_size.iter_mut().zip(&self.forcing_size) {
+                *slope = forcing[kind];
+            }
+            for &(row, column, a) in &self.a {
+                self.slope_size[row] += a.abs() * self.state_size[column];
+            }
+            let mut changed = false;
+            for (i, state) in self.state_size.iter_mut().enumerate() {
+                let driven = NOISE * h * self.slope_size[i] / (1.0 + h * self.rates[i]);
+                changed |= *state < driven;
+                *state = state.max(driven);
+            }
+            if !changed {
+                break;
+            }
+        }
+    }
+
+    /// Is the truncated series exact to rounding?
+    pub(super) fn is_resolved(&self) -> bool {
+        self.needed < DEGREE - 1
+    }
+
+    /// May the next element be longer?
+    pub(super) fn has_room(&self) -> bool {
+        self.needed <= ROOMY
+    }
+
+    /// Append the element [t, next] to the tracks; `end` becomes its last x.
+    pub(super) fn store(
+        &self,
+        t: f64,
+        next: f64,
+        states: &mut Track,
+        slopes: Option<&mut Track>,
+        end: &mut [f64],
+    ) {
+        let degree = (self.kept + 1).min(DEGREE);
+        states.push(t, next, degree, &self.x, &self.state_sizes);
+        if let Some(slopes) = slopes {
+            slopes.push(t, next, self.kept, &self.f, &self.slope_sizes);
+        }
+        for (end, x) in end.iter_mut().zip(self.x.chunks_exact(TERMS)) {
+            *end = x.iter().rev().sum();
+        }
+    }
+
+    /// x′ just after `t`, where the state is `x`.
+    pub(super) fn slope_at(
+        &mut self,
+        t: f64,
+        longest: f64,
+        x: &[f64],
+        tracks: [&Track; 3],
+        f: &mut [f64],
+    ) {
+        for (feeds, track) in self.feeds.iter_mut().zip(tracks) {
+            for feed in feeds {
+                feed.add_value(track, t, longest, f);
+            }
+        }
+        for &(row, column, a) in &self.a {
+            f[row] += a * x[column];
+        }
+    }
+}
