@@ -72,7 +72,8 @@ fn simulations(criterion: &mut Criterion) {
     for (name, equations) in cases {
         let rest = vec![0.0; equations.states];
         let signals = (Signal::constant(&rest), Signal::step(&[0.0], &[1.0]));
-        let (Ok(system), (Ok(history), Ok(inputs))) = (LinearSystem::new(equations), signals) else {
+        let (Ok(system), (Ok(history), Ok(inputs))) = (LinearSystem::new(equations), signals)
+        else {
             continue;
         };
         let past = Past {

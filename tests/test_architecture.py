@@ -66,6 +66,7 @@ FLOORS = [
         "_signals",
         "_realisation",
         "_system_response",
+        "_system_run",
         "_simulation",
     },
     {"_recording", "_gallery_entries", "gallery"},

@@ -118,7 +118,10 @@ def test_several_inputs_and_outputs_without_delay_agree_with_scipy(interpolation
     inputs = rng.normal(size=(2, 81))
     start = rng.normal(size=5)
     found = dtm.simulate(
-        dtm.DelaySystem(A, B, C, D), times, inputs, interpolation=interpolation,
+        dtm.DelaySystem(A, B, C, D),
+        times,
+        inputs,
+        interpolation=interpolation,
         initial_state=start,
     )
     _, outputs, states = signal.lsim(
@@ -128,7 +131,7 @@ def test_several_inputs_and_outputs_without_delay_agree_with_scipy(interpolation
     assert found.outputs.shape == (3, 81)
     assert np.abs(found.states - states.T).max() < 1e-12
     assert np.abs(found.outputs - outputs.T).max() < 1e-12
-    assert np.array_equal(found.inputs, inputs)
+    assert np.allclose(found.inputs, inputs, rtol=0.0, atol=1e-15)
 
 
 def series_of_delays(t, rows, start):
@@ -210,8 +213,10 @@ entries = st.floats(-2.0, 2.0)
 @st.composite
 def systems(draw):
     n = 2
+
     def matrix(bound=2.0):
         return [[draw(st.floats(-bound, bound)) for _ in range(n)] for _ in range(n)]
+
     A = {0.0: matrix(), **{tau: matrix() for tau in draw(delays)}}
     N = {draw(st.floats(0.1, 1.0)): matrix(0.3)} if draw(st.booleans()) else None
     B = {0.0: [[1.0], [0.5]], draw(st.floats(0.05, 0.8)): [[-0.5], [1.0]]}
@@ -243,9 +248,7 @@ def test_responses_superpose(system, p, q):
 def test_the_clock_does_not_matter(system, shift):
     times = np.linspace(0.0, 3.0, 31)
     still = dtm.simulate(system, times, math.sin, history=[1.0, 2.0])
-    moved = dtm.simulate(
-        system, times + shift, lambda t: math.sin(t - shift), history=[1.0, 2.0]
-    )
+    moved = dtm.simulate(system, times + shift, lambda t: math.sin(t - shift), history=[1.0, 2.0])
     # Times near 5 s are known to 1e-15 s.
     assert np.abs(still.states - moved.states).max() <= 3e-13 * max(1.0, np.abs(still.states).max())
 
@@ -262,15 +265,20 @@ def test_output_times_do_not_change_the_run(system, cut):
 def test_held_and_joined_inputs():
     G = dtm.delay(0.5) / dtm.s
     held = G.forced_response([0.0, 1.0, 2.0, 3.0], [1.0, -1.0, 2.0, 0.0])
-    assert np.allclose(held.outputs, [0.0, 0.5, 0.0, 0.5], atol=1e-15)
+    assert np.allclose(held.outputs, [0.0, 0.5, 0.5, 1.0], atol=1e-15)
     joined = G.forced_response([0.0, 1.0, 2.0], [0.0, 2.0, 2.0], interpolation="linear")
-    assert np.allclose(joined.outputs, [0.0, 0.25, 1.75], atol=1e-15)
-    assert np.allclose(joined.breaks, [0.0, 0.5, 1.0, 1.5, 2.0])
+    assert np.allclose(joined.outputs, [0.0, 0.25, 2.0], atol=1e-15)
+    assert np.allclose(joined.breaks, [0.0, 0.5, 1.0, 1.5])
     kinked = G.forced_response([0.0, 3.0], lambda t: abs(t - 1.0), input_breaks=[1.0])
     assert np.allclose(kinked.outputs, [0.0, 0.5 + 1.125], atol=1e-14)
-    # A step that was there before the start arrives as it did.
-    before = dtm.simulate(G, [0.0, 0.25, 1.0], 0.0, input_before=2.0)
+    # An input of before the start arrives as it was.
+    system = dtm.DelaySystem(0.0, {0.5: 1.0})
+    before = system.simulate([0.0, 0.25, 1.0], 0.0, input_before=2.0)
     assert np.allclose(before.outputs, [0.0, 0.5, 1.0], atol=1e-15)
+    lag = dtm.simulate(dtm.delay(0.5) / (dtm.s + 2.0), [0.0, 0.5, 1.5], 0.0, input_before=2.0)
+    assert np.allclose(lag.outputs, [1.0, 1.0, math.exp(-2.0)], atol=1e-15)
+    with pytest.raises(ValueError, match="pole at zero"):
+        dtm.simulate(G, [0.0, 1.0], 0.0, input_before=2.0)
 
 
 def test_a_stiff_lag_under_held_samples_is_a_row_of_exponentials():
@@ -318,19 +326,25 @@ def test_responses_decay_at_the_rate_of_the_certified_rightmost_root(key):
     h = gallery.problem(key).h
     if h.kind not in ("retarded", "neutral", "polynomial"):
         pytest.skip("a difference equation is not simulated")
-    roots = h.rightmost(2)
+    roots = h.rightmost(4)
     if not len(roots) or (h.kind == "neutral" and roots[0].real - h.chain_abscissa() < 0.05):
         pytest.skip("the chain of a neutral equation, countless modes of one rate, sets the decay")
     root = complex(roots[0])
     alpha, omega = root.real, abs(root.imag)
     n = h.degree
-    others = [z.real for z in roots.roots if abs(z.real - alpha) > 1e-9]
+    # A cluster of roots acts as a multiple one.
+    near = np.abs(roots.roots.real - alpha) + np.abs(np.abs(roots.roots.imag) - omega)
+    in_cluster = near < 0.02 * abs(alpha)
+    multiplicity = int(roots.multiplicities[in_cluster].sum())
+    if omega > 0.02 * abs(alpha):
+        multiplicity //= 2
+    others = roots.roots.real[~in_cluster]
     chain = h.chain_abscissa()
     gap = alpha - max([*others, chain if math.isfinite(chain) else -math.inf, 60.0 * alpha])
-    turn = math.pi / omega if omega > 1e-3 * abs(alpha) else 1.0 / abs(alpha)
-    # e^-9 of the second mode is left at the beginning of the fit; a multiple root, whose envelope
-    # is t^(m-1) e^(alpha t), is fitted with that power.
-    first = 9.0 / gap + 5.0 * float(h.delays[-1])
+    turn = math.pi / omega if omega > 0.02 * abs(alpha) else 1.0 / abs(alpha)
+    # e^-9 of the second mode is left at the beginning of the fit, or it decays as fast within the
+    # tolerance; the envelope of a multiple root is t^(m-1) e^(alpha t).
+    first = 9.0 / max(gap, 0.05 * abs(alpha)) + 5.0 * float(h.delays[-1])
     windows = max(8, math.ceil(0.5 / (abs(alpha) * turn)))
     count = 40
     times = first + turn * np.arange(windows * count + 1) / count
@@ -358,7 +372,6 @@ def test_responses_decay_at_the_rate_of_the_certified_rightmost_root(key):
     size = (weights[:, None] * np.abs(found.states[:, 1:])).max(axis=0)
     envelope = size[:-1].reshape(windows, count).max(axis=1)
     middle = first + turn * (np.arange(windows) + 0.5)
-    multiplicity = int(roots.multiplicities[0])
     rate = np.polyfit(middle, np.log(envelope) - (multiplicity - 1) * np.log(middle), 1)[0]
     # What is left of the second mode, and the lag of a multiple root's power, is a few percent.
     assert rate == pytest.approx(alpha, rel=0.03, abs=1e-9)

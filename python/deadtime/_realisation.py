@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from deadtime._deadtime import LinearSystem
 
 if TYPE_CHECKING:
+    from deadtime._quasipolynomial import QuasiPolynomial
     from deadtime._systems import DelaySystem
     from deadtime._transfer import TransferFunction
 
-__all__ = ["Realisation", "of_delay_system", "of_transfer_function"]
+__all__ = ["Realisable", "Realisation", "of_delay_system", "of_transfer_function"]
 
 Group = Mapping[float, NDArray[np.float64]]
 
@@ -44,24 +45,40 @@ class Realisation:
     memory: float
     #: Whether derivatives of the history are needed.
     needs_slopes: bool
+    #: Whether the states mean something to the user.
+    has_states: bool
+    #: Where they do not: the state at rest under an input of one, None where there is no rest.
+    rest: NDArray[np.float64] | None = None
+
+
+class Realisable(Protocol):
+    """A system that can be simulated."""
+
+    def _realised(self) -> Realisation: ...
+
+    def _gains_at_rest(self) -> NDArray[np.float64] | None:
+        """Outputs at rest per input, shape (n_outputs, n_inputs); None where there are none."""
 
 
 def _realised(
-    sizes: tuple[int, int, int], a: Group, n: Group, b: Group, c: Group, f: Group, d: Group
+    sizes: tuple[int, int, int],
+    *given: Group,
+    has_states: bool,
+    rest: NDArray[np.float64] | None = None,
 ) -> Realisation:
+    """Give the native form of A, N, B, C, F and D."""
     states = sizes[0]
-    groups = [
-        [(tau, matrix) for tau, matrix in group.items() if matrix.any()]
-        for group in (a, n, b, c, f, d)
-    ]
+    groups = [[(tau, matrix) for tau, matrix in group.items() if matrix.any()] for group in given]
     memory = max((tau for i in (0, 1, 3, 4) for tau, _ in groups[i]), default=0.0)
     return Realisation(
         LinearSystem(*sizes, *groups),
         *sizes,
-        a.get(0.0, np.zeros((states, states))),
+        given[0].get(0.0, np.zeros((states, states))),
         max((tau for group in groups for tau, _ in group), default=0.0),
         memory,
         bool(groups[1] or groups[4]),
+        has_states,
+        rest,
     )
 
 
@@ -75,11 +92,11 @@ def of_delay_system(system: DelaySystem) -> Realisation:
         if rank < size:
             raise ValueError(_singular(rank, size, bool(n)))
         a, n, b = (
-            {tau: np.linalg.solve(E, matrix) for tau, matrix in group.items()}
+            {tau: np.asarray(np.linalg.solve(E, m), np.float64) for tau, m in group.items()}
             for group in (a, n, b)
         )
     sizes = (size, system.n_inputs, system.n_outputs)
-    return _realised(sizes, a, n, b, system.C, {}, system.D)
+    return _realised(sizes, a, n, b, system.C, {}, system.D, has_states=True)
 
 
 def _singular(rank: int, size: int, is_late: bool) -> str:
@@ -119,20 +136,18 @@ def of_transfer_function(system: TransferFunction) -> Realisation:
             f"1/({den!r}) is a difference equation without any derivative, which is not simulated"
         )
 
-    def rows(h: object, power: slice, scale: float) -> dict[float, NDArray[np.float64]]:
-        coefficients = h.coefficients  # type: ignore[attr-defined]
+    def rows(h: QuasiPolynomial, power: slice, scale: float) -> dict[float, NDArray[np.float64]]:
+        coefficients = h.coefficients
         padded = np.zeros((len(coefficients), n + 1))
         width = min(n + 1, coefficients.shape[1])
         padded[:, :width] = coefficients[:, :width]
-        delays = (float(tau) - first for tau in h.delays)  # type: ignore[attr-defined]
-        return {
-            tau: scale * row[None, power] for tau, row in zip(delays, padded, strict=True)
-        }
+        delays = (float(tau) - first for tau in h.delays)
+        return {tau: scale * row[None, power] for tau, row in zip(delays, padded, strict=True)}
 
     lower, highest = slice(0, n), slice(n, n + 1)
     if n == 0:
-        none: Group = {}
-        return _realised((0, 1, 1), none, none, none, none, none, rows(num, highest, 1 / leading))
+        direct = rows(num, highest, 1.0 / leading)
+        return _realised((0, 1, 1), {}, {}, {}, {}, {}, direct, has_states=False, rest=np.zeros(0))
 
     def last_row(group: Group) -> dict[float, NDArray[np.float64]]:
         return {tau: np.vstack([np.zeros((n - 1, n)), row]) for tau, row in group.items()}
@@ -147,4 +162,7 @@ def of_transfer_function(system: TransferFunction) -> Realisation:
     b = np.zeros((n, 1))
     b[-1] = 1.0 / leading
     f = last_column(rows(num, highest, 1.0))
-    return _realised((n, 1, 1), a, late, {0.0: b}, rows(num, lower, 1.0), f, {})
+    c = rows(num, lower, 1.0)
+    constant = float(den.coefficients[:, 0].sum())
+    rest = np.append(1.0 / constant, np.zeros(n - 1)) if constant else None
+    return _realised((n, 1, 1), a, late, {0.0: b}, c, f, {}, has_states=False, rest=rest)

@@ -9,7 +9,8 @@ one of its breaks. Times are counted from the start of the run.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -44,8 +45,8 @@ class Fitted(NamedTuple):
 
     def derivative(self) -> Fitted:
         """Series of the derivative."""
-        slopes = legendre.legder(self.series, axis=2)
-        slopes = np.concatenate([slopes, np.zeros_like(self.series[:, :, :1])], axis=2)
+        slopes = np.zeros_like(self.series)
+        slopes[:, :, :-1] = legendre.legder(self.series, axis=2)
         slopes *= (2.0 / np.diff(self.edges))[:, None, None]
         return self._replace(series=slopes)
 
@@ -103,7 +104,7 @@ def sampled(
     name: str, function: Callable[..., ArrayLike], times: Vector, width: int, vectorized: bool
 ) -> Matrix:
     """Values of a callable at `times`, shape (width, m), checked."""
-    found = function(times) if vectorized else [function(float(t)) for t in times]
+    found: Any = function(times) if vectorized else [function(float(t)) for t in times]
     values = real_array(f"the value of {name}", found)
     if not vectorized:
         values = values.reshape(len(times), -1).T if values.ndim > 1 else values[None, :]
@@ -138,8 +139,10 @@ def fitted(
     inner = sorted({float(b) for b in breaks if low < b < high})
     corners = [low, *inner, high]
     scale = np.zeros(width)
-    edges, pieces, starts = [low - start], [], []
-    for left, right in zip(corners[:-1], corners[1:], strict=True):
+    edges: list[float] = [low - start]
+    pieces: list[Matrix] = []
+    starts: list[int] = []
+    for left, right in pairwise(corners):
         if left in inner:
             starts.append(len(pieces))
         waiting = [(left, right)]

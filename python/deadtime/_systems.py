@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,11 +24,10 @@ from deadtime._matrix_roots import MatrixDeterminant
 from deadtime._quasipolynomial import QuasiPolynomial
 from deadtime._realisation import Realisation, of_delay_system
 from deadtime._rootset import Range, RootSet
+from deadtime._system_response import SystemResponse
+from deadtime._system_run import respond, step_response
 from deadtime._transfer import TransferFunction
 from deadtime._validation import non_negative, real_array
-
-if TYPE_CHECKING:
-    from deadtime._system_response import SystemResponse
 
 __all__ = ["DelaySystem"]
 
@@ -623,9 +622,7 @@ class DelaySystem:
         -------
         SystemResponse
         """
-        from deadtime._simulation import simulate
-
-        return simulate(self, time, inputs, **arguments)
+        return respond(self, time, inputs, **arguments)
 
     def step_response(
         self,
@@ -657,8 +654,6 @@ class DelaySystem:
         >>> round(system.step_response().info()["overshoot"], 3)
         22.475
         """
-        from deadtime._simulation import step_response
-
         return step_response(self, time, amplitude, input)
 
     def _realised(self) -> Realisation:
@@ -666,6 +661,12 @@ class DelaySystem:
             object.__setattr__(self, "_realisation", of_delay_system(self))
         assert self._realisation is not None
         return self._realisation
+
+    def _gains_at_rest(self) -> Matrix | None:
+        try:
+            return self.frequency_response(0.0).real
+        except np.linalg.LinAlgError:
+            return None
 
     def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
         """Give det M, expanded if that is safe."""

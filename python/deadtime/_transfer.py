@@ -23,13 +23,14 @@ from deadtime._interchange import (
 from deadtime._margins import Margins, margins
 from deadtime._quasipolynomial import QuasiPolynomial, delay, is_number
 from deadtime._ratio import first_term, ratio
+from deadtime._realisation import Realisation, of_transfer_function
 from deadtime._rootset import Range, RootSet
+from deadtime._system_response import SystemResponse
+from deadtime._system_run import respond, step_response
 from deadtime._validation import non_negative, real_array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from deadtime._system_response import SystemResponse
 
 __all__ = ["TransferFunction", "feedback"]
 
@@ -463,8 +464,6 @@ class TransferFunction:
         >>> print(outputs)
         [0.        1.0025472]
         """
-        from deadtime._simulation import step_response
-
         return step_response(self, time, amplitude, 0)
 
     def forced_response(self, time: ArrayLike, inputs: Any, **arguments: Any) -> SystemResponse:
@@ -491,9 +490,13 @@ class TransferFunction:
         >>> print(G.forced_response([0.0, 1.0, 2.0], np.sin).outputs.round(6))
         [0.         0.104183 0.574802]
         """
-        from deadtime._simulation import simulate
+        return respond(self, time, inputs, **arguments)
 
-        return simulate(self, time, inputs, **arguments)
+    def _realised(self) -> Realisation:
+        return of_transfer_function(self)
+
+    def _gains_at_rest(self) -> NDArray[np.float64]:
+        return np.array([[self.dcgain()]])
 
     # As a loop gain
 

@@ -49,9 +49,7 @@ impl PySignal {
 
 /// Gauss nodes, and the matrix that takes values at them (first axis) to Legendre coefficients.
 #[pyfunction]
-pub(crate) fn legendre_tables(
-    py: Python<'_>,
-) -> PyResult<(Vector<'_>, Bound<'_, PyArray2<f64>>)> {
+pub(crate) fn legendre_tables(py: Python<'_>) -> PyResult<(Vector<'_>, Bound<'_, PyArray2<f64>>)> {
     let (nodes, transform) = system::legendre_tables();
     let size = nodes.len();
     let transform = transform.to_pyarray(py).reshape([size, size])?;

@@ -42,7 +42,7 @@ pub(super) struct Element {
     state_size: Vec<f64>,
     slope_size: Vec<f64>,
     forcing_size: Vec<Sizes>,
-    /// Σ |a_ij| of each row.
+    /// How fast A lets each state follow, see [`rates`].
     rates: Vec<f64>,
     /// What the pieces of state and slope keep.
     state_sizes: Vec<Sizes>,
@@ -56,7 +56,9 @@ impl Element {
     pub(super) fn new(a: &[f64], n: usize, feeds: [Vec<Feed>; 3]) -> Self {
         let entries = a.iter().enumerate().filter(|(_, a)| **a != 0.0);
         Self {
-            a: entries.map(|(place, a)| (place / n, place % n, *a)).collect(),
+            a: entries
+                .map(|(place, a)| (place / n, place % n, *a))
+                .collect(),
             feeds,
             solver: Solver::new(a, n),
             g: vec![0.0; n * TERMS],
@@ -65,10 +67,7 @@ impl Element {
             state_size: vec![0.0; n],
             slope_size: vec![0.0; n],
             forcing_size: vec![[0.0; 3]; n],
-            rates: a
-                .chunks_exact(n.max(1))
-                .map(|row| row.iter().map(|a| a.abs()).sum())
-                .collect(),
+            rates: rates(a, n),
             state_sizes: vec![[0.0; 3]; n],
             slope_sizes: vec![[0.0; 3]; n],
             needed: 0,
@@ -87,14 +86,7 @@ impl Element {
     }
 
     /// Solve over [t, t + h] from `start`; `tracks` as the feeds.
-    pub(super) fn solve(
-        &mut self,
-        start: &[f64],
-        t: f64,
-        h: f64,
-        slack: f64,
-        tracks: [&Track; 3],
-    ) {
+    pub(super) fn solve(&mut self, start: &[f64], t: f64, h: f64, slack: f64, tracks: [&Track; 3]) {
         self.g.fill(0.0);
         self.forcing_size.fill([0.0; 3]);
         let mut degree = 0;
@@ -205,6 +197,58 @@ impl Element {
         }
         for &(row, column, a) in &self.a {
             f[row] += a * x[column];
+        }
+    }
+}
+
+/// Sweeps of balancing; powers of two hardly move after a few.
+const SWEEPS: usize = 8;
+
+/// Σ_j |a_ij| d_j/d_i, with units d of the states in which rows and columns of A are of one size
+/// (Osborne 1960): how fast a state follows what drives it, whatever its unit.
+fn rates(a: &[f64], n: usize) -> Vec<f64> {
+    let mut units = vec![1.0; n];
+    let row = |units: &[f64], i: usize, own: bool| -> f64 {
+        let others = (0..n).filter(|&j| own || j != i);
+        others
+            .map(|j| a[i * n + j].abs() * units[j] / units[i])
+            .sum()
+    };
+    for _ in 0..SWEEPS {
+        for i in 0..n {
+            let others = (0..n).filter(|&j| j != i);
+            let column: f64 = others
+                .map(|j| a[j * n + i].abs() * units[i] / units[j])
+                .sum();
+            let row = row(&units, i, false);
+            if row > 0.0 && column > 0.0 {
+                units[i] *= (row / column).sqrt();
+            }
+        }
+    }
+    (0..n).map(|i| row(&units, i, true)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_do_not_know_units() {
+        // Poles −1, −10 and −100, as a chain of derivatives and in a thousandth of its unit.
+        let a = [0.0, 1.0, 0.0, 0.0, 0.0, 1.0, -1000.0, -1110.0, -111.0];
+        let found = rates(&a, 3);
+        assert!(
+            found.iter().all(|rate| (1.0..500.0).contains(rate)),
+            "{found:?}"
+        );
+        let mut scaled = a;
+        for i in 0..3 {
+            scaled[3 * i + 2] *= 1e3;
+            scaled[6 + i] *= 1e-3;
+        }
+        for (rate, other) in found.iter().zip(rates(&scaled, 3)) {
+            assert!((rate / other - 1.0).abs() < 1e-3);
         }
     }
 }

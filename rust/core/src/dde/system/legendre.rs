@@ -71,7 +71,8 @@ impl Tables {
     fn refine(&mut self) {
         let exact = self.nodes.map(precise_polynomials);
         let old = self.transform;
-        for (row, column) in (0..TERMS).flat_map(|row| (0..TERMS).map(move |column| (row, column))) {
+        for (row, column) in (0..TERMS).flat_map(|row| (0..TERMS).map(move |column| (row, column)))
+        {
             let mut rest = DoubleDouble::from(f64::from(u8::from(row == column)));
             for (old, exact) in old.iter().zip(&exact) {
                 rest = rest - exact[column] * old[row];

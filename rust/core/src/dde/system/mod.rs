@@ -164,13 +164,7 @@ impl Signal {
     /// A step from `before` to `after` at time 0.
     pub fn step(before: &[f64], after: &[f64]) -> Result<Self, Error> {
         let edges = [f64::NEG_INFINITY, 0.0, f64::INFINITY];
-        Self::new(
-            before.len(),
-            &edges,
-            1,
-            &[before, after].concat(),
-            vec![1],
-        )
+        Self::new(before.len(), &edges, 1, &[before, after].concat(), vec![1])
     }
 }
 

@@ -39,7 +39,10 @@ pub(super) fn run(
         &equations.output_derivative,
         &equations.direct,
     ];
-    let longest = groups.map(|group| terms::longest(group)).into_iter().fold(0.0, f64::max);
+    let longest = groups
+        .map(|group| terms::longest(group))
+        .into_iter()
+        .fold(0.0, f64::max);
     let mut outputs = Outputs::new(equations, times, longest);
     let last = outputs.last();
     let shortest = feeds[..2]
@@ -57,7 +60,11 @@ pub(super) fn run(
     } = past;
     let keeps_slopes = !(feeds[1].is_empty() && equations.output_derivative.is_empty());
     let slopes = slopes.map_or_else(|| still(n), |signal| signal.track);
-    let unit = if longest > 0.0 { longest } else { last.max(f64::MIN_POSITIVE) };
+    let unit = if longest > 0.0 {
+        longest
+    } else {
+        last.max(f64::MIN_POSITIVE)
+    };
     let input_breaks = passed_breaks(inputs, unit);
     for passed in &input_breaks {
         if passed.is_reported(equations.inputs) {
@@ -65,7 +72,15 @@ pub(super) fn run(
         }
     }
     let before = passed_breaks(&history, unit);
-    let mut jumps = Jumps::new(n, equations.inputs, &a, [&feeds[0], &feeds[1], &feeds[2]], input_breaks, unit, longest);
+    let mut jumps = Jumps::new(
+        n,
+        equations.inputs,
+        &a,
+        [&feeds[0], &feeds[1], &feeds[2]],
+        input_breaks,
+        unit,
+        longest,
+    );
     for passed in before {
         outputs.state_break(passed.time);
         jumps.push(passed)?;
@@ -127,8 +142,20 @@ pub(super) fn run(
         if element.has_room() {
             suggested = suggested.max(2.0 * h);
         }
-        let next = if h < whole { t + h } else if stop - t <= reach { stop } else { t + h };
-        element.store(t, next, &mut states, keeps_slopes.then_some(&mut slopes), &mut x);
+        let next = if h < whole {
+            t + h
+        } else if stop - t <= reach {
+            stop
+        } else {
+            t + h
+        };
+        element.store(
+            t,
+            next,
+            &mut states,
+            keeps_slopes.then_some(&mut slopes),
+            &mut x,
+        );
         check_growth(&x, next)?;
         let signals = Signals {
             state: &states,
@@ -178,7 +205,11 @@ fn split(equations: &SystemEquations) -> (Vec<terms::Term>, Vec<f64>) {
 fn still(n: usize) -> Track {
     Track::new(
         n,
-        vec![Piece::constant(f64::NEG_INFINITY, f64::INFINITY, vec![0.0; n])],
+        vec![Piece::constant(
+            f64::NEG_INFINITY,
+            f64::INFINITY,
+            vec![0.0; n],
+        )],
     )
 }
 
@@ -220,12 +251,7 @@ fn passed_breaks(signal: &Signal, unit: f64) -> Vec<Break> {
 }
 
 /// The break at 0: what comes before is given, what comes after obeys the equation.
-fn first_break(
-    jumps: &Jumps,
-    feeds: &[Vec<Feed>; 3],
-    tracks: [&Track; 3],
-    x: &[f64],
-) -> Break {
+fn first_break(jumps: &Jumps, feeds: &[Vec<Feed>; 3], tracks: [&Track; 3], x: &[f64]) -> Break {
     let n = x.len();
     let unit = jumps.unit();
     let mut bounds = vec![0.0; TERMS * n];

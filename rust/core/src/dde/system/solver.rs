@@ -62,7 +62,13 @@ impl Solver {
         f.copy_from_slice(g);
         for i in 0..n {
             let g = &g[i * TERMS..(i + 1) * TERMS];
-            integrate(g, degree, 0.5 * h, start[i], &mut x[i * TERMS..(i + 1) * TERMS]);
+            integrate(
+                g,
+                degree,
+                0.5 * h,
+                start[i],
+                &mut x[i * TERMS..(i + 1) * TERMS],
+            );
         }
         if self.is_zero {
             return;
@@ -248,7 +254,11 @@ impl Lu {
         }
         for i in (0..n).rev() {
             let row = &self.entries[i * n..(i + 1) * n];
-            let known: f64 = row[i + 1..].iter().zip(&x[i + 1..]).map(|(u, x)| u * x).sum();
+            let known: f64 = row[i + 1..]
+                .iter()
+                .zip(&x[i + 1..])
+                .map(|(u, x)| u * x)
+                .sum();
             x[i] = (x[i] - known) * row[i];
         }
     }

@@ -133,5 +133,7 @@ fn columns(matrix: &[f64], width: usize, sign: f64) -> Vec<Column> {
 
 /// The largest delay of a group.
 pub(super) fn longest(terms: &[Term]) -> f64 {
-    terms.iter().fold(0.0, |most, term| f64::max(most, term.delay))
+    terms
+        .iter()
+        .fold(0.0, |most, term| f64::max(most, term.delay))
 }

@@ -78,3 +78,41 @@ fn the_loop_is_the_exact_polynomial() {
         }
     }
 }
+
+#[test]
+fn breaks_of_a_retarded_loop_fade_and_those_of_a_neutral_one_stay() {
+    let times = [0.0, 40.0];
+    let retarded = step_response(scalar(1.0, 0.0, -1.0, 0.0, 1.0), &times);
+    assert_eq!(
+        retarded.breaks,
+        [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]
+    );
+    let neutral = step_response(scalar(1.0, 0.0, -1.0, 0.5, 1.0), &times);
+    assert!(neutral.breaks.len() > 25, "{:?}", neutral.breaks);
+}
+
+#[test]
+fn endless_work_is_refused_and_a_stop_heard() {
+    let run = |delay: f64, task: &Task| {
+        let system = LinearSystem::new(scalar(delay, 0.0, -1.0, 0.0, 1.0))?;
+        let inputs = Signal::step(&[0.0], &[1.0])?;
+        system.simulate(at_rest(1, 0.0), &inputs, &[10.0], task)
+    };
+    let refused = run(1e-8, &Task::new());
+    assert!(matches!(refused, Err(Error::TooMuch { .. })), "{refused:?}");
+    let task = Task::new();
+    task.stop();
+    assert_eq!(run(0.1, &task), Err(Error::Interrupted));
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let mut equations = scalar(1.0, 0.0, -1.0, 0.0, 1.0);
+    equations.state.push(term(0.5, &[1.0, 2.0]));
+    assert!(LinearSystem::new(equations).is_err());
+    assert!(LinearSystem::new(scalar(-1.0, 0.0, 1.0, 0.0, 1.0)).is_err());
+    assert!(LinearSystem::new(scalar(0.0, 0.0, 1.0, 0.5, 1.0)).is_err());
+    assert!(Signal::new(1, &[0.0, 0.0], 1, &[1.0], vec![]).is_err());
+    assert!(Signal::new(1, &[0.0, f64::INFINITY], 2, &[1.0, 1.0], vec![]).is_err());
+    assert!(Signal::constant(&[f64::NAN]).is_err());
+}
