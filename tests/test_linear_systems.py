@@ -4,6 +4,7 @@ import copy
 import json
 import math
 import pickle
+import re
 from pathlib import Path
 
 import deadtime as dtm
@@ -447,6 +448,14 @@ TWO = dtm.DelaySystem({0.5: -np.eye(2)}, np.eye(2))
 def test_what_cannot_be_simulated_is_refused_with_the_reason(system, time, arguments, message):
     with pytest.raises(ValueError, match=message):
         dtm.simulate(system, time, **arguments)
+
+
+def test_the_page_on_simulation_runs():
+    pytest.importorskip("matplotlib").use("Agg")
+    page = Path(__file__).parent.parent / "docs" / "simulating.md"
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) == 3
+    exec("\n".join(blocks), {})
 
 
 def test_what_is_no_system_is_refused():

@@ -128,15 +128,15 @@ def simulate(
     >>> import deadtime as dtm
     >>> system = dtm.DelaySystem({1 / 3: -1.0, 1 / 5: -1.0})
     >>> response = dtm.simulate(system, [0.0, 0.2, 0.5, 1.0], initial_state=1.0)
-    >>> print(response.outputs[0].round(9))
-    [ 1.          1.          0.538333333 -0.031266667]
+    >>> print(response.outputs[0].round(6))
+    [ 1.        1.        0.538333 -0.034597]
 
     A ramp into a closed loop:
 
     >>> T = dtm.feedback(2.0 / dtm.s * dtm.delay(0.36))
     >>> ramp = dtm.simulate(T, [0.0, 5.0, 10.0], [0.0, 5.0, 10.0], interpolation="linear")
     >>> print(ramp.outputs.round(4))
-    [0.     4.5004 9.5   ]
+    [0.     4.4998 9.5   ]
     """
     if isinstance(system, ControlLoop):
         no_meaning = {

@@ -46,7 +46,7 @@ class SystemResponse(ReadOnlyArrays):
     >>> system = dtm.DelaySystem(A={0.36: -2.0}, B={0.36: 2.0})
     >>> time, outputs = dtm.simulate(system, [0.0, 0.5, 1.0])
     >>> print(outputs)
-    [0.         0.28       1.0025472 ]
+    [0.     0.28   1.1232]
     """
 
     time: Array

@@ -462,7 +462,7 @@ class TransferFunction:
         >>> import deadtime as dtm
         >>> time, outputs = dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)).step_response([0.0, 1.0])
         >>> print(outputs)
-        [0.        1.0025472]
+        [0.     1.1232]
         """
         return step_response(self, time, amplitude, 0)
 
@@ -488,7 +488,7 @@ class TransferFunction:
         >>> from deadtime import delay, s
         >>> G = delay(0.5) / (s + 1)
         >>> print(G.forced_response([0.0, 1.0, 2.0], np.sin).outputs.round(6))
-        [0.         0.104183 0.574802]
+        [0.       0.104187 0.574944]
         """
         return respond(self, time, inputs, **arguments)
 

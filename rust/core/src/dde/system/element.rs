@@ -1,18 +1,18 @@
 //! One element of time: forcing gathered, equation solved, resolution judged.
 //!
 //! Rounding of row i of x′ = A x + g is relative to F_i = Σ |a_ij| R_j + G_i, where G_i sums the
-//! moduli of all that makes up g_i and R_j is the size of x_j, but no less than an eighth of what
-//! F_j drives it to: a state that vanishes by cancellation is noise of that size and must not be
-//! resolved like a signal. Delayed noise drives noise in turn. It is followed three times round,
-//! by sizes of three kinds that each piece keeps: those of x, those with noise of its own, and
-//! those with noise from noise; followed for ever, it would grow where x does not.
+//! moduli of all that makes up g_i and R_j is the size of x_j, but no less than a part [`NOISE`] of
+//! what F_j drives it to: a state that vanishes by cancellation is rounding of that, and must not
+//! be resolved like a signal. Delayed noise drives noise in turn; it is followed a few times
+//! round, by several kinds of sizes that each piece keeps, the first that of x itself. Followed
+//! for ever, it would grow where x does not.
 //! The element is resolved once the last coefficients of x′ are below [`RESOLVED`] F_i; those of
 //! x are smaller by another h/(4k).
 
 use super::legendre::{DEGREE, TERMS};
 use super::solver::Solver;
 use super::terms::Feed;
-use super::track::{Sizes, Track};
+use super::track::{KINDS, Sizes, Track};
 
 /// Coefficients of x′ below this part of F are rounding: ten units, since each sums 25 values.
 const RESOLVED: f64 = 10.0 * f64::EPSILON;
@@ -23,8 +23,9 @@ const NOTHING: f64 = 0.25 * f64::EPSILON;
 /// Where the last coefficient that matters is no higher, an element twice as long may do.
 const ROOMY: usize = 12;
 
-/// The part of what drives it that a state is at least.
-const NOISE: f64 = 0.125;
+/// The part of what drives it that a state is at least: its last coefficients carry a hundredth of
+/// one unit of rounding of that, and [`RESOLVED`] is ten.
+const NOISE: f64 = 1.0 / 32.0;
 
 /// Rounds of F and R: each takes noise through one more integration.
 const ROUNDS: usize = 3;
@@ -66,10 +67,10 @@ impl Element {
             f: vec![0.0; n * TERMS],
             state_size: vec![0.0; n],
             slope_size: vec![0.0; n],
-            forcing_size: vec![[0.0; 3]; n],
+            forcing_size: vec![[0.0; KINDS]; n],
             rates: rates(a, n),
-            state_sizes: vec![[0.0; 3]; n],
-            slope_sizes: vec![[0.0; 3]; n],
+            state_sizes: vec![[0.0; KINDS]; n],
+            slope_sizes: vec![[0.0; KINDS]; n],
             needed: 0,
             kept: 0,
         }
@@ -88,7 +89,7 @@ impl Element {
     /// Solve over [t, t + h] from `start`; `tracks` as the feeds.
     pub(super) fn solve(&mut self, start: &[f64], t: f64, h: f64, slack: f64, tracks: [&Track; 3]) {
         self.g.fill(0.0);
-        self.forcing_size.fill([0.0; 3]);
+        self.forcing_size.fill([0.0; KINDS]);
         let mut degree = 0;
         for (feeds, track) in self.feeds.iter_mut().zip(tracks) {
             for feed in feeds {
@@ -109,9 +110,9 @@ impl Element {
         for (sizes, f) in self.slope_sizes.iter_mut().zip(self.f.chunks_exact(TERMS)) {
             sizes[0] = f.iter().fold(0.0, |m, c| f64::max(m, c.abs()));
         }
-        for kind in 0..3 {
+        for kind in 0..KINDS {
             self.measure(kind, h);
-            if kind < 2 {
+            if kind + 1 < KINDS {
                 for i in 0..self.state_size.len() {
                     self.state_sizes[i][kind + 1] = self.state_size[i];
                     self.slope_sizes[i][kind + 1] = self.slope_size[i];

@@ -16,6 +16,7 @@
 //! several delays fade slowly: refused beyond a bound.
 
 mod element;
+mod given;
 mod jumps;
 mod legendre;
 mod outputs;
@@ -218,6 +219,15 @@ impl LinearSystem {
                     "{name} has {found} components, not {wanted}"
                 )));
             }
+        }
+        if past
+            .slopes
+            .as_ref()
+            .is_some_and(|slopes| slopes.track.width() != n)
+        {
+            return Err(Error::argument(format!(
+                "the derivative of the history does not have {n} components"
+            )));
         }
         if let Some(value) = past.state.iter().find(|value| !value.is_finite()) {
             return Err(Error::argument(format!(

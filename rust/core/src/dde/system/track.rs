@@ -16,16 +16,19 @@ pub(super) struct Piece {
     pub(super) size: Vec<Sizes>,
 }
 
-/// How large a signal is; and what its rounding, and the rounding of what that drives, is relative
-/// to.
-pub(super) type Sizes = [f64; 3];
+/// Kinds of sizes.
+pub(super) const KINDS: usize = 4;
+
+/// How large a signal is; then what its rounding is relative to, with the rounding of what drives
+/// it, and of what drives that, and so on.
+pub(super) type Sizes = [f64; KINDS];
 
 impl Piece {
     /// From series of one length a column.
     pub(super) fn new(start: f64, end: f64, degree: usize, series: Vec<f64>) -> Self {
         let size = series
             .chunks_exact(degree + 1)
-            .map(|column| [column.iter().map(|c| c.abs()).sum(); 3])
+            .map(|column| [column.iter().map(|c| c.abs()).sum(); KINDS])
             .collect();
         Self {
             start,
@@ -178,7 +181,8 @@ impl Track {
 
     /// Sizes of a column at `place`.
     pub(super) fn size(&self, place: usize, column: usize) -> Sizes {
-        self.get(place).map_or([0.0; 3], |piece| piece.size[column])
+        self.get(place)
+            .map_or([0.0; KINDS], |piece| piece.size[column])
     }
 
     /// [`Piece::taylor_bounds`] of the piece at `place`.
