@@ -292,6 +292,22 @@ def test_a_stiff_lag_under_held_samples_is_a_row_of_exponentials():
     assert np.abs(found.outputs[1:] - levels[:-1]).max() < 1e-13 * np.abs(levels).max()
 
 
+def test_the_state_at_the_start_is_the_one_given():
+    system = dtm.DelaySystem([[0, 1], [-4, -1]], [[0], [4]])
+    found = dtm.simulate(system, [5.0, 6.0], initial_state=[0.1, -0.3])
+    assert found.states[:, 0].tolist() == [0.1, -0.3]
+
+
+def test_a_run_of_noise_does_not_shorten_elements_for_ever():
+    """A settled speed, zero but for rounding, seen through three delays: once a million steps."""
+    A = {tau: np.zeros((5, 5)) for tau in (0.0, 0.3, 0.5, 0.7)}
+    A[0.0][:2, :2] = [[0, 1], [-4, -1]]
+    A[0.0][2:, 2:] = -np.eye(3)
+    A[0.5][2, 1] = A[0.3][3, 2] = A[0.7][4, 3] = 1.0
+    found = dtm.simulate(dtm.DelaySystem(A, [[0], [4], [0], [0], [0]]), [0.0, 300.0, 3000.0])
+    assert np.abs(found.states[:, 1:] - [[1], [0], [0], [0], [0]]).max() < 1e-14
+
+
 def test_transfer_functions_of_every_kind():
     times = np.linspace(0.0, 4.0, 41)
     window = ((1.0 - dtm.delay(0.5)) / dtm.s).step_response(times)

@@ -111,7 +111,6 @@ impl PyLinearSystem {
 
     /// Outputs, states and inputs at the times, one time after the other, and the breaking points.
     #[pyo3(signature = (times, state, history, slopes, inputs))]
-    #[expect(clippy::type_complexity, reason = "four arrays")]
     fn simulate<'py>(
         &self,
         py: Python<'py>,

@@ -163,7 +163,7 @@ impl Element {
         self.needed <= ROOMY
     }
 
-    /// Append the element [t, next] to the tracks; `end` becomes its last x.
+    /// Append the element [t, next] to the tracks; `end`, its first x, becomes its last one.
     pub(super) fn store(
         &self,
         t: f64,
@@ -174,6 +174,7 @@ impl Element {
     ) {
         let degree = (self.kept + 1).min(DEGREE);
         states.push(t, next, degree, &self.x, &self.state_sizes);
+        states.begin(end);
         if let Some(slopes) = slopes {
             slopes.push(t, next, self.kept, &self.f, &self.slope_sizes);
         }

@@ -58,8 +58,8 @@ impl Tables {
             let (_, derivative) = next_polynomial(x, &legendre);
             let weight = 2.0 / ((1.0 - x * x) * derivative * derivative);
             tables.nodes[i] = x;
-            for k in 0..TERMS {
-                tables.transform[i][k] = 0.5 * (2 * k + 1) as f64 * weight * legendre[k];
+            for (k, value) in legendre.iter().enumerate() {
+                tables.transform[i][k] = 0.5 * (2 * k + 1) as f64 * weight * value;
             }
         }
         tables.refine();

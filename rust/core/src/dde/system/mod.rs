@@ -234,19 +234,21 @@ impl LinearSystem {
                 "the initial state holds {value}: give finite numbers"
             )));
         }
-        if times.first().is_some_and(|first| !(*first >= 0.0)) {
-            return Err(Error::argument(
-                "a time lies before the start of the run: leave it out",
-            ));
+        if let Some(time) = times.iter().find(|time| !time.is_finite()) {
+            return Err(Error::argument(format!(
+                "the times hold {time}: give finite ones"
+            )));
         }
-        if let Some(pair) = times.windows(2).find(|pair| !(pair[1] > pair[0])) {
+        if let Some(first) = times.first().filter(|first| **first < 0.0) {
+            return Err(Error::argument(format!(
+                "time {first} lies before the start of the run: leave it out"
+            )));
+        }
+        if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
             return Err(Error::argument(format!(
                 "time {} does not come after {}: give increasing times",
                 pair[1], pair[0]
             )));
-        }
-        if times.last().is_some_and(|last| !last.is_finite()) {
-            return Err(Error::argument("the last time is not finite"));
         }
         run::run(&self.equations, past, inputs, times, task)
     }

@@ -84,11 +84,10 @@ impl Solver {
         for k in (0..TERMS).rev() {
             // `last` holds D_{k+1}⁻¹ r_{k+1}.
             let share = rho / (2 * k + 3) as f64;
-            for i in 0..n {
+            for (i, now) in now.iter_mut().enumerate() {
                 let row = &self.a[i * n..(i + 1) * n];
                 let carried: f64 = row.iter().zip(last.iter()).map(|(a, r)| a * r).sum();
-                now[i] = x[i * TERMS + k] - share * carried;
-                x[i * TERMS + k] = now[i];
+                *now = x[i * TERMS + k] - share * carried;
             }
             factors.blocks[k].solve(now);
             for i in 0..n {
@@ -102,9 +101,9 @@ impl Solver {
             for i in 0..n {
                 last[i] = x[i * TERMS + k - 1];
             }
-            for i in 0..n {
+            for (i, now) in now.iter_mut().enumerate() {
                 let row = &self.a[i * n..(i + 1) * n];
-                now[i] = share * row.iter().zip(last.iter()).map(|(a, r)| a * r).sum::<f64>();
+                *now = share * row.iter().zip(last.iter()).map(|(a, r)| a * r).sum::<f64>();
             }
             factors.blocks[k].solve(now);
             for i in 0..n {

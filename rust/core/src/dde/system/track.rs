@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use super::legendre::{self, DEGREE, Series, TERMS};
 
 /// One piece: coefficient k of column j at `series[j (degree + 1) + k]`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Piece {
     pub(super) start: f64,
     pub(super) end: f64,
@@ -14,6 +14,8 @@ pub(super) struct Piece {
     pub(super) series: Vec<f64>,
     /// Sizes of each column, see [`super::element`].
     pub(super) size: Vec<Sizes>,
+    /// Exact values at the start, where they are known: the series sums to them but for rounding.
+    first: Vec<f64>,
 }
 
 /// Kinds of sizes.
@@ -36,6 +38,7 @@ impl Piece {
             degree,
             series,
             size,
+            first: Vec::new(),
         }
     }
 
@@ -59,6 +62,11 @@ impl Piece {
 
     /// Value of a column at time `s`.
     pub(super) fn at(&self, s: f64, column: usize) -> f64 {
+        if s == self.start
+            && let Some(first) = self.first.get(column)
+        {
+            return *first;
+        }
         match self.column(column) {
             [c] => *c,
             series => legendre::at(series, self.local(s)),
@@ -93,7 +101,7 @@ pub(super) struct Track {
     width: usize,
     pieces: VecDeque<Piece>,
     dropped: usize,
-    spare: Vec<(Vec<f64>, Vec<Sizes>)>,
+    spare: Vec<Piece>,
 }
 
 impl Track {
@@ -135,20 +143,23 @@ impl Track {
         series: &[f64],
         size: &[Sizes],
     ) {
-        let (mut own, mut own_size) = self.spare.pop().unwrap_or_default();
-        own.clear();
-        own_size.clear();
-        own_size.extend_from_slice(size);
+        let mut piece = self.spare.pop().unwrap_or_default();
+        (piece.start, piece.end, piece.degree) = (start, end, degree);
+        piece.series.clear();
         for column in series.chunks_exact(TERMS) {
-            own.extend_from_slice(&column[..=degree]);
+            piece.series.extend_from_slice(&column[..=degree]);
         }
-        self.pieces.push_back(Piece {
-            start,
-            end,
-            degree,
-            series: own,
-            size: own_size,
-        });
+        piece.size.clear();
+        piece.size.extend_from_slice(size);
+        piece.first.clear();
+        self.pieces.push_back(piece);
+    }
+
+    /// Name the values at the start of the last piece.
+    pub(super) fn begin(&mut self, values: &[f64]) {
+        if let Some(piece) = self.pieces.back_mut() {
+            piece.first.extend_from_slice(values);
+        }
     }
 
     /// Forget pieces that end before `s`, but for the last.
@@ -156,7 +167,7 @@ impl Track {
         while self.pieces.len() > 1 && self.pieces.front().is_some_and(|piece| piece.end < s) {
             self.dropped += 1;
             if let Some(piece) = self.pieces.pop_front() {
-                self.spare.push((piece.series, piece.size));
+                self.spare.push(piece);
             }
         }
     }
