@@ -19,7 +19,7 @@ CORE_ARROWS = {
     "quasipoly": {"elementary"},
     "roots": {"elementary", "lambertw", "quasipoly"},
     "stability": {"elementary", "lambertw", "quasipoly", "roots"},
-    "dde": {"quasipoly"},
+    "dde": {"elementary", "quasipoly"},
 }
 
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
@@ -71,6 +71,11 @@ FLOORS = [
         "_ratio",
         "_transfer",
         "_systems",
+        "_signals",
+        "_realisation",
+        "_system_response",
+        "_system_run",
+        "_simulation",
     },
     {"_recording", "_gallery_entries", "gallery"},
     {"_readers", "_estimation", "_design"},

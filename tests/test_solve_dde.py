@@ -104,9 +104,7 @@ def compiled_mackey_glass():
 def test_callbacks_agree():
     times = np.linspace(0.0, 60.0, 61)
     arguments = {"t_eval": times, "rtol": 1e-9, "atol": 1e-10}
-    together = dtm.solve_dde(
-        mackey_glass, (0, 60), 0.5, 17.0, vectorized=True, **arguments
-    )
+    together = dtm.solve_dde(mackey_glass, (0, 60), 0.5, 17.0, vectorized=True, **arguments)
     for fun in (
         mackey_glass,
         lambda t, y, z: list(mackey_glass(t, y, z)),
@@ -120,9 +118,7 @@ def test_callbacks_agree():
 def test_numba_functions_are_called_without_python():
     numba = pytest.importorskip("numba")
     real, pointer = numba.types.float64, numba.types.CPointer(numba.types.float64)
-    signature = numba.types.void(
-        real, pointer, pointer, pointer, pointer, numba.types.voidptr
-    )
+    signature = numba.types.void(real, pointer, pointer, pointer, pointer, numba.types.voidptr)
 
     @numba.cfunc(signature)
     def window(t, y, z, dz, dy, data):
@@ -521,9 +517,7 @@ def test_ctrl_c_stops_a_run(listens_to_ctrl_c, compiled):
     if compiled:
         numba = pytest.importorskip("numba")
         real, pointer = numba.types.float64, numba.types.CPointer(numba.types.float64)
-        signature = numba.types.void(
-            real, pointer, pointer, pointer, pointer, numba.types.voidptr
-        )
+        signature = numba.types.void(real, pointer, pointer, pointer, pointer, numba.types.voidptr)
 
         @numba.cfunc(signature)
         def fun(t, y, z, dz, dy, data):

@@ -43,6 +43,7 @@ from deadtime._robust import RobustMap, robust_map
 from deadtime._rootset import RootSet
 from deadtime._scalar_delay import dde_roots, rightmost_branches
 from deadtime._sensitivity import Sensitivity
+from deadtime._simulation import simulate
 from deadtime._solve_dde import solve_dde
 from deadtime._special import lambertw, lambertw0, lambertwm1
 from deadtime._special_forms import (
@@ -55,6 +56,7 @@ from deadtime._special_forms import (
 from deadtime._stability import MapStatus, StabilityMap, stability_map
 from deadtime._stability_radius import StabilityRadius, stability_radius
 from deadtime._sweep import Sweep, SweepStatus, sweep
+from deadtime._system_response import SystemResponse
 from deadtime._systems import DelaySystem
 from deadtime._transfer import TransferFunction, feedback
 
@@ -105,6 +107,7 @@ __all__ = [
     "Step",
     "Sweep",
     "SweepStatus",
+    "SystemResponse",
     "TransferFunction",
     "Whiteness",
     "crossings",
@@ -131,6 +134,7 @@ __all__ = [
     "rightmost_branches",
     "robust_map",
     "s",
+    "simulate",
     "simulate_fixed_step",
     "solve_dde",
     "stability_map",

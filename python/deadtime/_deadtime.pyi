@@ -1,6 +1,6 @@
 """Signatures of the native part."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias, final
 
 import numpy as np
@@ -10,7 +10,9 @@ __all__ = [
     "CharacteristicMatrix",
     "Family",
     "LinearLoop",
+    "LinearSystem",
     "QuasiPolynomial",
+    "Signal",
     "dde_root_number",
     "dde_roots",
     "lambertw",
@@ -23,6 +25,7 @@ __all__ = [
     "lambertwm1",
     "lambertwm1_number",
     "largest_stable_box",
+    "legendre_tables",
     "limit_threads",
     "loop_sensitivities",
     "nap",
@@ -333,6 +336,41 @@ def sweep_responses(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+def legendre_tables() -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+_Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
+
+@final
+class Signal:
+    def __new__(
+        cls, edges: NDArray[np.float64], series: NDArray[np.float64], breaks: Sequence[int]
+    ) -> Signal: ...
+
+@final
+class LinearSystem:
+    def __new__(
+        cls,
+        states: int,
+        inputs: int,
+        outputs: int,
+        a: _Terms,
+        n: _Terms,
+        b: _Terms,
+        c: _Terms,
+        f: _Terms,
+        d: _Terms,
+    ) -> LinearSystem: ...
+    def simulate(
+        self,
+        times: NDArray[np.float64],
+        state: NDArray[np.float64],
+        history: Signal,
+        slopes: Signal | None,
+        inputs: Signal,
+    ) -> tuple[
+        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+    ]: ...
+
 def sampled_abscissa_grid(
     cells: int,
     states: int,

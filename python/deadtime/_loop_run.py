@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._deadtime import on_samples
 from deadtime._loop_sensitivities import output_and_input_slopes, slope_names
 from deadtime._response import Response
-from deadtime._validation import finite, real_array
+from deadtime._validation import finite, increasing, one_dimensional, real_array
 
 if TYPE_CHECKING:
     from deadtime._loop import ControlLoop
 
-__all__ = ["increasing", "reference_jumps", "settled_step", "simulate_loop", "steady_state"]
+__all__ = ["reference_jumps", "settled_step", "simulate_loop", "steady_state"]
 
 Vector = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def simulate_loop(
     sensitivities: Sequence[str] = (),
 ) -> Response:
     """Check the arguments of `ControlLoop.simulate` and run it."""
-    times = _one_dimensional("time", time)
+    times = one_dimensional("time", time)
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
     initial = finite("initial_output", initial_output)
@@ -99,7 +99,7 @@ def simulate_loop(
             past = jumps.just_before(float(times[0]))
     history = None
     if not isinstance(command_history, tuple) or command_history:
-        history = _one_dimensional("command_history", command_history)
+        history = one_dimensional("command_history", command_history)
     phase = finite("sample_phase", sample_phase)
     native, ahead = loop._runner
     arguments = (*loop._at_rest(initial, past), before, held, history, phase)
@@ -188,27 +188,3 @@ def reference_jumps(
             "each element of reference_time (or of time, without reference_time), at least one"
         )
     return _Jumps(where, values, before)
-
-
-def _one_dimensional(name: str, given: ArrayLike) -> Vector:
-    array = real_array(name, given)
-    if array.ndim == 1:
-        return array
-    if array.ndim == 0:
-        return array.reshape(1)
-    raise ValueError(f"{name} has shape {array.shape}: give a one-dimensional array")
-
-
-def increasing(name: str, given: ArrayLike) -> Vector:
-    """Return the times as an array, or raise where they do not increase."""
-    times = _one_dimensional(name, given)
-    if not np.isfinite(times).all():
-        raise ValueError(f"{name} holds {times[~np.isfinite(times)][0]}: give finite times")
-    steps = np.diff(times)
-    if (steps <= 0.0).any():
-        at = int(np.argmax(steps <= 0.0))
-        raise ValueError(
-            f"{name}[{at + 1}]={times[at + 1]} does not come after {name}[{at}]={times[at]}: give "
-            "increasing times"
-        )
-    return times

@@ -19,8 +19,7 @@ from deadtime._deadtime import sweep_figures, sweep_responses
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._loop_model import LoopModel, refuse_discretised, rest_of
-from deadtime._loop_run import increasing
-from deadtime._validation import finite, positive, real_array, thread_number
+from deadtime._validation import finite, increasing, positive, real_array, thread_number
 
 __all__ = ["Sweep", "SweepStatus", "sweep"]
 

@@ -22,7 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._determinant import NotExpandedError, expanded
 from deadtime._matrix_roots import MatrixDeterminant
 from deadtime._quasipolynomial import QuasiPolynomial
+from deadtime._realisation import Realisation, of_delay_system
 from deadtime._rootset import Range, RootSet
+from deadtime._system_response import SystemResponse
+from deadtime._system_run import respond, step_response
 from deadtime._transfer import TransferFunction
 from deadtime._validation import non_negative, real_array
 
@@ -95,7 +98,7 @@ class DelaySystem:
     19
     """
 
-    __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N", "_expansion")
+    __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N", "_expansion", "_realisation")
 
     _A: dict[float, Matrix]
     _B: dict[float, Matrix]
@@ -105,6 +108,8 @@ class DelaySystem:
     _N: dict[float, Matrix]
     #: The expanded determinant, or why there is none; None until asked for.
     _expansion: QuasiPolynomial | ValueError | None
+    #: The form that is simulated; None until asked for.
+    _realisation: Realisation | None
 
     def __init__(
         self,
@@ -149,9 +154,8 @@ class DelaySystem:
                         f"and {q} outputs"
                     )
         put = object.__setattr__
-        for name, value in zip(
-            self.__slots__, (state, inputs, outputs, direct, derivative, late, None), strict=True
-        ):
+        values = (state, inputs, outputs, direct, derivative, late, None, None)
+        for name, value in zip(self.__slots__, values, strict=True):
             put(self, name, value)
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -599,6 +603,70 @@ class DelaySystem:
         if not strong and self._determinant().is_stable(strong=False):
             return True
         return self._leading().is_stable()
+
+    # Responses
+
+    def simulate(self, time: ArrayLike, inputs: Any = 1.0, **arguments: Any) -> SystemResponse:
+        """Response to inputs of any kind, from any history: `deadtime.simulate` of this system.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            Output times in s, increasing.
+        inputs : float, array_like or callable
+            As in `deadtime.simulate`.
+        **arguments
+            As in `deadtime.simulate`.
+
+        Returns
+        -------
+        SystemResponse
+        """
+        return respond(self, time, inputs, **arguments)
+
+    def step_response(
+        self,
+        time: ArrayLike | None = None,
+        amplitude: float = 1.0,
+        *,
+        input: int = 0,  # noqa: A002
+    ) -> SystemResponse:
+        """Response to a step of one input from rest at zero.
+
+        Parameters
+        ----------
+        time : array_like, optional
+            Output times in s; by default 501 from the step until the response has settled, or
+            has visibly failed to.
+        amplitude : float
+            Height of the step.
+        input : int, default 0
+            Which input, from zero; the others stay zero.
+
+        Returns
+        -------
+        SystemResponse
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> system = dtm.DelaySystem(A={0.36: -2.0}, B={0.36: 2.0})
+        >>> round(system.step_response().info()["overshoot"], 3)
+        22.475
+        """
+        return step_response(self, time, amplitude, input)
+
+    def _realised(self) -> Realisation:
+        if self._realisation is None:
+            object.__setattr__(self, "_realisation", of_delay_system(self))
+        assert self._realisation is not None
+        return self._realisation
+
+    def _gains_at_rest(self) -> Matrix | None:
+        try:
+            return self.frequency_response(0.0).real
+        except np.linalg.LinAlgError:
+            return None
 
     def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
         """Give det M, expanded if that is safe."""

@@ -23,7 +23,10 @@ from deadtime._interchange import (
 from deadtime._margins import Margins, margins
 from deadtime._quasipolynomial import QuasiPolynomial, delay, is_number
 from deadtime._ratio import first_term, ratio
+from deadtime._realisation import Realisation, of_transfer_function
 from deadtime._rootset import Range, RootSet
+from deadtime._system_response import SystemResponse
+from deadtime._system_run import respond, step_response
 from deadtime._validation import non_negative, real_array
 
 if TYPE_CHECKING:
@@ -429,6 +432,71 @@ class TransferFunction:
         bool
         """
         return self._den.is_stable(strong)
+
+    # In time
+
+    def step_response(
+        self, time: ArrayLike | None = None, amplitude: float = 1.0
+    ) -> SystemResponse:
+        """Response to a step from rest.
+
+        Parameters
+        ----------
+        time : array_like, optional
+            Output times in s; by default 501 from the step until the response has settled, or
+            has visibly failed to.
+        amplitude : float
+            Height of the step.
+
+        Returns
+        -------
+        SystemResponse
+
+        Raises
+        ------
+        ValueError
+            As in `deadtime.simulate`.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> time, outputs = dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)).step_response([0.0, 1.0])
+        >>> print(outputs)
+        [0.     1.1232]
+        """
+        return step_response(self, time, amplitude, 0)
+
+    def forced_response(self, time: ArrayLike, inputs: Any, **arguments: Any) -> SystemResponse:
+        """Response to an input of any kind from rest: `deadtime.simulate` of this system.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            Output times in s, increasing.
+        inputs : float, array_like or callable
+            As in `deadtime.simulate`.
+        **arguments
+            As in `deadtime.simulate`.
+
+        Returns
+        -------
+        SystemResponse
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from deadtime import delay, s
+        >>> G = delay(0.5) / (s + 1)
+        >>> print(G.forced_response([0.0, 1.0, 2.0], np.sin).outputs.round(6))
+        [0.       0.104187 0.574944]
+        """
+        return respond(self, time, inputs, **arguments)
+
+    def _realised(self) -> Realisation:
+        return of_transfer_function(self)
+
+    def _gains_at_rest(self) -> NDArray[np.float64]:
+        return np.array([[self.dcgain()]])
 
     # As a loop gain
 

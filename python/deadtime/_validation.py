@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "finite",
+    "increasing",
     "non_negative",
     "non_zero",
+    "one_dimensional",
     "positive",
     "real_array",
     "thread_number",
@@ -90,6 +92,31 @@ def whole_number(
     if not least <= number < limit:
         raise ValueError(f"{name}={number}: give a whole number of at least 1{otherwise}")
     return number
+
+
+def one_dimensional(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    """Return `given` as a vector of numbers, or raise; one number is a vector of one."""
+    array = real_array(name, given)
+    if array.ndim == 1:
+        return array
+    if array.ndim == 0:
+        return array.reshape(1)
+    raise ValueError(f"{name} has shape {array.shape}: give a one-dimensional array")
+
+
+def increasing(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    """Return `given` as a vector of finite times that increase, or raise."""
+    times = one_dimensional(name, given)
+    if not np.isfinite(times).all():
+        raise ValueError(f"{name} holds {times[~np.isfinite(times)][0]}: give finite times")
+    steps = np.diff(times)
+    if (steps <= 0.0).any():
+        at = int(np.argmax(steps <= 0.0))
+        raise ValueError(
+            f"{name}[{at + 1}]={times[at + 1]} does not come after {name}[{at}]={times[at]}: give "
+            "increasing times"
+        )
+    return times
 
 
 def thread_number(threads: int | None) -> int | None:

@@ -13,6 +13,7 @@ mod solver;
 mod special;
 mod stability;
 mod sweeps;
+mod systems;
 mod ufunc;
 
 use pyo3::prelude::*;
@@ -40,6 +41,8 @@ mod _deadtime {
     use super::stability::PyFamily;
     #[pymodule_export]
     use super::sweeps::{loop_sensitivities, sweep_figures, sweep_responses};
+    #[pymodule_export]
+    use super::systems::{PyLinearSystem, PySignal, legendre_tables};
     #[pymodule_export]
     use super::ufunc::limit_threads;
     use pyo3::prelude::*;

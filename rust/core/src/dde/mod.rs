@@ -11,7 +11,8 @@
 //! * [`sensitivity`]: derivatives of a response with respect to numbers of the loop;
 //! * [`scalar`]: the numbers all of these compute with, plain or with a slope;
 //! * [`spectral`]: any equation with constant delays, by collocation on elements that end on
-//!   breaking points, with its [`history`] and its [`breaks`].
+//!   breaking points, with its [`history`] and its [`breaks`];
+//! * [`system`]: linear systems of any order with any number of delays, retarded or neutral.
 
 pub mod breaks;
 mod chebyshev;
@@ -29,6 +30,7 @@ pub mod sampled;
 pub mod scalar;
 pub mod sensitivity;
 pub mod spectral;
+pub mod system;
 mod wanted;
 
 #[cfg(test)]
@@ -38,3 +40,4 @@ pub use figures::{Criteria, Figures};
 pub use linear::{Equations, LinearLoop, Reference, Start, Trajectory, Update};
 pub use response::{Request, Response, on_sample};
 pub use scalar::{Dual, Scalar};
+pub use system::{LinearSystem, Past, Signal, SystemEquations, SystemResponse};

@@ -1,0 +1,166 @@
+"""Functions of time as the native part takes them: Legendre series by pieces.
+
+Constants, held samples and straight lines between samples are exact. A callable is sampled at the
+Gauss nodes of an interval; where the last coefficients of its series are not below rounding, the
+interval is halved. Nodes lie inside the intervals, so a callable is never asked for its value at
+one of its breaks. Times are counted from the start of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._deadtime import Signal, legendre_tables
+from deadtime._validation import real_array
+
+__all__ = ["Fitted", "constant", "fitted", "held", "lines", "sampled", "step"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+# Values at these nodes, times the matrix, are coefficients.
+_NODES, _TRANSFORM = legendre_tables()
+
+# A series has ended where its last two coefficients are below this part of the largest value.
+_ENDED = 16.0 * float(np.finfo(float).eps)
+
+# An interval shorter than this part of the whole is not halved any more: there is a break in it.
+_SHORTEST = 1e-9
+
+_FOREVER = float("inf")
+
+
+class Fitted(NamedTuple):
+    """A callable by pieces: coefficient k of component i in piece j at ``series[j, i, k]``."""
+
+    edges: Vector
+    series: NDArray[np.float64]
+    breaks: list[int]
+
+    def derivative(self) -> Fitted:
+        """Series of the derivative."""
+        slopes = np.zeros_like(self.series)
+        slopes[:, :, :-1] = legendre.legder(self.series, axis=2)
+        slopes *= (2.0 / np.diff(self.edges))[:, None, None]
+        return self._replace(series=slopes)
+
+    def signal(self) -> Signal:
+        """Give the native form, without anything before or after."""
+        return Signal(self.edges, np.ascontiguousarray(self.series), self.breaks)
+
+    def input_signal(self, before: Vector) -> Signal:
+        """Give the native form, constant before and after."""
+        edges = np.concatenate([[-_FOREVER], self.edges, [_FOREVER]])
+        outer = np.zeros((2, *self.series.shape[1:]))
+        outer[0, :, 0] = before
+        outer[1, :, 0] = self.series[-1].sum(axis=1)
+        series = np.concatenate([outer[:1], self.series, outer[1:]])
+        return Signal(edges, series, [1, *(place + 1 for place in self.breaks)])
+
+
+def constant(values: Vector) -> Signal:
+    """Give `values`, shape (p,), at all times."""
+    return Signal(np.array([-_FOREVER, _FOREVER]), values.reshape(1, -1, 1), [])
+
+
+def step(before: Vector, after: Vector) -> Signal:
+    """Give a step at the start, both of shape (p,)."""
+    series = np.stack([before, after])[:, :, None]
+    return Signal(np.array([-_FOREVER, 0.0, _FOREVER]), series, [1])
+
+
+def held(times: Vector, values: Matrix, before: Vector) -> Signal:
+    """Give values, shape (p, m), that hold from `times` on."""
+    edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
+    series = np.concatenate([before[:, None], values], axis=1).T[:, :, None]
+    changed = np.any(series[1:] != series[:-1], axis=(1, 2))
+    changed[0] = True
+    keep = np.flatnonzero(np.append(True, changed))
+    return Signal(
+        np.append(edges[keep], _FOREVER),
+        np.ascontiguousarray(series[keep]),
+        list(range(1, len(keep))),
+    )
+
+
+def lines(times: Vector, values: Matrix, before: Vector) -> Signal:
+    """Join values, shape (p, m), at `times` by straight lines; the last one holds."""
+    edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
+    series = np.zeros((len(times) + 1, len(values), 2))
+    series[0, :, 0] = before
+    series[1:-1, :, 0] = (0.5 * (values[:, :-1] + values[:, 1:])).T
+    series[1:-1, :, 1] = (0.5 * (values[:, 1:] - values[:, :-1])).T
+    series[-1, :, 0] = values[:, -1]
+    return Signal(edges, series, list(range(1, len(times) + 1)))
+
+
+def sampled(
+    name: str, function: Callable[..., ArrayLike], times: Vector, width: int, vectorized: bool
+) -> Matrix:
+    """Values of a callable at `times`, shape (width, m), checked."""
+    found: Any = function(times) if vectorized else [function(float(t)) for t in times]
+    values = real_array(f"the value of {name}", found)
+    if not vectorized:
+        values = values.reshape(len(times), -1).T if values.ndim > 1 else values[None, :]
+    elif values.ndim == 1:
+        values = values[None, :]
+    if values.shape != (width, len(times)):
+        wanted = f"({width}, {len(times)})" if vectorized else f"({width},) at each time"
+        shape = values.shape if vectorized else values.shape[:1]
+        raise ValueError(f"{name} gives values of shape {shape}, not {wanted}")
+    sound = np.isfinite(values).all(axis=0)
+    if not sound.all():
+        at = int(np.argmin(sound))
+        raise ValueError(
+            f"{name} at t = {times[at]} s is {values[:, at][~np.isfinite(values[:, at])][0]}: give "
+            "finite values"
+        )
+    return values
+
+
+def fitted(
+    name: str,
+    function: Callable[..., ArrayLike],
+    span: tuple[float, float],
+    breaks: Iterable[float],
+    width: int,
+    *,
+    start: float,
+    vectorized: bool,
+) -> Fitted:
+    """Fit a callable of the user's time over `span`, in time from `start` on, between breaks."""
+    low, high = span
+    inner = sorted({float(b) for b in breaks if low < b < high})
+    corners = [low, *inner, high]
+    scale = np.zeros(width)
+    edges: list[float] = [low - start]
+    pieces: list[Matrix] = []
+    starts: list[int] = []
+    for left, right in pairwise(corners):
+        if left in inner:
+            starts.append(len(pieces))
+        waiting = [(left, right)]
+        while waiting:
+            a, b = waiting.pop()
+            times = 0.5 * ((1.0 - _NODES) * a + (1.0 + _NODES) * b)
+            values = sampled(name, function, times, width, vectorized)
+            series = values @ _TRANSFORM
+            scale = np.maximum(scale, np.abs(values).max(axis=1))
+            if (np.abs(series[:, -2:]).max(axis=1) <= _ENDED * scale).all():
+                pieces.append(series)
+                edges.append(b - start)
+                continue
+            if b - a <= _SHORTEST * (high - low):
+                raise ValueError(
+                    f"{name} is not smooth at t = {b:.10g} s: name the time in "
+                    f"{name.split()[0]}_breaks, or give samples"
+                )
+            middle = 0.5 * (a + b)
+            waiting += [(middle, b), (a, middle)]
+    return Fitted(np.array(edges), np.array(pieces), starts)

@@ -1,0 +1,256 @@
+//! One element of time: forcing gathered, equation solved, resolution judged.
+//!
+//! Rounding of row i of x′ = A x + g is relative to F_i = Σ |a_ij| R_j + G_i, where G_i sums the
+//! moduli of all that makes up g_i and R_j is the size of x_j, but no less than a part [`NOISE`] of
+//! what F_j drives it to: a state that vanishes by cancellation is rounding of that, and must not
+//! be resolved like a signal. Delayed noise drives noise in turn; it is followed a few times
+//! round, by several kinds of sizes that each piece keeps, the first that of x itself. Followed
+//! for ever, it would grow where x does not.
+//! The element is resolved once the last coefficients of x′ are below [`RESOLVED`] F_i; those of
+//! x are smaller by another h/(4k).
+
+use super::legendre::{DEGREE, TERMS};
+use super::solver::Solver;
+use super::terms::Feed;
+use super::track::{KINDS, Sizes, Track};
+
+/// Coefficients of x′ below this part of F are rounding: ten units, since each sums 25 values.
+const RESOLVED: f64 = 10.0 * f64::EPSILON;
+
+/// Coefficients of x′ below this part of F are not kept.
+const NOTHING: f64 = 0.25 * f64::EPSILON;
+
+/// Where the last coefficient that matters is no higher, an element twice as long may do.
+const ROOMY: usize = 12;
+
+/// The part of what drives it that a state is at least: its last coefficients carry a hundredth of
+/// one unit of rounding of that, and [`RESOLVED`] is ten.
+const NOISE: f64 = 1.0 / 32.0;
+
+/// Rounds of F and R: each takes noise through one more integration.
+const ROUNDS: usize = 3;
+
+/// The equation, and the element in hand.
+#[derive(Debug)]
+pub(super) struct Element {
+    a: Vec<(usize, usize, f64)>,
+    /// Feeds of the state, its derivative and the input.
+    feeds: [Vec<Feed>; 3],
+    solver: Solver,
+    g: Vec<f64>,
+    x: Vec<f64>,
+    f: Vec<f64>,
+    state_size: Vec<f64>,
+    slope_size: Vec<f64>,
+    forcing_size: Vec<Sizes>,
+    /// How fast A lets each state follow, see [`rates`].
+    rates: Vec<f64>,
+    /// What the pieces of state and slope keep.
+    state_sizes: Vec<Sizes>,
+    slope_sizes: Vec<Sizes>,
+    /// Last coefficient of x′ above [`RESOLVED`], and above [`NOTHING`].
+    needed: usize,
+    kept: usize,
+}
+
+impl Element {
+    pub(super) fn new(a: &[f64], n: usize, feeds: [Vec<Feed>; 3]) -> Self {
+        let entries = a.iter().enumerate().filter(|(_, a)| **a != 0.0);
+        Self {
+            a: entries
+                .map(|(place, a)| (place / n, place % n, *a))
+                .collect(),
+            feeds,
+            solver: Solver::new(a, n),
+            g: vec![0.0; n * TERMS],
+            x: vec![0.0; n * TERMS],
+            f: vec![0.0; n * TERMS],
+            state_size: vec![0.0; n],
+            slope_size: vec![0.0; n],
+            forcing_size: vec![[0.0; KINDS]; n],
+            rates: rates(a, n),
+            state_sizes: vec![[0.0; KINDS]; n],
+            slope_sizes: vec![[0.0; KINDS]; n],
+            needed: 0,
+            kept: 0,
+        }
+    }
+
+    /// What rounding of x is relative to on the latest element.
+    pub(super) fn state_size(&self) -> &[f64] {
+        &self.state_size
+    }
+
+    /// The same of x′.
+    pub(super) fn slope_size(&self) -> &[f64] {
+        &self.slope_size
+    }
+
+    /// Solve over [t, t + h] from `start`; `tracks` as the feeds.
+    pub(super) fn solve(&mut self, start: &[f64], t: f64, h: f64, slack: f64, tracks: [&Track; 3]) {
+        self.g.fill(0.0);
+        self.forcing_size.fill([0.0; KINDS]);
+        let mut degree = 0;
+        for (feeds, track) in self.feeds.iter_mut().zip(tracks) {
+            for feed in feeds {
+                let added =
+                    feed.add_series(track, t, h, slack, &mut self.g, &mut self.forcing_size);
+                degree = degree.max(added);
+            }
+        }
+        self.solver
+            .solve(h, slack, start, (&self.g, degree), &mut self.x, &mut self.f);
+        self.judge(h);
+    }
+
+    fn judge(&mut self, h: f64) {
+        for (sizes, x) in self.state_sizes.iter_mut().zip(self.x.chunks_exact(TERMS)) {
+            sizes[0] = x.iter().fold(0.0, |m, c| f64::max(m, c.abs()));
+        }
+        for (sizes, f) in self.slope_sizes.iter_mut().zip(self.f.chunks_exact(TERMS)) {
+            sizes[0] = f.iter().fold(0.0, |m, c| f64::max(m, c.abs()));
+        }
+        for kind in 0..KINDS {
+            self.measure(kind, h);
+            if kind + 1 < KINDS {
+                for i in 0..self.state_size.len() {
+                    self.state_sizes[i][kind + 1] = self.state_size[i];
+                    self.slope_sizes[i][kind + 1] = self.slope_size[i];
+                }
+            }
+        }
+        (self.needed, self.kept) = (0, 0);
+        for (f, size) in self.f.chunks_exact(TERMS).zip(&self.slope_size) {
+            let beyond = |part: f64| f.iter().rposition(|c| c.abs() > part * size).unwrap_or(0);
+            self.kept = self.kept.max(beyond(NOTHING));
+            if self.kept > self.needed {
+                self.needed = self.needed.max(beyond(RESOLVED));
+            }
+        }
+    }
+
+    /// F and R, from forcing sizes of one kind.
+    fn measure(&mut self, kind: usize, h: f64) {
+        for (size, own) in self.state_size.iter_mut().zip(&self.state_sizes) {
+            *size = own[0];
+        }
+        for _ in 0..ROUNDS {
+            for (slope, forcing) in self.slope_size.iter_mut().zip(&self.forcing_size) {
+                *slope = forcing[kind];
+            }
+            for &(row, column, a) in &self.a {
+                self.slope_size[row] += a.abs() * self.state_size[column];
+            }
+            let mut changed = false;
+            for (i, state) in self.state_size.iter_mut().enumerate() {
+                let driven = NOISE * h * self.slope_size[i] / (1.0 + h * self.rates[i]);
+                changed |= *state < driven;
+                *state = state.max(driven);
+            }
+            if !changed {
+                break;
+            }
+        }
+    }
+
+    /// Is the truncated series exact to rounding?
+    pub(super) fn is_resolved(&self) -> bool {
+        self.needed < DEGREE - 1
+    }
+
+    /// May the next element be longer?
+    pub(super) fn has_room(&self) -> bool {
+        self.needed <= ROOMY
+    }
+
+    /// Append the element [t, next] to the tracks; `end`, its first x, becomes its last one.
+    pub(super) fn store(
+        &self,
+        t: f64,
+        next: f64,
+        states: &mut Track,
+        slopes: Option<&mut Track>,
+        end: &mut [f64],
+    ) {
+        let degree = (self.kept + 1).min(DEGREE);
+        states.push(t, next, degree, &self.x, &self.state_sizes);
+        states.begin(end);
+        if let Some(slopes) = slopes {
+            slopes.push(t, next, self.kept, &self.f, &self.slope_sizes);
+        }
+        for (end, x) in end.iter_mut().zip(self.x.chunks_exact(TERMS)) {
+            *end = x.iter().rev().sum();
+        }
+    }
+
+    /// x′ just after `t`, where the state is `x`.
+    pub(super) fn slope_at(
+        &mut self,
+        t: f64,
+        longest: f64,
+        x: &[f64],
+        tracks: [&Track; 3],
+        f: &mut [f64],
+    ) {
+        for (feeds, track) in self.feeds.iter_mut().zip(tracks) {
+            for feed in feeds {
+                feed.add_value(track, t, longest, f);
+            }
+        }
+        for &(row, column, a) in &self.a {
+            f[row] += a * x[column];
+        }
+    }
+}
+
+/// Sweeps of balancing; powers of two hardly move after a few.
+const SWEEPS: usize = 8;
+
+/// Σ_j |a_ij| d_j/d_i, with units d of the states in which rows and columns of A are of one size
+/// (Osborne 1960): how fast a state follows what drives it, whatever its unit.
+fn rates(a: &[f64], n: usize) -> Vec<f64> {
+    let mut units = vec![1.0; n];
+    let row = |units: &[f64], i: usize, own: bool| -> f64 {
+        let others = (0..n).filter(|&j| own || j != i);
+        others
+            .map(|j| a[i * n + j].abs() * units[j] / units[i])
+            .sum()
+    };
+    for _ in 0..SWEEPS {
+        for i in 0..n {
+            let others = (0..n).filter(|&j| j != i);
+            let column: f64 = others
+                .map(|j| a[j * n + i].abs() * units[i] / units[j])
+                .sum();
+            let row = row(&units, i, false);
+            if row > 0.0 && column > 0.0 {
+                units[i] *= (row / column).sqrt();
+            }
+        }
+    }
+    (0..n).map(|i| row(&units, i, true)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_do_not_know_units() {
+        // Poles −1, −10 and −100, as a chain of derivatives and in a thousandth of its unit.
+        let a = [0.0, 1.0, 0.0, 0.0, 0.0, 1.0, -1000.0, -1110.0, -111.0];
+        let found = rates(&a, 3);
+        assert!(
+            found.iter().all(|rate| (1.0..500.0).contains(rate)),
+            "{found:?}"
+        );
+        let mut scaled = a;
+        for i in 0..3 {
+            scaled[3 * i + 2] *= 1e3;
+            scaled[6 + i] *= 1e-3;
+        }
+        for (rate, other) in found.iter().zip(rates(&scaled, 3)) {
+            assert!((rate / other - 1.0).abs() < 1e-3);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! What a run hands out: outputs, states and inputs at the times asked for, and the breaks.
+
+use super::slack;
+use super::terms::Feed;
+use super::track::Track;
+use super::{SystemEquations, SystemResponse};
+
+/// The signals of a run, as far as they are known.
+#[derive(Debug)]
+pub(super) struct Signals<'a> {
+    pub(super) state: &'a Track,
+    pub(super) slope: &'a Track,
+    pub(super) input: &'a Track,
+}
+
+/// The times asked for and what has been found for them.
+#[derive(Debug)]
+pub(super) struct Outputs<'a> {
+    times: &'a [f64],
+    n: usize,
+    p: usize,
+    q: usize,
+    state: Vec<Feed>,
+    slope: Vec<Feed>,
+    direct: Vec<Feed>,
+    places: [usize; 2],
+    longest: f64,
+    served: usize,
+    found: SystemResponse,
+}
+
+impl<'a> Outputs<'a> {
+    pub(super) fn new(equations: &SystemEquations, times: &'a [f64], longest: f64) -> Self {
+        let (n, p, q) = (equations.states, equations.inputs, equations.outputs);
+        let found = SystemResponse {
+            outputs: Vec::with_capacity(q * times.len()),
+            states: Vec::with_capacity(n * times.len()),
+            inputs: Vec::with_capacity(p * times.len()),
+            breaks: Vec::new(),
+        };
+        Self {
+            times,
+            n,
+            p,
+            q,
+            state: Feed::all(&equations.output, n, 1.0),
+            slope: Feed::all(&equations.output_derivative, n, 1.0),
+            direct: Feed::all(&equations.direct, p, 1.0),
+            places: [0; 2],
+            longest,
+            served: 0,
+            found,
+        }
+    }
+
+    /// The last time asked for.
+    pub(super) fn last(&self) -> f64 {
+        self.times.last().copied().unwrap_or(0.0)
+    }
+
+    /// Serve the times before `end`.
+    pub(super) fn before(&mut self, end: f64, signals: &Signals<'_>) {
+        while let Some(&t) = self.times.get(self.served) {
+            if t >= end {
+                break;
+            }
+            self.serve(t, signals);
+        }
+    }
+
+    fn serve(&mut self, t: f64, signals: &Signals<'_>) {
+        let tolerance = slack(t, self.longest);
+        let [state, input] = &mut self.places;
+        signals.state.seek(state, t, tolerance);
+        signals.input.seek(input, t, tolerance);
+        let found = &mut self.found;
+        found
+            .states
+            .extend((0..self.n).map(|i| signals.state.at(*state, t, i)));
+        found
+            .inputs
+            .extend((0..self.p).map(|i| signals.input.at(*input, t, i)));
+        let first = found.outputs.len();
+        found.outputs.resize(first + self.q, 0.0);
+        let y = &mut found.outputs[first..];
+        for (feeds, track) in [
+            (&mut self.state, signals.state),
+            (&mut self.slope, signals.slope),
+            (&mut self.direct, signals.input),
+        ] {
+            for feed in feeds {
+                feed.add_value(track, t, self.longest, y);
+            }
+        }
+        self.served += 1;
+    }
+
+    /// Note a break of the state at `t`, and when it shows in the output.
+    pub(super) fn state_break(&mut self, t: f64) {
+        self.note(t);
+        for i in 0..self.state.len() {
+            self.note(t + self.state[i].delay);
+        }
+        for i in 0..self.slope.len() {
+            self.note(t + self.slope[i].delay);
+        }
+    }
+
+    /// Note a break of the input at `t`, and when it shows in the output.
+    pub(super) fn input_break(&mut self, t: f64) {
+        self.note(t);
+        for i in 0..self.direct.len() {
+            self.note(t + self.direct[i].delay);
+        }
+    }
+
+    fn note(&mut self, t: f64) {
+        if t >= 0.0 && t <= self.last() + slack(t, self.longest) {
+            self.found.breaks.push(t);
+        }
+    }
+
+    /// All that was found, breaks in order and those within rounding of one another as one.
+    pub(super) fn finish(mut self) -> SystemResponse {
+        let longest = self.longest;
+        self.found.breaks.sort_by(f64::total_cmp);
+        self.found
+            .breaks
+            .dedup_by(|later, earlier| *later <= *earlier + 4.0 * slack(*later, longest));
+        self.found
+    }
+}

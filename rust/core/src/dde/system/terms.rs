@@ -1,0 +1,139 @@
+//! Matrices by their delays, and what they do to series.
+
+use crate::Error;
+
+use super::legendre::TERMS;
+use super::slack;
+use super::track::{Sizes, Track};
+
+/// A matrix, row-major, that acts with a delay in s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Delay τ_j ≥ 0.
+    pub delay: f64,
+    /// The entries.
+    pub matrix: Vec<f64>,
+}
+
+impl Term {
+    pub(super) fn check(&self, name: &str, rows: usize, columns: usize) -> Result<(), Error> {
+        if !(self.delay.is_finite() && self.delay >= 0.0) {
+            return Err(Error::argument(format!(
+                "delay {} of {name}: give a finite number of seconds, zero or more",
+                self.delay
+            )));
+        }
+        if self.matrix.len() != rows * columns {
+            return Err(Error::argument(format!(
+                "{name} with delay {} s has {} entries, not {rows} x {columns}",
+                self.delay,
+                self.matrix.len()
+            )));
+        }
+        match self.matrix.iter().find(|entry| !entry.is_finite()) {
+            Some(entry) => Err(Error::argument(format!(
+                "{name} holds {entry}: give finite numbers"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A column of a matrix: its number and its entries other than zero by their rows.
+type Column = (usize, Vec<(usize, f64)>);
+
+/// A delayed signal on its way through a matrix.
+#[derive(Debug)]
+pub(super) struct Feed {
+    pub(super) delay: f64,
+    columns: Vec<Column>,
+    place: usize,
+}
+
+impl Feed {
+    /// The terms of a group that do something.
+    pub(super) fn all(terms: &[Term], width: usize, sign: f64) -> Vec<Self> {
+        terms
+            .iter()
+            .filter(|term| term.matrix.iter().any(|entry| *entry != 0.0))
+            .map(|term| Self {
+                delay: term.delay,
+                columns: columns(&term.matrix, width, sign),
+                place: 0,
+            })
+            .collect()
+    }
+
+    /// The entries other than zero: row, column, value.
+    pub(super) fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.columns.iter().flat_map(|(column, entries)| {
+            entries.iter().map(|(row, value)| (*row, *column, *value))
+        })
+    }
+
+    /// Add the matrix times the delayed track over [t, t + h] to the series `g`, and to `size` what
+    /// rounding of that is relative to; the degree of what was added.
+    pub(super) fn add_series(
+        &mut self,
+        track: &Track,
+        t: f64,
+        h: f64,
+        slack: f64,
+        g: &mut [f64],
+        size: &mut [Sizes],
+    ) -> usize {
+        let s = t - self.delay;
+        track.seek(&mut self.place, s, slack);
+        let mut highest = 0;
+        for (column, entries) in &self.columns {
+            let (series, degree) = track.read(self.place, s, h, slack, *column);
+            highest = highest.max(degree);
+            let scale = track.size(self.place, *column);
+            for (row, factor) in entries {
+                for (size, scale) in size[*row].iter_mut().zip(&scale) {
+                    *size += factor.abs() * scale;
+                }
+                let g = &mut g[row * TERMS..=row * TERMS + degree];
+                for (g, c) in g.iter_mut().zip(&series) {
+                    *g += factor * c;
+                }
+            }
+        }
+        highest
+    }
+
+    /// Add the matrix times the delayed track at time `t` to `y`.
+    pub(super) fn add_value(&mut self, track: &Track, t: f64, longest: f64, y: &mut [f64]) {
+        let s = t - self.delay;
+        track.seek(&mut self.place, s, slack(t, longest));
+        for (column, entries) in &self.columns {
+            let value = track.at(self.place, s, *column);
+            for (row, factor) in entries {
+                y[*row] += factor * value;
+            }
+        }
+    }
+}
+
+fn columns(matrix: &[f64], width: usize, sign: f64) -> Vec<Column> {
+    (0..width)
+        .filter_map(|column| {
+            let entries: Vec<(usize, f64)> = matrix
+                .iter()
+                .skip(column)
+                .step_by(width)
+                .enumerate()
+                .filter(|(_, entry)| **entry != 0.0)
+                .map(|(row, entry)| (row, sign * entry))
+                .collect();
+            (!entries.is_empty()).then_some((column, entries))
+        })
+        .collect()
+}
+
+/// The largest delay of a group.
+pub(super) fn longest(terms: &[Term]) -> f64 {
+    terms
+        .iter()
+        .fold(0.0, |most, term| f64::max(most, term.delay))
+}

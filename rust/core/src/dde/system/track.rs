@@ -1,0 +1,268 @@
+//! Vector functions of time by pieces, each a Legendre series: state, derivative of the state and
+//! inputs alike.
+
+use std::collections::VecDeque;
+
+use super::legendre::{self, DEGREE, Series, TERMS};
+
+/// One piece: coefficient k of column j at `series[j (degree + 1) + k]`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Piece {
+    pub(super) start: f64,
+    pub(super) end: f64,
+    pub(super) degree: usize,
+    pub(super) series: Vec<f64>,
+    /// Sizes of each column, see [`super::element`].
+    pub(super) size: Vec<Sizes>,
+    /// Exact values at the start, where they are known: the series sums to them but for rounding.
+    first: Vec<f64>,
+}
+
+/// Kinds of sizes.
+pub(super) const KINDS: usize = 4;
+
+/// How large a signal is; then what its rounding is relative to, with the rounding of what drives
+/// it, and of what drives that, and so on.
+pub(super) type Sizes = [f64; KINDS];
+
+impl Piece {
+    /// From series of one length a column.
+    pub(super) fn new(start: f64, end: f64, degree: usize, series: Vec<f64>) -> Self {
+        let size = series
+            .chunks_exact(degree + 1)
+            .map(|column| [column.iter().map(|c| c.abs()).sum(); KINDS])
+            .collect();
+        Self {
+            start,
+            end,
+            degree,
+            series,
+            size,
+            first: Vec::new(),
+        }
+    }
+
+    pub(super) fn constant(start: f64, end: f64, values: Vec<f64>) -> Self {
+        Self::new(start, end, 0, values)
+    }
+
+    pub(super) fn column(&self, column: usize) -> &[f64] {
+        let terms = self.degree + 1;
+        &self.series[column * terms..(column + 1) * terms]
+    }
+
+    fn length(&self) -> f64 {
+        self.end - self.start
+    }
+
+    /// ξ of time `s`.
+    fn local(&self, s: f64) -> f64 {
+        ((s - self.start) - (self.end - s)) / self.length()
+    }
+
+    /// Value of a column at time `s`.
+    pub(super) fn at(&self, s: f64, column: usize) -> f64 {
+        if s == self.start
+            && let Some(first) = self.first.get(column)
+        {
+            return *first;
+        }
+        match self.column(column) {
+            [c] => *c,
+            series => legendre::at(series, self.local(s)),
+        }
+    }
+
+    /// Bounds of h^k/k! times the k-th derivative of a column, for all k up to [`DEGREE`].
+    ///
+    /// Exact for lines. A series that is resolved to rounding belongs to a function whose rates
+    /// are below 8 over the length of the piece.
+    pub(super) fn taylor_bounds(&self, s: f64, column: usize, h: f64) -> Series {
+        let mut bounds = [0.0; TERMS];
+        bounds[0] = self.at(s, column).abs();
+        match self.column(column) {
+            [] | [_] => {}
+            [_, slope] => bounds[1] = (2.0 * slope * h / self.length()).abs(),
+            series => {
+                let mut bound = series.iter().map(|c| c.abs()).sum::<f64>();
+                for (k, out) in bounds.iter_mut().enumerate().skip(1) {
+                    bound *= 8.0 * h / (self.length() * k as f64);
+                    *out = bound;
+                }
+            }
+        }
+        bounds
+    }
+}
+
+/// Pieces one after the other; places are numbers of pieces, counted from the first there ever was.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Track {
+    width: usize,
+    pieces: VecDeque<Piece>,
+    dropped: usize,
+    spare: Vec<Piece>,
+}
+
+impl Track {
+    pub(super) fn new(width: usize, pieces: Vec<Piece>) -> Self {
+        Self {
+            width,
+            pieces: pieces.into(),
+            dropped: 0,
+            spare: Vec::new(),
+        }
+    }
+
+    /// Leave out what comes after `end`.
+    pub(super) fn close(&mut self, end: f64) {
+        while self.pieces.len() > 1 && self.pieces.back().is_some_and(|last| last.start >= end) {
+            self.pieces.pop_back();
+        }
+        if let Some(last) = self.pieces.back_mut()
+            && last.degree == 0
+        {
+            last.end = end;
+        }
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    pub(super) fn pieces(&self) -> impl DoubleEndedIterator<Item = &Piece> {
+        self.pieces.iter()
+    }
+
+    /// Append a piece from series of [`TERMS`] coefficients a column, those above `degree` zero.
+    pub(super) fn push(
+        &mut self,
+        start: f64,
+        end: f64,
+        degree: usize,
+        series: &[f64],
+        size: &[Sizes],
+    ) {
+        let mut piece = self.spare.pop().unwrap_or_default();
+        (piece.start, piece.end, piece.degree) = (start, end, degree);
+        piece.series.clear();
+        for column in series.chunks_exact(TERMS) {
+            piece.series.extend_from_slice(&column[..=degree]);
+        }
+        piece.size.clear();
+        piece.size.extend_from_slice(size);
+        piece.first.clear();
+        self.pieces.push_back(piece);
+    }
+
+    /// Name the values at the start of the last piece.
+    pub(super) fn begin(&mut self, values: &[f64]) {
+        if let Some(piece) = self.pieces.back_mut() {
+            piece.first.extend_from_slice(values);
+        }
+    }
+
+    /// Forget pieces that end before `s`, but for the last.
+    pub(super) fn forget(&mut self, s: f64) {
+        while self.pieces.len() > 1 && self.pieces.front().is_some_and(|piece| piece.end < s) {
+            self.dropped += 1;
+            if let Some(piece) = self.pieces.pop_front() {
+                self.spare.push(piece);
+            }
+        }
+    }
+
+    fn get(&self, place: usize) -> Option<&Piece> {
+        self.pieces.get(place.saturating_sub(self.dropped))
+    }
+
+    /// Move `place` to the piece that holds the time just after `s`.
+    pub(super) fn seek(&self, place: &mut usize, s: f64, slack: f64) {
+        *place = (*place).max(self.dropped);
+        let last = (self.dropped + self.pieces.len()).saturating_sub(1);
+        while *place < last && self.get(*place).is_some_and(|piece| piece.end <= s + slack) {
+            *place += 1;
+        }
+    }
+
+    /// Value of a column at `s`, which lies in the piece at `place`.
+    pub(super) fn at(&self, place: usize, s: f64, column: usize) -> f64 {
+        self.get(place).map_or(0.0, |piece| piece.at(s, column))
+    }
+
+    /// Sizes of a column at `place`.
+    pub(super) fn size(&self, place: usize, column: usize) -> Sizes {
+        self.get(place)
+            .map_or([0.0; KINDS], |piece| piece.size[column])
+    }
+
+    /// [`Piece::taylor_bounds`] of the piece at `place`.
+    pub(super) fn taylor_bounds(&self, place: usize, s: f64, column: usize, h: f64) -> Series {
+        self.get(place)
+            .map_or([0.0; TERMS], |piece| piece.taylor_bounds(s, column, h))
+    }
+
+    /// Series of a column over [s, s + h], `place` being that of s; and its degree.
+    pub(super) fn read(
+        &self,
+        place: usize,
+        s: f64,
+        h: f64,
+        slack: f64,
+        column: usize,
+    ) -> (Series, usize) {
+        let Some(piece) = self.get(place) else {
+            return ([0.0; TERMS], 0);
+        };
+        let last = self.dropped + self.pieces.len() <= place + 1;
+        if last || s + h <= piece.end + slack {
+            return (part(piece, s, h, slack, column), piece.degree);
+        }
+        let mut values = [0.0; TERMS];
+        let (mut place, mut from) = (place, 0);
+        while let Some(piece) = self.get(place) {
+            let nodes = &legendre::nodes()[from..];
+            let last = self.dropped + self.pieces.len() <= place + 1;
+            let inside = |node: &&f64| last || s + 0.5 * h * (1.0 + **node) < piece.end;
+            let until = from + nodes.iter().take_while(inside).count();
+            if piece.degree == 0 {
+                values[from..until].fill(piece.at(s, column));
+            } else if until > from {
+                let (offset, ratio) = window(piece, s, h);
+                legendre::at_nodes(
+                    piece.column(column),
+                    offset,
+                    ratio,
+                    from..until,
+                    &mut values,
+                );
+            }
+            if until == TERMS {
+                break;
+            }
+            from = until;
+            place += 1;
+        }
+        (legendre::from_values(&values), DEGREE)
+    }
+}
+
+/// Series of a column of one piece over [s, s + h].
+fn part(piece: &Piece, s: f64, h: f64, slack: f64, column: usize) -> Series {
+    let series = piece.column(column);
+    if piece.degree == 0 {
+        return legendre::restricted(series, 0.0, 1.0);
+    }
+    if (s - piece.start).abs() <= slack && (h - piece.length()).abs() <= slack {
+        let mut out = [0.0; TERMS];
+        out[..series.len()].copy_from_slice(series);
+        return out;
+    }
+    let (offset, ratio) = window(piece, s, h);
+    legendre::restricted(series, offset, ratio)
+}
+
+/// Offset and ratio that take ξ of [s, s + h] to that of the piece.
+fn window(piece: &Piece, s: f64, h: f64) -> (f64, f64) {
+    (piece.local(s + 0.5 * h), h / piece.length())
+}
