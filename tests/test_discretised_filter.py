@@ -91,7 +91,7 @@ def test_a_derivative_of_the_error_sees_the_reference():
         delay=0.2,
         sample_time=TS,
     )
-    response = kick.simulate(TS * np.arange(60))
+    response = kick.simulate(TS * np.arange(200))
     num, _, _ = cont2discrete(([400.0, 0.0], [1.0, 40.0, 400.0]), TS, method="bilinear")
     # The first command: proportional, and the filter's direct path on the step of the error.
     assert response.inputs[0] == pytest.approx(1.0 + 0.2 * np.ravel(num)[0], rel=1e-12)

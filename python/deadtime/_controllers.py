@@ -104,7 +104,7 @@ class DerivativeFilter:
     >>> loop.characteristic().kind          # with an ideal derivative: neutral
     'retarded'
 
-    With 38 rad/s and samples of 0.065 s, the rule is a matter of a fifth of the stable gains:
+    With 38 rad/s and samples of 0.065 s, the rule is a matter of a third of the stable gains:
 
     >>> for rule in (None, "hold", "tustin", "backward"):
     ...     smooth = dtm.DerivativeFilter(38.0, discretisation=rule)
@@ -112,6 +112,10 @@ class DerivativeFilter:
     ...         dtm.Integrator(), dtm.PV(2.0, 0.3, smooth), delay=0.36, sample_time=0.065
     ...     )
     ...     print(rule, round(loop.stable_range("Kv")[1], 3))
+    None 0.894
+    hold 1.268
+    tustin 0.879
+    backward 0.887
     """
 
     omega: float
