@@ -16,9 +16,7 @@ PROBLEMS = {
 def _network():
     parameters = PROBLEMS["network50"]["parameters"]
     weights = np.zeros((50, 50))
-    for row, (columns, entries) in enumerate(
-        zip(parameters["idx"], parameters["W"], strict=True)
-    ):
+    for row, (columns, entries) in enumerate(zip(parameters["idx"], parameters["W"], strict=True)):
         np.add.at(weights[row], columns, np.array(entries, dtype=float))
     return weights, np.array(parameters["y0"], dtype=float)
 

