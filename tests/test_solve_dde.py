@@ -265,6 +265,11 @@ def test_a_jump_inside_the_history():
         assert found.y[0, -1] == pytest.approx(4.0, abs=1e-9)
 
 
+def test_one_number_is_the_history_of_all_components():
+    found = dtm.solve_dde(lambda t, y, z: -z[0], (0, 1), 2.0, 1.0, y0=[1.0, 5.0])
+    assert found.y[:, -1] == pytest.approx([-1.0, 3.0], abs=1e-13)
+
+
 def test_the_derivative_of_the_history_may_be_given():
     def fun(t, y, z, dz):
         return dz[0]
