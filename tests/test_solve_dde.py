@@ -143,6 +143,16 @@ def test_low_level_callables_bring_their_data():
     assert found.y[0, -1] == pytest.approx(-1.0, abs=1e-12)
 
 
+def test_other_signatures_are_refused():
+    square = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda x: x * x)
+    for fun in (square, scipy.LowLevelCallable(square)):
+        with pytest.raises(ValueError, match="signature"):
+            dtm.solve_dde(fun, (0, 1), 1.0, 1.0)
+    null = ctypes.CFUNCTYPE(*SIGNATURE)()
+    with pytest.raises(ValueError, match="null"):
+        dtm.solve_dde(null, (0, 1), 1.0, 1.0)
+
+
 def test_compiled_functions_take_delayed_slopes_and_python_events():
     def function(t, y, z, dz, dy, data):
         dy[0] = 2.0 * (1.0 - z[0]) - 0.3 * dz[0]
@@ -253,6 +263,11 @@ def test_a_jump_inside_the_history():
             grow, (0, 1), history, 1.0, history_breaks=breaks, vectorized=True, rtol=1e-10
         )
         assert found.y[0, -1] == pytest.approx(4.0, abs=1e-9)
+
+
+def test_one_number_is_the_history_of_all_components():
+    found = dtm.solve_dde(lambda t, y, z: -z[0], (0, 1), 2.0, 1.0, y0=[1.0, 5.0])
+    assert found.y[:, -1] == pytest.approx([-1.0, 3.0], abs=1e-13)
 
 
 def test_the_derivative_of_the_history_may_be_given():

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CharacteristicMatrix",
+    "DelayPieces",
+    "DelayRun",
     "Family",
     "LinearLoop",
     "LinearSystem",
@@ -32,6 +34,7 @@ __all__ = [
     "proved_boxes",
     "robust_map",
     "sampled_abscissa_grid",
+    "solve_delay_equation",
     "spin",
     "stability_radius",
     "sweep_figures",

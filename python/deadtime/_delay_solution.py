@@ -29,7 +29,7 @@ class DelaySolution:
     >>> import deadtime as dtm
     >>> found = dtm.solve_dde(lambda t, y, z: -z[0], (0, 3), 1.0, 1.0, dense_output=True)
     >>> print(found.sol(0.5), found.sol([-0.5, 1.0], nu=1))
-    [0.5] [[ 0. -0.]]
+    [0.5] [[ 0. -1.]]
     """
 
     def __init__(self, pieces: DelayPieces) -> None:

@@ -72,9 +72,8 @@ impl Breaks {
         let low = (distance - width).max(0.0).to_bits();
         let high = (distance + width).to_bits();
         if let Some((_, known)) = self.ahead.range_mut(low..=high).next() {
-            if point.order < known.order {
-                *known = point;
-            }
+            // The time that came first stays: that of a jump is exact.
+            known.order = known.order.min(point.order);
             return;
         }
         self.ahead.insert(distance.to_bits(), point);

@@ -77,13 +77,13 @@ impl<'a> Run<'a> {
         let digits = -problem.rtol.log10();
         let sight = UNSEEN + digits.ceil() as u32;
         let mut breaks = Breaks::new(problem.start, &problem.delays, problem.neutral, sight);
-        for point in &problem.breaks {
-            breaks.follow(*point);
-        }
         for jump in &problem.jumps {
             let order = u32::from(!jump.changes);
             let time = jump.time;
             breaks.add(BreakingPoint { time, order });
+        }
+        for point in &problem.breaks {
+            breaks.follow(*point);
         }
         let first = problem
             .jumps
@@ -218,7 +218,10 @@ impl<'a> Run<'a> {
         let start = self.solution.end;
         let length = self.length.min(self.longest());
         let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
-        let stop = ahead.min(self.problem.end);
+        // A point within rounding of the end is the end.
+        let end = self.problem.end;
+        let last = ahead >= end - 2.0 * SHORTEST * end.abs().max(start.abs());
+        let stop = if last { end } else { ahead };
         let room = stop - start;
         if room <= length * (1.0 + 1e-10) {
             return stop;

@@ -91,6 +91,16 @@ fn the_tolerance_is_kept() {
 }
 
 #[test]
+fn a_breaking_point_within_rounding_of_the_end_is_the_end() {
+    for ulps in 0..8 {
+        let mut end = 3.0_f64;
+        (0..ulps).for_each(|_| end = end.next_up());
+        let found = solve(&scalar(1.0, end, 1e-8), &mut linear_decay(), &Task::new());
+        assert_eq!(found.unwrap().outcome, Outcome::Finished);
+    }
+}
+
+#[test]
 fn memory_is_bounded_where_nobody_asks_for_the_past() {
     // At this gain the solution oscillates for ever.
     let mut equation = Plain {
