@@ -339,6 +339,24 @@ def test_jumps_of_the_right_hand_side():
     assert found.sol(1.3, nu=1) == pytest.approx(-1.0, abs=1e-12)
 
 
+def test_a_jump_at_a_breaking_point_keeps_its_own_time():
+    # 0.1 + 0.1 + 0.1 is not 0.3: the time of the jump is the one that counts.
+    def fun(t, y, z):
+        return np.where(t < 0.3, 1.0, -1.0) + 0.0 * z[0]
+
+    found = dtm.solve_dde(fun, (0, 1), 0.0, 0.1, y0=0.0, jumps=[0.3], vectorized=True, rtol=1e-9)
+    assert found.y[0, -1] == pytest.approx(-0.4, abs=1e-14)
+    assert found.n_rejected == 0
+    assert 0.3 in found.breaks
+
+
+def test_a_breaking_point_at_the_end_of_the_run():
+    for end in (3.0, np.nextafter(3.0, 4.0), np.nextafter(3.0, 2.0), 0.1 + 0.2):
+        found = dtm.solve_dde(decay, (0, end), 1.0, 0.1)
+        assert found.success
+        assert found.t[-1] == end
+
+
 def test_jumps_of_the_solution_travel_with_the_delay():
     # A dose of 1 at 0.5: y' = -y(t - 1).
     found = dtm.solve_dde(
