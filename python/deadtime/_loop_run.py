@@ -38,15 +38,16 @@ _SETTLED = 0.005
 _LOST = 20.0
 
 
-class _Again(NamedTuple):
+class _Again:
     """The output of one run at any times: the run is made again for them.
 
     Holds the loop rather than its native form, which does not pickle.
     """
 
-    loop: ControlLoop
-    start: float
-    arguments: tuple[Any, ...]
+    __slots__ = ("arguments", "loop", "start")
+
+    def __init__(self, loop: ControlLoop, start: float, arguments: tuple[Any, ...]) -> None:
+        self.loop, self.start, self.arguments = loop, start, arguments
 
     def __call__(self, times: Vector) -> Vector:
         native, ahead = self.loop._runner
@@ -105,17 +106,10 @@ def simulate_loop(
     arguments = (*loop._at_rest(initial, past), before, held, history, phase)
     # The times are the caller's; what is kept must not change with them.
     kept = times.copy()
-    outputs, inputs, breaks, seen = native.respond(kept, ahead, *arguments)
+    arrays = native.respond(kept, ahead, *arguments)
     start = float(kept[0])
-    response = Response._of_fresh(
-        time=kept,
-        outputs=outputs,
-        inputs=inputs,
-        breaks=breaks,
-        reference=seen,
-        steady_state=steady_state(loop, last),
-        _dense=_Again(loop, start, arguments),
-    )
+    again = _Again(loop, start, arguments)
+    response = Response._of_fresh(kept, arrays, steady_state(loop, last), again)
     if not sensitivities:
         return response
     names = slope_names(loop, sensitivities)

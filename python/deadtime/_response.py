@@ -81,12 +81,23 @@ class Response(ReadOnlyArrays):
         read_only(self.input_sensitivities)
 
     @classmethod
-    def _of_fresh(cls, **fields: Any) -> Response:
+    def _of_fresh(
+        cls,
+        time: Vector,
+        arrays: tuple[Vector, Vector, Vector, Vector],
+        steady_state: float | None,
+        dense: Callable[[Vector], Vector],
+    ) -> Response:
         """Of arrays that nobody else holds: nothing is copied or converted."""
-        for name in ("time", "outputs", "inputs", "breaks", "reference"):
-            fields[name].setflags(write=False)
         response = object.__new__(cls)
-        response.__dict__.update(sensitivities={}, input_sensitivities={}, **fields)
+        fields = response.__dict__
+        fields["time"] = time
+        fields["outputs"], fields["inputs"], fields["breaks"], fields["reference"] = arrays
+        for array in (time, *arrays):
+            array.setflags(False)  # read-only; a fifth of what the attribute of `flags` takes
+        fields["steady_state"] = steady_state
+        fields["sensitivities"], fields["input_sensitivities"] = {}, {}
+        fields["_dense"] = dense
         return response
 
     def __repr__(self) -> str:
