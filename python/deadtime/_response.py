@@ -94,7 +94,8 @@ class Response(ReadOnlyArrays):
         fields["time"] = time
         fields["outputs"], fields["inputs"], fields["breaks"], fields["reference"] = arrays
         for array in (time, *arrays):
-            array.setflags(False)  # read-only; a fifth of what the attribute of `flags` takes
+            # Read-only, in a fifth of the time that `flags` takes.
+            array.setflags(False)  # type: ignore[call-arg]
         fields["steady_state"] = steady_state
         fields["sensitivities"], fields["input_sensitivities"] = {}, {}
         fields["_dense"] = dense
