@@ -44,7 +44,7 @@ FLOORS = [
         "_quasipolynomial",
         "_plants",
         "_controllers",
-        "_discretisation",
+        "_derivative_filter",
         "_response",
         "_loop",
         "_fixed_step",

@@ -8,9 +8,10 @@ from deadtime import gallery
 from deadtime._boxes import ProvedBoxes, largest_stable_box, proved_boxes
 from deadtime._certificate import Certificate
 from deadtime._chains import Chain
-from deadtime._controllers import PD, PI, PID, PV, Controller, DerivativeFilter, P
+from deadtime._controllers import PD, PI, PID, PV, Controller, P
 from deadtime._crossings import Crossings, crossings, delay_margin
 from deadtime._delay_solution import DelayResult, DelaySolution
+from deadtime._derivative_filter import DerivativeFilter
 from deadtime._design import Design, design
 from deadtime._errors import (
     CertificateError,

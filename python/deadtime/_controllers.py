@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._batch import matrix, vector
-from deadtime._discretisation import Discretisation, checked, discretised
+from deadtime._derivative_filter import DerivativeFilter, Discretisation, discretised
 from deadtime._transfer import TransferFunction
-from deadtime._validation import finite, positive
+from deadtime._validation import finite
 
 __all__ = ["PD", "PI", "PID", "PV", "Controller", "DerivativeFilter", "P"]
 
@@ -72,60 +72,6 @@ def _sampled(
     F, G, C = (np.array(part, dtype=np.float64) for part in (block, into, out))
     found = discretised(F, G, C, sample_time, rule)
     return FilterUpdate(found.F, found.G, -on_error * found.G, found.C, found.D)
-
-
-@dataclass(frozen=True)
-class DerivativeFilter:
-    """H(s) = omega^2 s / (s^2 + 2 damping omega s + omega^2), a derivative that rolls off.
-
-    Parameters
-    ----------
-    omega : float
-        Corner in rad/s, above zero.
-    damping : float
-        Damping ratio, above zero.
-    discretisation : {"hold", "tustin", "backward"}, optional
-        How the filter runs in a loop with a sample time: on samples, by the rule named
-        (zero-order hold, the trapezoidal rule, Euler's implicit rule). By default it is a
-        continuous filter before the sampler, as an analogue one or one that runs much faster. A
-        continuous loop takes the continuous filter in any case.
-
-    Raises
-    ------
-    ValueError
-        If a number is not above zero or not finite, or there is no such rule.
-
-    Examples
-    --------
-    >>> import deadtime as dtm
-    >>> loop = dtm.ControlLoop(
-    ...     dtm.Integrator(), dtm.PV(2.0, 0.3, filter=dtm.DerivativeFilter(38.0)), delay=0.36
-    ... )
-    >>> loop.characteristic().kind          # with an ideal derivative: neutral
-    'retarded'
-
-    With 38 rad/s and samples of 0.065 s, the rule is a matter of a third of the stable gains:
-
-    >>> for rule in (None, "hold", "tustin", "backward"):
-    ...     smooth = dtm.DerivativeFilter(38.0, discretisation=rule)
-    ...     loop = dtm.ControlLoop(
-    ...         dtm.Integrator(), dtm.PV(2.0, 0.3, smooth), delay=0.36, sample_time=0.065
-    ...     )
-    ...     print(rule, round(loop.stable_range("Kv")[1], 3))
-    None 0.894
-    hold 1.268
-    tustin 0.879
-    backward 0.887
-    """
-
-    omega: float
-    damping: float = 1.0
-    discretisation: Discretisation | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "omega", positive("omega", self.omega))
-        object.__setattr__(self, "damping", positive("damping", self.damping))
-        checked(self.discretisation)
 
 
 @dataclass(frozen=True)

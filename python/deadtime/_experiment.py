@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deadtime._controllers import PV, Controller, DerivativeFilter, P
+from deadtime._controllers import PV, Controller, P
+from deadtime._derivative_filter import DerivativeFilter
 from deadtime._design import Design, critical_gain, design
 from deadtime._estimation import DelayEstimate
 from deadtime._estimation.compare import Comparison, compare_methods

@@ -72,8 +72,8 @@ class Sweep(ReadOnlyArrays):
         `SweepStatus` of each set.
     metrics : dict of str to ndarray, each of shape `shape`
         The figures of `Response.info`; empty where outputs were asked for.
-    outputs : ndarray, shape (*shape, n), or None
-        Outputs where they were asked for.
+    outputs : ndarray, shape (..., n), or None
+        Outputs, behind the axes of `shape`, where they were asked for.
 
     Examples
     --------

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from deadtime._controllers import PV, Controller, DerivativeFilter, P
+from deadtime._controllers import PV, Controller, P
+from deadtime._derivative_filter import DerivativeFilter
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 from deadtime._validation import finite

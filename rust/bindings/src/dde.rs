@@ -129,8 +129,7 @@ impl PyLinearLoop {
     /// values that hold from them on.
     #[expect(
         clippy::too_many_arguments,
-        clippy::type_complexity,
-        reason = "the start of a run and its reference; four arrays"
+        reason = "the start of a run and its reference"
     )]
     fn respond<'py>(
         &self,

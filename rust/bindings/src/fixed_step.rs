@@ -17,11 +17,7 @@ type Vector<'py> = Bound<'py, PyArray1<f64>>;
 ///
 /// `plant` holds A, B, C, D; `controller` F, G, H, P, p, q, M, i of the core's equations.
 #[pyfunction]
-#[expect(
-    clippy::type_complexity,
-    clippy::too_many_arguments,
-    reason = "one entry a symbol of the equations, one argument a setting"
-)]
+#[expect(clippy::too_many_arguments, reason = "one argument a setting")]
 pub(crate) fn fixed_step_run<'py>(
     py: Python<'py>,
     plant: (Floats<'py>, Floats<'py>, Floats<'py>, f64),
