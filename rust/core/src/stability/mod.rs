@@ -5,7 +5,7 @@
 //!
 //! Maps: `grid` judges the members over two parameters, by `rows` along which one gain varies. `row` is one of them, `pencil` its functions,
 //! `crossing` says where its roots cross the edge, `curves` joins the crossings of all rows to the boundaries;
-//! `branch` follows one root along a row and `leading` the rightmost. `along` lists the crossings of the imaginary
+//! `branch` follows roots along a row, by the values and bounds of `plane`, and `leading` the rightmost. `along` lists the crossings of the imaginary
 //! axis as a single gain varies. Where a family is affine in neither parameter, `blocks` cuts the map into
 //! pieces, `block` divides one of them by the proofs of boxes, and `transect` finds the crossings of a row.
 //!
@@ -31,6 +31,7 @@ mod largest;
 mod leading;
 mod local;
 mod pencil;
+mod plane;
 mod prove;
 mod radius;
 mod reduced;
