@@ -1,23 +1,17 @@
 //! Roots of A + k B, followed as k varies, several of them and several values of k at a time.
 //!
-//! From the last two values of k the next roots are extrapolated (cubic, with the slopes ds/dk = −B/h′),
-//! and Newton's step taken there, at s₀, to s₁. Let a = |h′(s₀)| − e₁, η = (|h(s₀)| + e₀)/a, and M bound |h″|
-//! within 2η of s₀. If M η ≤ a/4, then by Rouché's theorem exactly one root lies within 2η of s₀: on that circle
-//! |h′ (s − s₀)| ≥ 2aη exceeds |h(s₀)| + e₀ + M (2η)²/2 ≤ 1.5 aη. By Taylor's formula at s₀ it lies within
-//! (2Mη² + e₀ + 2 e₁ η)/a of s₁ (Kantorovich 1948), besides the rounding of s₁ itself. e₀ and e₁ are bounds on
-//! rounding (`plane`), which also cover coefficients that are sums of a few rounded products.
-//!
-//! Each root at each k is one lane. Its proof depends on nothing but its own start, so that a root that is lost
-//! costs those after it only.
+//! From the last two values of k the next roots are extrapolated (cubic, with the slopes ds/dk = −B/h′), and each is
+//! settled on from there and proved by itself (`settle`). A root that is lost costs what comes after it only.
 
 use num_complex::Complex64;
 
 use super::plane::{Around, Plane};
-use crate::lanes::{Columns, Complex, Kernel, Real, SHORT, Simd, sweep};
+use super::settle::{ARGUMENTS, Settle, VALUES};
+use crate::lanes::{Columns, SHORT, sweep};
 use crate::quasipoly::modulus;
 
 /// Roots that are followed at most.
-pub(super) const FOLLOWED: usize = 4;
+const FOLLOWED: usize = 4;
 
 /// Values of k at a time.
 const STRETCH: usize = 16;
@@ -25,26 +19,8 @@ const STRETCH: usize = 16;
 /// Elements of a block.
 const ELEMENTS: usize = FOLLOWED * STRETCH;
 
-/// A radius as wide as this, relative to the root, is worth another step.
-const SHARP: f64 = 1e-13;
-
-/// A radius that rounding keeps wider is taken up to this, relative to the root or to one over the longest delay.
-const WIDEST: f64 = 1e-11;
-
-/// Steps before a branch is taken for lost.
-const MAX_STEPS: u32 = 8;
-
 /// Starts lie within this share of the radius of their bounds, what Newton's steps lead to within half of it.
 const NEAR_CENTER: f64 = 0.4;
-
-/// Rounding of the bounds themselves.
-const ROOM: f64 = 1.0 + 1e-9;
-
-/// Squares of moduli in this range have lost nothing.
-const SQUARES: std::ops::Range<f64> = 1e-280..1e300;
-
-/// Added to a square it outweighs what underflow took.
-const TINY: f64 = 1e-300;
 
 /// A simple root and its disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,79 +38,6 @@ impl Root {
             (self.s.im.abs() > self.radius).then_some(2)
         }
     }
-}
-
-/// The discs of the roots next to starting values.
-struct Settle<'a>(&'a Plane);
-
-/// Start, k, the three bounds there, the centre of these and how far starts may be from it.
-const ARGUMENTS: usize = 9;
-
-/// Root, radius, ds/dk; the radius is infinite where nothing is proved.
-const VALUES: usize = 5;
-
-impl Kernel<ARGUMENTS, VALUES> for Settle<'_> {
-    #[inline(always)]
-    fn lanes<S: Simd>(&self, arguments: [Real<S>; ARGUMENTS]) -> [Real<S>; VALUES] {
-        let [re, im, k, error, slope_error, bend, x, y, within] = arguments;
-        let pace = self.0.pace();
-        let center = Complex::new(x, y);
-        let mut s = Complex::new(re, im);
-        let mut root = s;
-        let mut radius = re.constant(f64::INFINITY);
-        let mut along = s;
-        // Neither proved nor lost.
-        let mut open = distance(s, center).le(within);
-        for _ in 0..MAX_STEPS {
-            if !open.any() {
-                break;
-            }
-            let [a, da, b, db] = self.0.at(s);
-            let (h, dh) = (a + b.scaled(k), da + db.scaled(k));
-            let (square, slope_square) = (h.square_modulus(), dh.square_modulus());
-            let usable = slope_square.gt(SQUARES.start)
-                & slope_square.lt(SQUARES.end)
-                & square.lt(SQUARES.end);
-            let least = (slope_square.sqrt() - slope_error) * (1.0 - 1e-9);
-            let inverse = re.constant(1.0) / least;
-            let reach = ((square + TINY).sqrt() + error) * inverse * ROOM;
-            let inverse_slope = re.constant(1.0) / slope_square;
-            let next = s - over(h, dh, inverse_slope);
-            let wide =
-                (bend * reach * reach * 2.0 + error + slope_error * reach * 2.0) * inverse * ROOM
-                    + (s.re.abs() + s.im.abs() + reach) * (8.0 * f64::EPSILON);
-            let proved =
-                usable & least.gt(0.0) & (bend * reach * 4.0).le(least) & (reach * 2.0).le(within);
-            let size = next.re.abs().larger(next.im.abs());
-            let unit = if pace > 0.0 { size.larger(pace) } else { size };
-            let rounded = wide.le(error * inverse * 4.0) & wide.le(unit * WIDEST);
-            let sharp = proved & (wide.le(size * SHARP) | rounded);
-            let done = open & sharp;
-            root = done.choose(next, root);
-            radius = done.select(wide, radius);
-            along = done.choose(-over(b, dh, inverse_slope), along);
-            // Comparisons with NaN are false.
-            open = open & !sharp & usable & distance(next, center).le(within);
-            s = open.choose(next, s);
-        }
-        [root.re, root.im, radius, along.re, along.im]
-    }
-}
-
-/// A bound on |s − t|, larger by √2 at most.
-#[inline(always)]
-fn distance<S: Simd>(s: Complex<S>, t: Complex<S>) -> Real<S> {
-    let gap = s - t;
-    gap.re.abs() + gap.im.abs()
-}
-
-/// s/t, given 1/|t|².
-#[inline(always)]
-fn over<S: Simd>(s: Complex<S>, t: Complex<S>, inverse: Real<S>) -> Complex<S> {
-    Complex::new(
-        s.re.mul_add(t.re, s.im * t.im) * inverse,
-        s.im.mul_sub(t.re, s.re * t.im) * inverse,
-    )
 }
 
 /// A root at one k, and its slope.
@@ -181,7 +84,13 @@ impl Branch {
         };
         if farthest(self.around.center) > NEAR_CENTER * self.around.radius {
             let center = start(*points.get(points.len() / 2)?);
-            self.around = plane.around(center, farthest(center) / NEAR_CENTER)?;
+            // Where single steps are taken starts are poor, and Newton's method goes far.
+            let needed = if points.len() > 1 {
+                farthest(center) / NEAR_CENTER
+            } else {
+                f64::INFINITY
+            };
+            self.around = plane.around(center, needed)?;
         }
         Some(())
     }
@@ -193,7 +102,7 @@ pub(super) struct Branches {
     all: Vec<Branch>,
     arguments: Columns<ARGUMENTS, ELEMENTS>,
     values: Columns<VALUES, ELEMENTS>,
-    /// Values of k in a block, those of them at which no root is lost, and the first that has not been asked for.
+    /// Values of k in a block, those of them at which no root is lost, and those asked for.
     width: usize,
     ahead: usize,
     next: usize,
@@ -235,53 +144,70 @@ impl Branches {
                 now: knot,
             });
         }
-        if self.follow(plane, &[k]) == 0 {
+        if self.follow(plane, &[k], 1) == 0 {
             return self.clear();
         }
+        self.pass(1);
         for branch in &mut self.all {
             branch.before = branch.now;
         }
-        (self.ahead, self.next) = (0, 0);
     }
 
     /// Put down the roots at the first of the values of k that are still to come; false where one of them is lost, or
     /// would be the mirror image of one that is followed as well.
     pub(super) fn advance(&mut self, plane: &Plane, points: &[f64], roots: &mut Vec<Root>) -> bool {
-        roots.clear();
-        if self.all.is_empty() {
-            return true;
-        }
-        if self.next == self.ahead {
+        if self.next == self.ahead && !self.all.is_empty() {
+            self.pass(self.next);
             let tried = self.stretch.min(points.len());
-            let mut found = points
-                .get(..tried)
-                .map_or(0, |some| self.follow(plane, some));
+            let mut found = self.follow(plane, points, tried);
             if found == 0 && tried > 1 {
-                found = points.get(..1).map_or(0, |one| self.follow(plane, one));
+                found = self.follow(plane, points, 1);
             }
             if found == 0 {
                 return false;
             }
             self.stretch = if found == tried {
-                (2 * self.stretch).min(STRETCH)
+                (2 * tried).min(STRETCH)
             } else {
                 found
             };
         }
-        let [re, im, radius, ..] = &self.values;
-        for place in (0..self.all.len()).map(|branch| branch * self.width + self.next) {
-            roots.push(Root {
-                s: Complex64::new(re[place], im[place]),
-                radius: radius[place],
-            });
-        }
-        self.next += 1;
+        self.put(roots);
         true
     }
 
-    /// At how many of these k, one after the other, every root is found.
-    fn follow(&mut self, plane: &Plane, points: &[f64]) -> usize {
-        self.width = points.len();
+    /// Put down the roots at the next k of the block.
+    fn put(&mut self, roots: &mut Vec<Root>) {
+        let [re, im, radius, ..] = &self.values;
+        roots.clear();
+        roots.extend((0..self.all.len()).map(|place| {
+            let at = place * self.width + self.next;
+            Root {
+                s: Complex64::new(re[at], im[at]),
+                radius: radius[at],
+            }
+        }));
+        self.next += 1;
+    }
+
+    /// Go on from the last of the `taken` values of k that have been asked for.
+    fn pass(&mut self, taken: usize) {
+        for place in 0..self.all.len() {
+            let knot = |index| self.knot(place, index);
+            let last = taken.checked_sub(1).map(knot);
+            let previous = taken.checked_sub(2).map(knot);
+            if let Some((branch, last)) = self.all.get_mut(place).zip(last) {
+                branch.before = previous.unwrap_or(branch.now);
+                branch.now = last;
+            }
+        }
+        (self.ahead, self.next) = (0, 0);
+    }
+
+    /// At how many of the first `width` of these k, one after the other, every root is found.
+    fn follow(&mut self, plane: &Plane, points: &[f64], width: usize) -> usize {
+        (self.width, self.ahead, self.next) = (width, 0, 0);
+        let points = points.get(..width).unwrap_or_default();
         for (place, branch) in self.all.iter_mut().enumerate() {
             if branch.bounded(plane, points).is_none() {
                 return 0;
@@ -317,29 +243,19 @@ impl Branches {
         let found = (0..self.all.len()).fold(points.len(), |found, place| {
             self.proved(plane, place, found)
         });
-        if found > 0 {
-            for place in 0..self.all.len() {
-                let knot = |index: usize| {
-                    let k = points.get(index).copied().unwrap_or(f64::NAN);
-                    let [s, slope] = self.column(place, index);
-                    Knot { k, s, slope }
-                };
-                let (last, previous) = (knot(found - 1), (found > 1).then(|| knot(found - 2)));
-                if let Some(branch) = self.all.get_mut(place) {
-                    branch.before = previous.unwrap_or(branch.now);
-                    branch.now = last;
-                }
-            }
-        }
         (self.ahead, self.next) = (found, 0);
         found
     }
 
-    /// Root and slope of a branch.
-    fn column(&self, place: usize, index: usize) -> [Complex64; 2] {
+    /// A branch at one k of the block.
+    fn knot(&self, place: usize, index: usize) -> Knot {
         let at = place * self.width + index;
         let [re, im, _, slope_re, slope_im] = [0, 1, 2, 3, 4].map(|row| self.values[row][at]);
-        [Complex64::new(re, im), Complex64::new(slope_re, slope_im)]
+        Knot {
+            k: self.arguments[2][at],
+            s: Complex64::new(re, im),
+            slope: Complex64::new(slope_re, slope_im),
+        }
     }
 
     /// How many of the first `limit` roots of a branch are proved.
@@ -360,5 +276,56 @@ impl Branches {
             last = s;
         }
         limit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lambertw::lambertw;
+    use crate::quasipoly::QuasiPolynomial;
+
+    #[test]
+    fn branches_of_lambert_w_are_followed() {
+        let a = QuasiPolynomial::new(vec![vec![0.0, 1.0]], vec![0.0]).unwrap();
+        let b = QuasiPolynomial::new(vec![vec![1.0]], vec![1.0]).unwrap();
+        let plane = Plane::new(&a, &b);
+        for cells in [100, 1000] {
+            let points: Vec<f64> = (0..=cells)
+                .map(|index| 0.5 + 9.5 * f64::from(index) / f64::from(cells))
+                .collect();
+            let truth = |k: f64| [0, 1, 2].map(|j| lambertw(Complex64::new(-k, 0.0), j));
+            let mut branches = Branches::none();
+            branches.start(&plane, truth(points[0]).into_iter(), points[0]);
+            let mut roots = Vec::new();
+            for index in 1..points.len() {
+                let rest = &points[index..];
+                assert!(branches.advance(&plane, rest, &mut roots), "{index}");
+                assert_eq!(roots.len(), 3);
+                for (root, exact) in roots.iter().zip(truth(points[index])) {
+                    let off = (root.s - exact).norm();
+                    assert!(off <= root.radius + 4e-16 * exact.norm() && root.radius < 1e-11);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_double_root_is_not_passed() {
+        // At k = 1/e the first two roots of s + k e^(−s) meet.
+        let a = QuasiPolynomial::new(vec![vec![0.0, 1.0]], vec![0.0]).unwrap();
+        let b = QuasiPolynomial::new(vec![vec![1.0]], vec![1.0]).unwrap();
+        let plane = Plane::new(&a, &b);
+        let points: Vec<f64> = (0..100)
+            .map(|index| 0.3 + 0.002 * f64::from(index))
+            .collect();
+        let mut branches = Branches::none();
+        let start = lambertw(Complex64::new(-0.3, 0.0), 0);
+        branches.start(&plane, std::iter::once(start), 0.3);
+        let mut roots = Vec::new();
+        let passed = (1..100)
+            .take_while(|index| branches.advance(&plane, &points[*index..], &mut roots))
+            .count();
+        assert!((25..35).contains(&passed), "{passed}");
     }
 }
