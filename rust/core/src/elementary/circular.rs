@@ -18,15 +18,15 @@
 use super::nearest;
 use super::tables::{INVERSE_TURN, SINES};
 
-const STEPS_PER_UNIT: f64 = 10.185_916_357_881_302;
+pub(super) const STEPS_PER_UNIT: f64 = 10.185_916_357_881_302;
 /// π/32 in pieces.
-const STEP: [f64; 3] = [
+pub(super) const STEP: [f64; 3] = [
     0.098_174_770_362_675_19,
     6.200_584_880_614_035e-11,
     -7.610_657_361_233_729e-20,
 ];
 /// Below this the reduction in three pieces holds.
-const LARGE: f64 = 1_048_576.0;
+pub(super) const LARGE: f64 = 1_048_576.0;
 /// 2π/2⁶⁴: from units of 2⁻⁶⁴ turns to radians.
 const UNIT: f64 = std::f64::consts::TAU / 18_446_744_073_709_551_616.0;
 

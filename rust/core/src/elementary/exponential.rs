@@ -16,9 +16,9 @@
 use super::nearest;
 use super::tables::POWERS;
 
-const STEPS_PER_UNIT: f64 = 46.166_241_308_446_83;
+pub(super) const STEPS_PER_UNIT: f64 = 46.166_241_308_446_83;
 /// ln 2/32 in pieces.
-const STEP: [f64; 2] = [0.021_660_849_392_446_835, 5.145_609_244_655_338e-14];
+pub(super) const STEP: [f64; 2] = [0.021_660_849_392_446_835, 5.145_609_244_655_338e-14];
 
 /// e^x within 1.25 · 2⁻⁵³ of itself, or 2⁻¹⁰⁷⁵ where that is more.
 ///

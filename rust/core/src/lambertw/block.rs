@@ -5,12 +5,14 @@
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Mask, Real, Simd};
+use crate::lanes::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
-use super::columns::{BLOCK, Kernel, SHORT, sweep};
 use super::kernel::{self, Point};
 use super::route::Order;
 use super::{delay, huge_branch, log_form, real, special_values};
+
+/// Elements in a block.
+const BLOCK: usize = 256;
 
 /// 1 in lanes where it is true.
 #[inline(always)]

@@ -11,10 +11,9 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Mask, Real, Simd};
+use crate::lanes::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
 use super::branch_point::one_plus_w as near_branch_point;
-use super::columns::{Kernel, SHORT, sweep};
 use super::guess::{behind, logarithmic_step, principal};
 use super::huge_branch::{HUGE_BRANCH, turns};
 use super::kernel::{SERIES_ANSWERS, SERIES_STARTS, reflected};

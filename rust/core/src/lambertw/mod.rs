@@ -53,7 +53,6 @@
 pub mod block;
 mod branch_point;
 mod coefficients;
-mod columns;
 mod delay;
 mod elementary;
 mod guess;

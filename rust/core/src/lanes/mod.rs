@@ -8,10 +8,14 @@
 //! [`Mask::any`] decide more than whether work may be left out.
 
 mod bits;
+mod columns;
 mod complex;
 mod dispatch;
 mod real;
 
+#[cfg(test)]
+pub(crate) use columns::sweep_on;
+pub(crate) use columns::{Columns, Kernel, SHORT, sweep};
 pub(crate) use complex::Complex;
 pub(crate) use dispatch::Instructions;
 pub use dispatch::instructions;

@@ -3,6 +3,7 @@
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use pulp::Simd;
+use pulp::bytemuck::{cast_slice, cast_slice_mut};
 
 /// One double in each lane of two vectors.
 ///
@@ -36,6 +37,18 @@ impl<S: Simd> Real<S> {
     #[inline(always)]
     pub(crate) fn lanes(self) -> [S::f64s; 2] {
         self.lanes
+    }
+
+    /// The lanes one after the other.
+    #[inline(always)]
+    pub(crate) fn numbers(&self) -> &[f64] {
+        cast_slice(&self.lanes)
+    }
+
+    /// The same, to be written.
+    #[inline(always)]
+    pub(crate) fn numbers_mut(&mut self) -> &mut [f64] {
+        cast_slice_mut(&mut self.lanes)
     }
 
     /// `value` in every lane, for the instruction set of `self`.
@@ -231,7 +244,7 @@ impl<S: Simd> Mask<S> {
         // Folding words into one compiles to a single test; searching them does not.
         let (yes, no) = (self.simd.splat_u64s(1), self.simd.splat_u64s(0));
         let marks = [self.simd.select_u64s(either, yes, no)];
-        let words: &[u64] = pulp::bytemuck::cast_slice(&marks);
+        let words: &[u64] = cast_slice(&marks);
         words.iter().fold(0, |any, word| any | word) != 0
     }
 }

@@ -10,17 +10,15 @@
 //! Chains of a neutral equation are the abscissa where no root lies right of a line as close to them as the
 //! search in a single cell would go; a root closer than a few times that is left to that search.
 
-use super::branch::{Branch, Plane, Root};
+use super::branch::{Branches, Root};
 use super::cell::{Cell, judge, with_abscissa};
+use super::plane::Plane;
 use super::row::{Members, Row};
-use crate::quasipoly::QuasiPolynomial;
+use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::{Region, chain_abscissa, chain_margin, rightmost, roots};
 use crate::{Error, Task};
 
-/// Roots to follow.
-const FOLLOWED: usize = 4;
-
-/// How far behind the first of them, in units of one over the longest delay.
+/// Roots as far behind the first one are followed, in units of one over the longest delay.
 const NEARBY: f64 = 1.5;
 
 /// Lines a row may have before its cells are searched alone.
@@ -31,6 +29,9 @@ const BESIDE: usize = 2;
 
 /// Roots closer to the chains than this many margins are left to the search in a single cell.
 const CLOSE_TO_CHAINS: f64 = 10.0;
+
+/// Rounding of a distance.
+const ROOM: f64 = 1.0 + 1e-9;
 
 /// The counts of a row right of one line.
 struct Line {
@@ -59,7 +60,9 @@ struct Leading<'a> {
     lines: Vec<Line>,
     /// The line that served last.
     last: usize,
-    branches: Vec<Branch>,
+    branches: Branches,
+    /// The roots of the cell, from the right.
+    roots: Vec<Root>,
     /// Did the last cell that was searched alone have no root right of its chains?
     chains_led: bool,
 }
@@ -89,11 +92,13 @@ impl Members<'_> {
                 let chain = leading
                     .as_ref()
                     .map_or(f64::NEG_INFINITY, |leading| leading.chain);
-                match (known, (self.member)(index)) {
-                    (Known::Isolated(abscissa), _) => Ok(with_abscissa(cell, abscissa, chain)),
-                    (Known::Chains, _) => Ok(with_abscissa(cell, f64::NEG_INFINITY, chain)),
-                    (Known::Nothing, Some(h)) => judge(&h, self.demand, true, task),
-                    (Known::Nothing, None) => Ok(Cell::UNDECIDED),
+                match known {
+                    Known::Isolated(abscissa) => Ok(with_abscissa(cell, abscissa, chain)),
+                    Known::Chains => Ok(with_abscissa(cell, f64::NEG_INFINITY, chain)),
+                    Known::Nothing => match (self.member)(index) {
+                        Some(h) => judge(&h, self.demand, true, task),
+                        None => Ok(Cell::UNDECIDED),
+                    },
                 }
             })
             .collect();
@@ -130,28 +135,27 @@ impl<'a> Leading<'a> {
             scale,
             lines: Vec::new(),
             last: 0,
-            branches: Vec::new(),
+            branches: Branches::none(),
+            roots: Vec::new(),
             chains_led: false,
         })
     }
 
     /// The rightmost root of a cell.
     fn look(&mut self, index: usize) -> Result<Known, Error> {
-        let Some(k) = self.members.points.get(index).copied() else {
+        let points = self.members.points.get(index..).unwrap_or_default();
+        let Some(k) = points.first().copied() else {
             return Ok(Known::Nothing);
         };
-        let plane = &self.plane;
-        let followed = self.branches.len();
-        self.branches
-            .retain_mut(|branch| branch.follow(plane, k).is_some());
+        let mut roots = std::mem::take(&mut self.roots);
         // Without the one that is lost the others may lie far to the left, where lines are long.
-        let lost = self.branches.len() < followed;
-        let mut roots: Vec<Root> = self.branches.iter().map(|branch| *branch.root()).collect();
-        roots.sort_by(|p, q| q.s.re.total_cmp(&p.s.re));
-        if !lost && let Some(known) = self.by_lines(index, &roots)? {
-            return Ok(known);
+        let mut known = None;
+        if self.branches.advance(&self.plane, points, &mut roots) {
+            roots.sort_by(|p, q| q.s.re.total_cmp(&p.s.re));
+            known = self.by_lines(index, &roots)?;
         }
-        self.search(index, k)
+        self.roots = roots;
+        known.map_or_else(|| self.search(index, k), Ok)
     }
 
     /// What lines tell of the cell, if one fits.
@@ -304,11 +308,8 @@ impl<'a> Leading<'a> {
             Err(_) => found.clone(),
         };
         let upper = others.roots.iter().filter(|root| root.im >= 0.0);
-        let branches = upper
-            .take(FOLLOWED)
-            .map(|root| Branch::through(&self.plane, *root, k));
         // All of them or none: those behind a multiple root prove nothing without it.
-        self.branches = branches.collect::<Option<_>>().unwrap_or_default();
+        self.branches.start(&self.plane, upper.copied(), k);
         Ok(Known::Isolated(first.re))
     }
 }
@@ -319,6 +320,6 @@ fn are_apart(roots: &[Root]) -> bool {
         roots
             .iter()
             .skip(place + 1)
-            .all(|other| (one.s - other.s).norm() > one.radius + other.radius)
+            .all(|other| modulus(one.s - other.s) > (one.radius + other.radius) * ROOM)
     })
 }

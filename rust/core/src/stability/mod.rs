@@ -5,8 +5,8 @@
 //!
 //! Maps: `grid` judges the members over two parameters, by `rows` along which one gain varies. `row` is one of them, `pencil` its functions,
 //! `crossing` says where its roots cross the edge, `curves` joins the crossings of all rows to the boundaries;
-//! `branch` follows one root along a row and `leading` the rightmost. `along` lists the crossings of the imaginary
-//! axis as a single gain varies. Where a family is affine in neither parameter, `blocks` cuts the map into
+//! `branch` follows roots along a row, `settle` proves each of them by the values and bounds of `plane`, `leading` says
+//! which is the rightmost. `along` lists the crossings of the imaginary axis as a single gain varies. Where a family is affine in neither parameter, `blocks` cuts the map into
 //! pieces, `block` divides one of them by the proofs of boxes, and `transect` finds the crossings of a row.
 //!
 //! Whole boxes of parameters: `reduced` is the family with its fixed parameters put in, `local` what
@@ -31,12 +31,14 @@ mod largest;
 mod leading;
 mod local;
 mod pencil;
+mod plane;
 mod prove;
 mod radius;
 mod reduced;
 mod robust;
 mod row;
 mod rows;
+mod settle;
 mod tail;
 mod transect;
 mod value_set;

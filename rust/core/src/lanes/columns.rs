@@ -5,20 +5,18 @@
 
 use pulp::WithSimd;
 
-use crate::lanes::{Instructions, Real, Simd};
+use super::{Instructions, Real, Simd};
 
-/// Elements in a block.
-pub(super) const BLOCK: usize = 256;
-/// Elements of a short block, for a single call: two vectors of the widest instruction set.
-pub(super) const SHORT: usize = 16;
+/// Elements in two vectors of the widest instruction set: the shortest block.
+pub(crate) const SHORT: usize = 16;
 
 /// A function of `IN` doubles with `OUT` doubles as its value.
-pub(super) trait Kernel<const IN: usize, const OUT: usize>: Sync {
+pub(crate) trait Kernel<const IN: usize, const OUT: usize>: Sync {
     fn lanes<S: Simd>(&self, arguments: [Real<S>; IN]) -> [Real<S>; OUT];
 }
 
 /// Columns of one block.
-pub(super) type Columns<const N: usize, const W: usize> = [[f64; W]; N];
+pub(crate) type Columns<const N: usize, const W: usize> = [[f64; W]; N];
 
 struct Sweep<'a, K, const IN: usize, const OUT: usize, const W: usize> {
     kernel: &'a K,
@@ -54,7 +52,7 @@ where
 }
 
 /// Fill `values` for the first `length` elements and those that complete their last vector.
-pub(super) fn sweep<K, const IN: usize, const OUT: usize, const W: usize>(
+pub(crate) fn sweep<K, const IN: usize, const OUT: usize, const W: usize>(
     kernel: &K,
     arguments: &Columns<IN, W>,
     values: &mut Columns<OUT, W>,
@@ -62,7 +60,20 @@ pub(super) fn sweep<K, const IN: usize, const OUT: usize, const W: usize>(
 ) where
     K: Kernel<IN, OUT>,
 {
-    Instructions::chosen().run(Sweep {
+    sweep_on(Instructions::chosen(), kernel, arguments, values, length);
+}
+
+/// [`sweep`] with these instructions.
+pub(crate) fn sweep_on<K, const IN: usize, const OUT: usize, const W: usize>(
+    instructions: Instructions,
+    kernel: &K,
+    arguments: &Columns<IN, W>,
+    values: &mut Columns<OUT, W>,
+    length: usize,
+) where
+    K: Kernel<IN, OUT>,
+{
+    instructions.run(Sweep {
         kernel,
         arguments,
         values,
