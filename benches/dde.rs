@@ -1,10 +1,12 @@
-//! The linear stepper: one simulation of ten seconds each, the poles of a sampled loop, and sweeps.
+//! The linear stepper: one simulation of ten seconds each, the poles of a sampled loop, sweeps, and
+//! runs in fixed steps.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
 use deadtime::dde::ensemble::{self, Sets};
+use deadtime::dde::fixed_step::{self, Blocks, Path, Rest, Settings, Solver};
 use deadtime::dde::sampled::{self, LoopCells};
 use deadtime::dde::{Criteria, Equations, LinearLoop, Reference, Start};
 
@@ -150,5 +152,43 @@ fn sweeps(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, simulations, poles, sweeps);
+/// Ten seconds of the P loop in steps of a millisecond.
+fn fixed_steps(criterion: &mut Criterion) {
+    let blocks = Blocks {
+        plant_matrix: vec![0.0],
+        plant_input: vec![1.0],
+        plant_output: vec![1.0],
+        proportional: -1.31,
+        reference: 1.31,
+        ..Blocks::default()
+    };
+    let rest = Rest {
+        state: vec![0.0],
+        ..Rest::default()
+    };
+    let Ok(reference) = Reference::step(0.0, 1.0) else {
+        return;
+    };
+    let mut group = criterion.benchmark_group("fixed steps");
+    for (name, solver) in Solver::NAMED {
+        let settings = Settings {
+            delay: DELAY,
+            path: Path::Measurement,
+            limit: Some(1.0),
+            sample_steps: None,
+            solver,
+            step: 1e-3,
+            steps: 10_000,
+        };
+        group.throughput(Throughput::Elements(settings.steps as u64));
+        group.bench_function(name, |bencher| {
+            let task = Task::new();
+            bencher
+                .iter(|| fixed_step::run(black_box(&blocks), &settings, &rest, &reference, &task));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, simulations, poles, sweeps, fixed_steps);
 criterion_main!(benches);

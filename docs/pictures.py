@@ -30,5 +30,25 @@ def fixed_steps() -> None:
     figure.savefig(IMAGES / "fixed-steps.png", dpi=110)
 
 
+def mackey_glass() -> None:
+    """The chaotic attractor of Mackey and Glass, against its own past."""
+    found = dtm.solve_dde(
+        lambda t, y, z: 0.2 * z[0] / (1 + z[0] ** 10) - 0.1 * y,
+        (0.0, 500.0),
+        0.5,
+        [17.0],
+        rtol=1e-9,
+        vectorized=True,
+        dense_output=True,
+    )
+    times = np.linspace(150.0, 500.0, 7001)
+    now, before = found.sol(times)[0], found.sol(times - 17.0)[0]
+    figure, axes = plt.subplots(figsize=(5.0, 4.0), layout="constrained")
+    axes.plot(now, before, linewidth=0.8)
+    axes.set(xlabel="y(t)", ylabel="y(t - 17 s)")
+    figure.savefig(IMAGES / "mackey-glass.png", dpi=100)
+
+
 if __name__ == "__main__":
     fixed_steps()
+    mackey_glass()
