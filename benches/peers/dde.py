@@ -109,9 +109,9 @@ def loops() -> Iterable[Problem]:
 
 
 def solve(
-    fun: Callable[..., Any], history: Any, delay: float, tolerances: list[float]
+    fun: Any, history: Any, delay: float, tolerances: list[float], vectorized: bool = True
 ) -> list[Run]:
-    """`solve_dde` over a ladder of tolerances; `fun` takes all nodes at once."""
+    """`solve_dde` over a ladder of tolerances; `fun` takes all nodes at once, or is compiled."""
 
     def at(tolerance: float) -> Run:
         def simulate(times: Values) -> Values:
@@ -123,7 +123,7 @@ def solve(
                 rtol=tolerance,
                 atol=tolerance,
                 t_eval=times,
-                vectorized=True,
+                vectorized=vectorized,
             )
             return found.y.T
 
@@ -150,7 +150,7 @@ def mackey_glass() -> Problem:
             out = carray(dy, 1)
             out[0] = 0.2 * late / (1.0 + fourth * fourth * square) - 0.1 * carray(y, 1)[0]
 
-        problem.ours["compiled"] = solve_pointer(compiled_slope, ladder(7, 12))
+        problem.ours["compiled"] = solve(compiled_slope, 0.5, 17.0, ladder(7, 12), vectorized=False)
     start = np.array([0.5])
     problem.peers["scipy steps"] = [
         peers.scipy_steps(fun, start, 17.0, tol) for tol in ladder(7, 11)
@@ -163,27 +163,6 @@ def mackey_glass() -> Problem:
         compiled = peers.Jitcdde([0.2 * late / (1 + late**10) - 0.1 * y(0)], start, 17.0)
         problem.peers["JiTCDDE"] = [compiled.run(tol, 8) for tol in ladder(7, 14)]
     return problem
-
-
-def solve_pointer(function: Any, tolerances: list[float]) -> list[Run]:
-    """`solve_dde` of a compiled right-hand side with one delay of 17."""
-
-    def at(tolerance: float) -> Run:
-        def simulate(times: Values) -> Values:
-            found = dtm.solve_dde(
-                function,
-                (0.0, float(times[-1])),
-                0.5,
-                [17.0],
-                rtol=tolerance,
-                atol=tolerance,
-                t_eval=times,
-            )
-            return found.y.T
-
-        return simulate
-
-    return [at(tolerance) for tolerance in tolerances]
 
 
 def network() -> Problem:

@@ -1,19 +1,49 @@
-"""What a fit's Jacobian tells: which numbers the data part, and how uncertain each is."""
+"""What a fit can determine: which numbers are free, which the data part, how uncertain each is."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._loop import ControlLoop
 
-__all__ = ["check_distinguishable", "embedded", "standard_errors"]
+__all__ = [
+    "FREE_NAMES",
+    "check_distinguishable",
+    "checked_names",
+    "embedded",
+    "standard_errors",
+]
 
 Array = NDArray[np.float64]
 
 #: Ratio of singular values of the scaled Jacobian below which data do not tell two numbers apart:
 #: rounding in difference quotients is at about 1e-8.
 INDISTINGUISHABLE = 1e-6
+
+#: What fits can determine, in the order they report.
+FREE_NAMES = ("delay", "gain", "lag")
+
+
+def checked_names(free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
+    """Return the names of what is to be fitted, or raise where this loop has no such number."""
+    if isinstance(free, str):
+        free = (free,)
+    unknown = [name for name in free if name not in FREE_NAMES]
+    if unknown or not free:
+        raise ValueError(f"free={tuple(free)!r}: choose from {FREE_NAMES}, at least one")
+    missing = [name for name in free if name != "delay" and name not in loop.parameters]
+    if missing:
+        raise ValueError(
+            f"the plant {loop.plant!r} has no {missing[0]} to fit: use an Integrator or a "
+            "FirstOrder, or leave it out of `free`"
+        )
+    if "delay" not in free and loop.delay is None:
+        raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
+    return tuple(name for name in FREE_NAMES if name in free)
 
 
 def check_distinguishable(jacobian: Array, names: list[str]) -> None:

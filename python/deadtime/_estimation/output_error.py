@@ -26,7 +26,12 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from deadtime._controllers import P
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.evidence import check_distinguishable, embedded, standard_errors
+from deadtime._estimation.evidence import (
+    check_distinguishable,
+    checked_names,
+    embedded,
+    standard_errors,
+)
 from deadtime._estimation.held_response import HeldResponse
 from deadtime._estimation.profile import Profile
 from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
@@ -41,9 +46,6 @@ Array = NDArray[np.float64]
 
 #: The best fit for one number, the others at their best or held.
 _Along: TypeAlias = Callable[[float], "_Fit"]
-
-#: What the fit can determine, in the order it reports.
-FREE_NAMES = ("delay", "gain", "lag")
 
 #: Longest delay that is sought, as a part of the window.
 LONGEST = 0.6
@@ -66,7 +68,12 @@ def estimate_by_output_error(
     initial_output: float | None = None,
 ) -> DelayEstimate:
     """Fit `free` to the response of the plant to the logged command."""
-    names = _checked(free, loop)
+    names = checked_names(free, loop)
+    if not isinstance(loop.plant, Integrator):
+        raise ValueError(
+            f"the output-error method is for an Integrator, the loop has a "
+            f"{type(loop.plant).__name__}: use method='waveform'"
+        )
     problem = _problem(recording, loop, window, names, initial_output)
     data = problem.recording
     found = problem.solve()
@@ -319,22 +326,6 @@ class _ProfileCost:
         """Over the delay, around the best sum of delay and lag: no other valley is meant."""
         reach = self.best.delay + self.best.lag + 4.0 * self.problem._sample
         return self.problem._best_in(0.0, reach, at)
-
-
-def _checked(free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
-    if isinstance(free, str):
-        free = (free,)
-    unknown = [name for name in free if name not in FREE_NAMES]
-    if unknown or not free:
-        raise ValueError(f"free={tuple(free)!r}: choose from {FREE_NAMES}, at least one")
-    if not isinstance(loop.plant, Integrator):
-        raise ValueError(
-            f"the output-error method is for an Integrator, the loop has a "
-            f"{type(loop.plant).__name__}: use method='waveform'"
-        )
-    if "delay" not in free and loop.delay is None:
-        raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
-    return tuple(name for name in FREE_NAMES if name in free)
 
 
 def _problem(

@@ -22,17 +22,19 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.evidence import check_distinguishable, embedded, standard_errors
+from deadtime._estimation.evidence import (
+    check_distinguishable,
+    checked_names,
+    embedded,
+    standard_errors,
+)
 from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime._estimation.result import CramerRaoBound, DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 
-__all__ = ["FREE_NAMES", "estimate_by_waveform"]
-
-#: What the fit can determine, in the order it reports.
-FREE_NAMES = ("delay", "gain", "lag")
+__all__ = ["estimate_by_waveform"]
 
 #: Points of the first grid over the delay, and factors of the first grid over the gain.
 DELAY_POINTS = 24
@@ -61,7 +63,7 @@ def estimate_by_waveform(
     free: Sequence[str],
 ) -> DelayEstimate:
     """Fit `free` of the loop to the window of the recording."""
-    names = _checked(free, loop)
+    names = checked_names(free, loop)
     simulated = SimulatedRecording(recording, loop, window)
     data = simulated.recording
     _check_excitation(data, len(names))
@@ -216,23 +218,6 @@ class _Problem:
             max_nfev=200,
         )
         return _Minimum(found.x, found.fun, np.asarray(found.jac))
-
-
-def _checked(free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
-    if isinstance(free, str):
-        free = (free,)
-    unknown = [name for name in free if name not in FREE_NAMES]
-    if unknown or not free:
-        raise ValueError(f"free={tuple(free)!r}: choose from {FREE_NAMES}, at least one")
-    missing = [name for name in free if name != "delay" and name not in loop.parameters]
-    if missing:
-        raise ValueError(
-            f"the plant {loop.plant!r} has no {missing[0]} to fit: use an Integrator or a "
-            "FirstOrder, or leave it out of `free`"
-        )
-    if "delay" not in free and loop.delay is None:
-        raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
-    return tuple(name for name in FREE_NAMES if name in free)
 
 
 def _check_excitation(data: Recording, parameters: int) -> None:
