@@ -107,7 +107,7 @@ fn poles(criterion: &mut Criterion) {
     group.sample_size(10);
     group.bench_function("grid over kp", |bencher| {
         let task = Task::new();
-        bencher.iter(|| sampled::abscissa_grid(black_box(&cells), &task));
+        bencher.iter(|| sampled::abscissa_grid(black_box(&cells), 0.0, &task));
     });
     group.finish();
 }

@@ -235,7 +235,7 @@ pub(crate) fn sampled_abscissa_grid<'py>(
         sample_time: &sample_time,
     };
     let found = run(py, threads, progress.as_ref(), |task| {
-        models.judge(decay, task)
+        sampled::abscissa_grid(&models, decay, task)
     })?;
     let abscissa: Vec<f64> = found.iter().map(|cell| cell.abscissa).collect();
     let unstable: Vec<i32> = found.iter().map(|cell| cell.unstable).collect();

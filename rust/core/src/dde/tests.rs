@@ -225,7 +225,7 @@ fn the_grid_is_the_single_call() {
         delay: &[0.36],
         sample_time: &[0.065],
     };
-    let found = sampled::abscissa_grid(&cells, &Task::new()).unwrap();
+    let found = sampled::abscissa_grid(&cells, 0.0, &Task::new()).unwrap();
     for (kp, cell) in gains.iter().zip(&found) {
         let plant = LinearLoop::new(drone(*kp, 0.0), 0.36, Some(0.065), None).unwrap();
         let poles = sampled::poles(&plant).unwrap();

@@ -13,7 +13,8 @@ use crate::{Error, Task};
 
 use super::transition::{Sample, check_size, eigenvalues};
 
-/// |z| closer to the circle than this, relative to the larger of it and 1, is neither inside nor outside: rounding of the eigenvalues.
+/// |z| closer to the circle than this, relative to the larger of it and 1, is neither inside nor
+/// outside: rounding of the eigenvalues.
 const ON_THE_CIRCLE: f64 = 1e-12;
 
 /// Cells handed to a thread at a time.
@@ -53,16 +54,15 @@ pub struct CellPoles {
     pub status: CellStatus,
 }
 
-/// Abscissa and number of unstable poles of every cell.
+/// Abscissa of every cell, and number of its poles that decay more slowly than e^(−`decay` t).
 ///
 /// # Errors
-/// As for [`LoopCells::judge`].
-pub fn abscissa_grid(cells: &LoopCells<'_>, task: &Task) -> Result<Vec<CellPoles>, Error> {
-    cells.judge(0.0, task)
-}
-
-/// [`LoopCells::judge`].
-fn judge(cells: &LoopCells<'_>, decay: f64, task: &Task) -> Result<Vec<CellPoles>, Error> {
+/// [`Error::Argument`] for arrays of other lengths or models without sense; [`Error::Interrupted`].
+pub fn abscissa_grid(
+    cells: &LoopCells<'_>,
+    decay: f64,
+    task: &Task,
+) -> Result<Vec<CellPoles>, Error> {
     let rows = cells.rows()?;
     let shared = if rows.model_is_shared() {
         Some(rows.sample(0)?)
@@ -139,14 +139,6 @@ struct AllRows<'a> {
 }
 
 impl<'a> LoopCells<'a> {
-    /// Abscissa of every cell, and number of its poles that decay more slowly than e^(−`decay` t).
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for arrays of other lengths or models without sense; [`Error::Interrupted`].
-    pub fn judge(&self, decay: f64, task: &Task) -> Result<Vec<CellPoles>, Error> {
-        judge(self, decay, task)
-    }
-
     fn rows(&self) -> Result<AllRows<'a>, Error> {
         let (n, cells) = (self.states, self.cells);
         Ok(AllRows {
