@@ -261,3 +261,21 @@ def test_the_page_of_the_manual_runs():
     told = []
     runner.run(examples, out=told.append)
     assert runner.failures == 0, "".join(told)
+
+
+def test_without_a_time_sets_are_measured_until_they_settle():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
+    found = dtm.sweep(loop, {"Kp": [0.1, 1.0, 3.0]})
+    # Kp = 0.1 takes 40 s to settle, ten delays are 3.6 s.
+    assert found.time[-1] >= 40.0
+    assert (found.status == dtm.SweepStatus.OK).all()
+    for i, gain in enumerate((0.1, 1.0, 3.0)):
+        info = loop.replace(Kp=gain).step_response().info()
+        assert found["settling_time"][i] == pytest.approx(info["settling_time"], abs=1e-6)
+    grid = dtm.sweep(loop, {"Kp": [[0.1], [9.0]], "delay": [[0.1, 0.36]]})
+    assert grid.shape == (2, 2)
+    # 9 * 0.36 is beyond pi/2: that loop never settles.
+    assert grid.status.tolist()[0] == [0, 0]
+    assert grid.status[1, 1] != dtm.SweepStatus.OK
+    with pytest.raises(ValueError, match="responses need output times"):
+        dtm.sweep(loop, {"Kp": [1.0]}, responses=True)

@@ -21,7 +21,7 @@ from deadtime._validation import finite, increasing, one_dimensional, real_array
 if TYPE_CHECKING:
     from deadtime._loop import ControlLoop
 
-__all__ = ["reference_jumps", "settled_step", "simulate_loop", "steady_state"]
+__all__ = ["LEAST", "SHORTEST", "reference_jumps", "settled_step", "simulate_loop", "steady_state"]
 
 Vector = NDArray[np.float64]
 
@@ -31,8 +31,8 @@ _NONE = np.empty(0)
 # The default time of a step response: at first so many times the slowest constant of the loop (at
 # least so many seconds), doubled until the last quarter is settled or the response has run away.
 _POINTS = 501
-_SHORTEST = 10.0
-_LEAST = 0.01
+SHORTEST = 10.0
+LEAST = 0.01
 _DOUBLINGS = 10
 _SETTLED = 0.005
 _LOST = 20.0
@@ -142,7 +142,7 @@ def settled_step(loop: ControlLoop, amplitude: float) -> Response:
     """Step response up to where it has settled, found by doubling the time."""
     delay = loop._known_delay()
     slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
-    span = _SHORTEST * max([delay + (loop.sample_time or 0.0), *slowest, _LEAST])
+    span = SHORTEST * max([delay + (loop.sample_time or 0.0), *slowest, LEAST])
     for _ in range(_DOUBLINGS):
         response = loop.simulate(np.linspace(0.0, span, _POINTS), amplitude)
         goal = response.outputs[-1] if response.steady_state is None else response.steady_state

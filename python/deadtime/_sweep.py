@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
 
@@ -19,6 +19,7 @@ from deadtime._deadtime import sweep_figures, sweep_responses
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._loop_model import LoopModel, refuse_discretised, rest_of
+from deadtime._loop_run import LEAST, SHORTEST
 from deadtime._validation import finite, increasing, positive, real_array, thread_number
 
 __all__ = ["Sweep", "SweepStatus", "sweep"]
@@ -27,6 +28,9 @@ Vector = NDArray[np.float64]
 
 #: Sets built and simulated together.
 _BLOCK = 1 << 15
+
+# How often the time is doubled for the sets that have not settled.
+_DOUBLINGS = 4
 
 #: Figures in the order in which the native part gives them.
 _FIGURES = (
@@ -147,7 +151,7 @@ class Sweep(ReadOnlyArrays):
 def sweep(
     loop: ControlLoop,
     values: Mapping[str, ArrayLike],
-    time: ArrayLike,
+    time: ArrayLike | None = None,
     *,
     responses: bool = False,
     amplitude: float = 1.0,
@@ -172,8 +176,9 @@ def sweep(
         have their common shape.
     time : float or array_like, shape (n,)
         For metrics, the time in s up to which responses are measured, from zero; of an array, the
-        first and the last time. For responses, the output times, increasing, the first one being
-        that of the step.
+        first and the last time. By default ten times the longest delay or time constant, and up to
+        16 times longer for the sets that have not settled by then. For responses, the output
+        times, increasing, the first one being that of the step.
     responses : bool
         Return outputs instead of metrics.
     amplitude : float
@@ -226,6 +231,9 @@ def sweep(
     """
     arrays, shape = _sets(values)
     common = _checked(loop, arrays)
+    if time is None and not responses:
+        options = {"amplitude": amplitude, "settling": settling, "rise": rise, "threads": threads}
+        return _until_settled(common, arrays, options, progress)
     times = _times(time, responses)
     height = finite("amplitude", amplitude)
     if height == 0.0:
@@ -311,7 +319,36 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
     return loop
 
 
-def _times(time: ArrayLike, responses: bool) -> Vector:
+def _until_settled(
+    loop: ControlLoop,
+    arrays: Mapping[str, Vector],
+    options: dict[str, Any],
+    progress: Callable[[int], object] | None,
+) -> Sweep:
+    """Measure all sets, and those that have not settled over twice the time, again and again."""
+    numbers: dict[str, Any] = loop.parameters | dict(arrays)
+    waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
+    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
+    span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
+    found = sweep(loop, arrays, span, progress=progress, **options)
+    flat = {name: np.broadcast_to(array, found.shape) for name, array in arrays.items()}
+    metrics = {name: figures.copy() for name, figures in found.metrics.items()}
+    status = found.status.copy()
+    for _ in range(_DOUBLINGS):
+        late = status == SweepStatus.UNSETTLED
+        if not late.any():
+            break
+        span *= 2.0
+        longer = sweep(loop, {name: array[late] for name, array in flat.items()}, span, **options)
+        for name, figures in longer.metrics.items():
+            metrics[name][late] = figures
+        status[late] = longer.status
+    return replace(found, time=np.array([0.0, span]), metrics=metrics, status=status)
+
+
+def _times(time: ArrayLike | None, responses: bool) -> Vector:
+    if time is None:
+        raise ValueError("responses need output times: give an array of them as time")
     times = real_array("time", time)
     if times.ndim == 0 and not responses:
         return np.array([0.0, positive("time", float(times))])
