@@ -188,7 +188,7 @@ def compare_methods(
     plain = [name for name in named if name != "lag"]
     for name in ("dominant", "exact", "saturated"):
         try:
-            estimates[name] = estimate_by_overshoot(recording, loop, window, name)
+            estimates[name] = estimate_by_overshoot(recording, loop, window, map=name)
         except (NotIdentifiableError, ValueError) as error:
             refusals[name] = str(error).rstrip(".")
     estimates["waveform"] = estimate_by_waveform(recording, loop, window, plain)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Literal
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
 
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
@@ -13,14 +14,23 @@ from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 from deadtime._recording import Recording
 
-__all__ = ["estimate_delay"]
+__all__ = ["METHODS", "estimate_delay"]
+
+_Estimator: TypeAlias = Callable[..., DelayEstimate]
+
+#: The methods by name. Each takes recording, loop, window and free, then its own options by name.
+METHODS: Mapping[str, _Estimator] = {
+    "output_error": estimate_by_output_error,
+    "waveform": estimate_by_waveform,
+    "overshoot": estimate_by_overshoot,
+}
 
 
 def estimate_delay(
     recording: Recording,
     loop: ControlLoop,
     *,
-    method: Literal["auto", "output_error", "overshoot", "waveform"] = "auto",
+    method: str = "auto",
     free: Sequence[str] = ("delay", "gain"),
     window: tuple[float | None, float | None] | None = None,
     **options: Any,
@@ -95,20 +105,19 @@ def estimate_delay(
     if method == "auto":
         logged = recording.command is not None and isinstance(loop.plant, Integrator)
         method = "output_error" if logged else "waveform"
-    if method == "output_error":
-        if set(options) - {"initial_output"}:
-            raise ValueError(
-                f"the output-error method has the option 'initial_output', not {set(options)!r}"
-            )
-        return estimate_by_output_error(recording, loop, window, free, **options)
-    if method == "waveform":
-        if options:
-            raise ValueError(f"the waveform method has no option {next(iter(options))!r}")
-        return estimate_by_waveform(recording, loop, window, free)
-    if method == "overshoot":
-        if set(options) - {"map"}:
-            raise ValueError(f"the overshoot method has the option 'map', not {set(options)!r}")
-        return estimate_by_overshoot(recording, loop, window, **options)
-    raise ValueError(
-        f"method={method!r} is not one of 'auto', 'output_error', 'overshoot', 'waveform'"
-    )
+    if method not in METHODS:
+        raise ValueError(
+            f"method={method!r} is not one of {', '.join(map(repr, ('auto', *METHODS)))}"
+        )
+    estimator = METHODS[method]
+    _check_options(method, estimator, options)
+    return estimator(recording, loop, window, free, **options)
+
+
+def _check_options(method: str, estimator: _Estimator, options: Mapping[str, Any]) -> None:
+    """Refuse options that the method has not, naming those it has."""
+    known = list(inspect.signature(estimator).parameters)[4:]
+    for name in options:
+        if name not in known:
+            has = f"its options are {', '.join(map(repr, known))}" if known else "it has none"
+            raise ValueError(f"the {method} method has no option {name!r}: {has}")

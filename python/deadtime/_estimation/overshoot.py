@@ -19,6 +19,7 @@ noisy samples is larger than the peak.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -161,6 +162,7 @@ def estimate_by_overshoot(
     recording: Recording,
     loop: ControlLoop,
     window: tuple[float | None, float | None] | None,
+    free: Sequence[str] = ("delay",),  # the delay is what this method fits, whatever is asked for
     map: OvershootMap = "dominant",  # noqa: A002
 ) -> DelayEstimate:
     """Delay from the overshoot of the one step in the window."""
