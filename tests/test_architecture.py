@@ -50,6 +50,7 @@ FLOORS = [
         "_fixed_step",
         "_loop_model",
         "_loop_run",
+        "_open_run",
         "_loop_sensitivities",
         "_loop_stability",
         "_batch",

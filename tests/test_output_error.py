@@ -205,7 +205,13 @@ def refused(**change):
         ({"free": ()}, "at least one"),
         ({"free": ("gain",)}, "unknown"),
         ({"options": {"start": 1.0}}, "initial_output"),
-        ({"loop": dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0))}, "FirstOrder"),
+        (
+            {
+                "loop": dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0)),
+                "free": ("delay", "gain", "lag"),
+            },
+            "no lag to fit",
+        ),
         ({"command": None, "loop": dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1))}, "log the"),
     ],
 )
@@ -214,19 +220,20 @@ def test_what_cannot_be_estimated_is_refused_with_the_reason(change, match):
         refused(**change)
 
 
-def test_noise_alone_is_no_answer_to_a_command():
-    output = np.random.default_rng(0).normal(size=93)
-    try:
-        fit = refused(output=output)
-    except dtm.NotIdentifiableError:
-        return
-    low, high = fit.ci(0.95, "gain")
-    assert low <= 0.0 <= high or fit.stderr["delay"] > 0.3 or not fit.adequate
+@pytest.mark.parametrize("method", ["output_error", "waveform"])
+@pytest.mark.parametrize("free", [("delay",), ("delay", "gain"), ("delay", "gain", "lag")])
+def test_noise_alone_is_no_answer_to_a_command(method, free):
+    flight, known = fly(noise=0.001)
+    for seed in range(6):
+        output = np.random.default_rng(seed).normal(size=len(flight))
+        noise = dtm.Recording(flight.time, flight.reference, output, flight.command)
+        with pytest.raises(dtm.NotIdentifiableError, match=r"no answer|runs away|told|depend"):
+            dtm.estimate_delay(noise, known, method=method, free=free)
 
 
 def test_an_estimate_without_a_profile_says_so():
-    flight, known = fly(noise=0.001)
-    fit = dtm.estimate_delay(flight, known, method="waveform")
+    flight, known = fly(noise=0.001, Kp=2.0)
+    fit = dtm.estimate_delay(flight, known, method="overshoot")
     with pytest.raises(ValueError, match="output_error"):
         fit.profile()
 

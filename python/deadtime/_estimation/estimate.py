@@ -6,13 +6,13 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
+from deadtime._estimation.evidence import check_setpoint_active
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
 from deadtime._estimation.result import DelayEstimate
+from deadtime._estimation.several import Flights, Window, each_flight
 from deadtime._estimation.waveform import estimate_by_waveform
 from deadtime._loop import ControlLoop
-from deadtime._plants import Integrator
-from deadtime._recording import Recording
 
 __all__ = ["METHODS", "estimate_delay"]
 
@@ -25,14 +25,17 @@ METHODS: Mapping[str, _Estimator] = {
     "overshoot": estimate_by_overshoot,
 }
 
+#: Those that fit several recordings together.
+JOINT = ("output_error", "waveform")
+
 
 def estimate_delay(
-    recording: Recording,
-    loop: ControlLoop,
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
     *,
     method: str = "auto",
     free: Sequence[str] = ("delay", "gain"),
-    window: tuple[float | None, float | None] | None = None,
+    window: Window = None,
     **options: Any,
 ) -> DelayEstimate:
     """Estimate the delay of a closed loop from a recording of it.
@@ -98,12 +101,11 @@ def estimate_delay(
     >>> round(fit.delay, 6), round(fit.gain, 6), fit.adequate
     (0.4, 0.8, True)
     """
-    if not isinstance(recording, Recording):
-        raise TypeError(f"recording is a {type(recording).__name__}, not a Recording")
-    if not isinstance(loop, ControlLoop):
-        raise TypeError(f"loop is a {type(loop).__name__}, not a ControlLoop")
+    flights = each_flight(recording, loop, window)
+    for one in flights:
+        check_setpoint_active(one.recording.window(*(one.window or (None, None))))
     if method == "auto":
-        logged = recording.command is not None and isinstance(loop.plant, Integrator)
+        logged = all(one.recording.command is not None for one in flights)
         method = "output_error" if logged else "waveform"
     if method not in METHODS:
         raise ValueError(
@@ -111,7 +113,15 @@ def estimate_delay(
         )
     estimator = METHODS[method]
     _check_options(method, estimator, options)
-    return estimator(recording, loop, window, free, **options)
+    if method in JOINT:
+        return estimator(recording, loop, window, free, **options)
+    if len(flights) > 1:
+        raise ValueError(
+            f"the {method} method takes one recording, not {len(flights)}: fit them together by "
+            f"{' or '.join(map(repr, JOINT))}"
+        )
+    (flight,) = flights
+    return estimator(flight.recording, flight.loop, flight.window, free, **options)
 
 
 def _check_options(method: str, estimator: _Estimator, options: Mapping[str, Any]) -> None:

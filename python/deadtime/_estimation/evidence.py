@@ -6,15 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._loop import ControlLoop
+from deadtime._recording import MINIMUM_SAMPLES, Recording
 
 __all__ = [
-    "FREE_NAMES",
+    "OF_THE_LOOP",
+    "OF_THE_VEHICLE",
+    "check_answers",
     "check_distinguishable",
+    "check_setpoint_active",
     "checked_names",
     "embedded",
+    "excited",
+    "slow_name",
     "standard_errors",
 ]
 
@@ -24,29 +31,41 @@ Array = NDArray[np.float64]
 #: rounding in difference quotients is at about 1e-8.
 INDISTINGUISHABLE = 1e-6
 
-#: What fits can determine, in the order they report.
-FREE_NAMES = ("delay", "gain", "lag")
+#: What the vehicle answers with, in the order fits report; `start` is how much later than the
+#: reference the clock of the output runs.
+OF_THE_VEHICLE = ("delay", "gain", "lag", "time_constant")
+OF_THE_LOOP = (*OF_THE_VEHICLE, "start", "sample_time", "limit")
+
+#: The response has to explain the output so much better than a constant does that noise, over all
+#: delays that are tried, would do so once in some hundred times.
+BY_CHANCE = 1e-4
+
+#: Share of the variance that may be left over in an answer without a test.
+UNEXPLAINED = 0.1
 
 
-def checked_names(free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
+def checked_names(
+    free: Sequence[str], loop: ControlLoop, known: tuple[str, ...] = OF_THE_VEHICLE
+) -> tuple[str, ...]:
     """Return the names of what is to be fitted, or raise where this loop has no such number."""
     if isinstance(free, str):
         free = (free,)
-    unknown = [name for name in free if name not in FREE_NAMES]
+    unknown = [name for name in free if name not in known]
     if unknown or not free:
-        raise ValueError(f"free={tuple(free)!r}: choose from {FREE_NAMES}, at least one")
-    missing = [name for name in free if name != "delay" and name not in loop.parameters]
+        raise ValueError(f"free={tuple(free)!r}: choose from {known}, at least one")
+    given = {"delay", "start"}
+    missing = [name for name in free if name not in given and name not in loop.parameters]
     if missing:
         raise ValueError(
-            f"the plant {loop.plant!r} has no {missing[0]} to fit: use an Integrator or a "
-            "FirstOrder, or leave it out of `free`"
+            f"this loop has no {missing[0]} to fit (its numbers are "
+            f"{', '.join(loop.parameters)}): give it one to start from, or leave it out of `free`"
         )
     if "delay" not in free and loop.delay is None:
         raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
-    return tuple(name for name in FREE_NAMES if name in free)
+    return tuple(name for name in known if name in free)
 
 
-def check_distinguishable(jacobian: Array, names: list[str]) -> None:
+def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
     """Refuse numbers that the recording does not part, by name."""
     norms = np.linalg.norm(jacobian, axis=0)
     if not np.all(np.isfinite(norms)) or np.any(norms == 0.0):
@@ -65,6 +84,46 @@ def check_distinguishable(jacobian: Array, names: list[str]) -> None:
         )
 
 
+def excited(recording: Recording) -> float:
+    """How far a recording was moved: by its reference, or else what its output did."""
+    return float(np.ptp(recording.reference)) or float(np.ptp(recording.output))
+
+
+def check_setpoint_active(recording: Recording) -> None:
+    """Refuse a reference that copies the output, as loggers write it while a mode is inactive."""
+    moving = np.flatnonzero(np.diff(recording.output)) + 1
+    copied = int(np.sum(recording.reference[moving] == recording.output[moving]))
+    if moving.size >= MINIMUM_SAMPLES and copied > 0.5 * moving.size:
+        raise NotIdentifiableError(
+            f"the reference equals the output in {copied} of the {moving.size} rows in which the "
+            "output moves: the setpoint is inactive there, or one column was read twice; choose a "
+            "window in which the controller follows a setpoint of its own"
+        )
+
+
+def check_answers(output: Array, misfit: Array, numbers: int, autocorrelation: float) -> None:
+    """Refuse an output that a constant explains about as well as the response does: noise alone.
+
+    The ratio is that of an F test, with as many samples as the colour of the misfit leaves; what
+    explains nearly all is no noise, however few those are.
+    """
+    centred = output - output.mean()
+    constant, fitted = float(centred @ centred), float(misfit @ misfit)
+    if fitted <= UNEXPLAINED * constant:
+        return
+    rho = min(0.99, max(0.0, autocorrelation))
+    samples = misfit.size * (1.0 - rho) / (1.0 + rho)
+    freedom = max(1.0, samples - numbers - 1)
+    ratio = (constant - fitted) / numbers * freedom / fitted
+    if not ratio > 0.0 or special.fdtrc(numbers, freedom, ratio) > BY_CHANCE:
+        explained = 100.0 * max(0.0, 1.0 - fitted / constant) if constant > 0.0 else 0.0
+        raise NotIdentifiableError(
+            f"the output is no answer to the excitation: the best response explains "
+            f"{explained:.0f} % of its variance, which noise alone would; check columns, signs and "
+            "gains, choose a window with a step, or record a larger one"
+        )
+
+
 def embedded(cov: Array, loose: list[int], size: int) -> Array:
     """Covariance of all parameters: what stands at its bound has none of its own."""
     full = np.zeros((size, size))
@@ -72,11 +131,17 @@ def embedded(cov: Array, loose: list[int], size: int) -> Array:
     return full
 
 
+def slow_name(names: Sequence[str]) -> str:
+    """Name of what delays beside the delay: the lag, or the time constant where that is fitted."""
+    return "time_constant" if "time_constant" in names else "lag"
+
+
 def standard_errors(names: tuple[str, ...], cov: Array) -> dict[str, float]:
     """Standard errors of `names`, and of ``delay+lag`` where the delay is among them."""
     errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
     if "delay" in names:
-        total = np.array([1.0 if name in ("delay", "lag") else 0.0 for name in names])
+        slow = slow_name(names)
+        total = np.array([1.0 if name in ("delay", slow) else 0.0 for name in names])
         count = len(names)
-        errors["delay+lag"] = float(np.sqrt(total @ cov[:count, :count] @ total))
+        errors[f"delay+{slow}"] = float(np.sqrt(total @ cov[:count, :count] @ total))
     return errors

@@ -43,6 +43,8 @@ class HeldResponse:
     def __init__(self, time: Array, command: Array) -> None:
         self.time, self.command = time, command
         self._steps = np.diff(time)
+        # A lag of less has died away before it matters, and would overflow below.
+        self._shortest = 1e-7 * float(self._steps.min(initial=np.inf))
         self._integral = np.concatenate([[0.0], np.cumsum(command[:-1] * self._steps)])
 
     def at(self, times: Array, lag: float = 0.0) -> Response:
@@ -53,9 +55,9 @@ class HeldResponse:
         since = np.where(before, 0.0, times - self.time[row])
         command = np.where(before, 0.0, self.command[row])
         integral = self._integral[row] + command * since
-        if lag == 0.0:
+        if lag <= self._shortest:
             # To first order a lag is a delay: dF/dlag = -v at no lag.
-            return Response(integral, command, -command)
+            return Response(integral - lag * command, command, -command)
         velocity, by_lag = self._velocities(lag)
         decay = np.exp(-since / lag)
         gap = np.where(before, 0.0, velocity[row] - command)

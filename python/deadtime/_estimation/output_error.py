@@ -2,344 +2,260 @@
 
     y(t_i) = b + a F(t_i - Td; lag) + noise,
 
-F the exact response of 1/(s (lag s + 1)) to the command as it was held (`held_response`), a the
-gain, b the output at the start. The command being known, noise that circulates in the loop and a
-limit are no matter, and least squares is maximum likelihood for white noise: the standard error
-is the Cramér-Rao bound. For a given delay and lag the best a and b are linear least squares
-(variable projection, Golub & Pereyra 1973), so the search is over delay and lag alone; its cost
-has several valleys over the delay, so a grid comes first. Where a lag is fitted too (it bends the
-cost, and may lie at zero, its bound) or samples are few, the intervals are those of the profile
-likelihood: all values whose best fit is worse by less than the t quantile squared allows.
+F the exact response of 1/(s (lag s + 1)), or of another plant, to the command as it was held
+(`plant_path`), a the gain, b the output at the start. The command being known, noise that
+circulates in the loop and a limit are no matter, and least squares is maximum likelihood for
+white noise: the standard error is the Cramér-Rao bound. For a given delay and lag the best a and b
+are linear least squares (variable projection, Golub & Pereyra 1973); the cost has several valleys
+over the delay, so a grid over delay and lag comes first.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, minimize_scalar
 
 from deadtime._controllers import P
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.evidence import (
-    check_distinguishable,
-    checked_names,
-    embedded,
-    standard_errors,
-)
-from deadtime._estimation.held_response import HeldResponse
-from deadtime._estimation.profile import Profile
-from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
-from deadtime._estimation.result import CramerRaoBound, DelayEstimate
+from deadtime._estimation.conclusion import Fitted, concluded, without_vanishing
+from deadtime._estimation.evidence import checked_names, excited
+from deadtime._estimation.joint import solve_jointly
+from deadtime._estimation.plant_path import Path, path_of
+from deadtime._estimation.result import DelayEstimate
+from deadtime._estimation.several import Flights, Window, each_flight
 from deadtime._loop import ControlLoop
-from deadtime._plants import Integrator
 from deadtime._recording import Recording
 
-__all__ = ["estimate_by_output_error"]
+__all__ = ["estimate_by_output_error", "estimate_from_commands"]
 
 Array = NDArray[np.float64]
-
-#: The best fit for one number, the others at their best or held.
-_Along: TypeAlias = Callable[[float], "_Fit"]
 
 #: Longest delay that is sought, as a part of the window.
 LONGEST = 0.6
 
-#: Points of the grid over the delay, at most; four to a sample if there are fewer.
+#: Points of the grid over the delay, at most; fewer where a sample has four, or one where a lag
+#: is searched, too, whose responses have no corners.
 MOST_POINTS = 600
 
-#: Lags of the grid, in samples.
+#: Lags of the grid, in samples, and factors on a time constant.
 LAGS = (0.0, 2.0, 8.0)
+FACTORS = (0.3, 1.0, 3.0)
 
-#: Fewer samples than this for each fitted number are few.
-FEW = 12
+#: Values that one block of the grid holds, so that long recordings need no memory for all of it.
+BLOCK = 200_000
+
+#: The command counts as computed only where rows are the controller's samples, to this part.
+ON_SAMPLES = 1e-3
 
 
 def estimate_by_output_error(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
+    window: Window,
     free: Sequence[str],
     initial_output: float | None = None,
 ) -> DelayEstimate:
     """Fit `free` to the response of the plant to the logged command."""
-    names = checked_names(free, loop)
-    if not isinstance(loop.plant, Integrator):
-        raise ValueError(
-            f"the output-error method is for an Integrator, the loop has a "
-            f"{type(loop.plant).__name__}: use method='waveform'"
-        )
-    problem = _problem(recording, loop, window, names, initial_output)
-    data = problem.recording
-    found = problem.solve()
-    residuals = -found.misfit
-    jacobian = problem.jacobian(found)
-    values = problem.values(found)
-    held = [name for name in ("lag",) if name in names and found.lag == 0.0]
-    labels = [*names, *(["initial output"] if problem.offset is None else [])]
-    loose = [i for i, name in enumerate(labels) if name not in held]
-    check_distinguishable(jacobian[:, loose], [labels[i] for i in loose])
-    whiteness = whiteness_of(residuals, len(names))
-    exact = float(np.max(np.abs(residuals))) <= 1e-9 * float(np.ptp(data.output))
-    size = jacobian.shape[1]
-    white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
-    spread = white
-    if not (whiteness.white or exact):
-        spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
-    count = len(names)
-    errors = standard_errors(names, spread)
-    reason = _why_not_gauss(found.lag, errors, len(data), count)
-    adequate = whiteness.white or exact
-    return DelayEstimate(
-        method="output_error",
-        loop=loop.replace(**values),
-        free=names,
-        stderr=errors,
-        cov=spread[:count, :count],
-        crb=CramerRaoBound(
-            tuple(labels),
-            math.sqrt(float(residuals @ residuals) / (residuals.size - len(loose))),
-            standard_errors(names, white),
-        ),
-        recording=data,
-        residuals=residuals,
-        whiteness=whiteness,
-        adequate=adequate,
-        message=_message(names, problem.reconstructed, adequate, reason),
-        details={"initial_output": found.offset, "command": problem.source},
-        _profile=Profile(
-            cost=problem.profile(found),
-            best=found.cost,
-            freedom=residuals.size - len(loose),
-            widening={
-                name: (errors[name] / error if error > 0.0 else 1.0)
-                for name, error in standard_errors(names, white).items()
-            },
-            preferred=reason,
-        ),
+    return estimate_from_commands("output_error", recording, loop, window, free, initial_output)
+
+
+def estimate_from_commands(
+    method: str,
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
+    window: Window,
+    free: Sequence[str],
+    initial_output: float | None = None,
+    computed: bool = False,
+) -> DelayEstimate:
+    """Fit to the response to the command: as logged, or `computed` as the controller makes it."""
+    flights = each_flight(recording, loop, window)
+    names = checked_names(free, flights[0].loop)
+    models = [
+        _model(flight.recording, flight.loop, flight.window, names, initial_output, computed)
+        for flight in flights
+    ]
+    model, found = solve_jointly(models)
+    found = without_vanishing(model, found)
+    longest = min(LONGEST * one.span for one in models)
+    delay = dict(zip(names, found.point.tolist(), strict=False)).get("delay", 0.0)
+    if delay >= longest * (1.0 - 1e-3):
+        _runs_away(longest)
+    sources = {one.source for one in models}
+    done = f"least squares over {', '.join(names)} on the response to the command"
+    if sources != {"logged"}:
+        done += ", which was not logged but computed from reference and output"
+    advice = "" if {"lag", "time_constant"} & set(names) else " (try free=('delay', 'gain', 'lag'))"
+    start = found.point[len(names) :] if initial_output is None else [initial_output]
+    return concluded(
+        method,
+        model,
+        found,
+        [Fitted(one.recording, flight.loop) for one, flight in zip(models, flights, strict=True)],
+        message=done,
+        details={"initial_output": float(start[0]), "command": " or ".join(sorted(sources))},
+        advice=advice,
     )
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """Delay, lag, gain and output at the start, and simulated minus recorded output."""
-
-    delay: float
-    lag: float
-    gain: float
-    offset: float
-    misfit: Array
-
-    @cached_property
-    def cost(self) -> float:
-        return float(self.misfit @ self.misfit)
-
-
 @dataclass(frozen=True, eq=False)
-class _Problem:
-    """The least-squares problem, gain and offset projected out."""
+class _Model:
+    """Misfit of one recording; parameters are `names`, then the output at the start if free."""
 
     recording: Recording
-    response: HeldResponse
+    path: Path
     names: tuple[str, ...]
-    known: dict[str, float]
+    known: Mapping[str, float]
     offset: float | None
     source: str
 
     @property
-    def reconstructed(self) -> bool:
-        return self.source != "logged"
+    def labels(self) -> tuple[str, ...]:
+        return (*self.names, *(["initial output"] if self.offset is None else []))
+
+    @cached_property
+    def size(self) -> float:
+        return excited(self.recording)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return (len(self.recording),)
 
     @cached_property
     def span(self) -> float:
         return float(self.recording.time[-1] - self.recording.time[0])
 
-    def at(self, delay: float, lag: float, gain: float | None = None) -> _Fit:
-        """The best gain and offset for this delay and lag, `gain` fixed if given."""
-        if gain is None and "gain" not in self.names:
-            gain = self.known["gain"]
-        data = self.recording
-        path = self.response.at(data.time - delay, lag).value
-        target = data.output if self.offset is None else data.output - self.offset
-        centre, level = 0.0, 0.0
-        if self.offset is None:
-            centre, level = float(path.mean()), float(target.mean())
-        moved, wanted = path - centre, target - level
-        if gain is None:
-            power = float(moved @ moved)
-            gain = float(moved @ wanted) / power if power > 0.0 else 0.0
-        offset = level - gain * centre if self.offset is None else self.offset
-        return _Fit(delay, lag, gain, offset, gain * moved - wanted)
-
-    def values(self, fit: _Fit) -> dict[str, float]:
-        found = {"delay": fit.delay, "gain": fit.gain, "lag": fit.lag}
-        return {name: found[name] for name in self.names}
-
-    def jacobian(self, fit: _Fit) -> Array:
-        """Derivatives of the simulated output by `names`, then by the offset if it is fitted."""
-        response = self.response.at(self.recording.time - fit.delay, fit.lag)
-        columns = {
-            "delay": -fit.gain * response.rate,
-            "gain": response.value,
-            "lag": fit.gain * response.by_lag,
-        }
-        found = [columns[name] for name in self.names]
-        if self.offset is None:
-            found.append(np.ones(len(self.recording)))
-        return np.stack(found, axis=1)
-
-    def solve(self) -> _Fit:
-        """The best fit, from the best points of a grid."""
-        if "delay" not in self.names:
-            return self._over_lag(self.known["delay"])
-        best = self._over_delay(self.known["lag"])
-        if "lag" not in self.names:
-            return best
-        starts = [self._over_delay(lag * self._sample, coarse=True) for lag in LAGS]
-        for start in sorted(starts, key=lambda fit: fit.cost)[:2]:
-            found = self._over_both(start)
-            # At its bound a lag is worth something only if it improves the fit.
-            if found.cost < best.cost * (1.0 - 1e-9):
-                best = found
-        return best
-
     @cached_property
     def _sample(self) -> float:
-        return float(np.median(np.diff(self.recording.time)))
+        return self.recording.sample_time
 
-    def _over_delay(self, lag: float, gain: float | None = None, coarse: bool = False) -> _Fit:
-        """The best delay for a lag."""
+    def _ends(self, name: str) -> tuple[float, float]:
+        size = abs(self.known.get(name, 0.0))
+        return {
+            "delay": (0.0, LONGEST * self.span),
+            "lag": (0.0, self.span),
+            "time_constant": (1e-3 * size, 1e3 * size),
+        }.get(name, (-np.inf, np.inf))
+
+    @cached_property
+    def low(self) -> Array:
+        return np.array([self._ends(label)[0] for label in self.labels])
+
+    @cached_property
+    def high(self) -> Array:
+        return np.array([self._ends(label)[1] for label in self.labels])
+
+    @cached_property
+    def scale(self) -> Array:
+        sizes = {"delay": self._sample, "lag": self._sample, "initial output": self.size}
+        return np.array(
+            [sizes.get(label, abs(self.known.get(label, 1.0))) for label in self.labels]
+        )
+
+    def _values(self, point: Array) -> dict[str, float]:
+        return {**self.known, **dict(zip(self.names, point.tolist(), strict=False))}
+
+    def misfit(self, point: Array) -> Array:
+        values = self._values(point)
+        offset = float(point[-1]) if self.offset is None else self.offset
+        path = self.path.value(self.recording.time - values["delay"], values)
+        return values["gain"] * path + (offset - self.recording.output)
+
+    def jacobian(self, point: Array) -> Array:
+        values = self._values(point)
+        times = self.recording.time - values["delay"]
+        slopes = self.path.slopes(times, values, self.names)
+        columns = {name: values["gain"] * slope for name, slope in slopes.by.items()}
+        columns["delay"] = -values["gain"] * slopes.rate
+        if "gain" in self.names:
+            columns["gain"] = self.path.value(times, values)
+        columns["initial output"] = np.ones(len(self.recording))
+        return np.stack([columns[label] for label in self.labels], axis=1)
+
+    def starts(self) -> list[Array]:
+        """The best points of a grid over delay and lag, gain and offset at their best."""
+        found = []
+        for slow in self._slow_grid():
+            values = {**self.known, **slow}
+            delays = self._delays(4 if not slow else 1)
+            costs, gains, offsets = self._projected(delays, values)
+            inner = np.r_[np.inf, costs, np.inf]
+            valleys = np.flatnonzero((costs <= inner[:-2]) & (costs <= inner[2:]))
+            for place in valleys[np.argsort(costs[valleys])][:2]:
+                values |= {"delay": float(delays[place]), "gain": float(gains[place])}
+                point = [values[name] for name in self.names]
+                tail = [float(offsets[place])] if self.offset is None else []
+                found.append((float(costs[place]), np.array([*point, *tail])))
+        return [point for _, point in sorted(found, key=lambda pair: pair[0])]
+
+    def _slow_grid(self) -> list[dict[str, float]]:
+        if "lag" in self.names:
+            return [{"lag": lag * self._sample} for lag in LAGS]
+        if "time_constant" in self.names:
+            size = self.known["time_constant"]
+            return [{"time_constant": factor * size} for factor in FACTORS]
+        return [{}]
+
+    def _delays(self, each: int) -> Array:
+        """The grid over the delay, so many points a sample, or the delay if it is known."""
+        if "delay" not in self.names:
+            return np.array([self.known["delay"]])
         longest = LONGEST * self.span
-        each = 1 if coarse else 4
         points = int(min(MOST_POINTS, max(2.0, each * longest / self._sample)))
-        grid = np.linspace(0.0, longest, points + 1)
-        costs = [self.at(float(delay), lag, gain).cost for delay in grid]
-        place = int(np.argmin(costs))
-        ends = grid[max(0, place - 1)], grid[min(points, place + 1)]
-        if place == points:
-            raise NotIdentifiableError(
-                f"the fit runs away to a delay of {longest:g} s, {LONGEST:g} of the window: the "
-                "output is no answer to this command; check columns and units, or choose a longer "
-                "window"
-            )
-        if coarse:
-            return self.at(float(grid[place]), lag, gain)
-        return self._polished(self._best_in(*ends, lambda delay: self.at(delay, lag, gain)))
+        return np.linspace(0.0, longest, points + 1)
 
-    @staticmethod
-    def _best_in(low: float, high: float, at: _Along) -> _Fit:
-        """The best fit along one number between two ends, the ends included."""
-        found = minimize_scalar(
-            lambda value: at(float(value)).cost,
-            bounds=(low, high),
-            method="bounded",
-            options={"xatol": 1e-10 * max(high, 1e-3)},
-        )
-        return min((at(float(found.x)), at(low), at(high)), key=lambda fit: fit.cost)
+    def _projected(self, delays: Array, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
+        """Cost at each delay with the best gain and offset, and these."""
+        rows = max(1, BLOCK // len(self.recording))
+        blocks = [
+            self._projected_block(delays[first : first + rows], values)
+            for first in range(0, delays.size, rows)
+        ]
+        costs, gains, offsets = (np.concatenate(part) for part in zip(*blocks, strict=True))
+        return costs, gains, offsets
 
-    def _polished(self, fit: _Fit) -> _Fit:
-        """Gauss-Newton steps in the delay while they help.
-
-        A scalar search for the least cost ends at half of the digits.
-        """
-        for _ in range(4):
-            rate = self.response.at(self.recording.time - fit.delay, fit.lag).rate
-            column = -fit.gain * (rate - rate.mean() if self.offset is None else rate)
-            power = float(column @ column)
-            if power == 0.0:
-                break
-            moved = fit.delay - float(column @ fit.misfit) / power
-            if moved < 0.0:
-                break
-            better = self.at(moved, fit.lag, None if "gain" in self.names else fit.gain)
-            if not better.cost < fit.cost:
-                break
-            fit = better
-        return fit
-
-    def _over_lag(self, delay: float, gain: float | None = None) -> _Fit:
-        """The best lag for a delay."""
-        if "lag" not in self.names:
-            return self.at(delay, self.known["lag"], gain)
-        grid = np.concatenate([[0.0], np.geomspace(1e-2 * self._sample, 0.3 * self.span, 16)])
-        costs = [self.at(delay, float(lag), gain).cost for lag in grid]
-        place = int(np.argmin(costs))
-        low, high = grid[max(0, place - 1)], grid[min(len(grid) - 1, place + 1)]
-
-        def at(lag: float) -> _Fit:
-            return self.at(delay, lag, gain)
-
-        return self._best_in(float(low), float(high), at)
-
-    def _over_both(self, start: _Fit, gain: float | None = None) -> _Fit:
-        """The best delay and lag near a start."""
-
-        def misfit(point: Array) -> Array:
-            return self.at(float(point[0]), float(point[1]), gain).misfit
-
-        found = least_squares(
-            misfit,
-            [start.delay, max(start.lag, 0.5 * self._sample)],
-            bounds=([0.0, 0.0], [self.span, self.span]),
-            x_scale=[self._sample, self._sample],
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-12,
-            max_nfev=60,
-        )
-        return self.at(float(found.x[0]), float(found.x[1]), gain)
-
-    def profile(self, best: _Fit) -> _ProfileCost:
-        return _ProfileCost(self, best)
+    def _projected_block(
+        self, delays: Array, values: Mapping[str, float]
+    ) -> tuple[Array, Array, Array]:
+        path = self.path.value(self.recording.time - delays[:, None], values)
+        target = self.recording.output - (self.offset or 0.0)
+        centres = path.mean(axis=1) if self.offset is None else np.zeros(delays.size)
+        level = float(target.mean()) if self.offset is None else 0.0
+        moved, wanted = path - centres[:, None], target - level
+        power = np.einsum("ij,ij->i", moved, moved)
+        if "gain" in self.names:
+            gains = np.divide(moved @ wanted, power, out=np.zeros(delays.size), where=power > 0.0)
+        else:
+            gains = np.full(delays.size, values["gain"])
+        left = wanted - gains[:, None] * moved
+        return np.einsum("ij,ij->i", left, left), gains, level - gains * centres
 
 
-@dataclass(frozen=True)
-class _ProfileCost:
-    """Least cost with one quantity held, the others free."""
-
-    problem: _Problem
-    best: _Fit
-
-    def __call__(self, name: str, value: float) -> float:
-        problem = self.problem
-        if name == "delay":
-            return problem._over_lag(value).cost
-        if name == "lag":
-            return self._near(lambda delay: problem.at(delay, value)).cost
-        if name == "gain":
-            if "delay" not in problem.names:
-                return problem._over_lag(self.best.delay, value).cost
-            if "lag" not in problem.names:
-                return self._near(lambda delay: problem.at(delay, self.best.lag, value)).cost
-            return problem._over_both(self.best, value).cost
-        # delay+lag: the sum held, its parts free
-        if "lag" not in problem.names:
-            return problem.at(max(0.0, value - self.best.lag), self.best.lag).cost
-        return problem._best_in(0.0, value, lambda lag: problem.at(value - lag, lag)).cost
-
-    def _near(self, at: _Along) -> _Fit:
-        """Over the delay, around the best sum of delay and lag: no other valley is meant."""
-        reach = self.best.delay + self.best.lag + 4.0 * self.problem._sample
-        return self.problem._best_in(0.0, reach, at)
+def _runs_away(longest: float) -> None:
+    raise NotIdentifiableError(
+        f"the fit runs away to a delay of {longest:g} s, {LONGEST:g} of the window: the output is "
+        "no answer to this command; check columns and units, or choose a longer window"
+    )
 
 
-def _problem(
+def _model(
     recording: Recording,
     loop: ControlLoop,
     window: tuple[float | None, float | None] | None,
     names: tuple[str, ...],
     initial_output: float | None,
-) -> _Problem:
+    computed: bool,
+) -> _Model:
     """Commands up to the end of the window, from before its start where the rows tell them."""
     ends = window or (None, None)
     rows = recording.rows(*ends)
     data = recording.window(*ends)
-    command, source = _commands(recording, loop)
+    command, source = _commands(recording, loop, computed)
     command = command[: rows.stop]
     if len(data) < 2 * (len(names) + 2):
         raise NotIdentifiableError(
@@ -355,53 +271,32 @@ def _problem(
         raise NotIdentifiableError(
             f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
         )
-    return _Problem(
+    return _Model(
         recording=data,
-        response=HeldResponse(recording.time[: rows.stop], command),
+        path=path_of(loop.plant, recording.time[: rows.stop], command),
         names=names,
-        known={
-            "gain": loop.parameters["gain"],
-            "lag": loop.parameters["lag"],
-            "delay": 0.0 if loop.delay is None else loop.delay,
-        },
+        known={"delay": 0.0, "gain": 1.0, **loop.parameters},
         offset=initial_output,
         source=source,
     )
 
 
-def _commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]:
+def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[Array, str]:
     """The command of every row: logged, or as the controller makes it of reference and output."""
     limit = math.inf if loop.limit is None else loop.limit
-    if recording.command is not None:
+    if recording.command is not None and not computed:
         return np.clip(recording.command, -limit, limit), "logged"
     if loop.sample_time is None or not isinstance(loop.controller, P):
         raise NotIdentifiableError(
             "the recording holds no command, and only that of a sampled P controller can be "
             "computed from reference and output: log the command, or use method='waveform'"
         )
+    between = recording.sample_time
+    if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
+        raise NotIdentifiableError(
+            f"rows are {between:g} s apart and the controller samples every {loop.sample_time:g} "
+            "s: its command cannot be computed from rows it did not see; log the command, or use "
+            "method='waveform'"
+        )
     command = loop.controller.Kp * (recording.reference - recording.output)
     return np.clip(command, -limit, limit), "computed from reference and output"
-
-
-def _why_not_gauss(lag: float, errors: dict[str, float], samples: int, numbers: int) -> str:
-    if "lag" in errors:
-        return "the lag came out at zero, its bound" if lag == 0.0 else "delay and lag are alike"
-    if samples < FEW * (numbers + 1):
-        return f"{samples} samples are few"
-    return ""
-
-
-def _message(names: tuple[str, ...], reconstructed: bool, adequate: bool, reason: str) -> str:
-    text = f"least squares over {', '.join(names)} on the response to the command"
-    if reconstructed:
-        text += ", which was not logged but computed from reference and output"
-    if reason:
-        text += f"; {reason}, so intervals are those of the profile likelihood"
-    if not adequate:
-        text += (
-            "; the residuals are not white, so the model is only an equivalent of the vehicle and "
-            "the intervals are robust ones"
-        )
-        if "lag" not in names:
-            text += " (try free=('delay', 'gain', 'lag'))"
-    return text

@@ -16,12 +16,20 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import brentq
 
-__all__ = ["Profile"]
+__all__ = ["Profile", "floor_of"]
 
 Array = NDArray[np.float64]
 
 #: An end of an interval is sought no farther than this many times its Gaussian distance.
 FARTHEST = 64.0
+
+#: Ends are found to this part of a standard error.
+END = 1e-4
+
+
+def floor_of(name: str) -> float:
+    """Below what a quantity cannot be: times cannot be negative, gains and clocks can."""
+    return -np.inf if name in ("gain", "start") else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +64,9 @@ class Profile:
         return worse / (scale * widening**2) if scale > 0.0 else float(np.inf) * (worse > 0.0)
 
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
-        """Ends of the interval around the fitted `value`, no lower than zero but for a gain."""
+        """Ends of the interval around the fitted `value`, no lower than it can be."""
         quantile = float(special.stdtrit(self.freedom, 0.5 + level / 2)) ** 2
-        floor = -np.inf if name == "gain" else 0.0
+        floor = floor_of(name)
         reach = max(stderr, 1e-9 * abs(value), 1e-12)
         return self._end(name, value, -reach, quantile, floor), self._end(
             name, value, reach, quantile, floor
@@ -76,6 +84,6 @@ class Profile:
                     return floor
                 outer = floor - value
             if excess(outer) > 0.0:
-                return value + float(brentq(excess, inner, outer, xtol=1e-6 * abs(reach)))
+                return value + float(brentq(excess, inner, outer, xtol=END * abs(reach)))
             inner, factor = outer, 2.0 * factor
         return value + inner

@@ -9,13 +9,14 @@ bandwidth is Andrews' (1991, eq. 6.2 and 6.4) plug-in for the Bartlett kernel.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-__all__ = ["Whiteness", "robust_covariance", "white_covariance", "whiteness_of"]
+__all__ = ["Whiteness", "pieces_of", "robust_covariance", "white_covariance", "whiteness_of"]
 
 #: Residuals are called coloured when white ones would look so only this seldom.
 SIGNIFICANCE = 0.01
@@ -30,11 +31,12 @@ class Whiteness:
     Attributes
     ----------
     statistic : float
-        Q, chi-squared with `lags` degrees of freedom for white residuals.
+        Q, chi-squared with `lags` degrees of freedom (less the fitted numbers, summed over
+        recordings) for white residuals.
     p_value : float
         How often white residuals come out at least as coloured.
     lags : int
-        Number of autocorrelations in Q.
+        Number of autocorrelations in Q, of one recording.
     autocorrelation : float
         The autocorrelation at lag one.
     """
@@ -50,21 +52,34 @@ class Whiteness:
         return self.p_value > SIGNIFICANCE
 
 
-def whiteness_of(residuals: Array, parameters: int = 0) -> Whiteness:
+def whiteness_of(
+    residuals: Array, parameters: int = 0, sizes: Sequence[int] | None = None
+) -> Whiteness:
     """Test residuals of a fit with so many `parameters` for whiteness.
 
-    Residuals that vanish to rounding pass: there is nothing left in them.
+    Residuals of several recordings, of these `sizes`, are tested one recording at a time, and
+    their statistics added. Residuals that vanish to rounding pass: there is nothing left in them.
     """
-    n = residuals.size
-    centred = residuals - residuals.mean()
-    power = float(centred @ centred)
-    lags = max(1, min(20, n // 4))
-    if power == 0.0:
-        return Whiteness(0.0, 1.0, lags, 0.0)
-    rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
-    statistic = float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-    freedom = max(1, lags - parameters)
-    return Whiteness(statistic, float(special.chdtrc(freedom, statistic)), lags, float(rho[0]))
+    statistic, freedom, first, weight = 0.0, -parameters, 0.0, 0.0
+    longest = 1
+    for piece in pieces_of(residuals, sizes):
+        n = piece.size
+        centred = piece - piece.mean()
+        power = float(centred @ centred)
+        lags = max(1, min(20, n // 4))
+        longest, freedom = max(longest, lags), freedom + lags
+        if power == 0.0:
+            continue
+        rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
+        statistic += float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
+        first, weight = first + n * float(rho[0]), weight + n
+    p_value = float(special.chdtrc(max(1, freedom), statistic))
+    return Whiteness(statistic, p_value, longest, first / weight if weight else 0.0)
+
+
+def pieces_of(values: Array, sizes: Sequence[int] | None) -> list[Array]:
+    """Rows that belong to recordings of these sizes."""
+    return [values] if sizes is None else np.split(values, np.cumsum(sizes)[:-1])
 
 
 def white_covariance(jacobian: Array, residuals: Array) -> Array:
@@ -74,15 +89,22 @@ def white_covariance(jacobian: Array, residuals: Array) -> Array:
     return np.asarray(variance * _inverse_information(jacobian))
 
 
-def robust_covariance(jacobian: Array, residuals: Array) -> Array:
-    """Covariance of the parameters that holds for autocorrelated residuals too."""
+def robust_covariance(
+    jacobian: Array, residuals: Array, sizes: Sequence[int] | None = None
+) -> Array:
+    """Covariance of the parameters that holds for autocorrelated residuals too.
+
+    Recordings, of these `sizes`, are independent of each other.
+    """
     n, k = jacobian.shape
-    scores = jacobian * residuals[:, None]
-    spread = scores.T @ scores
-    bandwidth = _bandwidth(residuals)
-    for lag in range(1, bandwidth + 1):
-        product = scores[lag:].T @ scores[:-lag]
-        spread += (1.0 - lag / (bandwidth + 1)) * (product + product.T)
+    spread = np.zeros((k, k))
+    scored = pieces_of(jacobian * residuals[:, None], sizes)
+    for scores, piece in zip(scored, pieces_of(residuals, sizes), strict=True):
+        spread += scores.T @ scores
+        bandwidth = _bandwidth(piece)
+        for lag in range(1, bandwidth + 1):
+            product = scores[lag:].T @ scores[:-lag]
+            spread += (1.0 - lag / (bandwidth + 1)) * (product + product.T)
     bread = _inverse_information(jacobian)
     # n/(n-k): the small-sample factor that makes the white case agree with the usual estimate
     return np.asarray(bread @ spread @ bread * (n / (n - k)))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from deadtime._estimation.profile import Profile
+from deadtime._estimation.profile import Profile, floor_of
 from deadtime._estimation.residuals import Whiteness
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
@@ -21,9 +21,12 @@ from deadtime._validation import real_array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["CramerRaoBound", "DelayEstimate"]
+__all__ = ["CramerRaoBound", "DelayEstimate", "Flight"]
 
 Array = NDArray[np.float64]
+
+#: Quantities that are no times; a limit and a gain have the unit of command and output.
+UNITLESS = ("gain", "limit")
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,28 @@ class CramerRaoBound:
     free: tuple[str, ...]
     noise: float
     stderr: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Flight(ReadOnlyArrays):
+    """One of the recordings of a fit.
+
+    Attributes
+    ----------
+    recording : Recording
+        The window of it that was fitted.
+    loop : ControlLoop
+        The loop that flew it, with the fitted numbers put in.
+    residuals : ndarray, shape (n,)
+        Recorded minus simulated output.
+    """
+
+    recording: Recording
+    loop: ControlLoop
+    residuals: Array
+
+    def __post_init__(self) -> None:
+        read_only(self.residuals)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,6 +104,9 @@ class DelayEstimate(ReadOnlyArrays):
         Why there is no interval; empty where there is one.
     details : dict
         Quantities of the method alone, such as the overshoot.
+    others : tuple of Flight
+        The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
+        the first.
     """
 
     method: str
@@ -94,11 +122,17 @@ class DelayEstimate(ReadOnlyArrays):
     message: str
     uncalibrated: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
+    others: tuple[Flight, ...] = ()
     _profile: Profile | None = None
 
     def __post_init__(self) -> None:
         read_only(self.cov)
         read_only(self.residuals)
+
+    @property
+    def flights(self) -> tuple[Flight, ...]:
+        """All recordings that were fitted together, the first one included."""
+        return (Flight(self.recording, self.loop, self.residuals), *self.others)
 
     @property
     def delay(self) -> float:
@@ -127,8 +161,9 @@ class DelayEstimate(ReadOnlyArrays):
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals, in the unit of the output."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
+        """Root mean square of the residuals of all recordings, in the unit of the output."""
+        squares = [flight.residuals**2 for flight in self.flights]
+        return float(np.sqrt(np.mean(np.concatenate(squares))))
 
     def ci(self, level: float = 0.95, name: str = "delay") -> tuple[float, float]:
         """Confidence interval of a fitted quantity.
@@ -138,7 +173,7 @@ class DelayEstimate(ReadOnlyArrays):
         level : float
             Between 0 and 1.
         name : str
-            One of `free`, or ``"delay+lag"``.
+            One of `free`, or ``"delay+lag"`` (``"delay+time_constant"`` where that was fitted).
 
         Returns
         -------
@@ -162,12 +197,10 @@ class DelayEstimate(ReadOnlyArrays):
         value = self._value(name)
         if self._profile is not None and self._profile.preferred:
             return self._profile.interval(name, value, self._reach(name), level)
-        freedom = max(1, self.residuals.size - len(self.free))
+        freedom = max(1, sum(one.residuals.size for one in self.flights) - len(self.free))
         reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
         low = value - reach
-        if name != "gain":
-            low = max(0.0, low)
-        return (low, value + reach)
+        return (max(low, floor_of(name)), value + reach)
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
         """How much worse the best fit gets when one quantity is held.
@@ -191,14 +224,16 @@ class DelayEstimate(ReadOnlyArrays):
             When the method has no profile or the quantity was not fitted.
         """
         if self._profile is None:
-            raise ValueError(f"the {self.method} method has no profile; method='output_error' has")
+            raise ValueError(
+                f"the {self.method} method has no profile; 'output_error' and 'waveform' have"
+            )
         if name not in self.stderr:
             raise ValueError(
                 f"{name!r} was not fitted, there are profiles for {', '.join(self.stderr)}"
             )
         if values is None:
             middle, reach = self._value(name), 4.0 * self._reach(name)
-            low = middle - reach if name == "gain" else max(0.0, middle - reach)
+            low = max(middle - reach, floor_of(name))
             values = np.linspace(low, middle + reach, 41)
         held = np.atleast_1d(real_array("values", values))
         found = [self._profile.statistic(name, float(value)) for value in held]
@@ -206,9 +241,8 @@ class DelayEstimate(ReadOnlyArrays):
 
     def _value(self, name: str) -> float:
         """The fitted value of a quantity."""
-        if name == "delay+lag":
-            return self.delay_plus_lag
-        return float(self.loop.parameters[name])
+        known = {**self.loop.parameters, **self.details}
+        return float(sum(known.get(part, 0.0) for part in name.split("+")))
 
     def _reach(self, name: str) -> float:
         """About one standard error; where a quantity is at its bound, that of the delay."""
@@ -242,10 +276,13 @@ class DelayEstimate(ReadOnlyArrays):
     def summary(self) -> str:
         """The result as a few lines of text."""
         lines = [f"{self.method}: {self.message}"]
-        units = {"delay": "s", "lag": "s", "delay+lag": "s", "gain": ""}
-        values = dict(self.loop.parameters) | {"delay+lag": self.delay_plus_lag}
+        if self.others:
+            rows = " + ".join(str(len(flight.recording)) for flight in self.flights)
+            lines.append(f"  {len(self.flights)} recordings together, {rows} samples")
+        width = max((len(name) for name in self.stderr), default=0) + 1
         for name, stderr in self.stderr.items():
-            line = f"  {name:<10}{values[name]:9.4f} {units.get(name, ''):<2}"
+            unit = "" if name in UNITLESS else "s"
+            line = f"  {name:<{width}}{self._value(name):9.4f} {unit:<2}"
             if self.calibrated:
                 low, high = self.ci(0.95, name)
                 line += f" ± {stderr:.4f}   95 % interval {low:.4f} to {high:.4f}"
@@ -261,7 +298,7 @@ class DelayEstimate(ReadOnlyArrays):
         return "\n".join(lines)
 
     def plot(self) -> Figure:
-        """Fit over data, and the residuals; needs matplotlib."""
+        """Fit over data, the residuals, and the profile of the delay; needs matplotlib."""
         from deadtime._plots import plot_estimate
 
         return plot_estimate(self)

@@ -7,15 +7,18 @@ loop still has the commands of its last delay on the way, which the rows before 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._controllers import P
 from deadtime._errors import RecordingError
+from deadtime._estimation.evidence import excited
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
+from deadtime._response import Response
 
 __all__ = ["SimulatedRecording"]
 
@@ -23,6 +26,15 @@ Array = NDArray[np.float64]
 
 #: Longest window, in samples of the recording and in samples of the loop.
 MOST_SAMPLES = 50_000
+
+#: Difference quotients: part of a number, of the time between two samples, or of the step.
+STEP = 1e-5
+
+#: In place of none, where none cannot be differentiated at: part of the time between two samples.
+SHORT = 0.25
+
+IN_S = frozenset({"delay", "lag", "start"})
+NOT_NEGATIVE = frozenset({"delay", "lag"})
 
 
 class SimulatedRecording:
@@ -52,19 +64,80 @@ class SimulatedRecording:
 
     def output(self, values: Mapping[str, float], start: float) -> Array:
         """Output of the loop with these numbers, from rest at the output `start`."""
+        return self._run(values, start).outputs
+
+    def slopes(self, values: Mapping[str, float], start: float) -> dict[str, Array]:
+        """Derivatives of the output by each of `values` and its start (``initial output``).
+
+        Exact where the loop has sensitivities, difference quotients elsewhere; the output itself
+        is there as ``output``.
+        """
+        exact = [name for name in values if name in self._differentiable]
+        loop = self.loop.replace(**_of_the_loop(values))
+        # Next to none, a lag delays like a delay, to first order exactly so.
+        no_lag = loop.parameters.get("lag") == 0.0
+        if no_lag and "lag" in exact:
+            exact = [*(name for name in exact if name not in ("lag", "delay")), "delay"]
+        if loop.delay == 0.0 and not loop.is_sampled:
+            exact = [name for name in exact if name != "delay"]
+        run = self._run(values, start, exact)
+        found = {"output": run.outputs, **run.sensitivities}
+        if no_lag and "delay" in found:
+            found["lag"] = found["delay"]
+        for name in values:
+            if name not in found:
+                found[name] = self._quotient(values, start, name)
+        change = STEP * excited(self.recording)
+        found["initial output"] = (self.output(values, start + change) - run.outputs) / change
+        return found
+
+    def _quotient(self, values: Mapping[str, float], start: float, name: str) -> Array:
+        """Difference quotient by one number, one-sided where the number cannot be less."""
+        value = values[name]
+        change = STEP * max(abs(value), self.recording.sample_time if name in IN_S else 0.0)
+        if value == 0.0 and name in NOT_NEGATIVE and not self.loop.is_sampled:
+            # A shorter one makes the loop stiff; at their bound these have no error bars anyway.
+            change = SHORT * self.recording.sample_time
+        low = max(0.0, value - change) if name in NOT_NEGATIVE else value - change
+        higher = self.output({**values, name: value + change}, start)
+        return (higher - self.output({**values, name: low}, start)) / (value + change - low)
+
+    @cached_property
+    def _differentiable(self) -> frozenset[str]:
+        smooth = self.loop.controller._filter
+        on_samples = smooth is not None and smooth.discretisation is not None
+        if on_samples and self.loop.is_sampled:
+            return frozenset()
+        return frozenset({"delay", *self.loop.parameters})
+
+    def _run(
+        self, values: Mapping[str, float], start: float, sensitivities: Sequence[str] = ()
+    ) -> Response:
         window = self.recording
-        response = self.loop.replace(**values).simulate(
-            window.time,
+        # A clock of the output that runs late: what it calls t was at t - late.
+        late = values.get("start", 0.0)
+        loop = self.loop.replace(**_of_the_loop(values))
+        phase = 0.0
+        if loop.sample_time is not None:
+            phase = late % loop.sample_time
+            phase = 0.0 if phase >= loop.sample_time else phase
+        return loop.simulate(
+            window.time - late,
             window.reference,
             reference_time=window.time,
             initial_output=start,
             command_history=self._past,
+            sample_phase=phase,
+            sensitivities=sensitivities,
         )
-        return response.outputs
 
     def residuals(self, values: Mapping[str, float], start: float) -> Array:
         """Recorded minus simulated output."""
         return self.recording.output - self.output(values, start)
+
+
+def _of_the_loop(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if name != "start"}
 
 
 def _check_work(window: Recording, loop: ControlLoop) -> None:

@@ -1,0 +1,179 @@
+"""Least squares over named parameters: a minimum, and the minimum with one quantity held.
+
+A model gives the misfit (simulated minus recorded output) of its recordings and the derivatives
+of it. The search is scipy's trust-region method from a few starts, because a delay's cost has
+several valleys. With a quantity held, the other parameters move on: delay + lag is held by moving
+the delay against the lag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+__all__ = ["Minimum", "Model", "ProfileCost", "minimise", "solve"]
+
+Array = NDArray[np.float64]
+
+#: Starts that are refined; the best of them wins.
+REFINED = 3
+
+#: Evaluations of one search, at most.
+EVALUATIONS = 200
+
+#: Where a search ends, as a change of cost or parameters: at rounding for the answer; earlier where
+#: minima are compared, or only the cost is wanted, which is flat there.
+TO_ROUNDING, TO_COMPARE = 1e-14, 1e-7
+
+
+class Model(Protocol):
+    """Misfit of one or several recordings as a function of parameters.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Names of the parameters: those that are asked for first, then those fitted along.
+    names : tuple of str
+        Those that are asked for.
+    low, high, scale : ndarray, shape (p,)
+        Bounds, and sizes that matter.
+    size : float
+        How far the recording was moved.
+    sizes : tuple of int
+        Samples of each recording, in the order in which they stand in the misfit.
+    """
+
+    @property
+    def labels(self) -> tuple[str, ...]: ...
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def low(self) -> Array: ...
+    @property
+    def high(self) -> Array: ...
+    @property
+    def scale(self) -> Array: ...
+    @property
+    def size(self) -> float: ...
+    @property
+    def sizes(self) -> tuple[int, ...]: ...
+    def misfit(self, point: Array) -> Array:
+        """Simulated minus recorded output, shape (n,)."""
+
+    def jacobian(self, point: Array) -> Array:
+        """Derivatives of the misfit, shape (n, p)."""
+
+    def starts(self) -> list[Array]:
+        """Points to search from, the most promising first."""
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where a search ended: the parameters, the misfit there, its derivatives."""
+
+    point: Array
+    misfit: Array
+    jacobian: Array
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares."""
+        return float(self.misfit @ self.misfit)
+
+
+def solve(model: Model) -> Minimum:
+    """Return the best minimum reached from the best starts."""
+    found = [minimise(model, start, tolerance=TO_COMPARE) for start in model.starts()[:REFINED]]
+    best = min(found, key=lambda minimum: minimum.cost)
+    return minimise(model, best.point)
+
+
+def minimise(
+    model: Model,
+    start: Array,
+    base: Array | None = None,
+    free: Array | None = None,
+    tolerance: float = TO_ROUNDING,
+) -> Minimum:
+    """Search from `start` over the points base + free q.
+
+    Parameters
+    ----------
+    model : Model
+    start : ndarray, shape (p,)
+    base : ndarray, shape (p,), optional
+        Point through which the parameters move; the origin if not given.
+    free : ndarray, shape (p, k), optional
+        Directions in which they move, each with one entry of 1 where no other has one; all of
+        them if not given.
+    tolerance : float
+        Relative change of cost and parameters at which the search ends.
+    """
+    base = np.zeros(start.size) if base is None else base
+    free = np.eye(start.size) if free is None else free
+    moving = np.argmax(free > 0.0, axis=0)
+    low, high = model.low[moving].copy(), model.high[moving].copy()
+    for row in np.flatnonzero(np.any(free < 0.0, axis=1)):
+        # base - q is not to leave the bounds of its own.
+        column = int(np.argmin(free[row]))
+        high[column] = min(high[column], base[row] - model.low[row])
+    if not free.shape[1]:
+        return Minimum(base, model.misfit(base), model.jacobian(base))
+    bounded = np.isfinite(low)
+    least_width = 1e-12 * (1.0 + np.abs(low[bounded]))
+    high[bounded] = np.maximum(high[bounded], low[bounded] + least_width)
+
+    def misfit(q: Array) -> Array:
+        return model.misfit(base + free @ q)
+
+    def jacobian(q: Array) -> Array:
+        return model.jacobian(base + free @ q) @ free
+
+    found = least_squares(
+        misfit,
+        np.clip(start[moving], low, high),
+        jac=jacobian,
+        bounds=(low, high),
+        x_scale=model.scale[moving],
+        xtol=tolerance,
+        ftol=tolerance,
+        gtol=tolerance,
+        max_nfev=EVALUATIONS,
+    )
+    point = base + free @ found.x
+    return Minimum(point, np.asarray(found.fun), model.jacobian(point))
+
+
+@dataclass(frozen=True)
+class ProfileCost:
+    """Least cost with one quantity held, the others free, searched from the best point of all.
+
+    `known` holds the numbers that were not fitted, which may be part of a sum.
+    """
+
+    model: Model
+    best: Minimum
+    known: Mapping[str, float]
+
+    def __call__(self, name: str, value: float) -> float:
+        """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
+        base, free = self._held(name.split("+"), value)
+        return minimise(self.model, self.best.point, base, free, TO_COMPARE).cost
+
+    def _held(self, names: Sequence[str], value: float) -> tuple[Array, Array]:
+        """Base and directions in which the sum of `names` is `value`."""
+        labels = self.model.labels
+        value -= sum(self.known.get(name, 0.0) for name in names if name not in labels)
+        places = [labels.index(name) for name in names if name in labels]
+        fixed = places[0]
+        base = np.zeros(len(labels))
+        base[fixed] = value
+        free = np.delete(np.eye(len(labels)), fixed, axis=1)
+        for place in places[1:]:
+            free[fixed, place - (place > fixed)] = -1.0
+        return base, free
