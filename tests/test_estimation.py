@@ -318,7 +318,7 @@ def test_a_window_that_begins_in_flight_knows_the_commands_before_it():
         ({"free": ("gain",)}, "unknown"),
         ({"method": "magic"}, "not one of"),
         ({"map": "exact"}, "no option 'map'"),
-        ({"noise": "white"}, "'recording' or 'loop'"),
+        ({"noise": "white"}, "'auto', 'recording', 'loop'"),
     ],
 )
 def test_what_cannot_be_estimated_is_refused_with_the_reason(change, words):

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from deadtime._certificate import Certificate
     from deadtime._chains import Chain
     from deadtime._estimation import DelayEstimate
+    from deadtime._estimation.result import Flight
     from deadtime._margins import Margins
     from deadtime._recording import Recording
     from deadtime._response import Response
@@ -106,15 +107,55 @@ def plot_fits(
 
 
 def plot_estimate(fit: DelayEstimate) -> Figure:
-    """Fit over data, and below it the residuals."""
-    figure, (upper, lower) = new_figure(7.0, 5.0, rows=2)
-    plot_fits(upper, fit.recording, {f"{fit.method}, delay {fit.delay:.3f} s": fit})
-    upper.set_xlabel("")
-    kind = "white" if fit.whiteness.white else "coloured"
-    lower.plot(fit.recording.time, fit.residuals, **DATA)
-    lower.axhline(0.0, color="0.6", lw=0.8)
-    lower.set(xlabel="time / s", ylabel=f"residual / m\n({kind})")
+    """Fit over data, below it the residuals, beside it the profile of the delay if it has one."""
+    from matplotlib.figure import Figure
+
+    flights = fit.flights
+    profiled = fit.has_profile and "delay" in fit.stderr
+    figure = Figure(figsize=(9.6 if profiled else 7.0, 4.6), layout="constrained")
+    across = len(flights) + int(profiled)
+    ratios = [2.2] * len(flights) + [1.5] * int(profiled)
+    grid = figure.add_gridspec(2, across, height_ratios=[3.0, 1.0], width_ratios=ratios)
+    for column, flight in enumerate(flights):
+        upper = _bare(figure.add_subplot(grid[0, column]))
+        lower = _bare(figure.add_subplot(grid[1, column], sharex=upper))
+        _plot_flight(upper, lower, flight, f"{fit.method}, delay {fit.delay:.3f} s")
+        upper.tick_params(labelbottom=False)
+        kind = "white" if fit.whiteness.white else "coloured"
+        upper.set_ylabel("output" if column == 0 else "")
+        lower.set_ylabel(f"residual\n({kind})" if column == 0 else "")
+    if profiled:
+        _plot_profile(_bare(figure.add_subplot(grid[:, -1])), fit)
     return figure
+
+
+def _bare(ax: Axes) -> Axes:
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.grid(alpha=0.25)
+    return ax
+
+
+def _plot_flight(upper: Axes, lower: Axes, flight: Flight, label: str) -> None:
+    recording = flight.recording
+    upper.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
+    upper.plot(recording.time, recording.output, label="recorded", **DATA)
+    fitted = recording.output - flight.residuals
+    upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
+    upper.legend(frameon=False, fontsize="small")
+    lower.plot(recording.time, flight.residuals, **DATA)
+    lower.axhline(0.0, color="0.6", lw=0.8)
+    lower.set(xlabel="time / s")
+
+
+def _plot_profile(ax: Axes, fit: DelayEstimate) -> None:
+    """The t of every delay, with the 95 % interval where it crosses its level."""
+    values, t = fit.profile("delay")
+    ax.plot(values, t, color=COLOURS[0], lw=1.6)
+    for end in fit.ci(0.95):
+        ax.axvline(end, **REFERENCE)
+    ax.axvline(fit.delay, color=COLOURS[1], lw=1.0)
+    ax.set(xlabel="delay / s", ylabel="t", ylim=(0.0, None), title="profile, and 95 % interval")
+    ax.title.set_fontsize("small")
 
 
 def plot_responses(ax: Axes, responses: Mapping[str, Response], unit: str = "m") -> None:

@@ -32,9 +32,10 @@ Array = NDArray[np.float64]
 INDISTINGUISHABLE = 1e-6
 
 #: What the vehicle answers with, in the order fits report; `start` is how much later than the
-#: reference the clock of the output runs.
+#: reference the clock of the output runs. A sample time is not among them: whether a sample comes
+#: just before a step or after it makes the cost jump.
 OF_THE_VEHICLE = ("delay", "gain", "lag", "time_constant")
-OF_THE_LOOP = (*OF_THE_VEHICLE, "start", "sample_time", "limit")
+OF_THE_LOOP = (*OF_THE_VEHICLE, "start", "limit")
 
 #: The response has to explain the output so much better than a constant does that noise, over all
 #: delays that are tried, would do so once in some hundred times.

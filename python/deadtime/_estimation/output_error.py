@@ -88,7 +88,9 @@ def estimate_from_commands(
         _runs_away(longest)
     sources = {one.source for one in models}
     done = f"least squares over {', '.join(names)} on the response to the command"
-    if sources != {"logged"}:
+    if computed:
+        done += " as the controller made it of the recorded output, whose noise goes through it"
+    elif sources != {"logged"}:
         done += ", which was not logged but computed from reference and output"
     advice = "" if {"lag", "time_constant"} & set(names) else " (try free=('delay', 'gain', 'lag'))"
     start = found.point[len(names) :] if initial_output is None else [initial_output]
@@ -98,7 +100,11 @@ def estimate_from_commands(
         found,
         [Fitted(one.recording, flight.loop) for one, flight in zip(models, flights, strict=True)],
         message=done,
-        details={"initial_output": float(start[0]), "command": " or ".join(sorted(sources))},
+        details={
+            "initial_output": float(start[0]),
+            "command": " or ".join(sorted(sources)),
+            **({"noise": "loop"} if computed else {}),
+        },
         advice=advice,
     )
 

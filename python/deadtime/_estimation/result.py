@@ -160,6 +160,11 @@ class DelayEstimate(ReadOnlyArrays):
         return not self.uncalibrated
 
     @property
+    def has_profile(self) -> bool:
+        """Whether `profile` has an answer."""
+        return self._profile is not None
+
+    @property
     def rms(self) -> float:
         """Root mean square of the residuals of all recordings, in the unit of the output."""
         squares = [flight.residuals**2 for flight in self.flights]

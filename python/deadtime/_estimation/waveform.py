@@ -9,12 +9,14 @@ first and the best few points of it are refined, by the loop's exact sensitiviti
 The residuals are white only if the model is the vehicle and the noise enters at the measurement
 but does not circulate through the controller. Where it does (`noise="loop"`), the controller of the
 model reads the recorded output in place of the simulated one: what is left over are the
-innovations, and they are white.
+innovations, and they are white. Both are predictions with as many numbers, so the likelier is
+the one that leaves less over.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,7 +27,12 @@ from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.conclusion import Fitted, concluded, without_vanishing
-from deadtime._estimation.evidence import OF_THE_LOOP, checked_names, excited
+from deadtime._estimation.evidence import (
+    OF_THE_LOOP,
+    OF_THE_VEHICLE,
+    checked_names,
+    excited,
+)
 from deadtime._estimation.joint import solve_jointly
 from deadtime._estimation.output_error import estimate_from_commands
 from deadtime._estimation.result import DelayEstimate
@@ -39,7 +46,7 @@ __all__ = ["Noise", "estimate_by_waveform"]
 Array = NDArray[np.float64]
 
 #: Where sensor noise goes: into the recording alone, or through the controller as well.
-Noise = Literal["recording", "loop"]
+Noise = Literal["auto", "recording", "loop"]
 
 #: Points of the first grid over the delay, and factors of the first grid over the gain.
 DELAY_POINTS = 24
@@ -55,19 +62,59 @@ LEAST_LAG = 1e-6
 #: A residual for simulations that leave all bounds, in units of the step.
 HOPELESS = 1e3
 
+#: A misfit below this part of the excitation is rounding.
+ROUNDING = 1e-9
+
 
 def estimate_by_waveform(
     recording: Flights,
     loop: ControlLoop | Sequence[ControlLoop],
     window: Window,
     free: Sequence[str],
-    noise: Noise = "recording",
+    noise: Noise = "auto",
 ) -> DelayEstimate:
     """Fit `free` of the loop to the window of the recording."""
     if noise not in get_args(Noise):
-        raise ValueError(f"noise={noise!r} is not 'recording' or 'loop'")
+        raise ValueError(f"noise={noise!r} is not one of {', '.join(map(repr, get_args(Noise)))}")
     if noise == "loop":
-        return estimate_from_commands("waveform", recording, loop, window, free, computed=True)
+        return _by_innovations(recording, loop, window, free)
+    simulated = _by_simulation(recording, loop, window, free)
+    if noise == "recording" or not set(free) <= set(OF_THE_VEHICLE):
+        return simulated
+    try:
+        innovations = _by_innovations(recording, loop, window, free)
+    except NotIdentifiableError:  # the command cannot be computed, or says less than the loop
+        return simulated
+    return min(simulated, innovations, key=_unlikelihood)
+
+
+def _unlikelihood(fit: DelayEstimate) -> float:
+    """Minus log likelihood of Gaussian noise of unknown size in each recording, but for a constant.
+
+    Below rounding there is nothing to choose by.
+    """
+    total = 0.0
+    for one in fit.flights:
+        scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))
+        total += one.residuals.size * math.log(scatter)
+    return total
+
+
+def _by_innovations(
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
+    window: Window,
+    free: Sequence[str],
+) -> DelayEstimate:
+    return estimate_from_commands("waveform", recording, loop, window, free, computed=True)
+
+
+def _by_simulation(
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
+    window: Window,
+    free: Sequence[str],
+) -> DelayEstimate:
     flights = each_flight(recording, loop, window)
     names = checked_names(free, flights[0].loop, OF_THE_LOOP)
     models = [_model(flight, names) for flight in flights]
@@ -75,10 +122,6 @@ def estimate_by_waveform(
     found = without_vanishing(model, found)
     _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
     advice = "" if "lag" in names else " (try free=('delay', 'gain', 'lag'))"
-    if all(flight.loop.is_sampled for flight in flights):
-        advice += (
-            "; where the noise of the sensor goes through the controller too, use noise='loop'"
-        )
     return concluded(
         "waveform",
         model,
@@ -88,7 +131,7 @@ def estimate_by_waveform(
             for one, flight in zip(models, flights, strict=True)
         ],
         message=f"least squares over {', '.join(names)} on the response of the loop",
-        details={"initial_output": float(found.point[len(names)])},
+        details={"initial_output": float(found.point[len(names)]), "noise": "recording"},
         advice=advice,
     )
 
@@ -133,8 +176,7 @@ class _Model:
         if name == "initial output":
             return (-np.inf, np.inf)
         value = self.simulated.loop.parameters[name]
-        reach = 5.0 if name == "sample_time" else 1e3
-        low, high = sorted((value / reach, value * reach))
+        low, high = sorted((1e-3 * value, 1e3 * value))
         return (low, high)
 
     @cached_property
