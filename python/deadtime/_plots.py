@@ -154,6 +154,7 @@ def _plot_profile(ax: Axes, fit: DelayEstimate) -> None:
     for end in fit.ci(0.95):
         ax.axvline(end, **REFERENCE)
     ax.axvline(fit.delay, color=COLOURS[1], lw=1.0)
+    ax.axhline(1.96, color="0.6", lw=0.8, ls=":")
     ax.set(xlabel="delay / s", ylabel="t", ylim=(0.0, None), title="profile, and 95 % interval")
     ax.title.set_fontsize("small")
 

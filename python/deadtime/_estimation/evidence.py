@@ -41,8 +41,8 @@ OF_THE_LOOP = (*OF_THE_VEHICLE, "start", "limit")
 #: delays that are tried, would do so once in some hundred times.
 BY_CHANCE = 1e-4
 
-#: Share of the variance that may be left over in an answer without a test.
-UNEXPLAINED = 0.1
+#: Share of the variance that is left over at most where most of it is explained.
+MOSTLY = 0.5
 
 
 def checked_names(
@@ -105,15 +105,17 @@ def check_setpoint_active(recording: Recording) -> None:
 def check_answers(output: Array, misfit: Array, numbers: int, autocorrelation: float) -> None:
     """Refuse an output that a constant explains about as well as the response does: noise alone.
 
-    The ratio is that of an F test, with as many samples as the colour of the misfit leaves; what
-    explains nearly all is no noise, however few those are.
+    The ratio is that of an F test. Coloured misfit leaves fewer independent samples, unless most
+    of the variance is explained: then it is the model that lacks something, not the answer.
     """
     centred = output - output.mean()
     constant, fitted = float(centred @ centred), float(misfit @ misfit)
-    if fitted <= UNEXPLAINED * constant:
+    if fitted == 0.0:
         return
-    rho = min(0.99, max(0.0, autocorrelation))
-    samples = misfit.size * (1.0 - rho) / (1.0 + rho)
+    samples = float(misfit.size)
+    if fitted > MOSTLY * constant:
+        rho = min(0.99, max(0.0, autocorrelation))
+        samples *= (1.0 - rho) / (1.0 + rho)
     freedom = max(1.0, samples - numbers - 1)
     ratio = (constant - fitted) / numbers * freedom / fitted
     if not ratio > 0.0 or special.fdtrc(numbers, freedom, ratio) > BY_CHANCE:

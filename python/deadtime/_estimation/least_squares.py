@@ -171,6 +171,9 @@ class ProfileCost:
         value -= sum(self.known.get(name, 0.0) for name in names if name not in labels)
         places = [labels.index(name) for name in names if name in labels]
         fixed = places[0]
+        if len(places) == 1:
+            # What cannot be none is as short as is sought.
+            value = max(value, float(self.model.low[fixed]))
         base = np.zeros(len(labels))
         base[fixed] = value
         free = np.delete(np.eye(len(labels)), fixed, axis=1)

@@ -250,8 +250,10 @@ class DelayEstimate(ReadOnlyArrays):
         return float(sum(known.get(part, 0.0) for part in name.split("+")))
 
     def _reach(self, name: str) -> float:
-        """About one standard error; where a quantity is at its bound, that of the delay."""
-        return self.stderr[name] or self.stderr.get("delay", 0.0)
+        """About one standard error; where a quantity is at its bound, that of its like."""
+        return self.stderr[name] or max(
+            (error for other, error in self.stderr.items() if other not in UNITLESS), default=0.0
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the arrays, as plain values for JSON."""
