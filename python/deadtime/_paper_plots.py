@@ -91,7 +91,7 @@ def _figure2(part: Figure2) -> Figure:
         (trial,) = (one for one in part.trials if one.gain == gain and one.scenario.jitter)
         left.plot(trial.recording.time, trial.recording.output, color=colour, lw=0.7, ls="--")
     left.set_xlim(-0.1, 2.0)
-    _step_axes(left, "A delay of 0.1 s alone; dashed: over the network, with jitter")
+    _step_axes(left, "Td = 0.1 s; dashed: network with jitter")
     for kind, colour in (("lag", COLOURS[1]), ("hold", COLOURS[0])):
         for ratio, style in (("period", {"marker": "o"}), ("peak", {"marker": "x", "ls": ":"})):
             shown = [(getattr(one, kind), one) for one in part.stretches if getattr(one, kind)]
@@ -165,7 +165,6 @@ def _gap(part: Gap) -> Figure:
     """The way from one estimate to the other."""
     figure, ax = new_figure(6.5, 2.8)
     start = part.dominant
-    ax.plot([start, start], [3.6, 2.6], color="0.6", lw=1.0)
     for row, (name, added) in enumerate(part.parts.items()):
         place = 3.0 - row
         colour = COLOURS[1] if added > 0.0 else COLOURS[0]
@@ -270,9 +269,8 @@ def _figure10(part: Figure10) -> Figure:
         ax.annotate(
             f"{curve.best:.4f}: {curve.best_abscissa:.3f}",
             (curve.best, curve.best_abscissa),
-            (0, -14),
+            (8, -12),
             textcoords="offset points",
-            ha="center",
             fontsize="small",
             color=colour,
         )
