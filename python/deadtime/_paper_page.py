@@ -17,6 +17,7 @@ __all__ = ["render_reproduction", "write_reproduction"]
 STYLE = """
 body { max-width: 66rem; }
 td { vertical-align: top; }
+table.numbers td:nth-child(2), table.numbers th:nth-child(2) { text-align: left; }
 table.numbers td:last-child, table.numbers th:last-child { text-align: left; font-size: .85rem; }
 tr.good td:nth-child(5) { color: #1d7a3e; }
 tr.partly td:nth-child(5) { color: #9a6700; }
@@ -26,6 +27,28 @@ nav a { margin-right: .8rem; }
 """
 
 HEADS = ("where", "what", "printed", "ours", "verdict", "why, and with which model")
+
+#: What the drawings show.
+CAPTIONS = {
+    "table1": "The delays that the measured overshoots give: printed, by the dominant root, and by "
+    "the exact step response.",
+    "figure2": "Left: step responses of the loop. Middle: period and first peak with a hold or a "
+    "lag over those of a delay alone that overshoots by as much, for the six rows of Table 1. "
+    "Right: how far one loop for all gains misses the overshoots of Table 1.",
+    "figure3": "Left: responses on both sides of the limit. Middle: the rightmost root. Right: "
+    "where a simulation in fixed steps sees the limit.",
+    "table2": "The overshoot of the altitude loop over its delay.",
+    "figure6": "The responses of Table 2, and their peaks with the samples of the coarse model.",
+    "figure7": "Left: the loop with the delay that 2.3 % gives. Right: the delay that each "
+    "flight gives, in three ways.",
+    "gap": "From the delay by the dominant root to that by simulation.",
+    "figure8": "Responses at Kp = 4 and 5, without the limit of the speed.",
+    "figure9": "Roots of ten branches of W at Kp = 4 and 5.",
+    "figure10": "The rightmost root over the velocity gain, with an ideal derivative and with the "
+    "filter of the flights.",
+    "figure11": "Left: responses of the model of the flights. Right: where they enter the band of "
+    "2 % for good.",
+}
 
 CLASSES = {
     Verdict.EXACT: "good",
@@ -66,7 +89,7 @@ def _part(name: str, part: Part, figure: Figure | None) -> Iterator[str]:
     yield f'<section id="{name}"><h2>{escaped(TITLES[name])}</h2>'
     yield from (f"<p>{escaped(sentence)}</p>" for sentence in part.findings())
     if figure is not None:
-        yield picture(f"{name}-drawing", figure, TITLES[name])
+        yield picture(f"{name}-drawing", figure, CAPTIONS[name])
     if part.comparisons:
         rows = [_compared(one) for one in part.comparisons]
         yield table(HEADS, rows).replace("<table>", '<table class="numbers">', 1)

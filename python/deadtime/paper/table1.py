@@ -191,6 +191,7 @@ def _compared(row: Table1Row) -> list[Comparison]:
     measured, damping, delay, root = PRINTED[int(row.gain)]
     name = f"K={row.gain:g}"
     at = f"Td = {row.taken_delay:g} s"
+    printed_damping = damping_of(complex(*map(float, root)))
     return [
         Comparison.of_measurement("Table 1", f"{name} Mp (%)", measured, None, "measured"),
         Comparison.of_number(
@@ -216,5 +217,6 @@ def _compared(row: Table1Row) -> list[Comparison]:
             root,
             row.root,
             f"W0 at {at}",
+            note=f"the printed pair has a damping ratio of {printed_damping:.4f}",
         ),
     ]
