@@ -361,6 +361,8 @@ def test_the_summary_counts_every_comparison(found):
 def test_an_unknown_part_is_refused():
     with pytest.raises(ValueError, match="table9: not one of table1"):
         paper.reproduce(only=["table9"])
+    with pytest.raises(ValueError, match="no part is asked for"):
+        paper.reproduce(only=[])
 
 
 def test_the_page_is_valid_and_fetches_nothing(found):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import ROUND_HALF_UP, Decimal
-from enum import StrEnum
+from enum import Enum
 from typing import Any
 
 __all__ = ["Comparison", "Verdict", "agreeing_digits", "printed_digits"]
@@ -19,7 +19,7 @@ __all__ = ["Comparison", "Verdict", "agreeing_digits", "printed_digits"]
 LEAST_DIGITS = 2
 
 
-class Verdict(StrEnum):
+class Verdict(Enum):
     """What became of a number or a statement of the paper."""
 
     EXACT = "reproduced"
@@ -147,7 +147,7 @@ class Comparison:
     def told(self) -> str:
         """The verdict in words."""
         if self.digits is None:
-            return str(self.verdict)
+            return self.verdict.value
         agreeing, printed = self.digits
         if self.verdict is Verdict.EXACT:
             return "the printed digit" if printed == 1 else f"all {printed} digits"
@@ -169,7 +169,7 @@ class Comparison:
             "computed": self.computed,
             "shown": self.shown,
             "model": self.model,
-            "verdict": str(self.verdict),
+            "verdict": self.verdict.value,
             "agreeing_digits": None if self.digits is None else self.digits[0],
             "printed_digits": None if self.digits is None else self.digits[1],
             "note": self.note,

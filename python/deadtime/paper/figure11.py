@@ -58,7 +58,7 @@ class SettlingTimes:
     wider: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure11:
     """Figure 11, as the model has it.
 

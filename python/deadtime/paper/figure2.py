@@ -55,7 +55,7 @@ SCENARIOS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trial:
     """The delay that the overshoot gives of a loop whose round trip is known, as in Table 1.
 
@@ -77,7 +77,7 @@ class Trial:
     delays: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure2:
     """Figure 2, in virtual time, and the answer to its question.
 

@@ -33,7 +33,7 @@ WIDTH = 1e-4
 DECAYED = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure3:
     """Figure 3, reproduced.
 

@@ -26,7 +26,7 @@ DELAY = 0.36
 FLIGHTS = ("2.3", "2.3", "2.29", "2.27", "0.6")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure6:
     """Figure 6, reproduced.
 
@@ -105,7 +105,7 @@ class Flight:
     saturated: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure7:
     """Figure 7: what the measured overshoots say.
 

@@ -24,7 +24,7 @@ GAINS = (4.0, 5.0)
 BRANCHES = np.arange(-5, 5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure8:
     """Figure 8: responses at the measured delay.
 
@@ -102,7 +102,7 @@ def figure8() -> Figure8:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Figure9:
     """Figure 9: roots at the measured delay.
 

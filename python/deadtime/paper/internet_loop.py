@@ -71,7 +71,7 @@ def internet_loop(
     >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=8.0), sample_time=0.02)
     >>> for name in ("dominant", "saturated"):
     ...     print(round(dtm.estimate_delay(trial, loop, method="overshoot", map=name).delay, 4))
-    0.1124
+    0.1128
     0.1
     """
     for name, value in {"gain": gain, "delay": delay, "jitter": jitter, "loss": loss}.items():

@@ -160,7 +160,7 @@ def reproduce(
     Raises
     ------
     ValueError
-        If there is no such part.
+        If there is no such part, or none is asked for.
 
     Examples
     --------
@@ -173,6 +173,8 @@ def reproduce(
     unknown = [name for name in wanted if name not in PARTS]
     if unknown:
         raise ValueError(f"{', '.join(unknown)}: not one of {', '.join(PARTS)}")
+    if not wanted:
+        raise ValueError(f"no part is asked for: give one or more of {', '.join(PARTS)}")
     parts = {}
     for name in PARTS:
         if name in wanted:

@@ -130,7 +130,7 @@ def table1() -> Table1:
     >>> from deadtime import paper
     >>> for row in paper.table1().rows[:2]:
     ...     print(f"{row.gain:g} {row.root_damping:.4f} {row.delay:.4f} {row.exact_delay:.4f}")
-    5 0.7898 0.0918 0.0916
+    5 0.7898 0.0918 0.0915
     6 0.6454 0.0909 0.0904
     """
     rows = tuple(_row(gain, percent) for gain, percent in PRINTED_OVERSHOOTS.items())
