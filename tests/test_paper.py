@@ -335,11 +335,17 @@ def test_a_loop_that_does_not_overshoot_has_no_time_scale():
 
 
 def test_table_1_speaks_for_a_hold_and_against_a_lag(found):
-    hold, lag = found.parts["figure2"].explanations
+    hold, lag, both = found.parts["figure2"].explanations
     assert hold.misfits[0] == lag.misfits[0] == pytest.approx(8.49, abs=0.02)
     assert hold.values[hold.best] == pytest.approx(0.17, abs=0.006)
     assert hold.misfits[hold.best] < 0.5 * hold.misfits[0]
     assert np.all(np.diff(lag.misfits) >= 0)
+    assert both.hold == hold.values[hold.best]
+    assert both.misfits[0] == pytest.approx(hold.misfits[hold.best], abs=1e-9)
+    assert both.misfits.min() > 0.95 * both.misfits[0]
+    assert both.misfits[-1] > 2 * both.misfits[0]
+    with pytest.raises(ValueError, match=r"hold=0\.1"):
+        paper.explain("hold", np.array([0.1]), hold=0.1)
     # A hold without a delay overshoots by K Ts - 1.
     explained = paper.explain("hold", np.array([0.2]))
     gains = np.arange(5.0, 11.0)

@@ -110,9 +110,7 @@ def _figure2(part: Figure2) -> Figure:
         ylabel="times that of the delay alone",
     )
     for fit, colour in zip(part.explanations, COLOURS, strict=False):
-        right.plot(
-            1e3 * fit.values, fit.misfits, color=colour, marker=".", label=f"delay and {fit.name}"
-        )
+        right.plot(1e3 * fit.values, fit.misfits, color=colour, marker=".", label=fit.words)
     _legend(
         right,
         "The overshoots of Table 1 by one loop",

@@ -187,6 +187,8 @@ class Explanation:
     ----------
     name : {"hold", "lag"}
         The other time.
+    hold : float
+        A hold that is there in any case, s; 0 for none.
     values : ndarray, shape (n,)
         Holds or lags tried, s; the first is 0.
     delays : ndarray, shape (n,)
@@ -198,10 +200,17 @@ class Explanation:
     """
 
     name: str
+    hold: float
     values: NDArray[np.float64]
     delays: NDArray[np.float64]
     misfits: NDArray[np.float64]
     overshoots: NDArray[np.float64]
+
+    @property
+    def words(self) -> str:
+        """What is fitted, in words."""
+        held = f", a hold of {1e3 * self.hold:.0f} ms" if self.hold else ""
+        return f"delay{held} and {self.name}"
 
     @property
     def best(self) -> int:
@@ -209,7 +218,7 @@ class Explanation:
         return int(np.argmin(self.misfits))
 
 
-def explain(name: str, values: NDArray[np.float64]) -> Explanation:
+def explain(name: str, values: NDArray[np.float64], *, hold: float = 0.0) -> Explanation:
     """Fit a delay to the overshoots of Table 1 for each of several holds or lags.
 
     Parameters
@@ -218,10 +227,17 @@ def explain(name: str, values: NDArray[np.float64]) -> Explanation:
         What is tried beside the delay.
     values : ndarray
         Its values above zero, s; zero is tried too.
+    hold : float
+        A hold beside a lag, s; 0 for none.
 
     Returns
     -------
     Explanation
+
+    Raises
+    ------
+    ValueError
+        If `name` is neither, or there are to be two holds.
 
     Examples
     --------
@@ -234,7 +250,9 @@ def explain(name: str, values: NDArray[np.float64]) -> Explanation:
     gains = np.array(list(PRINTED_OVERSHOOTS), dtype=float)
     measured = np.array(list(PRINTED_OVERSHOOTS.values()))
     delays = np.arange(DELAY_STEP, LONGEST_DELAY, DELAY_STEP)
-    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.0), delay=0.1)
+    if name not in ("hold", "lag") or (name == "hold" and hold):
+        raise ValueError(f"name={name!r}, hold={hold}: give a hold, or a lag with or without one")
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.0), delay=0.1, sample_time=hold or None)
     tried = np.concatenate([[0.0], np.asarray(values, dtype=float)])
     best_delays, misfits, overshoots = [], [], []
     for value in tried.tolist():
@@ -248,4 +266,6 @@ def explain(name: str, values: NDArray[np.float64]) -> Explanation:
         best_delays.append(delays[row])
         misfits.append(misfit[row])
         overshoots.append(found[row])
-    return Explanation(name, tried, np.array(best_delays), np.array(misfits), np.array(overshoots))
+    return Explanation(
+        name, hold, tried, np.array(best_delays), np.array(misfits), np.array(overshoots)
+    )
