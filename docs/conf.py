@@ -16,6 +16,6 @@ myst_enable_extensions = ["dollarmath", "amsmath"]
 autosummary_generate = True
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "reproduction-numbers.md"]
 html_theme = "alabaster"
 html_title = "deadtime"

@@ -8,8 +8,10 @@ from pathlib import Path
 import deadtime as dtm
 import matplotlib.pyplot as plt
 import numpy as np
+from deadtime import paper
 
 IMAGES = Path(__file__).parent / "images"
+NUMBERS = Path(__file__).parent / "reproduction-numbers.md"
 
 
 def fixed_steps() -> None:
@@ -49,6 +51,29 @@ def mackey_glass() -> None:
     figure.savefig(IMAGES / "mackey-glass.png", dpi=100)
 
 
+def reproduction() -> None:
+    """The figures of the reproduced paper, and the table of its numbers."""
+    found = paper.reproduce()
+    for name, figure in found.figures().items():
+        figure.savefig(IMAGES / f"paper-{name}.png", dpi=75)
+    lines = [found.summary(), ""]
+    for name, part in found.parts.items():
+        if part.comparisons:
+            lines += [
+                f"**{paper.TITLES[name]}**",
+                "",
+                "| where | what | printed | ours | verdict |",
+            ]
+            lines += ["|---|---|---|---|---|"]
+            lines += [
+                f"| {one.where} | {one.quantity} | {one.printed} | {one.shown} | {one.told} |"
+                for one in part.comparisons
+            ]
+            lines += [""]
+    NUMBERS.write_text("\n".join(lines).replace("<", "&lt;"), encoding="utf-8")
+
+
 if __name__ == "__main__":
     fixed_steps()
     mackey_glass()
+    reproduction()

@@ -81,9 +81,11 @@ FLOORS = [
     {"_recording", "_gallery_entries", "gallery"},
     {"_readers", "_estimation", "_design"},
     {"_experiment"},
+    {"paper"},
     {"_plots"},
-    {"_stability_plots", "_box_plots"},
-    {"_report"},
+    {"_stability_plots", "_box_plots", "_paper_plots"},
+    {"_page"},
+    {"_report", "_paper_page"},
     {"_cli"},
 ]
 NUMERICS = FLOORS[2]

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from deadtime._cli import options as opt
 from deadtime._cli.maps import map_gains
+from deadtime._cli.reproduce import reproduce_paper
 from deadtime._cli.show import (
     console,
     estimates_table,
@@ -243,6 +244,7 @@ def _roots_table(found: RootSet) -> Table:
 
 
 app.command("map")(map_gains)
+app.command("reproduce")(reproduce_paper)
 
 
 @app.command()

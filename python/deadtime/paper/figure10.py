@@ -1,0 +1,281 @@
+"""Figure 10: the rightmost root of the altitude loop under proportional-plus-velocity control.
+
+u = Kp (r - z) - Kv dz/dt with Kp = 2 and Td = 0.36 s: s + (Kp + Kv s) e^(-s Td), neutral, with a
+chain of roots near Re s = ln(Kv)/Td. The velocity is in truth a filtered derivative (38 rad/s,
+damping 1), which makes the loop retarded and moves the roots: `filtered` below. The best gain is
+where the rightmost root lies furthest left.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+import deadtime as dtm
+from deadtime.paper.comparison import Comparison
+from deadtime.paper.figures6and7 import DELAY
+from deadtime.paper.part import Grid
+
+__all__ = ["PAPER_FILTER", "Curve", "Figure10", "figure10", "velocity_loop"]
+
+#: Proportional gain of the design, 1/s.
+GAIN = 2.0
+
+#: The filter of the paper's velocity.
+PAPER_FILTER = dtm.DerivativeFilter(omega=38.0, damping=1.0)
+
+#: Velocity gains of the figure, and those of a curve.
+GRID, FINE = np.round(np.arange(0.1, 1.0, 0.1), 1), np.linspace(0.005, 1.0, 200)
+
+#: A change of the rightmost root by more than this part of it is not minor.
+MINOR = 0.1
+
+
+def velocity_loop(Kv: float, filtered: bool = True, limit: float | None = None) -> dtm.ControlLoop:
+    """The altitude loop of the paper under proportional-plus-velocity control.
+
+    Parameters
+    ----------
+    Kv : float
+        Velocity gain.
+    filtered : bool
+        With the velocity through the filter of 38 rad/s, or with an ideal derivative.
+    limit : float, optional
+        Of the vertical speed, m/s.
+
+    Returns
+    -------
+    ControlLoop
+        Kp = 2, Td = 0.36 s.
+    """
+    smoothing = PAPER_FILTER if filtered else None
+    controller = dtm.PV(Kp=GAIN, Kv=Kv, filter=smoothing)
+    return dtm.ControlLoop(dtm.Integrator(), controller, delay=DELAY, limit=limit)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The rightmost root over the velocity gain.
+
+    Attributes
+    ----------
+    gains : ndarray
+        Kv.
+    abscissas : ndarray
+        Real part of the rightmost root, or of the chain where that lies further right, 1/s.
+    best : float
+        The gain with the smallest one.
+    best_abscissa : float
+        1/s.
+    critical : float
+        The gain at which the loop loses stability.
+    roots : dict of float to complex
+        Rightmost root for the gains of the figure, 1/s.
+    """
+
+    gains: NDArray[np.float64]
+    abscissas: NDArray[np.float64]
+    best: float
+    best_abscissa: float
+    critical: float
+    roots: dict[float, complex]
+
+
+@dataclass(frozen=True, eq=False)
+class Figure10:
+    """Figure 10, reproduced, and with the filter.
+
+    Attributes
+    ----------
+    ideal, filtered : Curve
+        Without and with the filter of the velocity.
+    delay : float
+        Of both loops, s.
+    turns_complex : float
+        Kv above which the rightmost root of the ideal loop is a pair.
+    comparisons : tuple of Comparison
+        The printed numbers beside ours.
+    """
+
+    ideal: Curve
+    filtered: Curve
+    delay: float
+    turns_complex: float
+    comparisons: tuple[Comparison, ...]
+
+    def grids(self) -> tuple[Grid, ...]:
+        """Rightmost roots and best gains, without and with the filter."""
+        curves = (self.ideal, self.filtered)
+        rows = [
+            (f"Kv = {gain:g}", *(_told(curve.roots[float(gain)]) for curve in curves))
+            for gain in GRID
+        ]
+        rows.append(("best", *(f"Kv = {one.best:.4f}: {one.best_abscissa:.4f}" for one in curves)))
+        rows.append(("unstable above", *(f"Kv = {one.critical:.4f}" for one in curves)))
+        return (
+            Grid(
+                "Rightmost root (1/s), Kp = 2, Td = 0.36 s",
+                ("", "ideal derivative", "filtered, 38 rad/s"),
+                tuple(rows),
+            ),
+        )
+
+    def findings(self) -> tuple[str, ...]:
+        """What the figure shows."""
+        ideal, filtered = self.ideal, self.filtered
+        return (
+            f"Kv = 0.3 is the most stable gain only among multiples of 0.1: the best is "
+            f"{ideal.best:.4f} ({ideal.best_abscissa:.3f} 1/s).",
+            f"The filter is not minor: at Kv = 0.3 the rightmost root moves from "
+            f"{_told(ideal.roots[0.3])} to {_told(filtered.roots[0.3])}, the best gain is "
+            f"{filtered.best:.3f} ({filtered.best_abscissa:.3f}), and the loop is stable up to "
+            f"{filtered.critical:.3f} instead of {ideal.critical:.3f}.",
+        )
+
+
+def figure10() -> Figure10:
+    """Reproduce Figure 10.
+
+    Returns
+    -------
+    Figure10
+
+    Examples
+    --------
+    >>> from deadtime import paper
+    >>> found = paper.figure10()
+    >>> print(f"{found.ideal.best:.4f} {found.ideal.best_abscissa:.4f}")
+    0.2415 -3.6841
+    >>> print(f"{found.filtered.best:.3f} {found.filtered.best_abscissa:.3f}")
+    0.190 -2.645
+    """
+    ideal, filtered = (_curve(velocity_loop(0.3, one)) for one in (False, True))
+    complex_above = _turns_complex()
+    return Figure10(
+        ideal, filtered, DELAY, complex_above, _compared(ideal, filtered, complex_above)
+    )
+
+
+def _curve(loop: dtm.ControlLoop) -> Curve:
+    def abscissa(gain: float) -> float:
+        return loop.replace(Kv=float(gain)).spectral_abscissa()
+
+    best = minimize_scalar(abscissa, bounds=(0.1, 0.4), method="bounded", options={"xatol": 1e-7})
+    return Curve(
+        gains=FINE,
+        abscissas=np.array([abscissa(gain) for gain in FINE]),
+        best=float(best.x),
+        best_abscissa=float(best.fun),
+        critical=loop.stable_range("Kv")[1],
+        roots={float(gain): _rightmost(loop.replace(Kv=float(gain))) for gain in GRID},
+    )
+
+
+def _rightmost(loop: dtm.ControlLoop) -> complex:
+    root = complex(loop.rightmost().roots[0])
+    return complex(root.real, abs(root.imag))
+
+
+def _turns_complex() -> float:
+    """Gain at which the rightmost real root and the rightmost pair lie equally far right."""
+
+    def lead(gain: float) -> float:
+        found = (
+            velocity_loop(gain, filtered=False)
+            .characteristic()
+            .roots(re=(-6.0, 2.0), im=(-20.0, 20.0))
+        )
+        real = found.roots[np.abs(found.roots.imag) < 1e-9].real
+        pairs = found.roots[found.roots.imag > 1e-9].real
+        return float(real.max() - pairs.max())
+
+    return float(brentq(lead, 0.3, 0.7, xtol=1e-6))
+
+
+def _told(root: complex) -> str:
+    if abs(root.imag) < 1e-9:
+        return f"{root.real:.4f}"
+    return f"{root.real:.4f} ± {root.imag:.4f}i"
+
+
+def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comparison, ...]:
+    neutral = "ideal derivative (neutral), Td = 0.36 s"
+    marker = _delay_of_marker()
+    on_grid = min(ideal.roots, key=lambda gain: ideal.roots[gain].real)
+    moved = abs(filtered.roots[0.3].real / ideal.roots[0.3].real - 1.0)
+    return (
+        Comparison.of_number(
+            "Fig 10",
+            "rightmost root Kv=0.3",
+            "-3.323",
+            ideal.roots[0.3].real,
+            neutral,
+            note=f"text: -3.32, which agrees; -3.323 would need Td = {marker:.5f} s; the chain "
+            f"of the neutral loop lies at {math.log(0.3) / DELAY:.4f}",
+        ),
+        Comparison.of_root(
+            "Sec 4.4",
+            "rightmost root Kv=0.7",
+            ("-0.93", "7.71"),
+            ideal.roots[0.7],
+            neutral,
+        ),
+        Comparison.of_number(
+            "Sec 4.4",
+            "critical Kv",
+            "0.97",
+            ideal.critical,
+            neutral,
+            note=f"with the filter {filtered.critical:.4f}",
+            filtered=filtered.critical,
+        ),
+        Comparison.of_number(
+            "Fig 10",
+            "most stable Kv",
+            "0.3",
+            ideal.best,
+            neutral,
+            note=f"the best of multiples of 0.1 is {on_grid:g}; with the filter the best is "
+            f"{filtered.best:.3f}",
+            abscissa=ideal.best_abscissa,
+            filtered=filtered.best,
+            filtered_abscissa=filtered.best_abscissa,
+        ),
+        Comparison.of_statement(
+            "Sec 4.4",
+            'filter "has only a minor effect"',
+            "minor",
+            holds=moved < MINOR,
+            shown=f"{_told(ideal.roots[0.3])} → {_told(filtered.roots[0.3])} at Kv = 0.3",
+            model="filter of 38 rad/s, damping 1",
+            note=f"at Kv = 0.7 {ideal.roots[0.7].real:.3f} → {filtered.roots[0.7].real:.3f}; "
+            f"stable up to {ideal.critical:.4f} → {filtered.critical:.4f}; the best gain "
+            f"{ideal.best:.4f} → {filtered.best:.4f}; neutral → retarded",
+            computed=filtered.roots[0.3],
+        ),
+        Comparison.of_statement(
+            "Sec 4.4",
+            "roots move right for Kv >",
+            "0.5",
+            holds=abs(ideal.best - 0.5) < 0.05,
+            shown=f"{ideal.best:.4f}",
+            model=neutral,
+            note=f"at Kv = {complex_above:.3f} the rightmost root changes from real to a pair",
+            computed=ideal.best,
+            turns_complex=complex_above,
+        ),
+    )
+
+
+def _delay_of_marker() -> float:
+    """The delay at which the rightmost root is that of the figure's marker, s."""
+
+    def off(delay: float) -> float:
+        loop = velocity_loop(0.3, filtered=False).replace(delay=delay)
+        return loop.spectral_abscissa() + 3.323
+
+    return float(brentq(off, DELAY, DELAY + 1e-3, xtol=1e-9))

@@ -1,0 +1,184 @@
+"""All tables and figures at once, with the verdicts counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from deadtime.paper.comparison import Comparison, Verdict
+from deadtime.paper.figure2 import figure2
+from deadtime.paper.figure3 import figure3
+from deadtime.paper.figure10 import figure10
+from deadtime.paper.figure11 import figure11
+from deadtime.paper.figures6and7 import figure6, figure7
+from deadtime.paper.figures8and9 import figure8, figure9
+from deadtime.paper.gap import gap
+from deadtime.paper.part import Part
+from deadtime.paper.table1 import table1
+from deadtime.paper.table2 import table2
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["PARTS", "TITLES", "Reproduction", "reproduce"]
+
+#: What is reproduced, in the order of the paper.
+PARTS: Mapping[str, Callable[[], Part]] = {
+    "table1": table1,
+    "figure2": figure2,
+    "figure3": figure3,
+    "table2": table2,
+    "figure6": figure6,
+    "figure7": figure7,
+    "gap": gap,
+    "figure8": figure8,
+    "figure9": figure9,
+    "figure10": figure10,
+    "figure11": figure11,
+}
+
+TITLES: Mapping[str, str] = {
+    "table1": "Table 1: delays of the Internet loop from its overshoots",
+    "figure2": "Figure 2: the Internet loop, simulated and over a network",
+    "figure3": "Figure 3: the critical gain at Td = 0.1 s",
+    "table2": "Table 2: overshoot of the altitude loop",
+    "figure6": "Figure 6: simulated altitude",
+    "figure7": "Figure 7: the flights under proportional control",
+    "gap": "0.3682 s and 0.3598 s: why the estimates differ",
+    "figure8": "Figure 8: Kp = 4 and 5 at Td = 0.36 s, responses",
+    "figure9": "Figure 9: Kp = 4 and 5 at Td = 0.36 s, roots",
+    "figure10": "Figure 10: the rightmost root over the velocity gain",
+    "figure11": "Figure 11: the flights under proportional-plus-velocity control",
+}
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """Parts of the paper, reproduced.
+
+    Attributes
+    ----------
+    parts : mapping of str to object
+        What the functions of this namespace return, by their names.
+    """
+
+    parts: Mapping[str, Part]
+
+    @property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        """Every printed number beside ours, in the order of the paper."""
+        return tuple(one for part in self.parts.values() for one in part.comparisons)
+
+    def counts(self) -> dict[Verdict, int]:
+        """How often each verdict was given.
+
+        Returns
+        -------
+        dict of Verdict to int
+        """
+        given = Counter(one.verdict for one in self.comparisons)
+        return {verdict: given[verdict] for verdict in Verdict}
+
+    def summary(self) -> str:
+        """The verdicts in one sentence.
+
+        Returns
+        -------
+        str
+        """
+        counts = self.counts()
+        numbers = (Verdict.EXACT, Verdict.PARTLY, Verdict.DIFFERENT)
+        said = (Verdict.CONFIRMED, Verdict.CONTRADICTED)
+        return (
+            f"{sum(counts[one] for one in numbers)} printed numbers: "
+            f"{counts[Verdict.EXACT]} reproduced to every digit, {counts[Verdict.PARTLY]} to fewer "
+            f"digits, {counts[Verdict.DIFFERENT]} not. "
+            f"{sum(counts[one] for one in said)} statements: {counts[Verdict.CONFIRMED]} "
+            f"confirmed, {counts[Verdict.CONTRADICTED]} not supported. "
+            f"{counts[Verdict.MEASURED]} measurements, which no model has to give."
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The reproduction as plain values.
+
+        Returns
+        -------
+        dict of str to object
+        """
+        return {
+            "summary": self.summary(),
+            "counts": {verdict.name.lower(): count for verdict, count in self.counts().items()},
+            "parts": {
+                name: {
+                    "title": TITLES[name],
+                    "comparisons": [one.to_dict() for one in part.comparisons],
+                    "tables": [
+                        {"title": grid.title, "heads": grid.heads, "rows": grid.rows}
+                        for grid in part.grids()
+                    ],
+                    "findings": part.findings(),
+                }
+                for name, part in self.parts.items()
+            },
+        }
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw the figures of the parts that are there.
+
+        Returns
+        -------
+        dict of str to matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed.
+        """
+        from deadtime._paper_plots import draw
+
+        return {name: figure for name, part in self.parts.items() if (figure := draw(part))}
+
+
+def reproduce(
+    only: Iterable[str] | None = None, progress: Callable[[str], object] | None = None
+) -> Reproduction:
+    """Reproduce the tables and figures of the paper.
+
+    Parameters
+    ----------
+    only : iterable of str, optional
+        Names of parts; all by default.
+    progress : callable, optional
+        Called with the title of each part before it is computed.
+
+    Returns
+    -------
+    Reproduction
+
+    Raises
+    ------
+    ValueError
+        If there is no such part, or none is asked for.
+
+    Examples
+    --------
+    >>> from deadtime import paper
+    >>> found = paper.reproduce(only=["table2", "gap"])
+    >>> print(found.summary().split(".")[0])
+    19 printed numbers: 19 reproduced to every digit, 0 to fewer digits, 0 not
+    """
+    wanted = list(PARTS) if only is None else list(dict.fromkeys(only))
+    unknown = [name for name in wanted if name not in PARTS]
+    if unknown:
+        raise ValueError(f"{', '.join(unknown)}: not one of {', '.join(PARTS)}")
+    if not wanted:
+        raise ValueError(f"no part is asked for: give one or more of {', '.join(PARTS)}")
+    parts = {}
+    for name in PARTS:
+        if name in wanted:
+            if progress is not None:
+                progress(TITLES[name])
+            parts[name] = PARTS[name]()
+    return Reproduction(parts)
