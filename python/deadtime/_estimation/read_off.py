@@ -1,0 +1,64 @@
+"""A delay that was read off a recording, made into a result.
+
+Such methods look at a few features of the response, not at all of it. How well the loop with the
+numbers they found explains the recording is told by the same residuals as for every other method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.evidence import standard_errors
+from deadtime._estimation.residuals import whiteness_of
+from deadtime._estimation.result import DelayEstimate
+from deadtime._estimation.simulated import SimulatedRecording
+
+__all__ = ["read_off_estimate"]
+
+#: Residuals below this share of the output's range are rounding.
+ROUNDING = 1e-9
+
+
+def read_off_estimate(
+    method: str,
+    simulated: SimulatedRecording,
+    values: Mapping[str, float],
+    cov: NDArray[np.float64],
+    start: float,
+    *,
+    message: str,
+    uncalibrated: str,
+    details: Mapping[str, Any],
+) -> DelayEstimate:
+    """The result for these `values` and their covariance, its loop at rest at `start` at first."""
+    names = tuple(values)
+    try:
+        residuals = simulated.residuals(values, start)
+    except ValueError as error:
+        found = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+        raise NotIdentifiableError(
+            f"the {method} method reads {found}, and a loop with that does not do what was "
+            f"recorded ({error}): check gains, signs and units"
+        ) from None
+    whiteness = whiteness_of(residuals, len(names))
+    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(simulated.recording.output))
+    return DelayEstimate(
+        method=method,
+        loop=simulated.loop.replace(**values),
+        free=names,
+        stderr=standard_errors(names, cov),
+        cov=cov,
+        crb=None,
+        recording=simulated.recording,
+        residuals=residuals,
+        whiteness=whiteness,
+        adequate=whiteness.white or exact,
+        message=message,
+        uncalibrated=uncalibrated,
+        details=details,
+    )
