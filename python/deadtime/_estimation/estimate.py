@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
+from deadtime._estimation.decrement import estimate_by_decrement
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
 from deadtime._estimation.result import DelayEstimate
@@ -23,6 +24,7 @@ METHODS: Mapping[str, _Estimator] = {
     "output_error": estimate_by_output_error,
     "waveform": estimate_by_waveform,
     "overshoot": estimate_by_overshoot,
+    "decrement": estimate_by_decrement,
 }
 
 
