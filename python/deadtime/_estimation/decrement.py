@@ -37,7 +37,7 @@ from deadtime._estimation.step_reading import StepReading, read_step, stiffness_
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 
-__all__ = ["estimate_by_decrement", "loop_with_root"]
+__all__ = ["estimate_by_decrement", "loop_with_root", "read_extremes"]
 
 Array = NDArray[np.float64]
 
@@ -124,8 +124,8 @@ def estimate_by_decrement(
         uncalibrated=(
             "the decrement method takes the response for one decaying oscillation: noise alone "
             f"makes the delay uncertain by {math.sqrt(own[0, 0]):.2g} s, but what other roots "
-            "leave in the first peaks, and noise that circulates in the loop, shift it further; use "
-            "method='waveform' for an interval"
+            "leave in the first peaks, and noise that circulates in the loop, shift it further; "
+            "use method='waveform' for an interval"
         ),
         details={
             "damping_ratio": float(pair[0] / math.hypot(*pair)),

@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
+from deadtime._estimation.decay import estimate_by_decay
 from deadtime._estimation.decrement import estimate_by_decrement
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
@@ -25,6 +26,7 @@ METHODS: Mapping[str, _Estimator] = {
     "waveform": estimate_by_waveform,
     "overshoot": estimate_by_overshoot,
     "decrement": estimate_by_decrement,
+    "decay": estimate_by_decay,
 }
 
 

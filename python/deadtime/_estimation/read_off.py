@@ -6,7 +6,7 @@ numbers they found explains the recording is told by the same residuals as for e
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,19 @@ from deadtime._estimation.residuals import whiteness_of
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
 
-__all__ = ["read_off_estimate"]
+__all__ = ["check_delay_alone", "read_off_estimate"]
 
 #: Residuals below this share of the output's range are rounding.
 ROUNDING = 1e-9
+
+
+def check_delay_alone(method: str, free: Sequence[str]) -> None:
+    """Refuse to fit anything without the delay; what else is asked for is taken as given."""
+    if "delay" not in free:
+        raise ValueError(
+            f"the {method} method determines the delay alone, and free={tuple(free)!r} does not "
+            "ask for it"
+        )
 
 
 def read_off_estimate(
