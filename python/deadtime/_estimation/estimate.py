@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from deadtime._estimation.decay import estimate_by_decay
 from deadtime._estimation.decrement import estimate_by_decrement
+from deadtime._estimation.gcc import estimate_by_gcc
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
 from deadtime._estimation.result import DelayEstimate
@@ -27,6 +28,7 @@ METHODS: Mapping[str, _Estimator] = {
     "overshoot": estimate_by_overshoot,
     "decrement": estimate_by_decrement,
     "decay": estimate_by_decay,
+    "gcc": estimate_by_gcc,
 }
 
 

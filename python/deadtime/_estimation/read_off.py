@@ -37,15 +37,20 @@ def read_off_estimate(
     method: str,
     simulated: SimulatedRecording,
     values: Mapping[str, float],
-    cov: NDArray[np.float64],
+    cov: NDArray[np.float64] | None,
     start: float,
     *,
     message: str,
     uncalibrated: str,
     details: Mapping[str, Any],
 ) -> DelayEstimate:
-    """The result for these `values` and their covariance, its loop at rest at `start` at first."""
+    """The result for these `values`, its loop at rest at `start` at first.
+
+    Without a covariance the standard errors are NaN: the method has none.
+    """
     names = tuple(values)
+    if cov is None:
+        cov = np.full((len(names), len(names)), np.nan)
     try:
         residuals = simulated.residuals(values, start)
     except ValueError as error:
