@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
+from deadtime._estimation.arx_scan import estimate_by_arx_scan
 from deadtime._estimation.decay import estimate_by_decay
 from deadtime._estimation.decrement import estimate_by_decrement
 from deadtime._estimation.gcc import estimate_by_gcc
@@ -29,6 +30,7 @@ METHODS: Mapping[str, _Estimator] = {
     "decrement": estimate_by_decrement,
     "decay": estimate_by_decay,
     "gcc": estimate_by_gcc,
+    "arx_scan": estimate_by_arx_scan,
 }
 
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import signal, special
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.feedback import FEEDBACK, feedback_p_value
 from deadtime._estimation.input_output import InputOutput, read_input_output
 from deadtime._estimation.read_off import check_delay_alone, read_off_estimate
 from deadtime._estimation.result import DelayEstimate
@@ -31,7 +32,7 @@ from deadtime._estimation.simulated import SimulatedRecording
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 
-__all__ = ["Weighting", "estimate_by_gcc", "feedback_p_value"]
+__all__ = ["Weighting", "estimate_by_gcc"]
 
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
 Array = NDArray[np.float64]
@@ -45,12 +46,6 @@ SMOOTHED = 0.05
 
 #: Longest whitening filter, in samples.
 LONGEST_FILTER = 12
-
-#: Below this p-value the command follows the output.
-FEEDBACK = 1e-3
-
-#: Samples of the past that the test for feedback looks at.
-PAST = 2
 
 
 def estimate_by_gcc(
@@ -67,7 +62,7 @@ def estimate_by_gcc(
     simulated = SimulatedRecording(recording, loop, window)
     data = simulated.recording
     read = read_input_output(recording, loop, simulated, "gcc")
-    p_value = 0.0 if read.source != "logged" else feedback_p_value(data)
+    p_value = feedback_p_value(data)
     feedback = p_value < FEEDBACK
     # Noise that comes back within the same sample makes a peak at no shift.
     least = 1 if feedback else 0
@@ -172,35 +167,6 @@ def _explained(read: InputOutput, shift: int) -> float:
             "drowns it; check columns and units, or excite more"
         )
     return abs(coefficient)
-
-
-def feedback_p_value(recording: Recording) -> float:
-    """How often a command that is not made from the output would look so much as if it were.
-
-    An F test of Granger's (1969) kind: does the output, to `PAST` samples back, help to predict the
-    command beyond what reference and past commands do?
-    """
-    command = recording.command
-    assert command is not None
-    rows = np.arange(PAST, command.size)
-
-    def back(values: Array, first: int) -> list[Array]:
-        return [values[rows - lag] for lag in range(first, PAST + 1)]
-
-    plain = [np.ones(rows.size), *back(command, 1), *back(recording.reference, 0)]
-    full = [*plain, *back(recording.output, 0)]
-    left, ranks = [], []
-    for columns in (plain, full):
-        matrix = np.stack(columns, axis=1)
-        weights, _, rank, _ = np.linalg.lstsq(matrix, command[rows], rcond=1e-10)
-        left.append(float(np.sum((command[rows] - matrix @ weights) ** 2)))
-        ranks.append(int(rank))
-    more, freedom = ranks[1] - ranks[0], rows.size - ranks[1]
-    floor = 1e-20 * float(np.sum((command - command.mean()) ** 2))
-    if more < 1 or freedom < 1 or left[0] <= floor:
-        return 1.0
-    ratio = (left[0] - left[1]) / more / (max(left[1], floor) / freedom)
-    return float(special.fdtrc(more, freedom, max(ratio, 0.0)))
 
 
 def _message(weighting: Weighting, share: float, feedback: bool, read: InputOutput) -> str:
