@@ -10,6 +10,7 @@ from deadtime._estimation.arx_scan import estimate_by_arx_scan
 from deadtime._estimation.decay import estimate_by_decay
 from deadtime._estimation.decrement import estimate_by_decrement
 from deadtime._estimation.gcc import estimate_by_gcc
+from deadtime._estimation.grid import estimate_by_grid
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
 from deadtime._estimation.result import DelayEstimate
@@ -26,6 +27,7 @@ _Estimator: TypeAlias = Callable[..., DelayEstimate]
 METHODS: Mapping[str, _Estimator] = {
     "output_error": estimate_by_output_error,
     "waveform": estimate_by_waveform,
+    "grid": estimate_by_grid,
     "overshoot": estimate_by_overshoot,
     "decrement": estimate_by_decrement,
     "decay": estimate_by_decay,
