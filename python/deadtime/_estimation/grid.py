@@ -13,7 +13,7 @@ not explained by it: the curvature then promises too much, without the residuals
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,9 @@ STEPS = 2
 #: The reference is away from the output at the start by so many standard deviations of the noise,
 #: or does not excite the loop.
 CLEARANCE = 5.0
+
+#: A gain this many times its standard error is one.
+ANSWERS = 3.0
 
 #: A misfit for simulations that leave all bounds, in units of the output's range.
 HOPELESS = 1e3
@@ -94,6 +97,7 @@ def estimate_by_grid(
     if not adequate:
         spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
     errors = standard_errors(names, spread)
+    _check_answer(problem.values(point), errors)
     noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
     low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
     return DelayEstimate(
@@ -155,6 +159,16 @@ def _check_excitation(data: Recording, numbers: int) -> None:
         raise NotIdentifiableError(
             f"{left} samples after the step are too few for {numbers} numbers and an initial "
             "output: widen the window"
+        )
+
+
+def _check_answer(values: Mapping[str, float], errors: Mapping[str, float]) -> None:
+    """Refuse a gain that might as well be none: then no delay explains anything."""
+    if "gain" in values and abs(values["gain"]) < ANSWERS * errors["gain"]:
+        raise NotIdentifiableError(
+            f"the gain comes out at {values['gain']:.2g} ± {errors['gain']:.2g}, which may be none "
+            "at all: the output is no answer to this reference, or the noise drowns it; check "
+            "columns and units"
         )
 
 
