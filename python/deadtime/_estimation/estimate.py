@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from deadtime._estimation.arx_scan import estimate_by_arx_scan
+from deadtime._estimation.cta import estimate_by_cta
 from deadtime._estimation.decay import estimate_by_decay
 from deadtime._estimation.decrement import estimate_by_decrement
 from deadtime._estimation.gcc import estimate_by_gcc
@@ -28,6 +29,7 @@ METHODS: Mapping[str, _Estimator] = {
     "output_error": estimate_by_output_error,
     "waveform": estimate_by_waveform,
     "grid": estimate_by_grid,
+    "cta": estimate_by_cta,
     "overshoot": estimate_by_overshoot,
     "decrement": estimate_by_decrement,
     "decay": estimate_by_decay,

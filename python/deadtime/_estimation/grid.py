@@ -27,6 +27,7 @@ from deadtime._estimation.evidence import (
     embedded,
     standard_errors,
 )
+from deadtime._estimation.excitation import ROUNDING, check_excitation, start_and_span
 from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime._estimation.result import CramerRaoBound, DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
@@ -45,10 +46,6 @@ POINTS, SHORTEST, LONGEST = 32, 0.005, 0.6
 #: of the point before.
 STEPS = 2
 
-#: The reference is away from the output at the start by so many standard deviations of the noise,
-#: or does not excite the loop.
-CLEARANCE = 5.0
-
 #: A gain this many times its standard error is one.
 ANSWERS = 3.0
 
@@ -57,9 +54,6 @@ HOPELESS = 1e3
 
 #: Quantile of the normal distribution for 95 % between two sides.
 TWO_SIDED_95 = 1.96
-
-#: Residuals below this share of the output's range are rounding.
-ROUNDING = 1e-9
 
 
 def estimate_by_grid(
@@ -76,7 +70,7 @@ def estimate_by_grid(
         raise ValueError("the grid method goes over the delay: leave it among `free`")
     simulated = SimulatedRecording(recording, loop, window)
     data = simulated.recording
-    _check_excitation(data, len(names))
+    check_excitation(data, len(names))
     problem = _Problem(simulated, names, initial_output)
     grid = problem.grid() if delays is None else _checked(delays)
     costs, best = problem.over(grid)
@@ -140,28 +134,6 @@ def _checked(delays: ArrayLike) -> Array:
     return grid
 
 
-def _check_excitation(data: Recording, numbers: int) -> None:
-    """Refuse a window in which nothing is asked of the loop or nothing moves."""
-    if float(np.ptp(data.output)) == 0.0:
-        raise NotIdentifiableError(
-            f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
-        )
-    steps = data.steps()
-    noise = float(np.median(np.abs(np.diff(data.output)))) / 0.6745 / math.sqrt(2.0)
-    away = abs(float(data.reference[0] - data.output[0]))
-    if not steps and away <= max(CLEARANCE * noise, ROUNDING * float(np.ptp(data.output))):
-        raise NotIdentifiableError(
-            f"the reference is {data.reference[0]:g} throughout the window, where the output is "
-            "already: nothing excites the loop; choose a window with a step"
-        )
-    left = len(data) - (steps[0].index if steps else 0)
-    if left < 2 * (numbers + 1):
-        raise NotIdentifiableError(
-            f"{left} samples after the step are too few for {numbers} numbers and an initial "
-            "output: widen the window"
-        )
-
-
 def _check_answer(values: Mapping[str, float], errors: Mapping[str, float]) -> None:
     """Refuse a gain that might as well be none: then no delay explains anything."""
     if "gain" in values and abs(values["gain"]) < ANSWERS * errors["gain"]:
@@ -188,10 +160,7 @@ class _Problem:
 
     def __post_init__(self) -> None:
         data = self.simulated.recording
-        steps = data.steps()
-        rest = data.output[: steps[0].index] if steps else data.output[:1]
-        self.start = float(rest.mean())
-        self.span = float(data.time[-1] - (steps[0].time if steps else data.time[0]))
+        self.start, self.span = start_and_span(data)
         self.range = max(float(np.ptp(data.output)), float(np.ptp(data.reference)))
         self.sample = data.sample_time
         self.labels = [*self.names, *(["initial output"] if self.initial_output is None else [])]

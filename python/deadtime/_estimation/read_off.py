@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.evidence import standard_errors
+from deadtime._estimation.excitation import ROUNDING
 from deadtime._estimation.residuals import whiteness_of
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
 
 __all__ = ["check_delay_alone", "read_off_estimate"]
-
-#: Residuals below this share of the output's range are rounding.
-ROUNDING = 1e-9
 
 
 def check_delay_alone(method: str, free: Sequence[str]) -> None:

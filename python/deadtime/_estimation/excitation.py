@@ -1,0 +1,52 @@
+"""Whether anything was asked of the loop in a window, and from where."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from deadtime._errors import NotIdentifiableError
+from deadtime._recording import Recording
+
+__all__ = ["ROUNDING", "check_excitation", "start_and_span"]
+
+#: The reference is away from the output at the start by so many standard deviations of the noise,
+#: or does not excite the loop.
+CLEARANCE = 5.0
+
+#: Misfits below this share of the output's range are rounding.
+ROUNDING = 1e-9
+
+
+def check_excitation(data: Recording, numbers: int) -> None:
+    """Refuse a window in which nothing is asked of the loop or nothing moves."""
+    if float(np.ptp(data.output)) == 0.0:
+        raise NotIdentifiableError(
+            f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
+        )
+    steps = data.steps()
+    noise = float(np.median(np.abs(np.diff(data.output)))) / 0.6745 / math.sqrt(2.0)
+    away = abs(float(data.reference[0] - data.output[0]))
+    if not steps and away <= max(CLEARANCE * noise, ROUNDING * float(np.ptp(data.output))):
+        raise NotIdentifiableError(
+            f"the reference is {data.reference[0]:g} throughout the window, where the output is "
+            "already: nothing excites the loop; choose a window with a step"
+        )
+    left = len(data) - (steps[0].index if steps else 0)
+    if left < 2 * (numbers + 1):
+        raise NotIdentifiableError(
+            f"{left} samples after the step are too few for {numbers} numbers and an initial "
+            "output: widen the window"
+        )
+
+
+def start_and_span(data: Recording) -> tuple[float, float]:
+    """Output before the first step, and the time from that step to the end, s.
+
+    Where the reference does not move, the step is at the first sample.
+    """
+    steps = data.steps()
+    rest = data.output[: steps[0].index] if steps else data.output[:1]
+    begin = steps[0].time if steps else data.time[0]
+    return float(rest.mean()), float(data.time[-1] - begin)
