@@ -11,6 +11,7 @@ from deadtime._estimation.cta import estimate_by_cta
 from deadtime._estimation.decay import estimate_by_decay
 from deadtime._estimation.decrement import estimate_by_decrement
 from deadtime._estimation.gcc import estimate_by_gcc
+from deadtime._estimation.graphical import estimate_by_graphical
 from deadtime._estimation.grid import estimate_by_grid
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
@@ -33,6 +34,7 @@ METHODS: Mapping[str, _Estimator] = {
     "overshoot": estimate_by_overshoot,
     "decrement": estimate_by_decrement,
     "decay": estimate_by_decay,
+    "graphical": estimate_by_graphical,
     "gcc": estimate_by_gcc,
     "arx_scan": estimate_by_arx_scan,
 }
