@@ -15,6 +15,7 @@ from deadtime._estimation.graphical import estimate_by_graphical
 from deadtime._estimation.grid import estimate_by_grid
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
+from deadtime._estimation.relay import estimate_by_relay
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.waveform import estimate_by_waveform
 from deadtime._loop import ControlLoop
@@ -35,6 +36,7 @@ METHODS: Mapping[str, _Estimator] = {
     "decrement": estimate_by_decrement,
     "decay": estimate_by_decay,
     "graphical": estimate_by_graphical,
+    "relay": estimate_by_relay,
     "gcc": estimate_by_gcc,
     "arx_scan": estimate_by_arx_scan,
 }

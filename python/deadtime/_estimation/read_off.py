@@ -18,8 +18,10 @@ from deadtime._estimation.excitation import ROUNDING
 from deadtime._estimation.residuals import whiteness_of
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
+from deadtime._loop import ControlLoop
+from deadtime._recording import Recording
 
-__all__ = ["check_delay_alone", "read_off_estimate"]
+__all__ = ["check_delay_alone", "estimate_with_residuals", "read_off_estimate"]
 
 
 def check_delay_alone(method: str, free: Sequence[str]) -> None:
@@ -46,9 +48,6 @@ def read_off_estimate(
 
     Without a covariance the standard errors are NaN: the method has none.
     """
-    names = tuple(values)
-    if cov is None:
-        cov = np.full((len(names), len(names)), np.nan)
     try:
         residuals = simulated.residuals(values, start)
     except ValueError as error:
@@ -57,16 +56,45 @@ def read_off_estimate(
             f"the {method} method reads {found}, and a loop with that does not do what was "
             f"recorded ({error}): check gains, signs and units"
         ) from None
+    return estimate_with_residuals(
+        method,
+        simulated.loop,
+        simulated.recording,
+        values,
+        cov,
+        residuals,
+        message=message,
+        uncalibrated=uncalibrated,
+        details=details,
+    )
+
+
+def estimate_with_residuals(
+    method: str,
+    loop: ControlLoop,
+    recording: Recording,
+    values: Mapping[str, float],
+    cov: NDArray[np.float64] | None,
+    residuals: NDArray[np.float64],
+    *,
+    message: str,
+    uncalibrated: str,
+    details: Mapping[str, Any],
+) -> DelayEstimate:
+    """The result for these `values` of a method that has its own residuals."""
+    names = tuple(values)
+    if cov is None:
+        cov = np.full((len(names), len(names)), np.nan)
     whiteness = whiteness_of(residuals, len(names))
-    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(simulated.recording.output))
+    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(recording.output))
     return DelayEstimate(
         method=method,
-        loop=simulated.loop.replace(**values),
+        loop=loop.replace(**values),
         free=names,
         stderr=standard_errors(names, cov),
         cov=cov,
         crb=None,
-        recording=simulated.recording,
+        recording=recording,
         residuals=residuals,
         whiteness=whiteness,
         adequate=whiteness.white or exact,
