@@ -10,6 +10,7 @@ from deadtime._estimation.arx_scan import estimate_by_arx_scan
 from deadtime._estimation.cta import estimate_by_cta
 from deadtime._estimation.decay import estimate_by_decay
 from deadtime._estimation.decrement import estimate_by_decrement
+from deadtime._estimation.frequency import estimate_by_frequency
 from deadtime._estimation.gcc import estimate_by_gcc
 from deadtime._estimation.graphical import estimate_by_graphical
 from deadtime._estimation.grid import estimate_by_grid
@@ -30,6 +31,7 @@ _Estimator: TypeAlias = Callable[..., DelayEstimate]
 METHODS: Mapping[str, _Estimator] = {
     "output_error": estimate_by_output_error,
     "waveform": estimate_by_waveform,
+    "frequency": estimate_by_frequency,
     "grid": estimate_by_grid,
     "cta": estimate_by_cta,
     "overshoot": estimate_by_overshoot,

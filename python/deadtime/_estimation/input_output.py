@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.commands import known_commands
+from deadtime._estimation.commands import commands_over_samples
 from deadtime._estimation.simulated import SimulatedRecording
 from deadtime._loop import ControlLoop
 from deadtime._plants import FirstOrder, Integrator
@@ -81,7 +81,7 @@ def read_input_output(
             f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: the "
             f"{method} method needs even ones; use method='output_error' or 'waveform'"
         )
-    command, source = known_commands(data, loop)
+    command, source = commands_over_samples(data, loop)
     if len(data) < FEWEST:
         raise NotIdentifiableError(
             f"{len(data)} samples are too few for the {method} method, {FEWEST} are needed: widen "
