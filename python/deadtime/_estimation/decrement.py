@@ -199,30 +199,40 @@ def _vertex(answer: StepReading, beyond: Array, place: int, reach: float) -> Ext
         near = np.abs(np.arange(beyond.size) - place) <= 2
     if not near[:-1].any() or near[-1] or int(near.sum()) < 5:
         return None  # the window ends before the extreme has passed
-    centre = float(answer.since[place])
-    times = (answer.since[near] - centre) / reach
-    degree = 3 if times.size > 5 else 2
-    powers = np.vander(times, degree + 1, increasing=True)
-    coefficients, *_ = np.linalg.lstsq(powers, beyond[near], rcond=None)
-    curve = np.polynomial.Polynomial(coefficients)
-    slope, bend = curve.deriv(), curve.deriv(2)
-    found = np.asarray(slope.roots(), dtype=complex)
-    real = found[(np.abs(found.imag) < 1e-9) & (np.abs(found.real) <= 1.0)].real
-    roots = [float(root) for root in real if float(bend(root)) * float(curve(root)) < 0.0]
-    if not roots:
+    times = (answer.since[near] - answer.since[place]) / reach
+    # Noise can take the vertex from a cubic; a parabola always has one.
+    for degree in (3, 2) if times.size > 5 else (2,):
+        powers = np.vander(times, degree + 1, increasing=True)
+        coefficients, *_ = np.linalg.lstsq(powers, beyond[near], rcond=None)
+        curve = np.polynomial.Polynomial(coefficients)
+        vertex = _nearest_extreme(curve)
+        if vertex is not None:
+            break
+    else:
         return None
-    vertex = min(roots, key=abs)
-    # Covariance of the coefficients for a noise of one: what matters of the noise-free case too.
+    # Covariance of the coefficients for a noise of one: it matters of the noise-free case too.
     cov = np.linalg.inv(powers.T @ powers)
     at = vertex ** np.arange(degree + 1)
     rate = np.arange(degree + 1) * np.concatenate([[0.0], at[:-1]])
     noise = max(answer.noise, SMALLEST)
     return Extreme(
-        time=centre + reach * vertex,
+        time=float(answer.since[place]) + reach * vertex,
         height=float(abs(curve(vertex))),
-        time_error=noise * math.sqrt(rate @ cov @ rate) / abs(float(bend(vertex))) * reach,
+        time_error=noise
+        * math.sqrt(rate @ cov @ rate)
+        / abs(float(curve.deriv(2)(vertex)))
+        * reach,
         height_error=noise * math.sqrt(at @ cov @ at),
     )
+
+
+def _nearest_extreme(curve: np.polynomial.Polynomial) -> float | None:
+    """Where the curve is farthest from zero, nearest to the middle of -1 to 1."""
+    found = np.asarray(curve.deriv().roots(), dtype=complex)
+    real = found[(np.abs(found.imag) < 1e-9) & (np.abs(found.real) <= 1.0)].real
+    bend = curve.deriv(2)
+    places = [float(root) for root in real if float(bend(root)) * float(curve(root)) < 0.0]
+    return min(places, key=abs) if places else None
 
 
 def _linear(extremes: list[Extreme], answer: StepReading, loop: ControlLoop) -> list[Extreme]:

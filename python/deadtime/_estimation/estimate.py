@@ -61,11 +61,18 @@ def estimate_delay(
         Reference and output over time, as logged where the controller runs.
     loop : ControlLoop
         What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
-    method : {"auto", "output_error", "overshoot", "waveform"}
+    method : str
         ``"output_error"`` fits the response of the vehicle to the command as it was logged: the
         best there is, and what ``"auto"`` takes where the recording has a command.
         ``"waveform"`` fits the simulated loop to the whole window, and is taken elsewhere.
         ``"overshoot"`` reads one number, as Armah & Yi did.
+        ``"decrement"`` reads successive peaks, ``"decay"`` the tail where nothing overshoots,
+        ``"graphical"`` the beginning of a step.
+        ``"frequency"`` is maximum likelihood at the lines of a spectrum, for periodic experiments.
+        ``"grid"`` is the cost over a range of delays, kept as a curve; ``"cta"`` the waveform with
+        Chebyshev's approximation of the delay.
+        ``"relay"`` reads the period of a limit cycle.
+        ``"gcc"`` is generalised cross-correlation, ``"arx_scan"`` what `delayest` does.
     free : sequence of str
         What is fitted: any of ``"delay"``, ``"gain"`` and ``"lag"``. The overshoot method fits the
         delay alone.
@@ -75,6 +82,15 @@ def estimate_delay(
     **options
         For ``"output_error"``: ``initial_output``, the true output at the start where it is known;
         fitted otherwise.
+        For ``"frequency"``: ``period`` of the excitation, s, with ``left_out=1`` periods of
+        transient; ``highest``, Hz.
+        For ``"grid"``: ``delays`` to try, s; ``initial_output``. For ``"cta"``: ``intervals=8``;
+        ``initial_output``.
+        For ``"decay"``: ``tail=0.3``, the share of the step that is left where it begins.
+        For ``"graphical"``: ``construction="tangent"``, ``"two_point"`` (with two ``shares``) or
+        ``"first_movement"``. For ``"relay"``: its ``amplitude`` where no command was logged.
+        For ``"gcc"``: ``weighting="none"``, ``"scot"``, ``"phat"`` or ``"prewhitened"``.
+        For ``"arx_scan"``: ``na=2``, ``nb=2``, ``fractional=False``.
         For ``"overshoot"``: ``map="dominant"`` (the paper's), ``"exact"`` (the exact step
         response) or ``"saturated"`` (the loop simulated with its hold and limit).
 

@@ -22,6 +22,9 @@ CLEARANCE = 3.0
 #: How much longer than the step's own reading of noise the start is averaged, s.
 BEFORE_STEP = 2.0
 
+#: So many samples at rest tell the noise by themselves.
+ENOUGH = 20
+
 #: An output that ends short of this share of the step does not follow the reference.
 FOLLOWS = 0.5
 
@@ -123,7 +126,9 @@ def read_step(recording: Recording) -> StepReading:
 
 def _noise(before: Array, tail: Array) -> float:
     """Standard deviation of the sensor noise, from where the loop rests."""
-    if before.size >= 5:
-        return float(np.std(before, ddof=1))
-    differences = np.diff(tail)
-    return float(np.median(np.abs(differences)) / 0.6745 / math.sqrt(2.0))
+    resting = float(np.std(before, ddof=1)) if before.size >= 5 else 0.0
+    if before.size >= ENOUGH:
+        return resting
+    # Few samples often show too little; second differences pass over what still moves at the end.
+    bends = np.diff(tail, 2)
+    return max(resting, float(np.median(np.abs(bends))) / 0.6745 / math.sqrt(6.0))
