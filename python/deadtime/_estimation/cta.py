@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.evidence import check_distinguishable, checked_names
-from deadtime._estimation.excitation import check_excitation, start_and_span
+from deadtime._estimation.evidence import check_distinguishable, checked_names, standard_errors
+from deadtime._estimation.excitation import check_excitation, check_gain, start_and_span
 from deadtime._estimation.read_off import read_off_estimate
 from deadtime._estimation.residuals import robust_covariance
 from deadtime._estimation.result import DelayEstimate
@@ -77,6 +77,7 @@ def estimate_by_cta(
     check_distinguishable(jacobian, fit.labels)
     cov = robust_covariance(jacobian, -misfit)[: len(names), : len(names)]
     values = dict(zip(names, (float(value) for value in point), strict=False))
+    check_gain(values, standard_errors(names, cov))
     return read_off_estimate(
         "cta",
         simulated,
@@ -164,7 +165,10 @@ class _Fit:
         # The deviation from the new reference begins at -1 all along the delay, at no speed.
         begin = np.where(np.arange(size) < nodes, -1.0, 0.0)
         weights = modes[0] * np.linalg.solve(modes, begin)
-        return np.asarray(rates, dtype=np.complex128), np.asarray(weights, dtype=np.complex128)
+        # One of each conjugate pair stands for both.
+        weights = np.where(rates.imag > 0.0, 2.0, 1.0) * weights
+        upper = rates.imag >= 0.0
+        return rates[upper].astype(np.complex128), weights[upper].astype(np.complex128)
 
     def solve(self) -> tuple[Array, Array]:
         """The best numbers and the derivatives of the misfit there."""

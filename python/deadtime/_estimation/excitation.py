@@ -1,19 +1,23 @@
-"""Whether anything was asked of the loop in a window, and from where."""
+"""Whether anything was asked of the loop in a window, and whether it answered."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._recording import Recording
 
-__all__ = ["ROUNDING", "check_excitation", "start_and_span"]
+__all__ = ["ROUNDING", "check_excitation", "check_gain", "start_and_span"]
 
 #: The reference is away from the output at the start by so many standard deviations of the noise,
 #: or does not excite the loop.
 CLEARANCE = 5.0
+
+#: A gain this many times its standard error is one.
+ANSWERS = 3.0
 
 #: Misfits below this share of the output's range are rounding.
 ROUNDING = 1e-9
@@ -50,3 +54,13 @@ def start_and_span(data: Recording) -> tuple[float, float]:
     rest = data.output[: steps[0].index] if steps else data.output[:1]
     begin = steps[0].time if steps else data.time[0]
     return float(rest.mean()), float(data.time[-1] - begin)
+
+
+def check_gain(values: Mapping[str, float], errors: Mapping[str, float]) -> None:
+    """Refuse a fitted gain that might as well be none: then no delay explains anything."""
+    if "gain" in values and abs(values["gain"]) < ANSWERS * errors["gain"]:
+        raise NotIdentifiableError(
+            f"the gain comes out at {values['gain']:.2g} ± {errors['gain']:.2g}, which may be none "
+            "at all: the output is no answer to what was asked, or the noise drowns it; check "
+            "columns and units"
+        )

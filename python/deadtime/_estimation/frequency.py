@@ -31,6 +31,7 @@ from scipy.optimize import least_squares
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.commands import commands_over_samples
 from deadtime._estimation.evidence import check_distinguishable, checked_names, standard_errors
+from deadtime._estimation.excitation import ROUNDING, check_gain
 from deadtime._estimation.held_response import HeldResponse
 from deadtime._estimation.held_transfer import held_transfer
 from deadtime._estimation.periodic import PeriodicSpectra, periodic_spectra
@@ -53,12 +54,6 @@ MOST_POINTS = 400
 
 #: Samples are even where their distances differ by less than this share.
 EVEN = 1e-3
-
-#: Misfits below this share of the output are rounding.
-ROUNDING = 1e-9
-
-#: A gain this many times its standard error is one.
-ANSWERS = 3.0
 
 
 class _Lines(NamedTuple):
@@ -116,7 +111,7 @@ def estimate_by_frequency(
     cov = np.asarray(cov * lines.widening, dtype=np.float64)
     values = {name: float(value) for name, value in zip(names, point, strict=True)}
     errors = standard_errors(names, cov)
-    _check_answer(values, errors)
+    check_gain(values, errors)
     residuals = _residuals(data, response, known | values)
     whiteness = whiteness_of(residuals, len(names))
     exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
@@ -259,15 +254,6 @@ def _cost_at_best_gain(
     slope = now - misfit(other)
     moved = now - slope * float(slope @ now) / float(slope @ slope)
     return float(moved @ moved)
-
-
-def _check_answer(values: dict[str, float], errors: dict[str, float]) -> None:
-    """Refuse a gain that might as well be none: then no delay explains anything."""
-    if "gain" in values and abs(values["gain"]) < ANSWERS * errors["gain"]:
-        raise NotIdentifiableError(
-            f"the gain comes out at {values['gain']:.2g} ± {errors['gain']:.2g}, which may be none "
-            "at all: the output is no answer to this command, or the noise drowns it"
-        )
 
 
 def _residuals(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:

@@ -13,7 +13,7 @@ not explained by it: the curvature then promises too much, without the residuals
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,12 @@ from deadtime._estimation.evidence import (
     embedded,
     standard_errors,
 )
-from deadtime._estimation.excitation import ROUNDING, check_excitation, start_and_span
+from deadtime._estimation.excitation import (
+    ROUNDING,
+    check_excitation,
+    check_gain,
+    start_and_span,
+)
 from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime._estimation.result import CramerRaoBound, DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
@@ -42,12 +47,16 @@ Array = NDArray[np.float64]
 #: Points of the grid, and between which shares of the window they lie besides none.
 POINTS, SHORTEST, LONGEST = 32, 0.005, 0.6
 
+#: Delays and lags of a continuous loop below this share of the window, or of the time between two
+#: samples, take long to simulate and cannot be told from none.
+SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
+
+#: Valleys of the curve that are refined; the deepest wins.
+REFINED = 3
+
 #: Steps of least squares for what is free besides the delay, at each point: it starts from the best
 #: of the point before.
 STEPS = 2
-
-#: A gain this many times its standard error is one.
-ANSWERS = 3.0
 
 #: A misfit for simulations that leave all bounds, in units of the output's range.
 HOPELESS = 1e3
@@ -73,13 +82,15 @@ def estimate_by_grid(
     check_excitation(data, len(names))
     problem = _Problem(simulated, names, initial_output)
     grid = problem.grid() if delays is None else _checked(delays)
-    costs, best = problem.over(grid)
-    point = problem.refined(best)
+    costs, points = problem.over(grid)
+    point = problem.refined(costs, points)
     problem.check_ends(point)
 
     misfit, jacobian = problem.misfit(point), problem.jacobian(point)
     residuals = -misfit
-    held = [i for i, name in enumerate(problem.labels) if name == "lag" and point[i] <= 1e-9]
+    held = [
+        i for i, name in enumerate(problem.labels) if name == "lag" and problem.at_least(point, i)
+    ]
     loose = [i for i in range(len(problem.labels)) if i not in held]
     check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
     whiteness = whiteness_of(residuals, len(names))
@@ -91,7 +102,7 @@ def estimate_by_grid(
     if not adequate:
         spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
     errors = standard_errors(names, spread)
-    _check_answer(problem.values(point), errors)
+    check_gain(problem.values(point), errors)
     noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
     low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
     return DelayEstimate(
@@ -134,16 +145,6 @@ def _checked(delays: ArrayLike) -> Array:
     return grid
 
 
-def _check_answer(values: Mapping[str, float], errors: Mapping[str, float]) -> None:
-    """Refuse a gain that might as well be none: then no delay explains anything."""
-    if "gain" in values and abs(values["gain"]) < ANSWERS * errors["gain"]:
-        raise NotIdentifiableError(
-            f"the gain comes out at {values['gain']:.2g} ± {errors['gain']:.2g}, which may be none "
-            "at all: the output is no answer to this reference, or the noise drowns it; check "
-            "columns and units"
-        )
-
-
 def _valleys(costs: Array) -> list[int]:
     """Rows of the grid that are lower than both neighbours."""
     middle = costs[1:-1]
@@ -166,7 +167,8 @@ class _Problem:
         self.labels = [*self.names, *(["initial output"] if self.initial_output is None else [])]
         gain = self.simulated.loop.parameters.get("gain", 1.0)
         low, high = sorted((1e-3 * gain, 1e3 * gain))
-        ends = {"delay": (0.0, self.span), "gain": (low, high), "lag": (0.0, self.span)}
+        least = self.shortest
+        ends = {"delay": (least, self.span), "gain": (low, high), "lag": (least, self.span)}
         bounds = [ends.get(label, (-np.inf, np.inf)) for label in self.labels]
         self.low, self.high = (np.array(side) for side in zip(*bounds, strict=True))
         scales = {"delay": self.sample, "gain": abs(gain), "lag": self.sample}
@@ -174,10 +176,17 @@ class _Problem:
         guesses = {"gain": gain, "lag": self.sample, "initial output": self.start}
         self.guess = np.array([guesses.get(label, 0.0) for label in self.labels])
 
+    @property
+    def shortest(self) -> float:
+        """Shortest delay and lag: in continuous loops shorter ones take long to simulate."""
+        if self.simulated.loop.is_sampled:
+            return 0.0
+        return min(self.span * SHORTEST_OF_WINDOW, self.sample * SHORTEST_OF_SAMPLE)
+
     def grid(self) -> Array:
-        """Delays from none to most of the window, closer where they are short."""
+        """Delays from the shortest to most of the window, closer where they are short."""
         points = np.geomspace(SHORTEST, LONGEST, POINTS) * self.span
-        return np.concatenate([[0.0], points])
+        return np.concatenate([[self.shortest], points[points > self.shortest]])
 
     def values(self, point: Array) -> dict[str, float]:
         return dict(zip(self.names, (float(value) for value in point), strict=False))
@@ -239,9 +248,9 @@ class _Problem:
         return whole(found.x)
 
     def over(self, grid: Array) -> tuple[Array, Array]:
-        """Least cost at each delay, and the numbers at the lowest."""
-        costs = np.empty(grid.size)
-        lowest, point = self.guess, self.guess
+        """Least cost at each delay, and the numbers there."""
+        costs, points = np.empty(grid.size), np.empty((grid.size, self.guess.size))
+        point = self.guess
         for row, delay in enumerate(grid):
             trial = min(
                 (np.concatenate([[delay], start[1:]]) for start in (self.guess, point)),
@@ -249,26 +258,31 @@ class _Problem:
             )
             point = self.best(trial, [0], STEPS)
             misfit = self.misfit(point)
-            costs[row] = float(misfit @ misfit)
-            if row == int(np.argmin(costs[: row + 1])):
-                lowest = point
-        place = int(np.argmin(costs))
-        if place == grid.size - 1:
+            costs[row], points[row] = float(misfit @ misfit), point
+        if int(np.argmin(costs)) == grid.size - 1:
             raise NotIdentifiableError(
                 f"the cost falls up to a delay of {grid[-1]:g} s, the longest that is tried: the "
                 "output is no answer of such a loop to this reference; check columns, signs, "
                 "units and gains, or give other `delays`"
             )
-        return costs, lowest
+        return costs, points
 
-    def refined(self, point: Array) -> Array:
-        return self.best(point, [], 60)
+    def refined(self, costs: Array, points: Array) -> Array:
+        """The deepest of the deepest valleys, all numbers at their best."""
+        valleys = sorted({int(np.argmin(costs)), *_valleys(costs)}, key=lambda row: costs[row])
+        found = [self.best(points[row], [], 60) for row in valleys[:REFINED]]
+        return min(found, key=lambda point: float(np.sum(self.misfit(point) ** 2)))
+
+    def at_least(self, point: Array, place: int) -> bool:
+        """Whether a delay or lag came out at the shortest there is."""
+        return bool(point[place] <= self.low[place] * (1.0 + 1e-6) + 1e-9)
 
     def check_ends(self, point: Array) -> None:
         """Refuse what ran to an end of its search; a delay or lag of zero is an answer."""
         for label, value, low, high in zip(self.labels, point, self.low, self.high, strict=True):
-            for end in (low, high):
-                if math.isfinite(end) and end != 0.0 and abs(value - end) <= 1e-3 * abs(end):
+            ends = (high,) if label in ("delay", "lag") else (low, high)
+            for end in ends:
+                if math.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
                     raise NotIdentifiableError(
                         f"the fit runs away to a {label} of {end:g}, the end of its search: the "
                         "output is no answer of such a loop to this reference; check columns, "
