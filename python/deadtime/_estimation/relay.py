@@ -15,7 +15,8 @@ where samples are as long as the lag), an unknown one counts as delay: almost al
 shorter than a quarter of the period.
 
 Half cycles up and down are averaged in pairs, in which an offset or a drift cancels to first
-order; the standard error is that of the mean of the cycles.
+order; the standard error is that of the mean of the cycles, which share
+their crossings.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def estimate_by_relay(
     cycles = _paired(reads)
     late = _late_by_lag(plant.lag, half)
     delay = float(cycles.mean()) - late
-    stderr = float(cycles.std(ddof=1)) / math.sqrt(cycles.size)
+    stderr = _error_of_mean(cycles)
     if delay <= 0.0:
         raise NotIdentifiableError(
             f"a quarter of the period, {0.5 * half:.3g} s, is all lag and hold: the lag of "
@@ -228,6 +229,18 @@ def _paired(reads: Array) -> Array:
     """Means of one half cycle and the next, whole pairs only."""
     even = reads[reads.size % 2 :]
     return np.asarray(even.reshape(-1, 2).mean(axis=1))
+
+
+def _error_of_mean(cycles: Array) -> float:
+    """Standard error of the mean of cycles that share a crossing with their neighbours.
+
+    Without a hold the errors of the crossings between them cancel, all but the first and the last.
+    """
+    off = cycles - cycles.mean()
+    count = cycles.size
+    power = float(off @ off) / (count - 1)
+    neighbours = float(off[1:] @ off[:-1]) / (count - 1)
+    return math.sqrt(max(power + 2.0 * neighbours, power / count) / count)
 
 
 def _late_by_lag(lag: float, half: float) -> float:
