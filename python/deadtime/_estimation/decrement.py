@@ -2,18 +2,15 @@
 
 Once its other roots have died out, the response to a step rings as e^(-σt) cos(ω_d t + φ) with
 the rightmost pair s = -σ ± iω_d. Its extremes follow each other after π/ω_d, each e^(-σπ/ω_d) times
-the one before: a line through the logarithms of their heights and one through their times give σ
-and ω_d (Armah & Yi's eq. 4 is the first of them). That pair is a root of s (lag s + 1) + K e^(-s
-Td) = 0, two real equations: with ζ = cos φ = σ/abs(s) and no lag, Td = φ/ω_d and
-K = ω_d e^(-σ Td)/sin φ, whatever the gain. In a sampled loop 1 + K H(z; Td) = 0 with z = e^(s h)
-and the held plant H takes the place of that equation.
+the one before (Armah & Yi's eq. 4): a line through the logarithms of their heights and one through
+their times give σ and ω_d. The pair is a root of s (lag s + 1) + K e^(-s Td) = 0, two real
+equations: with cos φ = σ/abs(s) and no lag, Td = φ/ω_d and K = ω_d e^(-σ Td)/sin φ, whatever the
+gain. In a sampled loop 1 + K H(e^(s h); Td) = 0, H the held plant, takes its place. A known
+gain is used by conditioning: with the covariance C of (Td, K), Td moves by C_TK/C_KK (K_known - K).
 
-A gain that is known is used by conditioning: with the covariance C of (Td, K), Td moves by
-C_TK/C_KK (K_known - K).
-
-Peaks are vertices of cubics fitted around them, so a peak lies between samples and averages noise.
-Extremes within the limit of the command only are linear, and those alone are used. The first one
-still holds a few per cent of other roots; a smaller share of each that follows.
+Peaks are vertices of cubics fitted around them, so they lie between samples and average noise. Only
+those within the limit of the command are linear and used. The first still holds some per cent of
+other roots, a smaller share of each that follows.
 """
 
 from __future__ import annotations

@@ -1,20 +1,17 @@
 """Maximum likelihood in the frequency domain (Pintelon & Schoukens 2012, chapters 8 to 12).
 
-Periodic excitation (`period`): the DFT of each period gives U_m and Y_m at the lines that the
-reference excites. The reference repeats exactly, so their means over the periods are what it
-causes, and their covariances over the periods are the noise on both, feedback and all: the
-reference is the instrument. With the exact response G(z) = gain H(z; delay, lag) of the held plant
+Periodic excitation (`period`): means of the DFT of each period at the lines that the reference
+excites are what it causes, and covariances between the periods are the noise on both, feedback and
+all: the reference is the instrument. With the response G(z) = gain H(z; delay, lag) of the held
+plant, exact for every delay, errors in variables are fitted by
 
-    cost = sum |Y - G U|²/(s_y² + |G|² s_u² - 2 Re(s_yu G*)),
+    cost = sum |Y - G U|²/(s_y² + |G|² s_u² - 2 Re(s_yu G*));
 
-errors in variables, covariances averaged over neighbouring lines. Its minimum is half a chi-square
-with two degrees of freedom a line less one a number: the test of the model. The covariance is that
-of the Jacobian, widened where the test fails.
+twice its minimum is chi-square where the model holds, which is tested; elsewhere errors are wider.
 
 One record without a period: the lines of the DFT of y - gain F(t - Td), F the exact response to
 the held commands from the beginning on, so that no transient leaks; the mean, and with it the
-output at the start, is dropped. White noise is white over the lines. All of them are output error
-by Parseval's theorem; `highest` leaves out those where the model is not trusted.
+start, is dropped. White noise is white over the lines; all of them are output error (Parseval).
 """
 
 from __future__ import annotations

@@ -1,22 +1,16 @@
 """Delay from the limit cycle of an integrator under relay feedback (Åström & Hägglund 1984).
 
 The output climbs with slope a until a delay after the command has switched, then falls with the
-same slope: from its crossing c of the reference to the next one, c', it takes 2 (s + Td - c), s
-being when the command switched. Each half cycle so gives
+same slope: from its crossing c of the reference to the next, c', it takes 2 (s + Td - c), s being
+when the command switched. Each half cycle so gives Td = (c + c')/2 - s, a quarter of the period
+where the relay switches at the crossing. A sampled one waits for the next sample; where noise
+makes it switch to and fro, s is the time of one switch with the same effect. Crossings are those of
+lines through the samples on the slope; the peak is a (s + Td - c).
 
-    Td = (c + c')/2 - s,
-
-a quarter of the period where the relay switches at the crossing, s = c. A sampled one switches at
-the next sample, which lengthens the quarter by half a sample on average and by the wait s - c
-exactly. Where noise makes it switch to and fro, s is the time of one switch with the same effect.
-Crossings are those of lines through the samples on the slope; the peak is a (s + Td - c). A known
-lag is taken off (exactly where the relay switches at the crossing, within a millisecond or two
-where samples are as long as the lag), an unknown one counts as delay: almost all of it where it is
-shorter than a quarter of the period.
-
-Half cycles up and down are averaged in pairs, in which an offset or a drift cancels to first
-order; the standard error is that of the mean of the cycles, which share
-their crossings.
+A known lag is taken off (exactly where the relay switches at the crossing, within a millisecond or
+two where samples are as long as the lag), an unknown one counts as delay: almost all of it where it
+is shorter than a quarter of the period. Half cycles are averaged in pairs, in which an offset or a
+drift cancels to first order; the standard error is that of the mean of these cycles.
 """
 
 from __future__ import annotations
