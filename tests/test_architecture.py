@@ -78,7 +78,7 @@ FLOORS = [
         "_system_run",
         "_simulation",
     },
-    {"_recording", "_gallery_entries", "gallery"},
+    {"_recording", "_waves", "_circulating_noise", "_excitation", "_gallery_entries", "gallery"},
     {"_readers", "_estimation", "_design"},
     {"_experiment"},
     {"paper"},

@@ -29,6 +29,7 @@ from deadtime._estimation import (
     damping_ratio,
     estimate_delay,
 )
+from deadtime._excitation import Experiment
 from deadtime._expansion import Expansion
 from deadtime._fixed_step import simulate_fixed_step
 from deadtime._loop import ControlLoop
@@ -84,6 +85,7 @@ __all__ = [
     "DerivativeFilter",
     "Design",
     "Expansion",
+    "Experiment",
     "FirstOrder",
     "Integrator",
     "MapStatus",

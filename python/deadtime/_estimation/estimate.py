@@ -6,9 +6,18 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
+from deadtime._estimation.arx_scan import estimate_by_arx_scan
+from deadtime._estimation.cta import estimate_by_cta
+from deadtime._estimation.decay import estimate_by_decay
+from deadtime._estimation.decrement import estimate_by_decrement
 from deadtime._estimation.evidence import check_setpoint_active
+from deadtime._estimation.frequency import estimate_by_frequency
+from deadtime._estimation.gcc import estimate_by_gcc
+from deadtime._estimation.graphical import estimate_by_graphical
+from deadtime._estimation.grid import estimate_by_grid
 from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
+from deadtime._estimation.relay import estimate_by_relay
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.several import Flights, Window, each_flight
 from deadtime._estimation.waveform import estimate_by_waveform
@@ -22,7 +31,16 @@ _Estimator: TypeAlias = Callable[..., DelayEstimate]
 METHODS: Mapping[str, _Estimator] = {
     "output_error": estimate_by_output_error,
     "waveform": estimate_by_waveform,
+    "frequency": estimate_by_frequency,
+    "grid": estimate_by_grid,
+    "cta": estimate_by_cta,
     "overshoot": estimate_by_overshoot,
+    "decrement": estimate_by_decrement,
+    "decay": estimate_by_decay,
+    "graphical": estimate_by_graphical,
+    "relay": estimate_by_relay,
+    "gcc": estimate_by_gcc,
+    "arx_scan": estimate_by_arx_scan,
 }
 
 #: Those that fit several recordings together.
@@ -46,11 +64,18 @@ def estimate_delay(
         Reference and output over time, as logged where the controller runs.
     loop : ControlLoop
         What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
-    method : {"auto", "output_error", "overshoot", "waveform"}
+    method : str
         ``"output_error"`` fits the response of the vehicle to the command as it was logged: the
         best there is, and what ``"auto"`` takes where the recording has a command.
         ``"waveform"`` fits the simulated loop to the whole window, and is taken elsewhere.
         ``"overshoot"`` reads one number, as Armah & Yi did.
+        ``"decrement"`` reads successive peaks, ``"decay"`` the tail where nothing overshoots,
+        ``"graphical"`` the beginning of a step.
+        ``"frequency"`` is maximum likelihood at the lines of a spectrum, for periodic experiments.
+        ``"grid"`` is the cost over a range of delays, kept as a curve; ``"cta"`` the waveform with
+        Chebyshev's approximation of the delay.
+        ``"relay"`` reads the period of a limit cycle.
+        ``"gcc"`` is generalised cross-correlation, ``"arx_scan"`` what `delayest` does.
     free : sequence of str
         What is fitted: any of ``"delay"``, ``"gain"`` and ``"lag"``. The overshoot method fits the
         delay alone.
@@ -60,6 +85,15 @@ def estimate_delay(
     **options
         For ``"output_error"``: ``initial_output``, the true output at the start where it is known;
         fitted otherwise.
+        For ``"frequency"``: ``period`` of the excitation, s, with ``left_out=1`` periods of
+        transient; ``highest``, Hz.
+        For ``"grid"``: ``delays`` to try, s; ``initial_output``. For ``"cta"``: ``intervals=8``;
+        ``initial_output``.
+        For ``"decay"``: ``tail=0.3``, the share of the step that is left where it begins.
+        For ``"graphical"``: ``construction="tangent"``, ``"two_point"`` (with two ``shares``) or
+        ``"first_movement"``. For ``"relay"``: its ``amplitude`` where no command was logged.
+        For ``"gcc"``: ``weighting="none"``, ``"scot"``, ``"phat"`` or ``"prewhitened"``.
+        For ``"arx_scan"``: ``na=2``, ``nb=2``, ``fractional=False``.
         For ``"overshoot"``: ``map="dominant"`` (the paper's), ``"exact"`` (the exact step
         response) or ``"saturated"`` (the loop simulated with its hold and limit).
 

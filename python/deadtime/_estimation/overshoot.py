@@ -26,13 +26,12 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.optimize import brentq
 
-from deadtime._controllers import P
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.residuals import whiteness_of
+from deadtime._estimation.read_off import read_off_estimate
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
+from deadtime._estimation.step_reading import CLEARANCE, read_step, stiffness_of
 from deadtime._loop import ControlLoop
-from deadtime._plants import Integrator
 from deadtime._recording import Recording, Step
 
 __all__ = ["OvershootMap", "damping_ratio", "estimate_by_overshoot"]
@@ -41,12 +40,6 @@ OvershootMap = Literal["dominant", "exact", "saturated"]
 
 #: Below x = 1/e the rightmost root is real and the response does not overshoot.
 SMALLEST_X = math.exp(-1.0)
-
-#: A peak has to stand out of the noise by this many standard deviations to be an overshoot.
-CLEARANCE = 3.0
-
-#: How much longer than the step's own reading of noise the start is averaged, s.
-BEFORE_STEP = 2.0
 
 
 @dataclass(frozen=True)
@@ -168,7 +161,7 @@ def estimate_by_overshoot(
     """Delay from the overshoot of the one step in the window."""
     if map not in get_args(OvershootMap):
         raise ValueError(f"map={map!r} is not one of {', '.join(get_args(OvershootMap))}")
-    stiffness = _stiffness(loop)
+    stiffness = stiffness_of(loop, "overshoot")
     simulated = SimulatedRecording(recording, loop, window)
     read = read_overshoot(simulated.recording)
 
@@ -184,23 +177,15 @@ def estimate_by_overshoot(
     change = max(read.noise, 1e-6)
     slope = abs(delay_of(read.value + change) - delay) / change if read.value + change < 1 else 0.0
     stderr = slope * read.noise
-    fitted = loop.replace(delay=delay)
-    residuals = simulated.residuals({"delay": delay}, read.start)
-    whiteness = whiteness_of(residuals)
     details = {"map": map, "overshoot": read.value, "overshoot_noise": read.noise}
     if 0.0 < read.value < 1.0:
         details["damping_ratio"] = damping_ratio(read.value)
-    return DelayEstimate(
-        method="overshoot",
-        loop=fitted,
-        free=("delay",),
-        stderr={"delay": stderr},
-        cov=np.array([[stderr**2]]),
-        crb=None,
-        recording=simulated.recording,
-        residuals=residuals,
-        whiteness=whiteness,
-        adequate=whiteness.white,
+    return read_off_estimate(
+        "overshoot",
+        simulated,
+        {"delay": delay},
+        np.array([[stderr**2]]),
+        read.start,
         message=(
             f"{100 * read.value:.2f} % overshoot, map {map!r}: takes the gain to be "
             f"{loop.parameters['gain']:g} and the vehicle to have no lag"
@@ -214,75 +199,23 @@ def estimate_by_overshoot(
     )
 
 
-def _stiffness(loop: ControlLoop) -> float:
-    """K = gain·Kp of the loop, which has to be an integrator under proportional control."""
-    if not isinstance(loop.plant, Integrator) or not isinstance(loop.controller, P):
-        raise ValueError(
-            "the overshoot method is for an Integrator under P control, the loop has "
-            f"{type(loop.plant).__name__} under {type(loop.controller).__name__}: use "
-            "method='waveform'"
-        )
-    stiffness = loop.plant.gain * loop.controller.Kp
-    if stiffness <= 0.0:
-        raise ValueError(
-            f"gain·Kp = {stiffness:g}: the loop must have negative feedback; check the signs"
-        )
-    return stiffness
-
-
 def read_overshoot(recording: Recording) -> Overshoot:
     """The overshoot of the one step in a recording, refused where there is none."""
-    steps = recording.steps()
-    if not steps:
-        raise NotIdentifiableError(
-            "the reference does not move in the window: there is no step to overshoot"
-        )
-    if len(steps) > 1:
-        times = ", ".join(f"{step.time:g}" for step in steps[:6])
-        raise NotIdentifiableError(
-            f"{len(steps)} steps of the reference in the window (at {times} s): choose a window "
-            "with one"
-        )
-    step = steps[0]
-    after = recording.output[step.index :]
-    before = recording.output[: step.index]
-    before = before[recording.time[: step.index] >= step.time - BEFORE_STEP]
-    if before.size == 0 or after.size < 4:
-        raise NotIdentifiableError(
-            f"the window leaves {before.size} samples before and {after.size} after the step at "
-            f"{step.time:g} s: widen it"
-        )
-    start = float(before.mean())
-    size = step.after - start
-    if size == 0.0 or math.copysign(1.0, size) != math.copysign(1.0, step.amplitude):
-        raise NotIdentifiableError(
-            f"the output is {start:g} before the step from {step.before:g} to {step.after:g}: the "
-            "loop was not at rest"
-        )
-    tail = after[-max(4, after.size // 4) :]
-    noise = _noise(before, tail)
-    travelled = (after - start) / size
-    row = int(np.argmax(travelled))
-    value = float(travelled[row]) - 1.0
-    settled = max(0.0, float(np.mean((tail - start) / size)) - 1.0)
-    sigma = noise / abs(size)
-    if value - settled <= max(CLEARANCE * sigma, 1e-9):
+    answer = read_step(recording)
+    row = int(np.argmax(answer.travelled))
+    value = float(answer.travelled[row]) - 1.0
+    settled = max(0.0, float(np.mean(answer.tail)) - 1.0)
+    if value - settled <= max(CLEARANCE * answer.noise, 1e-9):
         beyond = max(0.0, value - settled)
         raise NotIdentifiableError(
             f"no overshoot: the output exceeds its final value by {100 * beyond:.2g} % of the "
-            f"step, noise alone gives {100 * CLEARANCE * sigma:.2g} %. Kp·Td is below or near 1/e, "
-            "where the overshoot says nothing of the delay: raise Kp, or use method='waveform'"
+            f"step, noise alone gives {100 * CLEARANCE * answer.noise:.2g} %. Kp·Td is below or "
+            "near 1/e, where the overshoot says nothing of the delay: raise Kp, or use "
+            "method='waveform'"
         )
-    deviation = sigma * math.sqrt(1.0 + 1.0 / before.size)
-    return Overshoot(value, deviation, start, step, float(recording.time[step.index + row]))
-
-
-def _noise(before: np.ndarray, tail: np.ndarray) -> float:
-    """Standard deviation of the sensor noise, from where the loop rests."""
-    if before.size >= 5:
-        return float(np.std(before, ddof=1))
-    differences = np.diff(tail)
-    return float(np.median(np.abs(differences)) / 0.6745 / math.sqrt(2.0))
+    deviation = answer.noise * math.sqrt(1.0 + 1.0 / answer.start_samples)
+    peak_time = answer.step.time + float(answer.since[row])
+    return Overshoot(value, deviation, answer.start, answer.step, peak_time)
 
 
 def _saturated_delay(

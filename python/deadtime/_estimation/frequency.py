@@ -1,0 +1,283 @@
+"""Maximum likelihood in the frequency domain (Pintelon & Schoukens 2012, chapters 8 to 12).
+
+Periodic excitation (`period`): means of the DFT of each period at the lines that the reference
+excites are what it causes, and covariances between the periods are the noise on both, feedback and
+all: the reference is the instrument. With the response G(z) = gain H(z; delay, lag) of the held
+plant, exact for every delay, errors in variables are fitted by
+
+    cost = sum |Y - G U|²/(s_y² + |G|² s_u² - 2 Re(s_yu G*));
+
+twice its minimum is chi-square where the model holds, which is tested; elsewhere errors are wider.
+
+One record without a period: the lines of the DFT of y - gain F(t - Td), F the exact response to
+the held commands from the beginning on, so that no transient leaks; the mean, and with it the
+start, is dropped. White noise is white over the lines; all of them are output error (Parseval).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+from scipy.optimize import least_squares
+
+from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.commands import commands_over_samples
+from deadtime._estimation.evidence import check_distinguishable, checked_names, standard_errors
+from deadtime._estimation.excitation import ROUNDING, check_gain
+from deadtime._estimation.held_response import HeldResponse
+from deadtime._estimation.held_transfer import held_transfer
+from deadtime._estimation.periodic import PeriodicSpectra, periodic_spectra
+from deadtime._estimation.residuals import SIGNIFICANCE, whiteness_of
+from deadtime._estimation.result import DelayEstimate
+from deadtime._loop import ControlLoop
+from deadtime._plants import Integrator
+from deadtime._recording import Recording
+from deadtime._validation import positive
+
+__all__ = ["estimate_by_frequency"]
+
+Array = NDArray[np.float64]
+
+#: Longest delay that is sought, as a share of the window, and how many to a sample are tried first.
+LONGEST, EACH = 0.6, 2
+
+#: Most delays that are tried first.
+MOST_POINTS = 400
+
+#: Samples are even where their distances differ by less than this share.
+EVEN = 1e-3
+
+
+class _Lines(NamedTuple):
+    """What is fitted: misfit at the lines, over their standard deviation where that is known."""
+
+    misfit: Callable[[dict[str, float]], Array]
+    known_noise: bool
+    freedom: int
+    widening: float
+    longest: float
+    describe: str
+
+
+def estimate_by_frequency(
+    recording: Recording,
+    loop: ControlLoop,
+    window: tuple[float | None, float | None] | None,
+    free: Sequence[str],
+    period: float | None = None,
+    left_out: int = 1,
+    highest: float | None = None,
+) -> DelayEstimate:
+    """Fit `free` to the lines of the DFT, up to `highest` Hz.
+
+    With a `period` in s the first `left_out` periods are taken for transient.
+    """
+    names = checked_names(free, loop)
+    if not isinstance(loop.plant, Integrator):
+        raise ValueError(
+            f"the frequency method is for an Integrator, the loop has a "
+            f"{type(loop.plant).__name__}: use method='waveform'"
+        )
+    data = recording.window(*(window or (None, None)))
+    rows = recording.rows(*(window or (None, None)))
+    _check_even(data)
+    command, source = commands_over_samples(recording, loop)
+    response = HeldResponse(recording.time[: rows.stop], command[: rows.stop])
+    _check_moves(data, command[rows])
+    top = math.inf if highest is None else positive("highest", highest)
+    if period is None:
+        lines = _record_lines(data, response, len(names), top)
+    else:
+        spectra = periodic_spectra(data, command[rows], positive("period", period), left_out, top)
+        lines = _periodic_lines(spectra, data.sample_time, len(names))
+    known = {name: loop.parameters[name] for name in ("gain", "lag")}
+    known["delay"] = 0.0 if loop.delay is None else loop.delay
+    point, jacobian = _solve(lines, names, known, data.sample_time)
+    check_distinguishable(jacobian, list(names))
+    misfit = lines.misfit(known | dict(zip(names, point, strict=True)))
+    power = float(misfit @ misfit)
+    scale = power / lines.freedom
+    worse = float(special.chdtrc(lines.freedom, power)) if lines.known_noise else 1.0
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    cov = np.asarray(inverse * (max(1.0, scale) if lines.known_noise else scale))
+    cov = np.asarray(cov * lines.widening, dtype=np.float64)
+    values = {name: float(value) for name, value in zip(names, point, strict=True)}
+    errors = standard_errors(names, cov)
+    check_gain(values, errors)
+    residuals = _residuals(data, response, known | values)
+    whiteness = whiteness_of(residuals, len(names))
+    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
+    adequate = exact or (worse > SIGNIFICANCE if lines.known_noise else whiteness.white)
+    return DelayEstimate(
+        method="frequency",
+        loop=loop.replace(**values),
+        free=names,
+        stderr=errors,
+        cov=cov,
+        crb=None,
+        recording=data,
+        residuals=residuals,
+        whiteness=whiteness,
+        adequate=adequate,
+        message=_message(names, lines, source, adequate),
+        uncalibrated=_why_uncalibrated(loop),
+        details={"lines": lines.describe, "command": source, "p_value_of_model": worse},
+    )
+
+
+def _check_even(data: Recording) -> None:
+    steps = np.diff(data.time)
+    if float(np.max(np.abs(steps - data.sample_time))) > EVEN * data.sample_time:
+        raise NotIdentifiableError(
+            f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: a DFT "
+            "needs even ones; use method='output_error'"
+        )
+
+
+def _check_moves(data: Recording, command: Array) -> None:
+    for name, signal in (("command", command), ("output", data.output)):
+        if float(np.ptp(signal)) == 0.0:
+            raise NotIdentifiableError(
+                f"the {name} is {signal[0]:g} throughout the window: nothing excites the vehicle "
+                "or it did not move; choose a window in which it does"
+            )
+
+
+def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest: float) -> _Lines:
+    """Lines of one record, the mean dropped; white noise has the same size at each."""
+    size = len(data)
+    frequencies = np.fft.rfftfreq(size, data.sample_time)
+    kept = (frequencies > 0.0) & (frequencies <= highest)
+    nyquist = size % 2 == 0 and bool(kept[-1])
+    real = 2 * int(kept.sum()) - int(nyquist)
+    if real < 2 * (numbers + 1):
+        raise NotIdentifiableError(
+            f"{int(kept.sum())} lines up to {highest:g} Hz are too few for {numbers} numbers: "
+            "widen the window or give a higher `highest`"
+        )
+    weight = np.full(int(kept.sum()), math.sqrt(2.0 / size))
+    if nyquist:
+        weight[-1] = math.sqrt(1.0 / size)
+
+    def misfit(values: dict[str, float]) -> Array:
+        path = response.at(data.time - values["delay"], values["lag"]).value
+        lines = weight * np.fft.rfft(data.output - values["gain"] * path)[kept]
+        return np.concatenate([lines.real, lines.imag])
+
+    describe = f"{int(kept.sum())} of one record"
+    span = float(data.time[-1] - data.time[0])
+    return _Lines(misfit, False, real - numbers, 1.0, LONGEST * span, describe)
+
+
+def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) -> _Lines:
+    """Excited lines of periods, over the standard deviations that the periods show."""
+    z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
+    floor = ROUNDING * float(np.max(np.abs(spectra.output)))
+
+    def misfit(values: dict[str, float]) -> Array:
+        g = values["gain"] * held_transfer(z, values["delay"], values["lag"], sample_time)
+        variance = (
+            spectra.output_variance
+            + np.abs(g) ** 2 * spectra.input_variance
+            - 2.0 * (spectra.covariance * np.conj(g)).real
+        )
+        # Per real part; the power of all parts is then a chi-square.
+        spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
+        lines = (spectra.output - g * spectra.input) / spread
+        return np.concatenate([lines.real, lines.imag])
+
+    freedom = 2 * spectra.lines.size - numbers
+    if freedom < 2:
+        raise NotIdentifiableError(
+            f"{spectra.lines.size} excited lines are too few for {numbers} numbers: excite more"
+        )
+    # A variance that was estimated with f degrees of freedom is too small by (f - 1)/f on average
+    # where it divides.
+    widening = spectra.freedom / (spectra.freedom - 1.0)
+    describe = f"{spectra.lines.size} of {spectra.periods} periods"
+    longest = min(LONGEST * spectra.periods, 1.0) * spectra.samples * sample_time
+    return _Lines(misfit, True, freedom, widening, longest, describe)
+
+
+def _solve(
+    lines: _Lines, names: tuple[str, ...], known: dict[str, float], sample_time: float
+) -> tuple[Array, Array]:
+    """The numbers of least cost, from the best of a grid over the delay, and the Jacobian there."""
+
+    def misfit(point: Array) -> Array:
+        return lines.misfit(known | dict(zip(names, (float(x) for x in point), strict=True)))
+
+    start = np.array([{**known, "lag": sample_time}[name] for name in names])
+    if "delay" in names:
+        count = int(min(MOST_POINTS, max(2.0, EACH * lines.longest / sample_time)))
+        grid = np.linspace(0.0, lines.longest, count + 1)
+        trials = [np.concatenate([[delay], start[1:]]) for delay in grid]
+        start = min(trials, key=lambda trial: _cost_at_best_gain(misfit, trial, names))
+        if start[0] == grid[-1]:
+            raise NotIdentifiableError(
+                f"the fit runs away to a delay of {grid[-1]:.3g} s, the longest that is tried: the "
+                "output is no answer to this command; check columns and units"
+            )
+    low = [-np.inf if name == "gain" else 0.0 for name in names]
+    found = least_squares(
+        misfit,
+        start,
+        bounds=(low, np.inf),
+        jac="3-point",
+        x_scale=[abs(known["gain"]) if name == "gain" else sample_time for name in names],
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-14,
+        max_nfev=100,
+    )
+    return found.x, np.asarray(found.jac)
+
+
+def _cost_at_best_gain(
+    misfit: Callable[[Array], Array], point: Array, names: tuple[str, ...]
+) -> float:
+    """Cost at a point, its gain moved to where the misfit, taken as linear in it, is least."""
+    now = misfit(point)
+    if "gain" not in names:
+        return float(now @ now)
+    place = names.index("gain")
+    other = point.copy()
+    other[place] *= 0.9
+    slope = now - misfit(other)
+    moved = now - slope * float(slope @ now) / float(slope @ slope)
+    return float(moved @ moved)
+
+
+def _residuals(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:
+    """Recorded output less the response to the commands, about its mean."""
+    path = values["gain"] * response.at(data.time - values["delay"], values["lag"]).value
+    residuals = data.output - path
+    return np.asarray(residuals - residuals.mean())
+
+
+def _why_uncalibrated(loop: ControlLoop) -> str:
+    if loop.is_sampled:
+        return ""
+    return (
+        "the frequency method takes the command as constant between samples, and that of a "
+        "continuous loop is not; use method='waveform' for an interval"
+    )
+
+
+def _message(names: tuple[str, ...], lines: _Lines, source: str, adequate: bool) -> str:
+    text = f"maximum likelihood over {', '.join(names)} at the lines {lines.describe}"
+    if source != "logged":
+        text += f", the command {source}"
+    if not adequate:
+        text += (
+            "; more is left than the noise explains, so the model is only an equivalent of the "
+            "vehicle"
+        )
+        if "lag" not in names:
+            text += " (try free=('delay', 'gain', 'lag'))"
+    return text
