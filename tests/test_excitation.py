@@ -173,6 +173,15 @@ def test_a_relay_in_a_sampled_loop_switches_at_samples_only():
     )
 
 
+def test_the_log_does_not_tell_where_the_delay_is():
+    loop = held_loop(dtm.P(2.0))
+    other = loop.replace(delay_path="measurement")
+    experiment = dtm.Experiment.prbs(5.0, 0.4, 0.4)
+    one, two = experiment.fly(loop, 0.01, seed=3), experiment.fly(other, 0.01, seed=3)
+    np.testing.assert_array_equal(one.output, two.output)
+    np.testing.assert_array_equal(one.command, two.command)
+
+
 def test_copies_stay_as_they_are():
     experiment = dtm.Experiment.multisine(0.4, 80 * TS, 12, 2)
     for again in (copy.deepcopy(experiment), pickle.loads(pickle.dumps(experiment))):
