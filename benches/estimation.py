@@ -22,7 +22,7 @@ import os
 import statistics
 import time
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass, field
 from inspect import signature
@@ -267,8 +267,8 @@ def tally(
 
 def shared(
     pool: Executor, work: Iterable[tuple[Case, Column]], runs: int, intervals: bool = False
-) -> list[Tally]:
-    """`tally` of every pair, in batches on all processes."""
+) -> Iterator[Tally]:
+    """`tally` of every pair, in batches on all processes, in the order they were given."""
     batch = max(1, min(25, runs // (2 * (os.cpu_count() or 1))))
     waiting = [
         [
@@ -277,7 +277,7 @@ def shared(
         ]
         for case, column in work
     ]
-    return [joined([part.result() for part in parts]) for parts in waiting]
+    return (joined([part.result() for part in parts]) for parts in waiting)
 
 
 def joined(parts: list[Tally]) -> Tally:
@@ -304,16 +304,13 @@ def errors_of_methods(pool: Executor, chosen: list[Case], columns: list[Column],
     print(
         f"{'RMSE of the delay, ms':36}{'bound':>9}", *(f"{c.name:>{wide}}" for c in columns), sep=""
     )
-    pairs = [(case, column) for case in chosen for column in columns]
-    tallies = dict(
-        zip(((a.name, b.name) for a, b in pairs), shared(pool, pairs, runs), strict=True)
-    )
+    tallies = shared(pool, [(case, column) for case in chosen for column in columns], runs)
     for case in chosen:
         bound = bound_ms(case)
         lines = {"": f"{bound:9.2f}", "known": "", "to the bound": f"{'':9}", "refused": f"{'':9}"}
         lines["known"] = f"{case.known.get('bound', math.nan):9.2f}" if case.known else f"{'':9}"
         for column in columns:
-            found = tallies[case.name, column.name]
+            found = next(tallies)
             delays = found.errors.get("delay", [])
             rmse = 1e3 * math.sqrt(np.mean(np.square(delays))) if delays else math.nan
             lines[""] += cell(rmse, wide)
@@ -325,7 +322,7 @@ def errors_of_methods(pool: Executor, chosen: list[Case], columns: list[Column],
         if not lines["refused"].strip():
             del lines["refused"]
         for label, text in lines.items():
-            print(f"{case.name if not label else '    ' + label:36}{text}")
+            print(f"{case.name if not label else '    ' + label:36}{text}", flush=True)
 
 
 def cell(value: float, wide: int) -> str:
@@ -393,7 +390,7 @@ def coverage(pool: Executor, runs: int, text: str) -> None:
         known = signature(METHODS[column.method]).parameters
         if text not in column.method or any(option not in known for option in column.options):
             continue
-        (found,) = shared(pool, [(case, column)], runs, intervals=True)
+        found = next(shared(pool, [(case, column)], runs, intervals=True))
         told = runs - found.refused
         shares = "  ".join(f"{n} {100 * held / told:.1f} %" for n, held in found.held.items())
         print(f"{column.method + ', ' + label:44}{runs:6d}{found.refused:9d}  {shares}")

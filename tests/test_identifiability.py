@@ -18,10 +18,9 @@ from hypothesis import strategies as st
 TS = 0.065
 
 
-def held_loop(Kp=1.31, delay=0.36, lag=0.0, gain=1.0):
-    return dtm.ControlLoop(
-        dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=TS, limit=1.0
-    )
+def held_loop(Kp=1.31, delay=0.36, lag=0.0, gain=1.0, sample_time=TS, limit=1.0):
+    plant = dtm.Integrator(gain, lag)
+    return dtm.ControlLoop(plant, dtm.P(Kp), delay=delay, sample_time=sample_time, limit=limit)
 
 
 # --- slopes ---------------------------------------------------------------------------------
@@ -113,6 +112,27 @@ def test_the_bounds_of_a_step_are_known(noise, alone, with_gain_and_offset):
     fitted = dtm.identifiability(loop, step, noise=noise, free=("delay", "gain"))
     assert fitted.stderr["delay"] == pytest.approx(with_gain_and_offset, rel=0.006)
     assert fitted.bound.free == ("delay", "gain", "initial output")
+
+
+@pytest.mark.parametrize(
+    ("loop", "noise", "expected"),
+    [
+        (held_loop(limit=None, sample_time=None), 0.01, 0.88),
+        (held_loop(3.0, limit=None, sample_time=None), 0.01, 0.16),
+        (held_loop(sample_time=None), 0.003, 0.77),
+        (held_loop(3.0), 0.01, 2.09),
+        (held_loop(3.0, limit=None), 0.01, 0.94),
+        (held_loop(0.8), 0.01, 3.44),
+        (held_loop(4.0, 0.05, sample_time=0.01), 0.01, 1.05),
+        (held_loop(delay=0.30, lag=0.06), 0.01, 2.76),
+    ],
+)
+def test_the_bounds_of_other_loops_are_known(loop, noise, expected):
+    # The continuous loops without a limit are logged every 10 ms.
+    between = loop.sample_time or (0.01 if loop.limit is None else TS)
+    step = dtm.Experiment.step(5.0, sample_time=between)
+    plan = dtm.identifiability(loop, step, noise=noise, free=("delay",), initial_output=0.0)
+    assert 1e3 * plan.stderr["delay"] == pytest.approx(expected, abs=0.006)
 
 
 def over_sequences(duration):
