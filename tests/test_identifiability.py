@@ -272,6 +272,26 @@ def test_estimates_scatter_as_the_bound_says_and_not_by_the_number_of_processes(
     )
 
 
+def test_a_gain_alone_is_estimated_with_the_delay_as_it_is():
+    plan = dtm.identifiability(
+        held_loop(), dtm.Experiment.step(), noise=0.01, free=("gain",), initial_output=0.0
+    )
+    assert plan.correlation is None
+    tried = plan.monte_carlo(60, progress=True)
+    assert tried.rmse["gain"] == pytest.approx(plan.stderr["gain"], rel=0.35)
+    assert set(tried.rmse) == {"gain"}
+
+
+def test_other_methods_are_tried_by_name():
+    plan = dtm.identifiability(
+        held_loop(lag=0.06), dtm.Experiment.step(rest=1.04), noise=0.01, free=("delay", "gain")
+    )
+    tried = plan.monte_carlo(6, "waveform", known=held_loop().replace(delay=None))
+    # Without its lag the model takes that for delay.
+    assert tried.bias["delay"] == pytest.approx(0.06, abs=0.02)
+    assert tried.bias["delay+lag"] == pytest.approx(0.0, abs=0.02)
+
+
 def test_refusals_are_counted_by_their_reason():
     # Next to Kp Td = 1/e the overshoot is of the size of the noise: about half show one.
     loop = held_loop(Kp=0.95)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.evidence import checked_names
-from deadtime._estimation.monte_carlo import MonteCarlo, Plan, flown_many_times
+from deadtime._estimation.monte_carlo import SLOW, MonteCarlo, Plan, flown_many_times
 from deadtime._estimation.planned_bound import (
     PlannedBound,
     bound_of,
@@ -19,6 +19,7 @@ from deadtime._estimation.planned_bound import (
 )
 from deadtime._excitation import Experiment
 from deadtime._loop import ControlLoop
+from deadtime._processes import Progress
 from deadtime._recording import Recording
 from deadtime._validation import finite, positive, whole_number
 
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["Identifiability", "identifiability"]
-
-#: Numbers that act like a delay.
-SLOW = ("lag", "time_constant")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,7 +96,7 @@ class Identifiability:
         circulates: bool = True,
         known: ControlLoop | None = None,
         processes: int | None = None,
-        progress: bool | Callable[[int, int], object] = False,
+        progress: Progress = False,
         **options: Any,
     ) -> MonteCarlo:
         """Fly the experiment many times with noise, and estimate from each flight.
@@ -116,7 +114,8 @@ class Identifiability:
         circulates : bool
             As for `Experiment.fly`.
         known : ControlLoop, optional
-            What the estimator is given; by default the loop without its delay.
+            What the estimator is given; by default the loop without its delay, or with it where
+            that is not free.
         processes : int, optional
             Processes to work in; by default as many as there are processors, and none but this
             one for few runs. They are started anew, so a script that asks for them keeps what it
@@ -152,13 +151,15 @@ class Identifiability:
         >>> 0.7 < tried.rmse["delay"] / plan.stderr["delay"] < 1.3
         True
         """
+        if known is None:
+            known = self.loop.replace(delay=None) if "delay" in self.free else self.loop
         plan = Plan(
             loop=self.loop,
             experiment=self.experiment,
             noise=self.noise,
             free=self.free,
             initial_output=self.initial_output,
-            known=self.loop.replace(delay=None) if known is None else known,
+            known=known,
             method=method,
             options=dict(options),
             circulates=circulates,

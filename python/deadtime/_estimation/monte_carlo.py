@@ -1,43 +1,36 @@
 """Many flights of one experiment, an estimate from each: what a method makes of the noise.
 
-Flights are independent, so they are shared out among processes in small batches; each flight has
-a seed of its own, so that results do not depend on how.
+Each flight has a seed of its own, so results do not depend on how flights are shared out.
 """
 
 from __future__ import annotations
 
-import os
 import re
-import signal
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import partial
+from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._errors import DeadtimeError, NotIdentifiableError
-from deadtime._estimation.estimate import estimate_delay
+from deadtime._estimation.estimate import METHODS, estimate_delay
 from deadtime._excitation import Experiment
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
+from deadtime._plants import Integrator
+from deadtime._processes import Progress, shared_out
 from deadtime._validation import whole_number
 
-__all__ = ["MonteCarlo", "Plan", "flown_many_times"]
+__all__ = ["SLOW", "MonteCarlo", "Plan", "flown_many_times"]
 
 Array = NDArray[np.float64]
-Report = Callable[[int, int], object]
 
-#: Fewer runs than this are over before other processes have started.
-FEW = 100
-
-#: Flights of one batch, at most: so often progress is reported.
-BATCH = 25
+#: Numbers that act like a delay.
+SLOW = ("lag", "time_constant")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,66 +125,17 @@ def flown_many_times(
     runs: int,
     seed: int,
     processes: int | None,
-    progress: bool | Report,
+    progress: Progress,
 ) -> MonteCarlo:
     """Fly and estimate `runs` times and sum up."""
     count = whole_number("runs", runs)
     if not 0.0 < plan.level < 1.0:
         raise ValueError(f"level={plan.level!r} is not between 0 and 1: 0.95 is usual")
-    workers = os.cpu_count() or 1
-    if processes is not None:
-        workers = whole_number("processes", processes)
-    elif count < FEW:
-        workers = 1
-    size = max(1, min(BATCH, count // (4 * workers)))
-    batches = [range(start, min(start + size, count)) for start in range(0, count, size)]
-    with _reporting(progress, count) as report:
-        if workers == 1:
-            outcomes = _here(plan, seed, batches, report, count)
-        else:
-            outcomes = _elsewhere(plan, seed, batches, report, count, workers)
+    outcomes = shared_out(partial(_flown, plan, seed), count, processes, progress)
     return _summed_up(plan, outcomes)
 
 
-def _here(
-    plan: Plan, seed: int, batches: list[range], report: Report, count: int
-) -> list[_Outcome]:
-    outcomes: list[_Outcome] = []
-    for batch in batches:
-        outcomes += _batch(plan, seed, batch)
-        report(len(outcomes), count)
-    return outcomes
-
-
-def _elsewhere(
-    plan: Plan, seed: int, batches: list[range], report: Report, count: int, workers: int
-) -> list[_Outcome]:
-    """Batches on other processes; an interrupt waits for those that are at work and no others."""
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), _left_to_the_parent)
-    try:
-        futures = {pool.submit(_batch, plan, seed, batch): i for i, batch in enumerate(batches)}
-        found: dict[int, list[_Outcome]] = {}
-        done = 0
-        for future in as_completed(futures):
-            found[futures[future]] = future.result()
-            done += len(found[futures[future]])
-            report(done, count)
-    except BrokenProcessPool as error:
-        raise RuntimeError(
-            "the processes for the flights cannot start or were killed: in a script, keep what it "
-            'does under `if __name__ == "__main__":`, or give processes=1'
-        ) from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-    return [outcome for i in range(len(batches)) for outcome in found[i]]
-
-
-def _left_to_the_parent() -> None:
-    """Ctrl-C goes to every process of a terminal: only the one that asked answers to it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _batch(plan: Plan, seed: int, flights: range) -> list[_Outcome]:
+def _flown(plan: Plan, seed: int, flights: range) -> list[_Outcome]:
     # The children of one seed, as its `spawn` makes them.
     return [_outcome(plan, np.random.SeedSequence(seed, spawn_key=(i,))) for i in flights]
 
@@ -199,13 +143,13 @@ def _batch(plan: Plan, seed: int, flights: range) -> list[_Outcome]:
 def _outcome(plan: Plan, seed: np.random.SeedSequence) -> _Outcome:
     flight = plan.experiment.fly(plan.loop, plan.noise, seed, plan.circulates)
     options = dict(plan.options)
-    logged = plan.method in ("auto", "output_error") and flight.command is not None
-    if plan.initial_output is not None and logged and plan.loop.is_sampled:
+    if plan.initial_output is not None and _takes_the_start(plan):
         options.setdefault("initial_output", plan.initial_output)
     try:
         fit = estimate_delay(flight, plan.known, method=plan.method, free=plan.free, **options)
-        truth = _truth(plan)
-        values = {name: fit._value(name) for name in fit.stderr if name in truth}
+        truth = _with_sum(plan.loop.parameters)
+        fitted = _with_sum(fit.loop.parameters)
+        values = {name: fitted[name] for name in fit.stderr}
         bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
         held = {}
         if fit.calibrated:
@@ -219,10 +163,18 @@ def _outcome(plan: Plan, seed: np.random.SeedSequence) -> _Outcome:
     return _Outcome(values, bounds, held)
 
 
-def _truth(plan: Plan) -> dict[str, float]:
-    values = plan.loop.parameters
-    slow = values.get("lag", 0.0)
-    return values | {"delay+lag": values["delay"] + slow}
+def _takes_the_start(plan: Plan) -> bool:
+    """Whether the method can be told the output at the start."""
+    method = plan.method
+    if method == "auto" and plan.loop.is_sampled and isinstance(plan.loop.plant, Integrator):
+        method = "output_error"
+    return method in METHODS and "initial_output" in signature(METHODS[method]).parameters
+
+
+def _with_sum(values: Mapping[str, float]) -> dict[str, float]:
+    """The numbers of a loop, and the sum of its delay and what delays beside it."""
+    sums = {f"delay+{name}": values["delay"] + values[name] for name in SLOW if name in values}
+    return dict(values) | {"delay+lag": values["delay"]} | sums
 
 
 def _summed_up(plan: Plan, outcomes: list[_Outcome]) -> MonteCarlo:
@@ -233,7 +185,7 @@ def _summed_up(plan: Plan, outcomes: list[_Outcome]) -> MonteCarlo:
             f"all {len(outcomes)} flights were refused, most of them because "
             f"{reasons.most_common(1)[0][0]}"
         )
-    everything = _truth(plan)
+    everything = _with_sum(plan.loop.parameters)
     truth = {name: everything[name] for name in told[0].values}
     estimates = {name: np.array([one.values[name] for one in told]) for name in truth}
     errors = {name: estimates[name] - truth[name] for name in truth}
@@ -256,24 +208,3 @@ def _summed_up(plan: Plan, outcomes: list[_Outcome]) -> MonteCarlo:
 def _without_numbers(reason: str) -> str:
     """Reasons that differ in their numbers only are one."""
     return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", reason)
-
-
-@contextmanager
-def _reporting(progress: bool | Report, count: int) -> Iterator[Report]:
-    """What to call with the numbers of flights done and of all flights."""
-    if callable(progress):
-        yield progress
-        return
-    if not progress:
-        yield lambda done, total: None
-        return
-    try:
-        from rich.progress import Progress
-    except ImportError as error:
-        raise ImportError(
-            "a progress bar needs rich: install it with pip install 'deadtime[cli]', or give a "
-            "function as progress"
-        ) from error
-    with Progress(transient=True) as bar:
-        task = bar.add_task("flights", total=count)
-        yield lambda done, total: bar.update(task, completed=done)
