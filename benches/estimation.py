@@ -442,8 +442,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--runs", type=int, default=200, help="flights of each case and method")
-    parser.add_argument("--coverage-runs", type=int, default=2000, help="0: leave coverage out")
+    parser.add_argument(
+        "--runs", type=int, default=200, help="flights of each case and method; 0: none"
+    )
+    parser.add_argument(
+        "--coverage-runs", type=int, default=2000, help="flights of each coverage; 0: none"
+    )
     parser.add_argument("--case", default="", help="only cases whose name has this in it")
     parser.add_argument("--method", default="", help="only methods whose name has this in it")
     parser.add_argument("--quick", action="store_true", help="a flight of some cases")
@@ -457,8 +461,9 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
         begin = time.perf_counter()
-        errors_of_methods(pool, chosen, columns, runs)
-        print(f"{runs} flights a cell, {time.perf_counter() - begin:.0f} s")
+        if runs:
+            errors_of_methods(pool, chosen, columns, runs)
+            print(f"{runs} flights a cell, {time.perf_counter() - begin:.0f} s")
         if not given.case:
             error_of_the_map()
             if covering:

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.evidence import check_distinguishable, standard_errors
-from deadtime._estimation.residuals import inverse_information
 from deadtime._estimation.result import CramerRaoBound
 from deadtime._excitation import Experiment
 from deadtime._frozen import ReadOnlyArrays, read_only
@@ -103,7 +102,10 @@ def bound_of(
     labels = tuple(flights[0])
     jacobian = np.concatenate([np.stack(list(flight.values()), axis=1) for flight in flights])
     check_distinguishable(jacobian, list(labels))
-    cov = noise**2 * len(flights) * inverse_information(jacobian)
+    scale = np.linalg.norm(jacobian, axis=0)
+    # P P^T is the inverse of J^T J for the pseudoinverse P of J.
+    inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
+    cov = noise**2 * len(flights) * inverse @ inverse.T
     return PlannedBound(labels, noise, standard_errors(names, cov), cov, flights[0])
 
 

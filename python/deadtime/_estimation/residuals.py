@@ -15,13 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-__all__ = [
-    "Whiteness",
-    "inverse_information",
-    "robust_covariance",
-    "white_covariance",
-    "whiteness_of",
-]
+__all__ = ["Whiteness", "robust_covariance", "white_covariance", "whiteness_of"]
 
 #: Residuals are called coloured when white ones would look so only this seldom.
 SIGNIFICANCE = 0.01
@@ -77,7 +71,7 @@ def white_covariance(jacobian: Array, residuals: Array) -> Array:
     """Covariance of the parameters for white residuals, ``σ² (JᵀJ)⁻¹``."""
     n, k = jacobian.shape
     variance = float(residuals @ residuals) / (n - k)
-    return np.asarray(variance * inverse_information(jacobian))
+    return np.asarray(variance * _inverse_information(jacobian))
 
 
 def robust_covariance(jacobian: Array, residuals: Array) -> Array:
@@ -89,7 +83,7 @@ def robust_covariance(jacobian: Array, residuals: Array) -> Array:
     for lag in range(1, bandwidth + 1):
         product = scores[lag:].T @ scores[:-lag]
         spread += (1.0 - lag / (bandwidth + 1)) * (product + product.T)
-    bread = inverse_information(jacobian)
+    bread = _inverse_information(jacobian)
     # n/(n-k): the small-sample factor that makes the white case agree with the usual estimate
     return np.asarray(bread @ spread @ bread * (n / (n - k)))
 
@@ -104,7 +98,7 @@ def _bandwidth(residuals: Array) -> int:
     return int(min(n // 4, np.ceil(1.1447 * (alpha * n) ** (1 / 3))))
 
 
-def inverse_information(jacobian: Array) -> Array:
+def _inverse_information(jacobian: Array) -> Array:
     """``(JᵀJ)⁻¹`` through a QR decomposition of the scaled columns."""
     scale = np.linalg.norm(jacobian, axis=0)
     scale[scale == 0.0] = 1.0
