@@ -396,7 +396,7 @@ def coverage(pool: Executor, runs: int, text: str) -> None:
         print(f"{column.method + ', ' + label:44}{runs:6d}{found.refused:9d}  {shares}")
 
 
-def times(columns: list[Column], repetitions: int) -> None:
+def times(columns: list[Column], repetitions: int, most: int) -> None:
     """One estimate of 308 samples with its intervals, and one profile, in this process."""
     print(f"\n{'ms for 308 samples':36}{'estimate, intervals':>20}{'profile':>10}")
     experiment = dtm.Experiment.prbs(20.0, 0.4, 0.4)
@@ -468,7 +468,7 @@ def main() -> None:
             error_of_the_map()
             if covering:
                 coverage(pool, covering, given.method)
-            times(columns, repetitions)
+            times(columns, repetitions, 1 if given.quick else 3)
 
 
 if __name__ == "__main__":
