@@ -400,21 +400,15 @@ def times(columns: list[Column], repetitions: int, most: int) -> None:
     """One estimate of 308 samples with its intervals, and one profile, in this process."""
     print(f"\n{'ms for 308 samples':36}{'estimate, intervals':>20}{'profile':>10}")
     experiment = dtm.Experiment.prbs(20.0, 0.4, 0.4)
-    for lag, free in (
-        (0.0, ("delay",)),
-        (0.0, ("delay", "gain")),
-        (0.06, ("delay", "gain", "lag")),
-    ):
-        flown = loop(lag=lag)
+    for free in (("delay",), ("delay", "gain"), ("delay", "gain", "lag"))[:most]:
+        flown = loop(lag=0.06 if "lag" in free else 0.0)
         flight = experiment.fly(flown, 0.01, seed=1)
         for column in columns:
             try:
                 durations = [timed(flight, flown, column, free) for _ in range(repetitions)]
             except (dtm.DeadtimeError, ValueError):
                 continue
-            estimate, profile = (
-                statistics.median(column) for column in zip(*durations, strict=True)
-            )
+            estimate, profile = (statistics.median(each) for each in zip(*durations, strict=True))
             shown = f"{profile:10.1f}" if profile else f"{'-':>10}"
             print(f"{column.name + ': ' + ', '.join(free):36}{estimate:20.1f}{shown}")
 
