@@ -282,6 +282,24 @@ def test_a_gain_alone_is_estimated_with_the_delay_as_it_is():
     assert set(tried.rmse) == {"gain"}
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.06])
+def test_coverage_is_that_of_the_intervals(lag):
+    loop, level = held_loop(lag=lag), 0.5
+    free = ("delay", "gain", "lag") if lag else ("delay", "gain")
+    plan = dtm.identifiability(loop, dtm.Experiment.prbs(8.0, 0.4, 0.2), noise=0.01, free=free)
+    tried = plan.monte_carlo(12, level=level, seed=5)
+    held = dict.fromkeys(tried.coverage, 0)
+    for i in range(12):
+        seed = np.random.SeedSequence(5, spawn_key=(i,))
+        flight = plan.experiment.fly(loop, 0.01, seed)
+        fit = dtm.estimate_delay(flight, loop.replace(delay=None), free=free)
+        for name in held:
+            low, high = fit.ci(level, name)
+            held[name] += low <= tried.truth[name] <= high
+    assert {name: count / 12 for name, count in held.items()} == tried.coverage
+    assert 0 < sum(held.values()) < 12 * len(held)
+
+
 def test_other_methods_are_tried_by_name():
     plan = dtm.identifiability(
         held_loop(lag=0.06), dtm.Experiment.step(rest=1.04), noise=0.01, free=("delay", "gain")

@@ -15,9 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from deadtime._errors import DeadtimeError, NotIdentifiableError
 from deadtime._estimation.estimate import METHODS, estimate_delay
+from deadtime._estimation.result import DelayEstimate
 from deadtime._excitation import Experiment
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
@@ -153,14 +155,23 @@ def _outcome(plan: Plan, seed: np.random.SeedSequence) -> _Outcome:
         bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
         held = {}
         if fit.calibrated:
-            for name in values:
-                low, high = fit.ci(plan.level, name)
-                # An end that is at the truth but for rounding holds it, as at a lag of zero.
-                slack = 1e-9 * (1.0 + abs(truth[name]))
-                held[name] = bool(low - slack <= truth[name] <= high + slack)
+            held = {name: _holds(fit, name, truth[name], plan.level) for name in values}
     except DeadtimeError as refusal:
         return _Outcome({}, {}, {}, str(refusal))
     return _Outcome(values, bounds, held)
+
+
+def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
+    """Whether the interval holds the truth.
+
+    One value of the profile tells: its ends, which need some ten of them each, are not sought.
+    """
+    profile = fit._profile
+    if profile is not None and profile.preferred:
+        quantile = float(special.stdtrit(profile.freedom, 0.5 + level / 2.0)) ** 2
+        return profile.statistic(name, truth) <= quantile
+    low, high = fit.ci(level, name)
+    return low <= truth <= high
 
 
 def _takes_the_start(plan: Plan) -> bool:
