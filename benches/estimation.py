@@ -215,6 +215,7 @@ def cases() -> list[Case]:
             0.01,
             noted(18.3, 20.3, 21.3),
             free=("delay", "gain", "lag"),
+            believed={"lag": 0.0},
         ),
         Case("PRBS 20 s held limit 1 %", loop(), dtm.Experiment.prbs(20.0, 0.4, 0.4), 0.01),
         Case(
