@@ -375,15 +375,18 @@ def coverage(pool: Executor, runs: int, text: str) -> None:
             Case("", loop(), plain, 0.01, free=("delay", "gain", "lag")),
             Column("", "output_error", {"initial_output": None}),
         ),
-        (
-            "noise in the log only",
-            Case("", loop(), plain, 0.01, free=("delay", "gain"), sensor=False),
-            Column("", "waveform"),
-        ),
-        (
-            "noise in the loop, Kp 3",
-            Case("", loop(3.0), plain, 0.01, free=("delay", "gain")),
-            Column("", "waveform", {"noise": "loop"}),
+        *(
+            (
+                f"noise in the {where}, told {told}",
+                Case("", loop(Kp), plain, 0.01, free=("delay", "gain"), sensor=where == "loop"),
+                Column("", "waveform", {"noise": told}),
+            )
+            for where, Kp, told in (
+                ("log", 1.31, "recording"),
+                ("log", 1.31, "auto"),
+                ("loop", 3.0, "loop"),
+                ("loop", 3.0, "auto"),
+            )
         ),
     ]
     print(f"\n{'coverage of 95 % intervals':44}{'runs':>6}{'refused':>9}")
