@@ -365,6 +365,17 @@ def test_an_interrupt_ends_all_processes_cleanly(tmp_path):
     assert time.monotonic() - begin < 60
 
 
+def test_a_script_that_would_start_itself_again_is_told_what_to_do(tmp_path):
+    script = tmp_path / "unguarded.py"
+    plain = INTERRUPTED.replace('if __name__ == "__main__":', "if True:").replace("50_000", "200")
+    script.write_text(plain)
+    run = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert run.returncode != 0
+    assert "processes=1" in run.stderr.splitlines()[-1]
+
+
 # --- how it fails ---------------------------------------------------------------------------
 
 
