@@ -73,7 +73,49 @@ def reproduction() -> None:
     NUMBERS.write_text("\n".join(lines).replace("<", "&lt;"), encoding="utf-8")
 
 
+def guess(Kp: float = 1.31) -> dtm.ControlLoop:
+    """The loop of the page on planning."""
+    plant = dtm.Integrator(gain=1.0, lag=0.06)
+    return dtm.ControlLoop(plant, dtm.P(Kp), delay=0.36, sample_time=0.065, limit=1.0)
+
+
+def planned_step() -> None:
+    """What a step will tell of the guessed loop."""
+    plan = dtm.identifiability(guess(), dtm.Experiment.step(5.0), noise=0.01, initial_output=0.0)
+    plan.plot().savefig(IMAGES / "planned-step.png", dpi=90)
+
+
+def hold() -> None:
+    """Bounds on the delay and on delay + lag over the hold of the reference."""
+    holds = 0.065 * np.array([2, 3, 4, 5, 6, 7, 8, 10, 12, 15, 18, 22, 26, 30])
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained", sharex=True)
+
+    def errors(experiment: dtm.Experiment) -> list[float]:
+        plan = dtm.identifiability(guess(), experiment, noise=0.01, initial_output=0.0)
+        return [1e3 * plan.stderr["delay"], 1e3 * plan.stderr["delay+lag"]]
+
+    square = np.array([errors(dtm.Experiment.square(20.0, 0.4, h)) for h in holds])
+    binary = np.array(
+        [[errors(dtm.Experiment.prbs(20.0, 0.4, h, seed)) for h in holds] for seed in range(8)]
+    )
+    for ax, i, name in zip(axes, (0, 1), ("delay, lag and gain free", "delay + lag"), strict=True):
+        ax.fill_between(
+            holds, binary[..., i].min(axis=0), binary[..., i].max(axis=0), color="C0", alpha=0.25
+        )
+        ax.plot(holds, binary[..., i].mean(axis=0), "C0.-", label="binary sequence, eight seeds")
+        ax.plot(holds, square[:, i], "C1.-", label="square wave")
+        ax.axvline(0.36, color="0.6", linewidth=0.8, linestyle="--")
+        ax.set(xlabel="hold (s)", title=name, ylim=(0.0, None))
+        ax.grid(alpha=0.25)
+    axes[0].set_ylabel("smallest standard error (ms)")
+    axes[0].annotate("delay", (0.37, 0.3), color="0.4")
+    axes[1].legend()
+    figure.savefig(IMAGES / "hold.png", dpi=90)
+
+
 if __name__ == "__main__":
     fixed_steps()
     mackey_glass()
     reproduction()
+    planned_step()
+    hold()

@@ -24,7 +24,7 @@ CORE_ARROWS = {
 
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
 FLOORS = [
-    {"_errors", "_frozen", "_validation", "_deadtime", "_enclosures"},
+    {"_errors", "_frozen", "_validation", "_processes", "_deadtime", "_enclosures"},
     {"_certificate_parts", "_certificate_function", "_certificate_check", "_certificate"},
     {
         "_ufunc",
@@ -83,7 +83,7 @@ FLOORS = [
     {"_experiment"},
     {"paper"},
     {"_plots"},
-    {"_stability_plots", "_box_plots", "_paper_plots"},
+    {"_stability_plots", "_box_plots", "_planning_plots", "_paper_plots"},
     {"_page"},
     {"_report", "_paper_page"},
     {"_cli"},

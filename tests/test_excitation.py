@@ -72,6 +72,13 @@ def test_a_multisine_has_the_lines_it_was_given(lines, phases, periods):
     assert np.abs(wave.reference).max() == pytest.approx(0.4)
 
 
+def test_a_number_of_lines_is_all_of_them_up_to_it():
+    few = dtm.Experiment.multisine(1.0, 80 * TS, np.int64(3))
+    np.testing.assert_array_equal(
+        few.reference, dtm.Experiment.multisine(1.0, 80 * TS, [1, 2, 3]).reference
+    )
+
+
 def test_odd_lines_and_low_peaks():
     odd = dtm.Experiment.multisine(1.0, 80 * TS, 10, odd=True)
     size = np.abs(np.fft.rfft(odd.reference))
@@ -173,6 +180,15 @@ def test_a_relay_in_a_sampled_loop_switches_at_samples_only():
     )
 
 
+def test_the_log_does_not_tell_where_the_delay_is():
+    loop = held_loop(dtm.P(2.0))
+    other = loop.replace(delay_path="measurement")
+    experiment = dtm.Experiment.prbs(5.0, 0.4, 0.4)
+    one, two = experiment.fly(loop, 0.01, seed=3), experiment.fly(other, 0.01, seed=3)
+    np.testing.assert_array_equal(one.output, two.output)
+    np.testing.assert_array_equal(one.command, two.command)
+
+
 def test_copies_stay_as_they_are():
     experiment = dtm.Experiment.multisine(0.4, 80 * TS, 12, 2)
     for again in (copy.deepcopy(experiment), pickle.loads(pickle.dumps(experiment))):
@@ -194,6 +210,8 @@ def test_copies_stay_as_they_are():
         (lambda: dtm.Experiment([0] * 9, [0] * 9), "increasing"),
         (lambda: dtm.Experiment(range(9), [0] * 9, period=-1.0), "period"),
         (lambda: dtm.Experiment.step(0.3), "8 samples"),
+        (lambda: dtm.Experiment.step(1e12), "seconds"),
+        (lambda: dtm.Experiment.multisine(1.0, 5.2, 2.5), "whole number"),
         (lambda: dtm.Experiment.step(5.0, rest=9.0), "after the end"),
         (lambda: dtm.Experiment.step(5.0, sample_time=0.0), "sample_time"),
         (lambda: dtm.Experiment.square(5.0, 1.0, hold=0.01), "shorter than a sample"),

@@ -356,7 +356,10 @@ class Experiment(ReadOnlyArrays):
         )
 
     def flown_loop(self, loop: ControlLoop) -> ControlLoop:
-        """The loop as it is flown: with the relay in the controller's place, where there is one.
+        """The loop as it is flown and logged.
+
+        With the relay in the controller's place, where there is one. The output is that which
+        arrives where the controller runs, so the whole delay counts as one of the command.
 
         Parameters
         ----------
@@ -381,6 +384,7 @@ class Experiment(ReadOnlyArrays):
                     f"the loop every {loop.sample_time:g} s: make the experiment with "
                     f"sample_time={loop.sample_time:g}"
                 )
+        loop = loop.replace(delay_path="command")
         if self.relay_amplitude is None:
             return loop
         if loop.limit is not None and loop.limit < self.relay_amplitude:
@@ -426,8 +430,9 @@ class Experiment(ReadOnlyArrays):
         Returns
         -------
         Recording
-            Reference, output with its noise, and the command after the limit, at the samples. In
-            a continuous loop the noise holds from each of them to the next.
+            Reference, output with its noise, and the command after the limit, at the samples.
+            The output is the one that arrives at the controller, late by a delay of the
+            measurement. In a continuous loop the noise holds from each sample to the next.
 
         Raises
         ------

@@ -8,13 +8,14 @@ that are random or those of Schroeder (1970), which keep its peak low.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import signal
 
 from deadtime._recording import MINIMUM_SAMPLES
-from deadtime._validation import positive
+from deadtime._validation import positive, whole_number
 
 __all__ = [
     "ON_A_SAMPLE",
@@ -32,6 +33,9 @@ Whole = NDArray[np.int64]
 #: Times are multiples of the sample time if they miss one by this share of it.
 ON_A_SAMPLE = 1e-6
 
+#: Nobody flies more samples than this.
+MOST_SAMPLES = 10_000_000
+
 #: Longest register whose sequence is known to `max_len_seq`.
 MOST_BITS = 32
 
@@ -44,6 +48,11 @@ def sample_times(duration: float, sample_time: float) -> Array:
         raise ValueError(
             f"duration={duration} s is less than {MINIMUM_SAMPLES} samples of {sample} s: give a "
             "longer one"
+        )
+    if count > MOST_SAMPLES:
+        raise ValueError(
+            f"duration={duration} s is {count:.3g} samples of {sample} s, beyond {MOST_SAMPLES}: "
+            "give a shorter one, and check that it is in seconds"
         )
     return np.arange(np.ceil(count - ON_A_SAMPLE), dtype=np.float64) * sample
 
@@ -63,8 +72,9 @@ def whole_period(period: float, sample_time: float) -> float | None:
 
 def excited_lines(lines: int | Sequence[int], count: int, odd: bool) -> Whole:
     """Harmonics to excite of a period of `count` samples, checked."""
-    given: ArrayLike = np.arange(1, lines + 1) if isinstance(lines, int) else lines
-    found = np.unique(np.asarray(given))
+    if np.ndim(lines) == 0:
+        lines = range(1, whole_number("lines", cast(int, lines)) + 1)
+    found = np.unique(np.asarray(lines))
     if found.size and found.dtype.kind not in "iu":
         raise TypeError(f"lines={lines!r}: give whole numbers")
     if found.size and (found[0] < 1 or 2 * found[-1] >= count):

@@ -1,0 +1,473 @@
+"""Delay estimation: the error of every method beside the Cramér-Rao bound, coverage, and time.
+
+The first table flies each case `--runs` times, each with noise of its own, and estimates the delay
+by every method: root-mean-square errors in ms, those a right implementation is known to have had
+over 200 runs of its own noise, and the ratio to the bound. Steps begin after a second at rest; the
+output at the start is known to the methods that can use it, and to the bound. `arx_scan` is what
+MATLAB's `delayest` does, refined between samples; it and `gcc` stand for the peers, of which none
+estimates a delay inside a loop with an interval.
+
+Then: the systematic error of the map from overshoot to delay by one pair of roots; how many of
+`--coverage-runs` intervals hold the truth; how long an estimate with its intervals takes.
+
+Run ``python benches/estimation.py [--runs N] [--coverage-runs N] [--case TEXT] [--method TEXT]
+[--quick]``. Works in as many processes as there are processors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import statistics
+import time
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import dataclass, field
+from inspect import signature
+from multiprocessing import get_context
+from typing import Any, NamedTuple
+
+import deadtime as dtm
+import numpy as np
+from deadtime._estimation.estimate import METHODS
+
+SAMPLE = 0.065
+REST = 16 * SAMPLE
+LAST = 5.0
+
+#: Intervals that hold the truth in 95 % of the flights; two thousand tell 1 % from it.
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Case:
+    """A loop, what is flown on it, and the errors that are known, in ms by column."""
+
+    name: str
+    loop: dtm.ControlLoop
+    experiment: dtm.Experiment
+    noise: float
+    known: Mapping[str, float] = field(default_factory=dict)
+    free: tuple[str, ...] = ("delay",)
+    believed: Mapping[str, Any] = field(default_factory=dict)
+    sensor: bool = True
+
+    @property
+    def circulates(self) -> bool:
+        """Whether the controller sees the noise: that of a sensor, in sampled loops."""
+        return self.sensor and self.loop.is_sampled
+
+    def given(self) -> dtm.ControlLoop:
+        """What the estimators are told."""
+        return self.loop.replace(delay=None, **self.believed)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A method with its options."""
+
+    name: str
+    method: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    continuous: bool = False
+
+    def missing(self) -> bool:
+        return self.method not in METHODS
+
+
+class Tally(NamedTuple):
+    """Errors by quantity in s or the gain's unit, intervals that held, flights refused."""
+
+    errors: dict[str, list[float]]
+    held: dict[str, int]
+    refused: int
+
+
+COLUMNS = [
+    Column("output_error", "output_error"),
+    Column("waveform", "waveform"),
+    Column("wave, no hold", "waveform", continuous=True),
+    Column("frequency", "frequency"),
+    Column("arx_scan", "arx_scan", {"fractional": True}),
+    Column("gcc", "gcc"),
+    Column("Mo exact", "overshoot", {"map": "exact"}),
+    Column("Mo paper", "overshoot", {"map": "dominant"}),
+    Column("Mo saturated", "overshoot", {"map": "saturated"}),
+    Column("decrement", "decrement"),
+    Column("decay", "decay"),
+    Column("grid", "grid"),
+    Column("cta", "cta"),
+    Column("graphical", "graphical"),
+    Column("relay", "relay"),
+]
+NOTED = ["bound", *(column.name for column in COLUMNS[:8])]
+
+
+def loop(
+    Kp: float = 1.31,
+    delay: float = 0.36,
+    lag: float = 0.0,
+    sample_time: float | None = SAMPLE,
+    limit: float | None = 1.0,
+) -> dtm.ControlLoop:
+    plant = dtm.Integrator(lag=lag)
+    return dtm.ControlLoop(plant, dtm.P(Kp), delay=delay, sample_time=sample_time, limit=limit)
+
+
+def step(sample_time: float = SAMPLE) -> dtm.Experiment:
+    return dtm.Experiment.step(REST + LAST, sample_time=sample_time, rest=REST)
+
+
+def noted(*errors: float | None) -> dict[str, float]:
+    """Known errors in ms: the bound, then the first columns."""
+    return {name: e for name, e in zip(NOTED, errors, strict=False) if e is not None}
+
+
+def cases() -> list[Case]:
+    free, fine = loop(sample_time=None, limit=None), step(0.01)
+    plain = step()
+    lagging = loop(delay=0.30, lag=0.06)
+    return [
+        Case(
+            "continuous 10 ms 1 %",
+            free,
+            fine,
+            0.01,
+            noted(0.88, 1.50, 0.90, 0.90, 4.8, 29.5, 10.6, 27.3, 29.0),
+        ),
+        Case(
+            "continuous 10 ms 1 % Kp 3",
+            free.replace(Kp=3.0),
+            fine,
+            0.01,
+            noted(0.16, 2.6, 0.14, 0.14, 3.8, 6.2, 3.5, 4.6, 16.0),
+        ),
+        Case(
+            "continuous limit 0.3 %",
+            loop(sample_time=None),
+            plain,
+            0.003,
+            noted(0.77, 5.3, 0.72, 0.72, 13.4, 4.3, 7.1, 4.9, 4.1),
+        ),
+        Case(
+            "held limit 0.3 %",
+            loop(),
+            plain,
+            0.003,
+            noted(0.81, 0.81, 0.84, 9.7, 1.7, 3.8, 10.2, 22.1, 23.7),
+        ),
+        Case(
+            "held limit 1 %",
+            loop(),
+            plain,
+            0.01,
+            noted(2.70, 2.70, 2.80, 10.2, 5.7, 15.9, 16.5, 32.8, 34.7),
+        ),
+        Case(
+            "held limit 3 %",
+            loop(),
+            plain,
+            0.03,
+            noted(8.10, 8.05, 8.39, 13.3, 17.2, 90.0, 45.0, 70.0, 73.0),
+        ),
+        Case(
+            "held limit 1 % Kp 3",
+            loop(3.0),
+            plain,
+            0.01,
+            noted(2.09, 2.10, 2.74, 22.8, 3.4, 12.2, 11.0, 118.0, 115.0),
+        ),
+        Case(
+            "held 1 % Kp 3",
+            loop(3.0, limit=None),
+            plain,
+            0.01,
+            noted(0.94, 0.93, 1.04, 25.4, 1.1, 3.8, 4.2, 31.7, 45.5),
+        ),
+        Case(
+            "held limit 1 % Kp 0.8",
+            loop(0.8),
+            plain,
+            0.01,
+            noted(3.44, 3.55, 3.70, 9.1, 9.1, 22.1, 21.4, 202.0, 203.0),
+        ),
+        Case(
+            "held 10 ms limit 1 % Kp 4 Td 0.05",
+            loop(4.0, delay=0.05, sample_time=0.01),
+            fine,
+            0.01,
+            noted(1.05, 1.05, 1.06, 1.08, 5.4, None, None, 70.0, 71.0),
+        ),
+        Case(
+            "lag 60 ms ignored",
+            lagging,
+            plain,
+            0.01,
+            noted(2.76, 59.5, 59.7, 69.0, 59.8, 52.8, 61.0, 93.0, 95.0),
+            believed={"lag": 0.0},
+        ),
+        Case(
+            "lag 60 ms fitted",
+            lagging,
+            plain,
+            0.01,
+            noted(18.3, 20.3, 21.3),
+            free=("delay", "gain", "lag"),
+            believed={"lag": 0.0},
+        ),
+        Case("PRBS 20 s held limit 1 %", loop(), dtm.Experiment.prbs(20.0, 0.4, 0.4), 0.01),
+        Case(
+            "multisine 4 x 5.2 s held limit 1 %",
+            loop(),
+            dtm.Experiment.multisine(0.4, 80 * SAMPLE, 12, 4, odd=True),
+            0.01,
+        ),
+        Case("relay 0.5 m/s 10 s held 1 %", loop(), dtm.Experiment.relay(10.0, 0.5), 0.01),
+    ]
+
+
+def tally(
+    case: Case, column: Column, seeds: range, intervals: bool = False, level: float = LEVEL
+) -> Tally:
+    """Fly the case with the noise of these seeds and estimate; runs in other processes."""
+    errors: dict[str, list[float]] = {}
+    held: dict[str, int] = {}
+    refused = 0
+    truth = dict(case.loop.parameters)
+    truth["delay+lag"] = truth["delay"] + truth["lag"]
+    given = case.given()
+    options = dict(column.options)
+    if "initial_output" in signature(METHODS[column.method]).parameters and "delay" in case.free:
+        options.setdefault("initial_output", 0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of feedback, in every flight
+        for seed in seeds:
+            flight = case.experiment.fly(case.loop, case.noise, seed, case.circulates)
+            try:
+                fit = dtm.estimate_delay(
+                    flight,
+                    given.continuous() if column.continuous else given,
+                    method=column.method,
+                    free=case.free,
+                    **options,
+                )
+            except (dtm.DeadtimeError, ValueError):
+                refused += 1
+                continue
+            values = {**fit.loop.parameters, "delay+lag": fit.delay_plus_lag}
+            for name in fit.stderr:
+                errors.setdefault(name, []).append(values[name] - truth[name])
+                if intervals:
+                    low, high = fit.ci(level, name)
+                    holds = low - 1e-9 <= truth[name] <= high + 1e-9
+                    held[name] = held.get(name, 0) + int(holds)
+    return Tally(errors, held, refused)
+
+
+def shared(
+    pool: Executor, work: Iterable[tuple[Case, Column]], runs: int, intervals: bool = False
+) -> Iterator[Tally]:
+    """`tally` of every pair, in batches on all processes, in the order they were given."""
+    batch = max(1, min(25, runs // (2 * (os.cpu_count() or 1))))
+    waiting = [
+        [
+            pool.submit(tally, case, column, range(i, min(i + batch, runs)), intervals)
+            for i in range(0, runs, batch)
+        ]
+        for case, column in work
+    ]
+    return (joined([part.result() for part in parts]) for parts in waiting)
+
+
+def joined(parts: list[Tally]) -> Tally:
+    errors: dict[str, list[float]] = {}
+    held: dict[str, int] = {}
+    for part in parts:
+        for name, some in part.errors.items():
+            errors.setdefault(name, []).extend(some)
+        for name, count in part.held.items():
+            held[name] = held.get(name, 0) + count
+    return Tally(errors, held, sum(part.refused for part in parts))
+
+
+def bound_ms(case: Case) -> float:
+    plan = dtm.identifiability(
+        case.loop, case.experiment, noise=case.noise, free=case.free, initial_output=0.0
+    )
+    return 1e3 * plan.stderr["delay"]
+
+
+def errors_of_methods(pool: Executor, chosen: list[Case], columns: list[Column], runs: int) -> None:
+    """Print a block of lines for each case: errors, known errors, ratio to the bound."""
+    wide = 14
+    print(
+        f"{'RMSE of the delay, ms':36}{'bound':>9}", *(f"{c.name:>{wide}}" for c in columns), sep=""
+    )
+    tallies = shared(pool, [(case, column) for case in chosen for column in columns], runs)
+    for case in chosen:
+        bound = bound_ms(case)
+        lines = {"": f"{bound:9.2f}", "known": "", "to the bound": f"{'':9}", "refused": f"{'':9}"}
+        lines["known"] = f"{case.known.get('bound', math.nan):9.2f}" if case.known else f"{'':9}"
+        for column in columns:
+            found = next(tallies)
+            delays = found.errors.get("delay", [])
+            rmse = 1e3 * math.sqrt(np.mean(np.square(delays))) if delays else math.nan
+            lines[""] += cell(rmse, wide)
+            lines["known"] += cell(case.known.get(column.name, math.nan), wide)
+            lines["to the bound"] += cell(rmse / bound, wide)
+            lines["refused"] += f"{found.refused or '':>{wide}}"
+        if not case.known:
+            del lines["known"]
+        if not lines["refused"].strip():
+            del lines["refused"]
+        for label, text in lines.items():
+            print(f"{case.name if not label else '    ' + label:36}{text}", flush=True)
+
+
+def cell(value: float, wide: int) -> str:
+    return f"{'-':>{wide}}" if math.isnan(value) else f"{value:>{wide}.2f}"
+
+
+def error_of_the_map() -> None:
+    """How far the map by one pair of roots is off, without any noise."""
+    known = [0.06, 0.22, 0.31, 0.43, 0.89, 1.36, 1.86, 2.36, 2.83, 3.61, 4.35, math.nan]
+    gains = [0.40, 0.45, 0.4714, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4, 1.5 + 1e-9]
+    print(
+        f"\n{'Kp Td':>8}{'exact Mo %':>12}{'paper: error of Td %':>22}{'known':>8}{'exact map':>11}"
+    )
+    for x, expected in zip(gains, known, strict=True):
+        flown = loop(Kp=x, delay=1.0, sample_time=None, limit=None)
+        flight = dtm.Experiment.step(31.0, sample_time=0.005, rest=1.0).fly(flown)
+        row = f"{x:8.4f}{100.0 * (flight.output.max() - 1.0):12.2f}"
+        for way, wide in (("dominant", 22), ("exact", 19)):
+            try:
+                fit = dtm.estimate_delay(
+                    flight, flown.replace(delay=None), method="overshoot", map=way, free=("delay",)
+                )
+                row += f"{100.0 * (fit.delay - 1.0):>+{wide}.3f}"
+            except dtm.NotIdentifiableError:
+                row += f"{'no solution':>{wide}}"
+            if way == "dominant":
+                row += f"{'none' if math.isnan(expected) else format(expected, '+.2f'):>8}"
+                wide = 11
+        print(row)
+
+
+def coverage(pool: Executor, runs: int, text: str) -> None:
+    """How many intervals hold the truth."""
+    plain = step()
+    rows = [
+        ("delay", Case("", loop(), plain, 0.01), Column("", "output_error")),
+        (
+            "delay, gain",
+            Case("", loop(), plain, 0.01, free=("delay", "gain")),
+            Column("", "output_error", {"initial_output": None}),
+        ),
+        (
+            "delay, gain, lag of 60 ms",
+            Case("", loop(delay=0.3, lag=0.06), plain, 0.01, free=("delay", "gain", "lag")),
+            Column("", "output_error", {"initial_output": None}),
+        ),
+        (
+            "delay, gain, lag of zero",
+            Case("", loop(), plain, 0.01, free=("delay", "gain", "lag")),
+            Column("", "output_error", {"initial_output": None}),
+        ),
+        *(
+            (
+                f"noise in the {where}, told {told}",
+                Case("", loop(Kp), plain, 0.01, free=("delay", "gain"), sensor=where == "loop"),
+                Column("", "waveform", {"noise": told}),
+            )
+            for where, Kp, told in (
+                ("log", 1.31, "recording"),
+                ("log", 1.31, "auto"),
+                ("loop", 3.0, "loop"),
+                ("loop", 3.0, "auto"),
+            )
+        ),
+    ]
+    print(f"\n{'coverage of 95 % intervals':44}{'runs':>6}{'refused':>9}")
+    for label, case, column in rows:
+        known = signature(METHODS[column.method]).parameters
+        if text not in column.method or any(option not in known for option in column.options):
+            continue
+        found = next(shared(pool, [(case, column)], runs, intervals=True))
+        told = runs - found.refused
+        shares = "  ".join(f"{n} {100 * held / told:.1f} %" for n, held in found.held.items())
+        print(f"{column.method + ', ' + label:44}{runs:6d}{found.refused:9d}  {shares}")
+
+
+def times(columns: list[Column], repetitions: int, most: int) -> None:
+    """One estimate of 308 samples with its intervals, and one profile, in this process."""
+    print(f"\n{'ms for 308 samples':36}{'estimate, intervals':>20}{'profile':>10}")
+    experiment = dtm.Experiment.prbs(20.0, 0.4, 0.4)
+    for free in (("delay",), ("delay", "gain"), ("delay", "gain", "lag"))[:most]:
+        flown = loop(lag=0.06 if "lag" in free else 0.0)
+        flight = experiment.fly(flown, 0.01, seed=1)
+        for column in columns:
+            try:
+                durations = [timed(flight, flown, column, free) for _ in range(repetitions)]
+            except (dtm.DeadtimeError, ValueError):
+                continue
+            estimate, profile = (statistics.median(each) for each in zip(*durations, strict=True))
+            shown = f"{profile:10.1f}" if profile else f"{'-':>10}"
+            print(f"{column.name + ': ' + ', '.join(free):36}{estimate:20.1f}{shown}")
+
+
+def timed(
+    flight: dtm.Recording, flown: dtm.ControlLoop, column: Column, free: tuple[str, ...]
+) -> tuple[float, float]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        begin = time.perf_counter()
+        fit = dtm.estimate_delay(
+            flight, flown.replace(delay=None), method=column.method, free=free, **column.options
+        )
+        if fit.calibrated:
+            for name in fit.stderr:
+                fit.ci(LEVEL, name)
+        middle = time.perf_counter()
+        if fit._profile is None:
+            return 1e3 * (middle - begin), 0.0
+        fit.profile()
+        return 1e3 * (middle - begin), 1e3 * (time.perf_counter() - middle)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--runs", type=int, default=200, help="flights of each case and method; 0: none"
+    )
+    parser.add_argument(
+        "--coverage-runs", type=int, default=2000, help="flights of each coverage; 0: none"
+    )
+    parser.add_argument("--case", default="", help="only cases whose name has this in it")
+    parser.add_argument("--method", default="", help="only methods whose name has this in it")
+    parser.add_argument("--quick", action="store_true", help="a flight of some cases")
+    given = parser.parse_args()
+    chosen = [case for case in cases() if given.case in case.name]
+    columns = [c for c in COLUMNS if given.method in f"{c.method} {c.name}" and not c.missing()]
+    runs, covering, repetitions = given.runs, given.coverage_runs, 11
+    if given.quick:
+        runs, covering, repetitions, chosen = 1, 2, 1, chosen[4:5] + chosen[-3:]
+    # Each worker has its own flights; threads below NumPy would only be in each other's way.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+        begin = time.perf_counter()
+        if runs:
+            errors_of_methods(pool, chosen, columns, runs)
+            print(f"{runs} flights a cell, {time.perf_counter() - begin:.0f} s")
+        if not given.case:
+            error_of_the_map()
+            if covering:
+                coverage(pool, covering, given.method)
+            times(columns, repetitions, 1 if given.quick else 3)
+
+
+if __name__ == "__main__":
+    main()

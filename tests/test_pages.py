@@ -1,0 +1,21 @@
+"""The Python of the pages on planning runs as it stands, with the results that are printed."""
+
+import doctest
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+
+
+@pytest.mark.parametrize("page", ["planning-a-flight.md", "what-a-ground-log-cannot-tell.md"])
+def test_the_python_of_a_page_runs(page):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, page, page, 0)
+    told = []
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
+    runner.run(examples, out=told.append)
+    assert runner.summarize(verbose=False).attempted > 3
+    assert not told, "".join(told)
