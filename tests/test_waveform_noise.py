@@ -46,18 +46,35 @@ def test_innovations_are_white_where_simulated_residuals_are_not():
 def test_where_the_noise_goes_is_found_out(circulates):
     right = 0
     for seed in range(20):
-        flight, known = fly(0.01, seed, Kp=2.0, circulates=circulates)
+        flight, known = fly(0.01, seed, Kp=3.0, circulates=circulates)
         fit = dtm.estimate_delay(flight, known, method="waveform")
         right += fit.details["noise"] == ("loop" if circulates else "recording")
-    # The likelihoods of single records come close now and then.
-    assert right >= 17
+    # Likelihoods of single records come close now and then: in 7 % of them here.
+    assert right >= 16
+
+
+def test_a_known_start_sharpens_the_waveform():
+    flight, known = fly(0.01, seed=3, circulates=False)
+    free = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
+    told = dtm.estimate_delay(flight, known, method="waveform", free=("delay",), initial_output=0.0)
+    assert told.crb.free == ("delay",)
+    assert free.crb.free == ("delay", "initial output")
+    assert told.stderr["delay"] < free.stderr["delay"]
+    assert told.details["initial_output"] == 0.0
+
+
+def test_a_delay_in_the_measurement_is_as_good_as_one_in_the_command():
+    flight, known = fly(0.0)
+    fit = dtm.estimate_delay(flight, known.replace(delay_path="measurement"), method="waveform")
+    assert fit.delay == pytest.approx(0.36, abs=1e-7)
+    assert fit.loop.delay_path == "measurement"
 
 
 def test_intervals_cover_where_the_noise_circulates():
     held = 0
     for seed in range(200):
         flight, known = fly(0.01, seed, Kp=3.0)
-        fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
+        fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay",), noise="loop")
         low, high = fit.ci()
         held += low <= 0.36 <= high
     # 190 of 200 expected, with a deviation of 3.1.
@@ -118,7 +135,7 @@ def test_a_limit_is_recovered():
 
 def test_profiles_of_the_waveform_meet_its_intervals():
     flight, known = fly(0.01, seed=2, circulates=False)
-    fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
+    fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay",), noise="recording")
     low, high = fit.ci()
     _, t = fit.profile("delay", [low, fit.delay, high])
     assert t[1] == pytest.approx(0.0, abs=1e-3)

@@ -43,6 +43,9 @@ VANISHING = 1e-6
 #: It is tried where its move alone makes the cost no larger than this many times.
 NEARLY = 2.0
 
+#: A number this close to its bound, as a part of its range, is at it.
+AT_BOUND = 1e-4
+
 #: Residuals below this part of the output's range are rounding.
 EXACT = 1e-9
 
@@ -113,7 +116,12 @@ def concluded(
     count = len(names)
     values = dict(zip(names, found.point.tolist(), strict=False))
     held = [name for name in ("lag", "delay") if values.get(name) == 0.0]
-    loose = [i for i, label in enumerate(labels) if label not in held]
+    # What is fitted along and stands at a bound does not move either.
+    close = AT_BOUND * (model.high - model.low)
+    at_bound = (found.point - model.low <= close) | (model.high - found.point <= close)
+    along = np.arange(len(labels)) >= count
+    still = np.isfinite(close) & at_bound & along
+    loose = [i for i, label in enumerate(labels) if label not in held and not still[i]]
     jacobian, residuals = found.jacobian, -found.misfit
     check_distinguishable(jacobian[:, loose], [labels[i] for i in loose])
     whiteness = whiteness_of(residuals, count, model.sizes)

@@ -57,7 +57,8 @@ class SimulatedRecording:
         window: tuple[float | None, float | None] | None,
     ) -> None:
         rows = recording.rows(*(window or (None, None)))
-        self.loop = loop
+        # The recorded output is what came back to the controller, wherever the delay is.
+        self.loop = loop.replace(delay_path="command")
         self.recording = recording.window(*(window or (None, None)))
         _check_work(self.recording, loop)
         self._past = _past_commands(recording, loop, rows.start)

@@ -9,8 +9,8 @@ first and the best few points of it are refined, by the loop's exact sensitiviti
 The residuals are white only if the model is the vehicle and the noise enters at the measurement
 but does not circulate through the controller. Where it does (`noise="loop"`), the controller of the
 model reads the recorded output in place of the simulated one: what is left over are the
-innovations, and they are white. Both are predictions with as many numbers, so the likelier is
-the one that leaves less over.
+innovations, and they are white. Both are predictions with as many numbers, so the one that leaves
+less over is the likelier; the innovations are taken where they are so by far (`noise="auto"`).
 """
 
 from __future__ import annotations
@@ -65,6 +65,9 @@ HOPELESS = 1e3
 #: A misfit below this part of the excitation is rounding.
 ROUNDING = 1e-9
 
+#: Innovations are taken where their log likelihood is larger by this much, a factor of 20.
+LIKELIER = 3.0
+
 
 def estimate_by_waveform(
     recording: Flights,
@@ -72,20 +75,22 @@ def estimate_by_waveform(
     window: Window,
     free: Sequence[str],
     noise: Noise = "auto",
+    initial_output: float | None = None,
 ) -> DelayEstimate:
     """Fit `free` of the loop to the window of the recording."""
     if noise not in get_args(Noise):
         raise ValueError(f"noise={noise!r} is not one of {', '.join(map(repr, get_args(Noise)))}")
     if noise == "loop":
-        return _by_innovations(recording, loop, window, free)
-    simulated = _by_simulation(recording, loop, window, free)
+        return _by_innovations(recording, loop, window, free, initial_output)
+    simulated = _by_simulation(recording, loop, window, free, initial_output)
     if noise == "recording" or not set(free) <= set(OF_THE_VEHICLE):
         return simulated
     try:
-        innovations = _by_innovations(recording, loop, window, free)
+        innovations = _by_innovations(recording, loop, window, free, initial_output)
     except NotIdentifiableError:  # the command cannot be computed, or says less than the loop
         return simulated
-    return min(simulated, innovations, key=_unlikelihood)
+    likelier = _unlikelihood(simulated) - _unlikelihood(innovations)
+    return innovations if likelier > LIKELIER else simulated
 
 
 def _unlikelihood(fit: DelayEstimate) -> float:
@@ -105,8 +110,11 @@ def _by_innovations(
     loop: ControlLoop | Sequence[ControlLoop],
     window: Window,
     free: Sequence[str],
+    initial_output: float | None,
 ) -> DelayEstimate:
-    return estimate_from_commands("waveform", recording, loop, window, free, computed=True)
+    return estimate_from_commands(
+        "waveform", recording, loop, window, free, initial_output, computed=True
+    )
 
 
 def _by_simulation(
@@ -114,10 +122,11 @@ def _by_simulation(
     loop: ControlLoop | Sequence[ControlLoop],
     window: Window,
     free: Sequence[str],
+    initial_output: float | None,
 ) -> DelayEstimate:
     flights = each_flight(recording, loop, window)
     names = checked_names(free, flights[0].loop, OF_THE_LOOP)
-    models = [_model(flight, names) for flight in flights]
+    models = [_model(flight, names, initial_output) for flight in flights]
     model, found = solve_jointly(models)
     found = without_vanishing(model, found)
     _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
@@ -131,21 +140,25 @@ def _by_simulation(
             for one, flight in zip(models, flights, strict=True)
         ],
         message=f"least squares over {', '.join(names)} on the response of the loop",
-        details={"initial_output": float(found.point[len(names)]), "noise": "recording"},
+        details={
+            "initial_output": float([*found.point, initial_output][len(names)]),
+            "noise": "recording",
+        },
         advice=advice,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Misfit of one recording; parameters are `names`, then the output at the start."""
+    """Misfit of one recording; parameters are `names`, then the output at the start if free."""
 
     simulated: SimulatedRecording
     names: tuple[str, ...]
+    offset: float | None
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return (*self.names, "initial output")
+        return (*self.names, *(["initial output"] if self.offset is None else []))
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -194,15 +207,17 @@ class _Model:
         known = self.simulated.loop.parameters
         return np.array([sizes.get(label) or abs(known[label]) for label in self.labels])
 
-    def _values(self, point: Array) -> dict[str, float]:
-        return dict(zip(self.names, point.tolist(), strict=False))
+    def _values(self, point: Array) -> tuple[dict[str, float], float]:
+        """Numbers of the loop, and the output at the start."""
+        start = float(point[-1]) if self.offset is None else self.offset
+        return dict(zip(self.names, point.tolist(), strict=False)), start
 
     def misfit(self, point: Array) -> Array:
         """Simulated minus recorded output; bounded where the loop with these numbers is not."""
         bound = HOPELESS * self.size
         recorded = self.simulated.recording.output
         try:
-            output = self.simulated.output(self._values(point), float(point[-1]))
+            output = self.simulated.output(*self._values(point))
         except ValueError:  # the response with these numbers grows without bound
             return np.full(recorded.size, bound)
         return np.clip(output - recorded, -bound, bound)
@@ -210,7 +225,7 @@ class _Model:
     def jacobian(self, point: Array) -> Array:
         """Derivatives of the misfit; none where it is at its bound."""
         try:
-            slopes = self.simulated.slopes(self._values(point), float(point[-1]))
+            slopes = self.simulated.slopes(*self._values(point))
         except ValueError:
             return np.zeros((sum(self.sizes), point.size))
         columns = np.stack([slopes[label] for label in self.labels], axis=1)
@@ -220,8 +235,9 @@ class _Model:
     def starts(self) -> list[Array]:
         """The points of a grid over delay and gain, the best first."""
         data = self.simulated.recording
-        start = float(np.mean(data.output[: max(1, data.steps()[0].index)]))
-        points = [np.array([*point, start]) for point in itertools.product(*self._grid())]
+        start = [float(np.mean(data.output[: max(1, data.steps()[0].index)]))]
+        along = start if self.offset is None else []
+        points = [np.array([*point, *along]) for point in itertools.product(*self._grid())]
         costs = [float(np.sum(self.misfit(point) ** 2)) for point in points]
         return [points[int(index)] for index in np.argsort(costs)]
 
@@ -236,10 +252,10 @@ class _Model:
         return [grids[name] if name in grids else np.array([known[name]]) for name in self.names]
 
 
-def _model(flight: FlownOnce, names: tuple[str, ...]) -> _Model:
+def _model(flight: FlownOnce, names: tuple[str, ...], offset: float | None = None) -> _Model:
     simulated = SimulatedRecording(flight.recording, flight.loop, flight.window)
     _check_excitation(simulated.recording, len(names))
-    return _Model(simulated, names)
+    return _Model(simulated, names, offset)
 
 
 def _check_excitation(data: Recording, parameters: int) -> None:
