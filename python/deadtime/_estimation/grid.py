@@ -45,7 +45,7 @@ __all__ = ["estimate_by_grid"]
 Array = NDArray[np.float64]
 
 #: Points of the grid, and between which shares of the window they lie besides none.
-POINTS, SHORTEST, LONGEST = 32, 0.005, 0.6
+POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
 
 #: Delays and lags of a continuous loop below this share of the window, or of the time between two
 #: samples, take long to simulate and cannot be told from none.
@@ -240,9 +240,9 @@ class _Problem:
             jac=jacobian,
             bounds=(self.low[loose], self.high[loose]),
             x_scale=self.scale[loose],
-            xtol=1e-14,
-            ftol=1e-14,
-            gtol=1e-14,
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
             max_nfev=steps,
         )
         return whole(found.x)

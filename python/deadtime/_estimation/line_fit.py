@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Values: TypeAlias = dict[str, float]
 
 #: How many delays to a sample are tried first, and the most of them.
-EACH, MOST_POINTS = 2, 400
+EACH, MOST_POINTS = 1, 400
 
 #: A lag that changes the cost by less than this share is none.
 VANISHING = 1e-6
@@ -83,9 +83,9 @@ def _descend(lines: Lines, names: tuple[str, ...], start: Values) -> tuple[Value
         bounds=([-np.inf if name == "gain" else 0.0 for name in names], np.inf),
         jac="3-point",
         x_scale=[abs(start["gain"]) if name == "gain" else lines.sample_time for name in names],
-        xtol=1e-14,
-        ftol=1e-14,
-        gtol=1e-14,
+        xtol=1e-13,
+        ftol=1e-13,
+        gtol=1e-13,
         max_nfev=100,
     )
     point = {name: float(value) for name, value in zip(names, found.x, strict=True)}
