@@ -86,7 +86,8 @@ def test_single_records_cover_with_gain_and_start_unknown():
 def test_periods_cover(free):
     lag = 0.06 if "lag" in free else 0.0
     held, errors, said, adequate = 0, [], [], 0
-    for seed in range(120):
+    runs = 60 if lag else 120
+    for seed in range(runs):
         flight, known = multisine(lag, noise=0.01, seed=seed)
         fit = estimate(flight, known, free)
         low, high = fit.ci()
@@ -94,10 +95,32 @@ def test_periods_cover(free):
         adequate += fit.adequate
         errors.append(fit.delay - 0.36)
         said.append(fit.stderr["delay"])
-    # 114 of 120 expected, with a deviation of 2.4.
-    assert held >= 106
-    assert adequate >= 106
+    # 95 % expected, with a deviation of 2.0 or 2.8 %.
+    assert held >= 0.88 * runs
+    assert adequate >= 0.88 * runs
     assert root_mean_square(errors) == pytest.approx(np.mean(said), rel=0.25)
+
+
+def test_a_lag_that_is_none_is_at_its_bound():
+    at_bound = 0
+    for seed in range(20):
+        flight, known = multisine(noise=0.01, seed=seed)
+        fit = estimate(flight, known, ("delay", "gain", "lag"))
+        at_bound += fit.lag == 0.0
+        assert fit.ci(0.95, "lag")[0] == 0.0
+        assert fit.delay_plus_lag == pytest.approx(0.36, abs=0.012)
+    # half of the time noise would have the lag below zero
+    assert 4 <= at_bound <= 16
+
+
+def test_the_profile_says_what_the_interval_is_made_of():
+    flight, known = multisine(0.06, noise=0.01, seed=2)
+    fit = estimate(flight, known, ("delay", "gain", "lag"))
+    for name in ("delay", "lag", "delay+lag"):
+        ends = fit.ci(0.95, name)
+        _, t = fit.profile(name, ends)
+        inside = [value for value, end in zip(t, ends, strict=True) if end > 0.0]
+        np.testing.assert_allclose(inside, 2.07, rtol=0.05)  # t of 21 degrees of freedom
 
 
 def test_a_lag_that_is_left_out_is_noticed():

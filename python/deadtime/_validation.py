@@ -90,7 +90,7 @@ def whole_number(
     except TypeError as error:
         raise TypeError(f"{name}={value!r}: give a whole number{otherwise}") from error
     if not least <= number < limit:
-        raise ValueError(f"{name}={number}: give a whole number of at least 1{otherwise}")
+        raise ValueError(f"{name}={number}: give a whole number of at least {least}{otherwise}")
     return number
 
 

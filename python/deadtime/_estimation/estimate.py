@@ -77,11 +77,13 @@ def estimate_delay(
         ``"relay"`` reads the period of a limit cycle.
         ``"gcc"`` is generalised cross-correlation, ``"arx_scan"`` what `delayest` does.
     free : sequence of str
-        What is fitted: any of ``"delay"``, ``"gain"`` and ``"lag"``. The overshoot method fits the
-        delay alone.
+        What is fitted: any of ``"delay"``, ``"gain"`` and ``"lag"``. ``"decrement"`` fits delay and
+        gain; ``"overshoot"``, ``"decay"``, ``"graphical"``, ``"relay"``, ``"gcc"`` and
+        ``"arx_scan"`` the delay alone, and take what else they need as given.
     window : (float or None, float or None), optional
-        The part of the recording to use, s. For ``"waveform"`` and ``"overshoot"`` it should begin
-        at rest and hold one step; ``"output_error"`` takes any in which the command changes.
+        The part of the recording to use, s. For ``"waveform"``, ``"grid"``, ``"cta"`` and all that
+        read a step it should begin at rest and hold one step; ``"output_error"``, ``"frequency"``,
+        ``"gcc"`` and ``"arx_scan"`` take any in which the command changes.
     **options
         For ``"output_error"``: ``initial_output``, the true output at the start where it is known;
         fitted otherwise.

@@ -17,21 +17,26 @@ start, is dropped. White noise is white over the lines; all of them are output e
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
-from scipy.optimize import least_squares
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.commands import commands_over_samples
-from deadtime._estimation.evidence import check_distinguishable, checked_names, standard_errors
+from deadtime._estimation.evidence import (
+    check_distinguishable,
+    checked_names,
+    embedded,
+    standard_errors,
+)
 from deadtime._estimation.excitation import ROUNDING, check_gain
 from deadtime._estimation.held_response import HeldResponse
 from deadtime._estimation.held_transfer import held_transfer
+from deadtime._estimation.line_fit import LineProfile, Lines, fit_lines
 from deadtime._estimation.periodic import PeriodicSpectra, periodic_spectra
+from deadtime._estimation.profile import Profile
 from deadtime._estimation.residuals import SIGNIFICANCE, whiteness_of
 from deadtime._estimation.result import DelayEstimate
 from deadtime._loop import ControlLoop
@@ -43,25 +48,14 @@ __all__ = ["estimate_by_frequency"]
 
 Array = NDArray[np.float64]
 
-#: Longest delay that is sought, as a share of the window, and how many to a sample are tried first.
-LONGEST, EACH = 0.6, 2
+#: Longest delay that is sought, as a share of the record or the periods.
+LONGEST = 0.6
 
-#: Most delays that are tried first.
-MOST_POINTS = 400
+#: A lag below this share of a sample is none.
+NO_LAG = 1e-9
 
 #: Samples are even where their distances differ by less than this share.
 EVEN = 1e-3
-
-
-class _Lines(NamedTuple):
-    """What is fitted: misfit at the lines, over their standard deviation where that is known."""
-
-    misfit: Callable[[dict[str, float]], Array]
-    known_noise: bool
-    freedom: int
-    widening: float
-    longest: float
-    describe: str
 
 
 def estimate_by_frequency(
@@ -97,19 +91,21 @@ def estimate_by_frequency(
         lines = _periodic_lines(spectra, data.sample_time, len(names))
     known = {name: loop.parameters[name] for name in ("gain", "lag")}
     known["delay"] = 0.0 if loop.delay is None else loop.delay
-    point, jacobian = _solve(lines, names, known, data.sample_time)
-    check_distinguishable(jacobian, list(names))
-    misfit = lines.misfit(known | dict(zip(names, point, strict=True)))
-    power = float(misfit @ misfit)
+    found, jacobian = fit_lines(lines, names, known)
+    loose = [i for i, name in enumerate(names) if name != "lag" or found["lag"] > 0.0]
+    check_distinguishable(jacobian[:, loose], [names[i] for i in loose])
+    power = lines.cost(found)
     scale = power / lines.freedom
-    worse = float(special.chdtrc(lines.freedom, power)) if lines.known_noise else 1.0
-    inverse = np.linalg.inv(jacobian.T @ jacobian)
-    cov = np.asarray(inverse * (max(1.0, scale) if lines.known_noise else scale))
-    cov = np.asarray(cov * lines.widening, dtype=np.float64)
-    values = {name: float(value) for name, value in zip(names, point, strict=True)}
+    worse, wider = 1.0, scale
+    if lines.known_noise:
+        worse = float(special.chdtrc(lines.freedom, power / lines.widening))
+        wider = max(lines.widening, scale)
+    inverse = np.linalg.inv(jacobian[:, loose].T @ jacobian[:, loose])
+    cov = embedded(np.asarray(wider * inverse), loose, len(names))
+    values = {name: found[name] for name in names}
     errors = standard_errors(names, cov)
     check_gain(values, errors)
-    residuals = _residuals(data, response, known | values)
+    residuals = _residuals(data, response, found)
     whiteness = whiteness_of(residuals, len(names))
     exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
     adequate = exact or (worse > SIGNIFICANCE if lines.known_noise else whiteness.white)
@@ -127,6 +123,13 @@ def estimate_by_frequency(
         message=_message(names, lines, source, adequate),
         uncalibrated=_why_uncalibrated(loop),
         details={"lines": lines.describe, "command": source, "p_value_of_model": worse},
+        _profile=Profile(
+            cost=LineProfile(lines, names, found),
+            best=power,
+            freedom=lines.freedom,
+            widening=dict.fromkeys(errors, math.sqrt(wider / scale) if scale > 0.0 else 1.0),
+            preferred="delay and lag are alike" if "lag" in names else "",
+        ),
     )
 
 
@@ -148,7 +151,7 @@ def _check_moves(data: Recording, command: Array) -> None:
             )
 
 
-def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest: float) -> _Lines:
+def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest: float) -> Lines:
     """Lines of one record, the mean dropped; white noise has the same size at each."""
     size = len(data)
     frequencies = np.fft.rfftfreq(size, data.sample_time)
@@ -165,16 +168,16 @@ def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest
         weight[-1] = math.sqrt(1.0 / size)
 
     def misfit(values: dict[str, float]) -> Array:
-        path = response.at(data.time - values["delay"], values["lag"]).value
+        path = _path(data, response, values)
         lines = weight * np.fft.rfft(data.output - values["gain"] * path)[kept]
         return np.concatenate([lines.real, lines.imag])
 
     describe = f"{int(kept.sum())} of one record"
     span = float(data.time[-1] - data.time[0])
-    return _Lines(misfit, False, real - numbers, 1.0, LONGEST * span, describe)
+    return Lines(misfit, False, real - numbers, 1.0, LONGEST * span, data.sample_time, describe)
 
 
-def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) -> _Lines:
+def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) -> Lines:
     """Excited lines of periods, over the standard deviations that the periods show."""
     z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
     floor = ROUNDING * float(np.max(np.abs(spectra.output)))
@@ -201,62 +204,18 @@ def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) 
     widening = spectra.freedom / (spectra.freedom - 1.0)
     describe = f"{spectra.lines.size} of {spectra.periods} periods"
     longest = min(LONGEST * spectra.periods, 1.0) * spectra.samples * sample_time
-    return _Lines(misfit, True, freedom, widening, longest, describe)
+    return Lines(misfit, True, freedom, widening, longest, sample_time, describe)
 
 
-def _solve(
-    lines: _Lines, names: tuple[str, ...], known: dict[str, float], sample_time: float
-) -> tuple[Array, Array]:
-    """The numbers of least cost, from the best of a grid over the delay, and the Jacobian there."""
-
-    def misfit(point: Array) -> Array:
-        return lines.misfit(known | dict(zip(names, (float(x) for x in point), strict=True)))
-
-    start = np.array([{**known, "lag": sample_time}[name] for name in names])
-    if "delay" in names:
-        count = int(min(MOST_POINTS, max(2.0, EACH * lines.longest / sample_time)))
-        grid = np.linspace(0.0, lines.longest, count + 1)
-        trials = [np.concatenate([[delay], start[1:]]) for delay in grid]
-        start = min(trials, key=lambda trial: _cost_at_best_gain(misfit, trial, names))
-        if start[0] == grid[-1]:
-            raise NotIdentifiableError(
-                f"the fit runs away to a delay of {grid[-1]:.3g} s, the longest that is tried: the "
-                "output is no answer to this command; check columns and units"
-            )
-    low = [-np.inf if name == "gain" else 0.0 for name in names]
-    found = least_squares(
-        misfit,
-        start,
-        bounds=(low, np.inf),
-        jac="3-point",
-        x_scale=[abs(known["gain"]) if name == "gain" else sample_time for name in names],
-        xtol=1e-14,
-        ftol=1e-14,
-        gtol=1e-14,
-        max_nfev=100,
-    )
-    return found.x, np.asarray(found.jac)
-
-
-def _cost_at_best_gain(
-    misfit: Callable[[Array], Array], point: Array, names: tuple[str, ...]
-) -> float:
-    """Cost at a point, its gain moved to where the misfit, taken as linear in it, is least."""
-    now = misfit(point)
-    if "gain" not in names:
-        return float(now @ now)
-    place = names.index("gain")
-    other = point.copy()
-    other[place] *= 0.9
-    slope = now - misfit(other)
-    moved = now - slope * float(slope @ now) / float(slope @ slope)
-    return float(moved @ moved)
+def _path(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:
+    """Response to the commands for a gain of one; the search may try lags that overflow."""
+    lag = values["lag"] if values["lag"] > NO_LAG * data.sample_time else 0.0
+    return response.at(data.time - values["delay"], lag).value
 
 
 def _residuals(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:
     """Recorded output less the response to the commands, about its mean."""
-    path = values["gain"] * response.at(data.time - values["delay"], values["lag"]).value
-    residuals = data.output - path
+    residuals = data.output - values["gain"] * _path(data, response, values)
     return np.asarray(residuals - residuals.mean())
 
 
@@ -269,10 +228,12 @@ def _why_uncalibrated(loop: ControlLoop) -> str:
     )
 
 
-def _message(names: tuple[str, ...], lines: _Lines, source: str, adequate: bool) -> str:
+def _message(names: tuple[str, ...], lines: Lines, source: str, adequate: bool) -> str:
     text = f"maximum likelihood over {', '.join(names)} at the lines {lines.describe}"
     if source != "logged":
         text += f", the command {source}"
+    if "lag" in names:
+        text += "; delay and lag are alike, so intervals are those of the profile likelihood"
     if not adequate:
         text += (
             "; more is left than the noise explains, so the model is only an equivalent of the "

@@ -45,7 +45,7 @@ __all__ = ["estimate_by_grid"]
 Array = NDArray[np.float64]
 
 #: Points of the grid, and between which shares of the window they lie besides none.
-POINTS, SHORTEST, LONGEST = 32, 0.005, 0.6
+POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
 
 #: Delays and lags of a continuous loop below this share of the window, or of the time between two
 #: samples, take long to simulate and cannot be told from none.
@@ -53,10 +53,6 @@ SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
 #: Valleys of the curve that are refined; the deepest wins.
 REFINED = 3
-
-#: Steps of least squares for what is free besides the delay, at each point: it starts from the best
-#: of the point before.
-STEPS = 2
 
 #: A misfit for simulations that leave all bounds, in units of the output's range.
 HOPELESS = 1e3
@@ -203,10 +199,14 @@ class _Problem:
             return np.full(len(self.simulated.recording), most)
         return np.clip(output - self.simulated.recording.output, -most, most)
 
-    def jacobian(self, point: Array) -> Array:
-        """Central differences, one-sided at an end."""
+    def cost(self, point: Array) -> float:
+        misfit = self.misfit(point)
+        return float(misfit @ misfit)
+
+    def jacobian(self, point: Array, first: int = 0) -> Array:
+        """Derivatives by the numbers from the `first` on; one-sided at an end."""
         columns = []
-        for place in range(point.size):
+        for place in range(first, point.size):
             step = 1e-5 * self.scale[place]
             up, down = point.copy(), point.copy()
             up[place] += step
@@ -215,50 +215,14 @@ class _Problem:
             columns.append((self.misfit(up) - self.misfit(down)) / change)
         return np.stack(columns, axis=1)
 
-    def best(self, point: Array, held: Sequence[int], steps: int) -> Array:
-        """Least squares over what is not held, from `point`."""
-        loose = [place for place in range(point.size) if place not in held]
-        if not loose:
-            return point
-
-        def whole(part: Array) -> Array:
-            full = point.copy()
-            full[loose] = part
-            return full
-
-        inside = np.clip(point[loose], self.low[loose], self.high[loose])
-
-        def misfit(part: Array) -> Array:
-            return self.misfit(whole(part))
-
-        def jacobian(part: Array) -> Array:
-            return self.jacobian(whole(part))[:, loose]
-
-        found = least_squares(
-            misfit,
-            inside,
-            jac=jacobian,
-            bounds=(self.low[loose], self.high[loose]),
-            x_scale=self.scale[loose],
-            xtol=1e-14,
-            ftol=1e-14,
-            gtol=1e-14,
-            max_nfev=steps,
-        )
-        return whole(found.x)
-
     def over(self, grid: Array) -> tuple[Array, Array]:
         """Least cost at each delay, and the numbers there."""
         costs, points = np.empty(grid.size), np.empty((grid.size, self.guess.size))
         point = self.guess
         for row, delay in enumerate(grid):
-            trial = min(
-                (np.concatenate([[delay], start[1:]]) for start in (self.guess, point)),
-                key=lambda start: float(np.sum(self.misfit(start) ** 2)),
-            )
-            point = self.best(trial, [0], STEPS)
-            misfit = self.misfit(point)
-            costs[row], points[row] = float(misfit @ misfit), point
+            starts = [np.concatenate([[delay], start[1:]]) for start in (self.guess, point)]
+            point = self._nearer(min(starts, key=self.cost))
+            costs[row], points[row] = self.cost(point), point
         if int(np.argmin(costs)) == grid.size - 1:
             raise NotIdentifiableError(
                 f"the cost falls up to a delay of {grid[-1]:g} s, the longest that is tried: the "
@@ -267,11 +231,36 @@ class _Problem:
             )
         return costs, points
 
+    def _nearer(self, point: Array) -> Array:
+        """A Gauss-Newton step in all but the delay, where it helps."""
+        if point.size == 1:
+            return point
+        jacobian = self.jacobian(point, first=1)
+        change = np.linalg.lstsq(jacobian, -self.misfit(point), rcond=None)[0]
+        moved = point.copy()
+        moved[1:] = np.clip(point[1:] + change, self.low[1:], self.high[1:])
+        return min((point, moved), key=self.cost)
+
     def refined(self, costs: Array, points: Array) -> Array:
         """The deepest of the deepest valleys, all numbers at their best."""
         valleys = sorted({int(np.argmin(costs)), *_valleys(costs)}, key=lambda row: costs[row])
-        found = [self.best(points[row], [], 60) for row in valleys[:REFINED]]
-        return min(found, key=lambda point: float(np.sum(self.misfit(point) ** 2)))
+        found = [self._descended(points[row]) for row in valleys[:REFINED]]
+        return min(found, key=self.cost)
+
+    def _descended(self, point: Array) -> Array:
+        """Least squares over all numbers, from a point."""
+        found = least_squares(
+            self.misfit,
+            np.clip(point, self.low, self.high),
+            jac=self.jacobian,
+            bounds=(self.low, self.high),
+            x_scale=self.scale,
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+            max_nfev=60,
+        )
+        return np.asarray(found.x)
 
     def at_least(self, point: Array, place: int) -> bool:
         """Whether a delay or lag came out at the shortest there is."""

@@ -1,10 +1,10 @@
 """What went into the vehicle and what came out, sample by sample, freed of what is known of it.
 
-With the command u_k held over each sample time h, an integrator moves by (y_{k+1} - y_k)/h per
-second and a first-order plant with time constant c leaves (y_{k+1} - p y_k)/(1 - p), p = e^(-h/c),
-behind: in both cases the gain times what arrived between the two samples, for the integrator the
-command (1-f) u_{k-d} + f u_{k-d-1} at a delay of (d + f) h. No half sample of the hold is left over
-then; where the plant is not undone it is, and is taken off.
+With u_k the command held over each sample time h, or its mean over it, an integrator moves by
+(y_{k+1} - y_k)/h per second and a first-order plant with time constant c leaves
+(y_{k+1} - p y_k)/(1 - p), p = e^(-h/c), behind: in both cases the gain times what arrived between
+the two samples, for the integrator the command (1-f) u_{k-d} + f u_{k-d-1} at a delay of (d + f) h.
+No half sample of the hold is left over then; where the plant is not undone it is, and is taken off.
 """
 
 from __future__ import annotations

@@ -88,7 +88,8 @@ def read_step(recording: Recording) -> StepReading:
     steps = recording.steps()
     if not steps:
         raise NotIdentifiableError(
-            "the reference does not move in the window: there is no step to answer"
+            "the reference does not move in the window: there is no step to answer; begin the "
+            "window some samples before it"
         )
     if len(steps) > 1:
         times = ", ".join(f"{step.time:g}" for step in steps[:6])
