@@ -68,6 +68,8 @@ FLOORS = [
         "_frequency",
         "_interchange",
         "_margins",
+        "_sampled_gain",
+        "_sampled_margins",
         "_ratio",
         "_transfer",
         "_systems",
