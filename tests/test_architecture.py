@@ -83,7 +83,7 @@ FLOORS = [
     {"_readers", "_estimation", "_design"},
     {"_experiment"},
     {"_plots"},
-    {"_stability_plots", "_box_plots"},
+    {"_stability_plots", "_box_plots", "_design_plots"},
     {"_report"},
     {"_cli"},
 ]

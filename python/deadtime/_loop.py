@@ -24,6 +24,7 @@ from deadtime._loop_stability import (
     open_loop,
     sampled_abscissa,
     sampled_roots,
+    stable_end,
     stable_range,
 )
 from deadtime._plants import Plant
@@ -682,7 +683,14 @@ class ControlLoop:
         )
         if _MOST_SAMPLES * period < delay + found[0] < math.inf:
             return found  # beyond the walk along the transition matrices
-        largest = self.stable_range("delay")[1]
+        largest = stable_end(
+            lambda late: sampled_abscissa(self._model, late, period),
+            "delay",
+            delay,
+            1.0,
+            0.0,
+            min(_MOST_SAMPLES * period, delay + found[0]),
+        )
         if largest - delay >= found[0]:
             return found
         pole = self.replace(delay=largest)._native.poles()[0]

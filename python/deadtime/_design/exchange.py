@@ -1,6 +1,6 @@
 """Gains that are best in the worst case, by exchange.
 
-    min over gains  of  max over scenarios p of cost(gains; p)   so that   margins(gains; p) >= asked
+    min over gains of max over scenarios p of cost(gains; p), margins(gains; p) >= asked for all p
 
 has infinitely many p: every delay of an interval. The exchange method takes a few (ends and
 middles), finds the best gains for those, looks over the whole interval for a p that is worse,
@@ -21,12 +21,12 @@ from deadtime._design.problem import Scenario, Vector
 from deadtime._design.result import LeastMargins
 from deadtime._design.search import Search
 from deadtime._design.worst import fine, worst_scenario
-from deadtime._errors import ConvergenceError
 
-__all__ = ["Found", "best_gains"]
+__all__ = ["Found", "best_gains", "least_margins"]
 
-#: Rounds of the exchange; two or three do where nothing jumps.
+#: Rounds of the exchange; two or three do where nothing jumps, and where it does more are no use.
 _ROUNDS = 12
+_ROUNDS_SIMULATED = 5
 
 #: The search aims so much above a demand, relatively, and what it then misses is made up for.
 _ABOVE = 1e-5
@@ -44,34 +44,35 @@ class Found:
     scenarios: tuple[Scenario, ...]
     cost: float
     worst: Scenario
-    margins: LeastMargins
     checked: int
 
 
-def best_gains(search: Search, demands: Demands) -> Found:
-    """The best gains in the worst scenario of all."""
+def best_gains(search: Search, demands: Demands, start: Vector | None = None) -> Found:
+    """The best gains in the worst scenario of all, from the map or from around a start."""
     problem, objective = search.problem, search.objective
     scenarios = list(problem.corners)
     aimed = demands.times(1.0 + _ABOVE)
-    gains = search.globally(scenarios, aimed)
+    if start is None:
+        gains = search.globally(scenarios, aimed)
+    else:
+        gains = search.locally(start, scenarios, aimed)
     best: Found | None = None
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS_SIMULATED if objective.simulated else _ROUNDS):
         if demands.asked and search.short(gains, scenarios, aimed) > _HOPELESS:
             break
         everywhere = [*fine(problem), *scenarios[len(problem.corners) :]]
         cost, worst = worst_scenario(problem, objective, gains, everywhere)
         seen = objective.worst(problem, gains, scenarios)
         added = [worst] if cost > seen + objective.tolerance * abs(seen) else []
-        places = [*fine(problem, margins=True), *scenarios[len(problem.corners) :]]
-        each = exact_margins(problem, gains, places)
-        least, missing = _least(each), np.zeros(3)
+        missing = np.zeros(3)
         if demands.asked:
-            missing = np.maximum(demands.vector * (1.0 - _MISSED) - least, 0.0)
+            places = [*fine(problem, margins=True), *scenarios[len(problem.corners) :]]
+            each = exact_margins(problem, gains, places)
+            missing = np.maximum(demands.vector * (1.0 - _MISSED) - least_margins(each), 0.0)
             missing = np.where(demands.vector > 0.0, missing, 0.0)
             added += [places[int(np.argmin(each[:, i]))] for i in np.flatnonzero(missing)]
         if not missing.any() and (best is None or cost < best.cost):
-            margins = LeastMargins(*(float(one) for one in least))
-            best = Found(gains, tuple(scenarios), cost, worst, margins, len(everywhere))
+            best = Found(gains, tuple(scenarios), cost, worst, len(everywhere))
         added = [one for one in added if one not in scenarios]
         if not added and not missing.any():
             break
@@ -79,23 +80,23 @@ def best_gains(search: Search, demands: Demands) -> Found:
         aimed = aimed.raised(missing)
         gains = search.locally(gains, scenarios, aimed)
     if best is None:
-        _refuse(search, demands, gains)
+        raise _unmet(search, demands, gains)
     return replace(best, scenarios=tuple(scenarios))
 
 
-def _least(each: Vector) -> Vector:
-    """Least margins; none at all where a scenario is not stable."""
+def least_margins(each: Vector) -> Vector:
+    """Least of margins (scenarios, 3); none at all where a scenario is not stable."""
     return np.asarray(np.where(np.isnan(each), 0.0, each).min(axis=0))
 
 
-def _refuse(search: Search, demands: Demands, gains: Vector) -> None:
-    """Say that the demands are not met, and what can be had."""
+def _unmet(search: Search, demands: Demands, gains: Vector) -> ValueError:
+    """The error that says that the demands are not met, and what can be had."""
     problem = search.problem
     points = search.survey.points[search.survey.stable]
     alone = search.estimate.of(points, problem.corners).max(axis=0)
     short = demands.shortfall(search.estimate.of(points, problem.corners))
     candidates = [gains, points[int(np.argmin(short))]]
-    least = [_least(exact_margins(problem, one, problem.corners)) for one in candidates]
+    least = [least_margins(exact_margins(problem, one, problem.corners)) for one in candidates]
     place = int(np.argmin([demands.shortfall(one) for one in least]))
     wanted = ", ".join(f"{n} margin {_with_unit(n, v)}" for n, v in demands.asked.items())
     most = ", ".join(
@@ -108,7 +109,7 @@ def _refuse(search: Search, demands: Demands, gains: Vector) -> None:
         for name, value in zip(LeastMargins._fields, least[place], strict=True)
     )
     at = ", ".join(f"{n} = {v:.4g}" for n, v in problem.named(candidates[place]).items())
-    raise ValueError(
+    return ValueError(
         f"no gains in the ranges have {wanted}: taken alone, the most to be had is {most}; "
         f"together the nearest is {nearest} at {at}. Ask for less, or widen the ranges"
     )

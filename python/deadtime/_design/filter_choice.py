@@ -27,12 +27,14 @@ from scipy.integrate import trapezoid
 
 from deadtime._controllers import PV, Controller
 from deadtime._derivative_filter import DerivativeFilter
-from deadtime._design.demands import Demands, demanded
+from deadtime._design.demands import Demands, MarginEstimate, demanded
 from deadtime._design.exchange import best_gains
-from deadtime._design.make import made, prepared
+from deadtime._design.make import made
 from deadtime._design.objectives import Objective, ObjectiveName, objective_named
 from deadtime._design.problem import Problem, Vector, controller_template, pose, with_filter
 from deadtime._design.result import Design, Trade, figure_in_words
+from deadtime._design.search import Search
+from deadtime._design.survey import Survey, surveyed
 from deadtime._design.worst import fine
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
@@ -118,9 +120,7 @@ class FilterChoice(ReadOnlyArrays):
     @property
     def trade(self) -> Trade:
         """The choice as what was traded."""
-        return Trade(
-            "filter", self.omega, self.omega, True, self.ideal.value, self.summary()
-        )
+        return Trade("filter", self.omega, self.omega, True, self.ideal.value, self.summary())
 
     def summary(self) -> str:
         """The choice in a sentence.
@@ -142,8 +142,7 @@ class FilterChoice(ReadOnlyArrays):
         return words
 
     def plot(self) -> Figure:
-        """Draw the trade over the corner, the Bode plots of the controller with and without the
-        filter, and that of the loop with its margins.
+        """Draw the trade, the controller with and without the filter, the loop with its margins.
 
         Returns
         -------
@@ -248,9 +247,14 @@ def design_filter(
     corners = _corners(ideal_problem, omegas)
     white = _bandwidth(loop, bandwidth, float(corners[-1]))
     sides = shape or [_SIDE[len(ideal_problem.free)]] * len(ideal_problem.free)
-    task = _Task(posed, goal, demands, tuple(sides), white)
     ideal = made(ideal_problem, goal, demands, sides)
-    tried = [task.tried(float(corner)) for corner in corners]
+    task = _Task(posed, goal, demands, white, surveyed(ideal_problem, sides))
+    # From the fastest corner down, each from the gains of the one before: they change slowly.
+    gains = np.array([ideal.gains[name] for name in ideal_problem.free])
+    tried: list[_Tried] = []
+    for corner in corners[::-1]:
+        tried.insert(0, task.tried(float(corner), gains))
+        gains = tried[0].gains
     if noise is not None and command_noise is not None:
         most = positive("command_noise", command_noise) / positive("noise", noise)
         rule = f"the fastest with a command noise of at most {command_noise:g}"
@@ -290,6 +294,7 @@ class _Tried:
 
     value: float
     noise: float
+    gains: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,19 +304,21 @@ class _Task:
     posed: Callable[[float | None], Problem]
     objective: Objective
     demands: Demands
-    shape: tuple[int, ...]
     bandwidth: float
 
-    def tried(self, corner: float) -> _Tried:
-        """Design with one corner; NaN where no gains are stable or meet the demands."""
+    survey: Survey
+
+    def tried(self, corner: float, start: Vector) -> _Tried:
+        """Design with one corner from the gains of another; NaN where none meet the demands."""
         problem = self.posed(corner)
+        search = Search(problem, self.objective, self.survey, MarginEstimate(problem))
         try:
-            search = prepared(problem, self.objective, self.shape)
-            found = best_gains(search, self.demands)
+            found = best_gains(search, self.demands, start)
         except ValueError:
-            return _Tried(math.nan, math.nan)
+            return _Tried(math.nan, math.nan, start)
         value = self.objective.value(problem, found.gains, [*fine(problem), found.worst])
-        return _Tried(value, noise_gain(problem.at(found.gains), self.bandwidth))
+        noise = noise_gain(problem.at(found.gains), self.bandwidth)
+        return _Tried(value, noise, found.gains)
 
 
 def _corners(problem: Problem, omegas: ArrayLike | None) -> Vector:
@@ -361,10 +368,10 @@ def _slowest(
     first = kept[0]
     if first == 0:
         return float(corners[0])
-    low, high = float(corners[first - 1]), float(corners[first])
+    low, high, start = float(corners[first - 1]), float(corners[first]), tried[first].gains
     for _ in range(_HALVINGS):
         middle = math.sqrt(low * high)
-        low, high = (low, middle) if keeps(task.tried(middle)) else (middle, high)
+        low, high = (low, middle) if keeps(task.tried(middle, start)) else (middle, high)
     return high
 
 
@@ -380,8 +387,8 @@ def _fastest(task: _Task, corners: Vector, tried: Sequence[_Tried], most: float)
     last = kept[-1]
     if last == len(corners) - 1:
         return float(corners[-1])
-    low, high = float(corners[last]), float(corners[last + 1])
+    low, high, start = float(corners[last]), float(corners[last + 1]), tried[last].gains
     for _ in range(_HALVINGS):
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if task.tried(middle).noise <= most else (low, middle)
+        low, high = (middle, high) if task.tried(middle, start).noise <= most else (low, middle)
     return low

@@ -52,11 +52,10 @@ class Objective(ABC):
     """A cost of a loop, and the figure it stands for."""
 
     name: ObjectiveName
-    unit: str
     #: Whether loops are simulated: many at once then cost little more than one.
     simulated = False
     #: How far costs may differ and be the same, relatively.
-    tolerance = 1e-7
+    tolerance = 1e-6
 
     @abstractmethod
     def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
@@ -90,7 +89,6 @@ class _ByPoles(Objective):
 
 class _Abscissa(_ByPoles):
     name: ObjectiveName = "abscissa"
-    unit = "1/s"
 
     def cost(self, loop: ControlLoop) -> float:
         return loop.spectral_abscissa()
@@ -101,7 +99,7 @@ class _Abscissa(_ByPoles):
 
 class _Damping(_ByPoles):
     name: ObjectiveName = "damping"
-    unit = ""
+    tolerance = 1e-4
 
     def cost(self, loop: ControlLoop) -> float:
         ratio, abscissa = dominant_damping(loop)
@@ -139,7 +137,6 @@ class _ByStep(Objective):
 
 class _SettlingTime(_ByStep):
     name: ObjectiveName = "settling_time"
-    unit = "s"
 
     def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
         return settling
@@ -150,7 +147,6 @@ class _SettlingTime(_ByStep):
 
 class _Overshoot(_ByStep):
     name: ObjectiveName = "overshoot"
-    unit = "%"
 
     def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
         return settling + _OVERSHOOT_WEIGHT * np.maximum(overshoot - NO_OVERSHOOT, 0.0)
@@ -168,7 +164,7 @@ def objective_named(name: str) -> Objective:
         raise ValueError(
             f"objective={name!r}: give one of {', '.join(map(repr, get_args(ObjectiveName)))}"
         )
-    return _OBJECTIVES[name]  # type: ignore[index]
+    return _OBJECTIVES[name]
 
 
 def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
@@ -176,9 +172,7 @@ def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
 
     The chains of a neutral loop oscillate without end: where they are dominant the ratio is zero.
     """
-    poles = np.asarray(
-        loop._native.poles() if loop.is_sampled else loop.rightmost(_POLES).roots
-    )
+    poles = np.asarray(loop._native.poles() if loop.is_sampled else loop.rightmost(_POLES).roots)
     chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
     abscissa = max(float(poles.real.max(initial=-np.inf)), chain)
     if not abscissa < 0.0:

@@ -190,9 +190,7 @@ def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
 
 def _gain_interval(loop: ControlLoop, gain: float | Range) -> Range:
     if "gain" not in loop.plant.parameters:
-        raise ValueError(
-            f"gain={gain!r}: {type(loop.plant).__name__} has no number called gain"
-        )
+        raise ValueError(f"gain={gain!r}: {type(loop.plant).__name__} has no number called gain")
     low, high = gain if isinstance(gain, (tuple, list, np.ndarray)) else (gain, gain)
     low, high = finite("gain", low), finite("gain", high)
     if not low <= high or low * high <= 0.0:

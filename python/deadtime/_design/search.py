@@ -22,6 +22,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize, minimize_scalar
 
 from deadtime._design.demands import Demands, MarginEstimate
@@ -36,22 +37,30 @@ _PENALTY = 50.0
 
 #: Cells whose cost is computed where the map does not hold it, with poles or by simulation.
 _CELLS_BY_POLES = 150
-_CELLS_SIMULATED = 700
+_CELLS_SIMULATED = 450
 
-#: Cells the local search starts from.
+#: Cells the local search starts from, fewer where it is dear.
 _STARTS = 3
+_STARTS_SIMULATED = 2
 
-#: Simplices one after the other: how many at most, how much smaller each is, evaluations of each.
+#: Simplices one after the other: how many at most, how much smaller each is, evaluations of each,
+#: to which part of its range a gain is to be known, and which part of the cost is no gain. Where
+#: roots meet, the abscissa has cusps, so that gains known to 1e-7 leave it known to 1e-3.
 _SIMPLICES = 6
 _SMALLER = 0.35
-_EVALUATIONS = 120
+_EVALUATIONS = 150
+_GAINS_KNOWN = 3e-7
+_IDLE = 1e-4
 
-#: Points along each side of a grid, half its width at first in cells of the map, how many grids,
-#: and how much narrower each is.
-_SIDE = {2: 11, 3: 5}
+#: Points along each side of a grid, half its width at first in cells of the map, how many grids
+#: (of what is simulated, nothing follows them), how much narrower each is, and how near to its
+#: middle the best point has to be for that.
+_SIDE = {2: 9, 3: 5}
 _REACH = 1.5
-_GRIDS = 14
+_GRIDS = 3
+_GRIDS_SIMULATED = 12
 _NARROWER = 0.5
+_ARRIVED = 0.5
 
 #: Every so-manyeth frequency is looked at on the map.
 _COARSE = 3
@@ -82,34 +91,47 @@ class Search:
         met = stable[short <= _MET]
         if met.size:
             costs[met] = self._map_costs(met, scenarios)
-            starts = self.survey.chosen(costs, _STARTS)
+            most = _STARTS_SIMULATED if self.objective.simulated else _STARTS
+            starts = self.survey.chosen(costs, most)
         else:
             # Perhaps the demands are met between the cells.
             costs[stable] = short
             starts = self.survey.chosen(costs, 1)
-        found = [self.locally(start, scenarios, demands) for start in starts]
-        return min(found, key=lambda gains: self._total(gains, scenarios, demands))
+        found = [self._by_grids(start, scenarios, demands) for start in starts]
+        best = min(found, key=lambda one: self._total(one[0], scenarios, demands))
+        return self._polished(*best, scenarios, demands)
 
     def locally(self, start: Vector, scenarios: Sequence[Scenario], demands: Demands) -> Vector:
         """The best gains around some."""
+        return self._polished(*self._by_grids(start, scenarios, demands), scenarios, demands)
+
+    def _by_grids(
+        self, start: Vector, scenarios: Sequence[Scenario], demands: Demands
+    ) -> tuple[Vector, Vector]:
+        """A better point, and how far around it a better one may still be."""
+        reach = _REACH * self.survey.spacing
+        if len(start) == 1 or self.objective.name == "damping":
+            return start, reach
         low, high = np.array(self.survey.bounds).T
-        spacing = self.survey.spacing
+        grids = _GRIDS_SIMULATED if self.objective.simulated else _GRIDS
+        return _by_grids(
+            lambda axes: self._totals(axes, scenarios, demands), start, reach, low, high, grids
+        )
+
+    def _polished(
+        self, start: Vector, reach: Vector, scenarios: Sequence[Scenario], demands: Demands
+    ) -> Vector:
+        """The best point within reach, where costs are continuous."""
+        low, high = np.array(self.survey.bounds).T
 
         def cost(gains: Vector) -> float:
             return self._total(gains, scenarios, demands)
 
         if len(start) == 1:
-            return _between_neighbours(cost, start, spacing, low, high)
-        if self.objective.name == "damping":
-            return _by_simplices(cost, start, 0.5 * spacing, low, high)
-
-        def costs(axes: list[Vector]) -> Vector:
-            return self._totals(axes, scenarios, demands)
-
-        best, reach = _by_grids(costs, start, _REACH * spacing, low, high)
+            return _between_neighbours(cost, start, reach, low, high)
         if self.objective.simulated:
-            return best
-        return _by_simplices(cost, best, 30.0 * reach, low, high)
+            return start
+        return _by_simplices(cost, start, 0.5 * reach, low, high)
 
     def short(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:
         """By how much gains fall short of the demands, by the estimate."""
@@ -131,21 +153,21 @@ class Search:
     ) -> Vector:
         """The same of every point of a grid."""
         points = grid_points(axes)
-        by_map = self.objective.name == "abscissa"
-        late = np.zeros(0)
-        if by_map or demands.asked:
-            late = worst_abscissa(self.problem, axes, scenarios).ravel()
-        if by_map:
-            costs = np.where(np.isfinite(late), late, NEVER)
-        else:
-            costs = self.objective.costs(self.problem, points, scenarios).max(axis=1)
-        if demands.asked:
-            short = np.full(len(points), _UNSTABLE)
-            stable = np.isfinite(late)
-            if stable.any():
-                estimated = self.estimate.of(points[stable], scenarios)
-                short[stable] = demands.shortfall(estimated)
-            costs = costs + _PENALTY * self._scale * short
+        late = worst_abscissa(self.problem, axes, scenarios).ravel()
+        stable = np.isfinite(late)
+        short = np.where(stable, 0.0, _UNSTABLE)
+        if demands.asked and stable.any():
+            estimated = self.estimate.of(points[stable], scenarios, _COARSE)
+            short[stable] = demands.shortfall(estimated)
+        if self.objective.name == "abscissa":
+            costs = np.where(stable, late, 0.0)
+            return np.asarray(costs + _PENALTY * self._scale * short)
+        # Only what may be taken is simulated.
+        costs = NEVER * (1.0 + short)
+        good = short <= _MET
+        if good.any():
+            found = self.objective.costs(self.problem, points[good], scenarios)
+            costs[good] = found.max(axis=1)
         return costs
 
     @property
@@ -155,7 +177,7 @@ class Search:
             return abs(float(self.survey.abscissa.min()))
         return 1.0
 
-    def _map_costs(self, cells: Vector, scenarios: Sequence[Scenario]) -> Vector:
+    def _map_costs(self, cells: NDArray[np.intp], scenarios: Sequence[Scenario]) -> Vector:
         """Costs of cells of the map; of some of them, infinite for the others, where dear."""
         abscissa = self.survey.abscissa.ravel()[cells]
         if self.objective.name == "abscissa":
@@ -172,12 +194,12 @@ class Search:
 
 
 def _between_neighbours(
-    cost: Callable[[Vector], float], start: Vector, spacing: Vector, low: Vector, high: Vector
+    cost: Callable[[Vector], float], start: Vector, reach: Vector, low: Vector, high: Vector
 ) -> Vector:
-    reach = (float(max(start[0] - spacing[0], low[0])), float(min(start[0] + spacing[0], high[0])))
+    ends = (float(max(start[0] - reach[0], low[0])), float(min(start[0] + reach[0], high[0])))
     found = minimize_scalar(
         lambda gain: cost(np.array([gain])),
-        bounds=reach,
+        bounds=ends,
         method="bounded",
         options={"xatol": 1e-9 * (high[0] - low[0]), "maxiter": 200},
     )
@@ -185,21 +207,29 @@ def _between_neighbours(
 
 
 def _by_grids(
-    costs: Callable[[list[Vector]], Vector], start: Vector, reach: Vector, low: Vector, high: Vector
+    costs: Callable[[list[Vector]], Vector],
+    start: Vector,
+    reach: Vector,
+    low: Vector,
+    high: Vector,
+    grids: int,
 ) -> tuple[Vector, Vector]:
-    """The best point, and half the width of the last grid."""
+    """The best point, and half the width of the next grid."""
     best, least = start, np.inf
     offsets = np.linspace(-1.0, 1.0, _SIDE[len(start)])
-    for _ in range(_GRIDS):
+    for _ in range(grids):
         axes = [
             np.unique(np.clip(middle + offsets * side, first, last))
             for middle, side, first, last in zip(best, reach, low, high, strict=True)
         ]
         found = costs(axes)
         place = int(np.argmin(found))
+        moved = grid_points(axes)[place] - best
         if found[place] < least:
-            best, least = grid_points(axes)[place], float(found[place])
-        reach = _NARROWER * reach
+            best, least = best + moved, float(found[place])
+        # Along a kink the best point walks: the grid narrows where it has arrived.
+        if np.all(np.abs(moved) <= _ARRIVED * reach):
+            reach = _NARROWER * reach
     return best, reach
 
 
@@ -216,15 +246,15 @@ def _by_simplices(
             bounds=list(zip(low, high, strict=True)),
             options={
                 "initial_simplex": np.clip(corners, low, high),
-                "xatol": 1e-9 * float((high - low).min()),
-                "fatol": 1e-9 * abs(least),
+                "xatol": _GAINS_KNOWN * float((high - low).min()),
+                "fatol": np.inf,
                 "maxfev": _EVALUATIONS,
             },
         )
         gained = least - float(found.fun)
         if gained > 0.0:
             best, least = np.asarray(found.x, dtype=np.float64), float(found.fun)
-        idle = idle + 1 if gained < 1e-7 * abs(least) else 0
+        idle = idle + 1 if gained < _IDLE * abs(least) else 0
         if idle == 2:
             break
         size, turn = _SMALLER * size, -turn

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,8 @@ class Survey:
 
     def chosen(self, costs: Vector, most: int) -> Vector:
         """The points with the least finite costs that are no neighbours of one another."""
-        points, found = self.points, []
+        points = self.points
+        found: list[Vector] = []
         for place in np.argsort(costs, kind="stable"):
             if not np.isfinite(costs[place]) or len(found) == most:
                 break
@@ -114,7 +116,7 @@ def worst_abscissa(
         held = {
             name: float(axis[i]) for name, axis, i in zip(free[2:], axes[2:], layer, strict=True)
         }
-        place = (..., *layer)
+        place: Any = (..., *layer)
         for one in scenarios:
             worst[place] = np.maximum(worst[place], _judged(_mapped(problem, one | held, plane)))
     return worst
@@ -134,9 +136,7 @@ def charts_at(problem: Problem, survey: Survey, gains: Vector) -> tuple[Stabilit
     held = problem.named(gains)
     axes = {name: survey.axes[i] for i, name in enumerate(free[:2])}
     held = {name: held[name] for name in free[2:]}
-    return tuple(
-        _mapped(problem, middle | {"delay": late} | held, axes) for late in problem.delays
-    )
+    return tuple(_mapped(problem, middle | {"delay": late} | held, axes) for late in problem.delays)
 
 
 def _by_the_rest(

@@ -6,7 +6,7 @@ import math
 
 from deadtime._design.demands import Demands
 from deadtime._design.exchange import Found
-from deadtime._design.result import Trade, figure_in_words
+from deadtime._design.result import LeastMargins, Trade, figure_in_words
 from deadtime._design.search import Search
 
 __all__ = ["trades"]
@@ -20,7 +20,9 @@ _NOTHING = 1e-3
 _UNITS = {"gain": "", "phase": "°", "delay": " s"}
 
 
-def trades(search: Search, demands: Demands, found: Found, value: float) -> tuple[Trade, ...]:
+def trades(
+    search: Search, demands: Demands, found: Found, margins: LeastMargins, value: float
+) -> tuple[Trade, ...]:
     """The price of each margin, of all of them, and of the intervals."""
     objective, problem = search.objective, search.problem
     asked = demands.asked
@@ -31,7 +33,7 @@ def trades(search: Search, demands: Demands, found: Found, value: float) -> tupl
         return objective.value(problem, gains, scenarios)
 
     for name, least in asked.items():
-        had = float(getattr(found.margins, name))
+        had = float(getattr(margins, name))
         active = had <= least * _ACTIVE
         what = f"{name} margin of at least {least:g}{_UNITS[name]}"
         without = value
