@@ -97,6 +97,8 @@ def _settled(design: Design, end: float) -> float:
 
 def _loop_bode(axes: tuple[Axes, Axes], loop: ControlLoop) -> None:
     loop.bode(axes=axes)
+    axes[0].set_xlim(axes[1].get_xlim())
+    axes[0].title.set_fontsize("small")
     axes[0].set_ylabel("loop gain")
     axes[1].set_ylabel("phase of the loop / °")
 
@@ -121,6 +123,7 @@ def _trade(upper: Axes, lower: Axes, choice: FilterChoice) -> None:
         ax.axhline(ideal, label="ideal derivative", **REFERENCE)
         ax.set(ylabel=label)
         ax.legend(frameon=False, fontsize="small")
+    lower.set_yscale("log")
     upper.set_title(f"chosen: {choice.omega:.3g} rad/s", fontsize="medium")
     lower.set_xlabel("corner of the filter / (rad/s)")
 

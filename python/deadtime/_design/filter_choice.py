@@ -248,7 +248,7 @@ def design_filter(
     white = _bandwidth(loop, bandwidth, float(corners[-1]))
     sides = shape or [_SIDE[len(ideal_problem.free)]] * len(ideal_problem.free)
     ideal = made(ideal_problem, goal, demands, sides)
-    task = _Task(posed, goal, demands, white, surveyed(ideal_problem, sides))
+    task = _Task(posed, goal, demands, white, tuple(sides), surveyed(ideal_problem, sides))
     # From the fastest corner down, each from the gains of the one before: they change slowly.
     gains = np.array([ideal.gains[name] for name in ideal_problem.free])
     tried: list[_Tried] = []
@@ -305,15 +305,18 @@ class _Task:
     objective: Objective
     demands: Demands
     bandwidth: float
-
+    shape: tuple[int, ...]
     survey: Survey
 
     def tried(self, corner: float, start: Vector) -> _Tried:
         """Design with one corner from the gains of another; NaN where none meet the demands."""
         problem = self.posed(corner)
-        search = Search(problem, self.objective, self.survey, MarginEstimate(problem))
+        alone = len(start) == 1
         try:
-            found = best_gains(search, self.demands, start)
+            # A map over one gain costs next to nothing.
+            survey = surveyed(problem, self.shape) if alone else self.survey
+            search = Search(problem, self.objective, survey, MarginEstimate(problem))
+            found = best_gains(search, self.demands, None if alone else start)
         except ValueError:
             return _Tried(math.nan, math.nan, start)
         value = self.objective.value(problem, found.gains, [*fine(problem), found.worst])
