@@ -32,6 +32,10 @@ _ROUNDS_SIMULATED = 5
 _ABOVE = 1e-5
 _MISSED = 1e-12
 
+#: A round that gains less, relatively, is the last: where roots meet at some delay, the worst case
+#: has cusps in the delay that no few scenarios hold down for good.
+_STALLED = 1e-3
+
 #: A shortfall of margins by the estimate that no further round makes up for.
 _HOPELESS = 3e-3
 
@@ -71,10 +75,11 @@ def best_gains(search: Search, demands: Demands, start: Vector | None = None) ->
             missing = np.maximum(demands.vector * (1.0 - _MISSED) - least_margins(each), 0.0)
             missing = np.where(demands.vector > 0.0, missing, 0.0)
             added += [places[int(np.argmin(each[:, i]))] for i in np.flatnonzero(missing)]
+        stalled = best is not None and cost > best.cost - _STALLED * abs(best.cost)
         if not missing.any() and (best is None or cost < best.cost):
             best = Found(gains, tuple(scenarios), cost, worst, len(everywhere))
         added = [one for one in added if one not in scenarios]
-        if not added and not missing.any():
+        if not missing.any() and (stalled or not added):
             break
         scenarios += [one for i, one in enumerate(added) if one not in added[:i]]
         aimed = aimed.raised(missing)

@@ -74,34 +74,33 @@ class Objective(ABC):
         return (value - reference) / max(abs(reference), 1e-300)
 
 
-class _ByPoles(Objective):
-    """Cost of one loop after the other."""
-
-    @abstractmethod
-    def cost(self, loop: ControlLoop) -> float:
-        """Cost of one loop."""
-
-    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
-        return np.array(
-            [[self.cost(problem.at(gains, one)) for one in scenarios] for gains in points]
-        )
-
-
-class _Abscissa(_ByPoles):
+class _Abscissa(Objective):
     name: ObjectiveName = "abscissa"
 
-    def cost(self, loop: ControlLoop) -> float:
-        return loop.spectral_abscissa()
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        # A loop need not be made for every number.
+        numbers = problem.loop.parameters
+        return np.array(
+            [
+                [problem.loop._abscissa(numbers | problem.named(gains) | one) for one in scenarios]
+                for gains in points
+            ]
+        )
 
     def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
         return self.worst(problem, gains, scenarios)
 
 
-class _Damping(_ByPoles):
+class _Damping(Objective):
     name: ObjectiveName = "damping"
     tolerance = 1e-4
 
-    def cost(self, loop: ControlLoop) -> float:
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        return np.array(
+            [[self._cost(problem.at(gains, one)) for one in scenarios] for gains in points]
+        )
+
+    def _cost(self, loop: ControlLoop) -> float:
         ratio, abscissa = dominant_damping(loop)
         if not abscissa < 0.0:
             return NEVER + abscissa

@@ -131,7 +131,7 @@ def pose(
         )
     intervals = {"delay": _delay_interval(loop, delay)}
     if gain is not None:
-        intervals["gain"] = _gain_interval(loop, gain)
+        intervals["gain"] = _gain_interval(gain)
     middle = {name: 0.5 * (low + high) for name, (low, high) in intervals.items()}
     whole = loop.replace(controller=template, **middle)
     if held:
@@ -188,9 +188,7 @@ def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
     return low, high
 
 
-def _gain_interval(loop: ControlLoop, gain: float | Range) -> Range:
-    if "gain" not in loop.plant.parameters:
-        raise ValueError(f"gain={gain!r}: {type(loop.plant).__name__} has no number called gain")
+def _gain_interval(gain: float | Range) -> Range:
     low, high = gain if isinstance(gain, (tuple, list, np.ndarray)) else (gain, gain)
     low, high = finite("gain", low), finite("gain", high)
     if not low <= high or low * high <= 0.0:

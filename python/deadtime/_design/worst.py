@@ -67,7 +67,7 @@ def proved(problem: Problem, gains: Vector, demands: Demands) -> tuple[str, ...]
     late, strong = problem.intervals["delay"], problem.intervals.get("gain")
     if _stable_throughout(loop, late, strong):
         found.append("stable")
-    if "gain" in loop.plant.parameters and demands.gain:
+    if demands.gain:
         weak, most = strong or (loop.parameters["gain"],) * 2
         if weak > 0.0 and _stable_throughout(loop, late, (weak, demands.gain * most)):
             found.append("gain margin")
