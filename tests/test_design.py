@@ -257,6 +257,25 @@ def test_the_settling_time_is_that_of_the_simulated_loop():
     assert 0.5 < best.step_info["time_at_limit"] < 1.5
 
 
+def test_the_fastest_settling_along_one_gain():
+    best = dtm.design(SAMPLED, controller=SMOOTH, fixed={"Kp": 2.0}, objective="settling_time")
+    Kv = np.linspace(-0.1, 0.8, 2001)
+    swept = dtm.sweep(SAMPLED.replace(controller=dtm.PV(2.0, 0.1, FILTER)), {"Kv": Kv}, 20.0)
+    assert best.value <= np.nanmin(swept["settling_time"]) * 1.03
+
+
+def test_a_step_that_the_limit_forbids_is_refused():
+    loop = dtm.ControlLoop(dtm.FirstOrder(1.0, 1.0), dtm.P(1.0), delay=0.3, limit=0.5)
+    with pytest.raises(ValueError, match="does not settle"):
+        dtm.design(
+            loop,
+            controller=dtm.PI,
+            objective="settling_time",
+            ranges={"Kp": (0.5, 2.0), "Ki": (0.5, 2.0)},
+            shape=(9, 9),
+        )
+
+
 def test_the_step_matters_where_there_is_a_limit():
     small = dtm.design(SAMPLED, objective="settling_time", amplitude=0.1, controller=SMOOTH)
     large = dtm.design(SAMPLED, objective="settling_time", amplitude=2.0, controller=SMOOTH)

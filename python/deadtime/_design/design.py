@@ -117,6 +117,7 @@ def design(
             phase_margin=phase_margin,
             delay_margin=delay_margin,
             ranges=ranges,
+            shape=shape,
             amplitude=amplitude,
             threads=threads,
         )

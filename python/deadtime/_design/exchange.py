@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from deadtime._design.demands import Demands, exact_margins
+from deadtime._design.objectives import NEVER
 from deadtime._design.problem import Scenario, Vector
 from deadtime._design.result import LeastMargins
 from deadtime._design.search import Search
@@ -86,6 +87,12 @@ def best_gains(search: Search, demands: Demands, start: Vector | None = None) ->
         gains = search.locally(gains, scenarios, aimed)
     if best is None:
         raise _unmet(search, demands, gains)
+    if best.cost >= NEVER:
+        raise ValueError(
+            f"a step of {problem.amplitude:g} does not settle with any gains that were tried: the "
+            "limit may not let the output stay there; give a smaller amplitude, or another "
+            "objective"
+        )
     return replace(best, scenarios=tuple(scenarios))
 
 

@@ -20,9 +20,10 @@ import numpy as np
 
 from deadtime._design.problem import Problem, Scenario, Vector
 from deadtime._loop import ControlLoop
+from deadtime._loop_model import rest_of
 from deadtime._sweep import sweep
 
-__all__ = ["Objective", "ObjectiveName", "dominant_damping", "objective_named"]
+__all__ = ["NEVER", "Objective", "ObjectiveName", "dominant_damping", "objective_named"]
 
 ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
 
@@ -186,7 +187,7 @@ def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
 def _figures(
     problem: Problem, points: Vector, scenarios: Sequence[Scenario], band: float
 ) -> tuple[Vector, Vector]:
-    """Settling time in s and overshoot in %, NaN where a loop does not settle."""
+    """Settling time in s, NaN where a loop does not settle, and overshoot in %."""
     values = {name: points[:, [i]] for i, name in enumerate(problem.free)}
     for name in problem.intervals:
         values[name] = np.array([[one[name] for one in scenarios]])
@@ -197,4 +198,9 @@ def _figures(
         settling=band,
         threads=problem.threads,
     )
-    return found["settling_time"], found["overshoot"]
+    # An output that the limit keeps from its rest is not settled, though it may stand still.
+    loop = problem.loop
+    limit = np.inf if loop.limit is None else loop.limit
+    _, command = rest_of(loop.plant, loop.controller, loop.parameters | values)
+    short = np.abs(command * problem.amplitude) > limit
+    return np.where(short, np.nan, found["settling_time"]), found["overshoot"]

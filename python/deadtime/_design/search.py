@@ -5,7 +5,7 @@ best gains lie on them; simulated ones also jump, where a peak leaves the settli
 is differentiated:
 
 one gain   golden section and parabolas (Brent 1973) between the neighbours of the cell: the cost
-           has one minimum there, kinked or not;
+           has one minimum there, kinked or not, if it does not jump;
 more       grids around the best point, each narrower than the one before (a map or a sweep of
            hundreds of loops costs little more than one), and then, where nothing jumps, the
            simplices of Nelder and Mead (1965), begun again around what they found, smaller and
@@ -55,7 +55,7 @@ _IDLE = 1e-4
 #: Points along each side of a grid, half its width at first in cells of the map, how many grids
 #: (of what is simulated, nothing follows them), how much narrower each is, and how near to its
 #: middle the best point has to be for that.
-_SIDE = {2: 9, 3: 5}
+_SIDE = {1: 21, 2: 9, 3: 5}
 _REACH = 1.5
 _GRIDS = 3
 _GRIDS_SIMULATED = 12
@@ -110,10 +110,11 @@ class Search:
     ) -> tuple[Vector, Vector]:
         """A better point, and how far around it a better one may still be."""
         reach = _REACH * self.survey.spacing
-        if len(start) == 1 or self.objective.name == "damping":
+        jumps = self.objective.simulated
+        if not jumps and (len(start) == 1 or self.objective.name == "damping"):
             return start, reach
         low, high = np.array(self.survey.bounds).T
-        grids = _GRIDS_SIMULATED if self.objective.simulated else _GRIDS
+        grids = _GRIDS_SIMULATED if jumps else _GRIDS
         return _by_grids(
             lambda axes: self._totals(axes, scenarios, demands), start, reach, low, high, grids
         )
@@ -127,10 +128,10 @@ class Search:
         def cost(gains: Vector) -> float:
             return self._total(gains, scenarios, demands)
 
-        if len(start) == 1:
-            return _between_neighbours(cost, start, reach, low, high)
         if self.objective.simulated:
             return start
+        if len(start) == 1:
+            return _between_neighbours(cost, start, reach, low, high)
         return _by_simplices(cost, start, 0.5 * reach, low, high)
 
     def short(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:

@@ -45,7 +45,7 @@ def trades(
         made.append(Trade(f"{name} margin", least, had, active, without, words))
     if sum(trade.active for trade in made) > 1:
         without = best_without(Demands(), found.scenarios)
-        words = f"all margins together: {_price(search, value, without)}"
+        words = f"all margins together: {_price(search, value, without, 'them')}"
         made.append(Trade("all margins", math.nan, math.nan, True, without, words))
     if any(low < high for low, high in problem.intervals.values()):
         without = best_without(demands, (problem.middle,))
@@ -59,9 +59,9 @@ def trades(
     return tuple(made)
 
 
-def _price(search: Search, value: float, without: float) -> str:
+def _price(search: Search, value: float, without: float, what: str = "it") -> str:
     lost = search.objective.lost(value, without)
-    return f"without it {figure_in_words(search.objective.name, without)} ({_part(lost)})"
+    return f"without {what} {figure_in_words(search.objective.name, without)} ({_part(lost)})"
 
 
 def _part(lost: float) -> str:
