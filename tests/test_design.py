@@ -123,6 +123,22 @@ def test_the_best_gains_within_margins_by_brute_force():
     assert best.abscissa <= least + 1e-6
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_design_does_not_depend_on_the_unit_of_time(scale):
+    def designed(unit):
+        loop = dtm.ControlLoop(
+            dtm.Integrator(0.85, 0.1 * unit), dtm.P(1.0), sample_time=0.065 * unit
+        )
+        smooth = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0 / unit))
+        late = (0.2 * unit, 0.3 * unit)
+        return dtm.design(loop, controller=smooth, delay=late, gain_margin=4.0, shape=(31, 31))
+
+    one, other = designed(1.0), designed(scale)
+    assert other.gains["Kp"] * scale == pytest.approx(one.gains["Kp"], rel=1e-3)
+    assert other.abscissa * scale == pytest.approx(one.abscissa, rel=1e-3)
+    assert other.margins.delay / scale == pytest.approx(one.margins.delay, rel=1e-3)
+
+
 def test_margins_that_are_met_anyway_cost_nothing():
     best = dtm.design(LOOP, controller=SMOOTH, gain_margin=2.0, delay_margin=0.1)
     free = dtm.design(LOOP, controller=SMOOTH)

@@ -143,10 +143,9 @@ class Search:
         cost = self.objective.worst(self.problem, gains, scenarios)
         if not demands.asked:
             return cost
-        late = cost
-        if self.objective.name != "abscissa":
-            late = max(self.problem.at(gains, one).spectral_abscissa() for one in scenarios)
-        short = self.short(gains, scenarios, demands) if late < 0.0 else _UNSTABLE
+        # An unstable loop has crossings, which are no margins.
+        stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
+        short = self.short(gains, scenarios, demands) if stable else _UNSTABLE
         return cost + _PENALTY * self._scale * short
 
     def _totals(

@@ -16,7 +16,7 @@ from deadtime._stability import StabilityMap, stability_map
 __all__ = ["Survey", "charts_at", "grid_points", "surveyed", "worst_abscissa"]
 
 #: Points along each free gain, for one, two and three of them.
-_SHAPES = {1: (401,), 2: (61, 61), 3: (31, 31, 13)}
+_SHAPES = {1: (401,), 2: (61, 61), 3: (21, 21, 9)}
 
 #: A chart over one gain has the delay as its second axis: so many values, this far beyond its ends.
 _CHART_DELAYS = 41
