@@ -113,7 +113,41 @@ def hold() -> None:
     figure.savefig(IMAGES / "hold.png", dpi=90)
 
 
+def designing() -> None:
+    """A design for an interval of the delay, what the middle alone would do, and a filter."""
+    vehicle = dtm.ControlLoop(
+        dtm.Integrator(0.85, 0.1), dtm.P(1.0), delay=0.25, sample_time=0.065, limit=1.0
+    )
+    smooth = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0))
+    interval = (0.2, 0.3)
+    best = dtm.design(
+        vehicle, controller=smooth, delay=interval, objective="settling_time", gain_margin=3.0
+    )
+    best.plot().savefig(IMAGES / "designing-plot.png", dpi=80)
+
+    figure, axes = plt.subplots(figsize=(7.0, 4.0), layout="constrained")
+    delays = np.linspace(0.15, 0.35, 81)
+    middle = dtm.design(vehicle, controller=smooth)
+    worst = dtm.design(vehicle, controller=smooth, delay=interval)
+    for found, label in ((middle, "for 0.25 s alone"), (worst, "for 0.2 to 0.3 s")):
+        gains = ", ".join(f"{name} {value:.3g}" for name, value in found.gains.items())
+        abscissas = [found.loop.replace(delay=late).spectral_abscissa() for late in delays]
+        axes.plot(delays, abscissas, linewidth=1.6, label=f"{label}: {gains}")
+    axes.axvspan(*interval, color="0.92", zorder=0)
+    axes.set(xlabel="delay (s)", ylabel="spectral abscissa (1/s)")
+    axes.set_title("The most stable gains, for one delay and for the worst of an interval")
+    axes.legend(frameon=False)
+    figure.savefig(IMAGES / "designing-interval.png", dpi=100)
+
+    paper = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
+    choice = dtm.design_filter(paper, fixed={"Kp": 2.0})
+    choice.plot().savefig(IMAGES / "designing-filter.png", dpi=80)
+    for one in (best, middle, worst, choice):
+        print(one.summary(), end="\n\n")
+
+
 if __name__ == "__main__":
+    designing()
     fixed_steps()
     mackey_glass()
     reproduction()

@@ -157,6 +157,18 @@ def test_a_design(tmp_path):
     robust = found("design", "--delay", 0.3, "--delay-to", 0.4, "--sample-time", 0.065)
     assert robust["abscissa"] < 0
     assert robust["delays"] == [0.3, pytest.approx(0.35), 0.4]
+    picture = tmp_path / "design.png"
+    fixed = found(
+        "design", "--delay", 0.36, "--fix", "Kp=2", "--filter", 38, "--gain-margin", 2.25,
+        "--plot", picture,
+    )  # fmt: skip
+    assert fixed["gains"]["Kp"] == 2.0
+    assert fixed["margins"]["gain"] >= 2.25
+    assert "holds the design back" in fixed["traded"]["gain margin"]
+    assert picture.stat().st_size > 5000
+    chosen = found("design", "--delay", 0.36, "--fix", "Kp=2", "--choose-filter")
+    assert 100 < chosen["filter"] < 200
+    assert "least margins: gain" in run("design", "--delay", 0.36, "--controller", "P").stdout
 
 
 def test_a_simulation_and_its_file(tmp_path):
@@ -223,6 +235,10 @@ BAD_NUMBERS = [
     (["design", "--delay", "-0.1"], "delay"),
     (["design", "--delay", "nan"], "delay"),
     (["design", "--delay", "0.1", "--gain", "0"], "gain"),
+    (["design", "--delay", "0.1", "--fix", "2"], "Kp=2"),
+    (["design", "--delay", "0.1", "--fix", "Ki=2"], "Ki"),
+    (["design", "--delay", "0.1", "--gain-margin", "0.5"], "gain_margin"),
+    (["design", "--delay", "0.1", "--filter", "38", "--choose-filter"], "take one"),
     (["simulate", "--kp", "2", "--delay", "-1"], "delay"),
     (["simulate", "--kp", "0", "--delay", "1"], "Kp"),
     (["simulate", "--kp", "nan", "--delay", "1"], "nan"),

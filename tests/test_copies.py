@@ -34,6 +34,10 @@ def designed():
     return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
 
 
+def filtered():
+    return dtm.design_filter(LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9)
+
+
 RESULTS = {
     "Response": LOOP.step_response,
     "Recording": recorded,
@@ -41,6 +45,7 @@ RESULTS = {
     "StabilityMap": mapped,
     "RootSet": LOOP.rightmost,
     "Design": designed,
+    "FilterChoice": filtered,
     "Margins": LOOP.continuous().margin,
 }
 WAYS = {

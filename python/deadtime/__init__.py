@@ -12,7 +12,7 @@ from deadtime._controllers import PD, PI, PID, PV, Controller, P
 from deadtime._crossings import Crossings, crossings, delay_margin
 from deadtime._delay_solution import DelayResult, DelaySolution
 from deadtime._derivative_filter import DerivativeFilter
-from deadtime._design import Design, design
+from deadtime._design import Design, FilterChoice, LeastMargins, Trade, design, design_filter
 from deadtime._errors import (
     CertificateError,
     ContourError,
@@ -90,9 +90,11 @@ __all__ = [
     "Design",
     "Expansion",
     "Experiment",
+    "FilterChoice",
     "FirstOrder",
     "Identifiability",
     "Integrator",
+    "LeastMargins",
     "MapStatus",
     "Margins",
     "MonteCarlo",
@@ -118,6 +120,7 @@ __all__ = [
     "Sweep",
     "SweepStatus",
     "SystemResponse",
+    "Trade",
     "TransferFunction",
     "Whiteness",
     "crossings",
@@ -126,6 +129,7 @@ __all__ = [
     "delay",
     "delay_margin",
     "design",
+    "design_filter",
     "estimate_delay",
     "feedback",
     "gallery",

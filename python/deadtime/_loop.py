@@ -24,13 +24,18 @@ from deadtime._loop_stability import (
     open_loop,
     sampled_abscissa,
     sampled_roots,
+    stable_end,
     stable_range,
 )
 from deadtime._plants import Plant
 from deadtime._response import Response
+from deadtime._sampled_gain import SampledLoopGain
+from deadtime._sampled_margins import delay_loss, sampled_margins
 from deadtime._validation import finite, non_negative, positive
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from deadtime import Margins, QuasiPolynomial, RootSet, TransferFunction
     from deadtime._deadtime import LinearLoop
 
@@ -376,16 +381,19 @@ class ControlLoop:
         return closed_loop(self.plant, self.controller, self.parameters, late)
 
     def margin(self) -> Margins:
-        """Return the gain, phase and delay margin of the continuous loop, its limit left out.
+        """Return the gain, phase and delay margin of the loop, its limit left out.
 
         Returns
         -------
         Margins
+            Of a sampled loop: hold and delay taken exactly. Its `delay_margins` are empty, because
+            further delay changes the hold's share and with it every crossing; `delay_margin` is
+            what `stable_range` finds or, beyond 200 samples, where a crossing comes to -1.
 
         Raises
         ------
         ValueError
-            If the loop is sampled, its delay is None, or its gain grows with frequency.
+            If the delay is None, or the gain grows with frequency.
 
         Examples
         --------
@@ -395,13 +403,104 @@ class ControlLoop:
         <Margins: gain 2.182 at 4.363 rad/s, phase 48.75° at 2 rad/s, delay 0.4254 s at 2 rad/s>
         >>> round(loop.stable_range("delay")[1] - loop.delay, 4)
         0.4254
+
+        The hold costs a part of each:
+
+        >>> loop.replace(sample_time=0.065).margin()
+        <Margins: gain 2.012 at 4.002 rad/s, phase 45.09° at 1.997 rad/s, delay 0.3939 s at ...>
         """
-        self._refuse_hold(
-            "has a hold in it, which these margins would leave out and so be too large: use "
-            'stable_range("delay"), or stable_range of a gain, which take it into account, or '
-            "continuous().margin() to leave it out on purpose"
-        )
+        if self.is_sampled:
+            return sampled_margins(self._sampled_gain, self.is_stable(), self._further_delay)
         return self.open_loop().margin()
+
+    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """Return the loop gain, cut at the command, at frequencies; its limit left out.
+
+        Parameters
+        ----------
+        omega : array_like
+            Frequencies in rad/s; of a sampled loop from 0 to pi/sample_time.
+
+        Returns
+        -------
+        ndarray of complex, shape of `omega`
+            Of a continuous loop ``open_loop().frequency_response(omega)``. Of a sampled one
+            L(z) at z = exp(j omega sample_time), hold and delay taken exactly: minus the command
+            that comes back for one that goes out.
+
+        Raises
+        ------
+        ValueError
+            If the delay is None, or a frequency is out of range.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
+        >>> print(loop.frequency_response([1.0, 2.0]).round(4), loop.phase(2.0).round(4))
+        [-0.7647-1.8473j -0.7058-0.7064j] -2.3558
+        """
+        if self.is_sampled:
+            return self._sampled_gain.frequency_response(omega)
+        return self.open_loop().frequency_response(omega)
+
+    def phase(self, omega: ArrayLike) -> NDArray[np.float64]:
+        """Return the argument of `frequency_response` in rad, continuous from zero frequency on.
+
+        Parameters
+        ----------
+        omega : array_like
+            Frequencies in rad/s.
+
+        Returns
+        -------
+        ndarray of float, shape of `omega`
+
+        Raises
+        ------
+        ValueError
+            As in `frequency_response`.
+        """
+        if self.is_sampled:
+            return self._sampled_gain.phase(omega)
+        return self.open_loop().phase(omega)
+
+    def bode(
+        self, omega: ArrayLike | None = None, *, axes: Sequence[Axes] | None = None
+    ) -> Sequence[Axes]:
+        """Draw gain and phase of the loop gain over frequency, and mark the margins.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Frequencies in rad/s, above zero and increasing; by default from two decades below
+            the gain crossover to where the delay has turned the phase a few times, of a sampled
+            loop to pi/sample_time.
+        axes : sequence of two matplotlib.axes.Axes, optional
+            Where to draw gain and phase; a new figure by default.
+
+        Returns
+        -------
+        sequence of two matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            As in `frequency_response` and `margin`.
+        """
+        from deadtime._plots import plot_bode, shown_rows
+
+        found = self.margin()
+        if omega is None:
+            marks = [*found.gain_crossovers, 1.0 / max(self._known_delay(), 1e-9)]
+            low, high = 0.01 * min(marks), 20.0 * max(marks)
+            if self.sample_time is not None:
+                high = np.pi / self.sample_time
+                low = min(low, 0.01 * high)
+            omega = np.geomspace(low, high, 1001)
+        drawn = shown_rows(axes, 2)
+        plot_bode(drawn, self, np.asarray(omega, dtype=np.float64), found)
+        return drawn
 
     def transition_matrix(self) -> NDArray[np.float64]:
         """Return the matrix that takes a sampled loop, limit left out, from sample to sample.
@@ -570,6 +669,32 @@ class ControlLoop:
     @cached_property
     def _model(self) -> LoopModel:
         return LoopModel.build(self.plant, self.controller, self.parameters)
+
+    @cached_property
+    def _sampled_gain(self) -> SampledLoopGain:
+        period = cast(float, self.sample_time)
+        return SampledLoopGain.of(self._model, self._known_delay(), period)
+
+    def _further_delay(self) -> tuple[float, float]:
+        """How much more delay a stable sampled loop stands, and the frequency it then swings at."""
+        delay, period = self._known_delay(), cast(float, self.sample_time)
+        found = delay_loss(
+            lambda late: SampledLoopGain.of(self._model, late, period), delay, self._sampled_gain
+        )
+        if _MOST_SAMPLES * period < delay + found[0] < math.inf:
+            return found  # beyond the walk along the transition matrices
+        largest = stable_end(
+            lambda late: sampled_abscissa(self._model, late, period),
+            "delay",
+            delay,
+            1.0,
+            0.0,
+            min(_MOST_SAMPLES * period, delay + found[0]),
+        )
+        if largest - delay >= found[0]:
+            return found
+        pole = self.replace(delay=largest)._native.poles()[0]
+        return largest - delay, abs(float(pole.imag))
 
     @cached_property
     def _native(self) -> LinearLoop:

@@ -29,6 +29,7 @@ __all__ = [
     "sampled_abscissa",
     "sampled_grid",
     "sampled_roots",
+    "stable_end",
     "stable_range",
 ]
 
@@ -126,27 +127,36 @@ def stable_range(
             f"the loop is not stable at {name}={value}: start from a stable one, for example with "
             "lower gains"
         )
+    down = stable_end(abscissa, name, value, -1.0, nearest, farthest)
+    return down, stable_end(abscissa, name, value, 1.0, nearest, farthest)
+
+
+def stable_end(
+    abscissa: Callable[[float], float],
+    name: str,
+    value: float,
+    direction: float,
+    nearest: float,
+    farthest: float,
+) -> float:
+    """Walk from a stable `value` one way, as `stable_range` does."""
     size = abs(value) if value != 0.0 else 1.0
     stops_at_zero = name in _NON_NEGATIVE or (name in _KEEPS_SIGN and value > 0.0)
-
-    def edge(direction: float) -> float:
-        inside, step = value, _FIRST_STEP * size
-        while abs(inside - value) < _FARTHEST * size:
-            outside = inside + direction * step
-            if stops_at_zero and direction < 0.0:
-                outside = max(outside, 0.5 * inside)
-                if outside < max(nearest, _NEARLY_ZERO * size):
-                    if name not in _MAY_BE_ZERO or abscissa(0.0) < 0.0:
-                        return 0.0
-                    return _refine(abscissa, inside, 0.0)
-            if outside > farthest:
-                break
-            if not abscissa(outside) < 0.0:
-                return _refine(abscissa, inside, outside)
-            inside, step = outside, step * _GROWTH
-        return direction * np.inf
-
-    return edge(-1.0), edge(1.0)
+    inside, step = value, _FIRST_STEP * size
+    while abs(inside - value) < _FARTHEST * size:
+        outside = inside + direction * step
+        if stops_at_zero and direction < 0.0:
+            outside = max(outside, 0.5 * inside)
+            if outside < max(nearest, _NEARLY_ZERO * size):
+                if name not in _MAY_BE_ZERO or abscissa(0.0) < 0.0:
+                    return 0.0
+                return _refine(abscissa, inside, 0.0)
+        if outside > farthest:
+            break
+        if not abscissa(outside) < 0.0:
+            return _refine(abscissa, inside, outside)
+        inside, step = outside, step * _GROWTH
+    return direction * np.inf
 
 
 def _refine(abscissa: Callable[[float], float], inside: float, outside: float) -> float:

@@ -41,7 +41,7 @@ from deadtime._frequency import (
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Margins", "gain_crossovers", "margins"]
+__all__ = ["Margins", "first_loss", "gain_crossovers", "margins"]
 
 Vector = NDArray[np.float64]
 
@@ -157,18 +157,18 @@ def margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins:
     places, gains, all_phase = _phase_crossovers(n, d, math.inf if stable else last)
     factors = 1.0 / gains
 
-    up, up_at = _first(factors, places, factors > 1.0, 1.0, math.inf)
-    down, down_at = _first(factors, places, factors < 1.0, -1.0, 0.0)
+    up, up_at = first_loss(factors, places, factors > 1.0, 1.0, math.inf)
+    down, down_at = first_loss(factors, places, factors < 1.0, -1.0, 0.0)
     most, least = _strong_range(a, b)
     if most <= up and most < math.inf:
         up, up_at = most, math.inf
     if least >= down and least > 0.0:
         down, down_at = least, math.inf
     any_delay = bool(b) and _lead(a) <= _rest(a) + sum(abs(v) for v in b.values())
-    late, late_at = _first(delays, crossovers, delays >= 0.0, 1.0, math.inf)
+    late, late_at = first_loss(delays, crossovers, delays >= 0.0, 1.0, math.inf)
     if any_delay:
         late, late_at = 0.0, math.inf
-    turned, turned_at = _first(np.abs(degrees), crossovers, delays >= 0.0, 1.0, math.inf)
+    turned, turned_at = first_loss(np.abs(degrees), crossovers, delays >= 0.0, 1.0, math.inf)
     if not stable:
         up = down = turned = late = math.nan
         up_at = down_at = turned_at = late_at = math.nan
@@ -397,7 +397,7 @@ def _strong_range(a: dict[float, float], b: dict[float, float]) -> tuple[float, 
     return first([1.0, *above, last], math.inf), first([1.0, *below, 0.0], 0.0)
 
 
-def _first(
+def first_loss(
     values: Vector, places: Vector, allowed: NDArray[np.bool_], sign: float, none: float
 ) -> tuple[float, float]:
     """The smallest (or with sign -1 the largest) allowed value and its place."""

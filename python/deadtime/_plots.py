@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from deadtime._chains import Chain
     from deadtime._estimation import DelayEstimate
     from deadtime._estimation.result import Flight
+    from deadtime._loop import ControlLoop
     from deadtime._margins import Margins
     from deadtime._recording import Recording
     from deadtime._response import Response
@@ -235,7 +236,10 @@ def plot_certificate(ax: Axes, proof: Certificate) -> None:
 
 
 def plot_bode(
-    axes: Sequence[Axes], G: TransferFunction, omega: NDArray[np.float64], found: Margins | None
+    axes: Sequence[Axes],
+    G: TransferFunction | ControlLoop,
+    omega: NDArray[np.float64],
+    found: Margins | None,
 ) -> None:
     """Gain and phase over frequency; with the margins, where they are read off."""
     upper, lower = axes
@@ -267,7 +271,9 @@ def _multiples(step: float) -> Any:
     return MultipleLocator(step)
 
 
-def _mark_bode_margins(upper: Axes, lower: Axes, G: TransferFunction, found: Margins) -> None:
+def _mark_bode_margins(
+    upper: Axes, lower: Axes, G: TransferFunction | ControlLoop, found: Margins
+) -> None:
     """Gain margin between 1 and the gain, phase margin between the phase and 180 degrees."""
     at = found.gain_margin_omega
     if np.isfinite(at) and at > 0.0:

@@ -15,6 +15,7 @@ from rich import box
 from rich.table import Table
 
 from deadtime._cli import options as opt
+from deadtime._cli.designs import design_gains
 from deadtime._cli.maps import map_gains
 from deadtime._cli.reproduce import reproduce_paper
 from deadtime._cli.show import (
@@ -25,7 +26,6 @@ from deadtime._cli.show import (
     save_figure,
     stages,
 )
-from deadtime._design import design as find_design
 from deadtime._errors import DeadtimeError
 from deadtime._estimation import estimate_delay
 from deadtime._estimation.compare import compare_methods
@@ -57,7 +57,6 @@ app = typer.Typer(
 
 Method = Literal["all", "output_error", "overshoot", "waveform"]
 Map = Literal["dominant", "exact", "saturated"]
-Objective = Literal["abscissa", "settling_time"]
 Ends = tuple[float, float]
 
 #: What ends a command with one line; anything else is a defect and shows where it is.
@@ -244,64 +243,8 @@ def _roots_table(found: RootSet) -> Table:
 
 
 app.command("map")(map_gains)
+app.command("design")(design_gains)
 app.command("reproduce")(reproduce_paper)
-
-
-@app.command()
-def design(
-    delay: opt.Delay,
-    delay_to: Annotated[
-        float | None, typer.Option(help="Upper end of the delay, if it is an interval, s.")
-    ] = None,
-    kp: Annotated[Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
-    kv: Annotated[Ends | None, typer.Option(help="Range of the velocity gain.")] = None,
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    sample_time: opt.Sample_time = None,
-    limit: opt.Limit = None,
-    filter: opt.Filter = None,  # noqa: A002
-    objective: Annotated[Objective, typer.Option(help="What to make small.")] = "abscissa",
-    plot: opt.Plot = None,
-    as_json: opt.As_json = False,
-) -> None:
-    """Find PV gains: the most stable on the map, or the fastest to settle."""
-    loop = opt.pv_loop(delay, gain, lag, sample_time, limit, filter)
-    if (kp is None) != (kv is None):
-        raise ValueError("give both --kp and --kv, or neither")
-    opt.check_duration(loop if delay_to is None else loop.replace(delay=delay_to))
-    with stages(1, quiet=as_json) as begin:
-        begin("mapping and searching")
-        found = find_design(
-            loop,
-            controller=loop.controller,
-            delay=delay if delay_to is None else (delay, delay_to),
-            objective=objective,
-            ranges=None if kp is None or kv is None else {"Kp": kp, "Kv": kv},
-        )
-    response = found.loop.step_response()
-    if plot is not None:
-        figure, axes = new_figure(7.0, 4.5)
-        found.charts[len(found.charts) // 2].plot(axes, found.gains)
-        save_figure(figure, plot)
-    if as_json:
-        print_json(
-            {
-                "gains": found.gains,
-                "abscissa": found.abscissa,
-                "delays": found.delays,
-                "objective": found.objective,
-                "value": found.value,
-                "step": response.info(),
-            }
-        )
-        return
-    gains = ", ".join(f"{name} = {value:.4g}" for name, value in found.gains.items())
-    info = response.info()
-    console.print(
-        f"{gains}: spectral abscissa {found.abscissa:.4g} 1/s, settles in "
-        f"{info['settling_time']:.3g} s, overshoot {info['overshoot']:.2g} %",
-        highlight=False,
-    )
 
 
 @app.command()

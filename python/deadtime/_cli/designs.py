@@ -1,0 +1,121 @@
+"""``deadtime design``: gains for a loop, with margins, for a delay known to an interval."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from deadtime._cli import options as opt
+from deadtime._cli.show import console, print_json, save_figure, stages
+from deadtime._controllers import PD, PI, PID, PV, Controller, P
+from deadtime._derivative_filter import DerivativeFilter
+from deadtime._design import Design
+from deadtime._design import design as find_design
+from deadtime._validation import finite
+
+__all__ = ["design_gains"]
+
+Ends = tuple[float, float]
+Objective = Literal["abscissa", "damping", "settling_time", "overshoot"]
+Kind = Literal["P", "PV", "PD", "PI", "PID"]
+
+CONTROLLERS: dict[str, type[Controller]] = {"P": P, "PV": PV, "PD": PD, "PI": PI, "PID": PID}
+
+
+def design_gains(
+    delay: opt.Delay,
+    delay_to: Annotated[
+        float | None, typer.Option(help="Upper end of the delay, if it is an interval, s.")
+    ] = None,
+    controller: Annotated[Kind, typer.Option(help="Kind of controller.")] = "PV",
+    kp: Annotated[Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
+    kv: Annotated[Ends | None, typer.Option(help="Range of the velocity gain.")] = None,
+    ki: Annotated[Ends | None, typer.Option(help="Range of the integral gain.")] = None,
+    kd: Annotated[Ends | None, typer.Option(help="Range of the derivative gain.")] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option(help="A gain that is given, such as Kp=2; repeatable.")
+    ] = None,
+    gain: opt.Gain = 1.0,
+    gain_to: Annotated[
+        float | None, typer.Option(help="Upper end of the plant's gain, if it is an interval.")
+    ] = None,
+    lag: opt.Lag = 0.0,
+    sample_time: opt.Sample_time = None,
+    limit: opt.Limit = None,
+    filter: opt.Filter = None,  # noqa: A002
+    choose_filter: Annotated[
+        bool, typer.Option("--choose-filter", help="Choose the corner of the filter, too.")
+    ] = False,
+    objective: Annotated[Objective, typer.Option(help="What to make best.")] = "abscissa",
+    gain_margin: Annotated[float | None, typer.Option(help="Least gain margin, a factor.")] = None,
+    phase_margin: Annotated[float | None, typer.Option(help="Least phase margin, °.")] = None,
+    delay_margin: Annotated[float | None, typer.Option(help="Least delay margin, s.")] = None,
+    amplitude: Annotated[float, typer.Option(help="Size of the step.")] = 1.0,
+    plot: opt.Plot = None,
+    as_json: opt.As_json = False,
+) -> None:
+    """Find the gains that are best in the worst case, within margins."""
+    if choose_filter and filter is not None:
+        raise ValueError("--filter gives the corner and --choose-filter asks for it: take one")
+    loop = opt.pv_loop(delay, gain, lag, sample_time, limit, filter)
+    opt.check_duration(loop if delay_to is None else loop.replace(delay=delay_to))
+    given = {"Kp": kp, "Kv": kv, "Ki": ki, "Kd": kd}
+    ranges = {name: ends for name, ends in given.items() if ends is not None}
+    smooth: DerivativeFilter | Literal["auto"] | None = None
+    if choose_filter or filter is not None:
+        smooth = "auto" if filter is None else DerivativeFilter(filter)
+    with stages(1, quiet=as_json) as begin:
+        begin("mapping and searching")
+        found = find_design(
+            loop,
+            controller=CONTROLLERS[controller],
+            delay=delay if delay_to is None else (delay, delay_to),
+            gain=None if gain_to is None else (gain, gain_to),
+            objective=objective,
+            fixed=dict(map(_gain, fix)) if fix else None,
+            gain_margin=gain_margin,
+            phase_margin=phase_margin,
+            delay_margin=delay_margin,
+            filter=smooth,
+            ranges=ranges or None,
+            amplitude=amplitude,
+        )
+    if plot is not None:
+        choice = found.filter_choice
+        save_figure(found.plot() if choice is None else choice.plot(), plot)
+    if as_json:
+        print_json(_told(found))
+        return
+    console.print(found.summary(), highlight=False, markup=False, soft_wrap=True)
+
+
+def _gain(text: str) -> tuple[str, float]:
+    """A name and a number from ``Kp=2``."""
+    name, equals, number = text.partition("=")
+    try:
+        value = float(number)
+    except ValueError:
+        equals = ""
+    if not equals:
+        raise ValueError(f"--fix {text}: give a gain and its value, such as --fix Kp=2")
+    return name.strip(), finite(name.strip(), value)
+
+
+def _told(found: Design) -> dict[str, object]:
+    choice = found.filter_choice
+    return {
+        "gains": found.gains,
+        "abscissa": found.abscissa,
+        "damping": found.damping,
+        "delays": found.delays,
+        "objective": found.objective,
+        "value": found.value,
+        "margins": found.margins._asdict(),
+        "worst": found.worst,
+        "checked": found.checked,
+        "proved": found.proved,
+        "step": found.step_info,
+        "traded": {trade.demand: trade.words for trade in found.traded},
+        "filter": None if choice is None else choice.omega,
+    }

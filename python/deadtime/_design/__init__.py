@@ -1,0 +1,21 @@
+"""Gains for a loop with a delay: one job a file.
+
+`problem` says what is free and what is not known, `objectives` what is made best, `demands` what
+must hold, `survey` maps the gains, `search` finds the best of them, `worst` looks for the delay at
+which they are worst, and `design` goes round until it finds none that is worse.
+"""
+
+from deadtime._design.design import design
+from deadtime._design.filter_choice import FilterChoice, design_filter
+from deadtime._design.problem import critical_gain
+from deadtime._design.result import Design, LeastMargins, Trade
+
+__all__ = [
+    "Design",
+    "FilterChoice",
+    "LeastMargins",
+    "Trade",
+    "critical_gain",
+    "design",
+    "design_filter",
+]

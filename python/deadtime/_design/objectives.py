@@ -1,0 +1,206 @@
+"""What a design makes best, as a cost: the smaller the better, the worst scenario counts.
+
+abscissa       Re of the rightmost pole.
+damping        the smallest damping ratio -Re s/abs(s) of the dominant poles, those that decay at
+               most three times as fast as the slowest (a delay always leaves fast poles with little
+               damping, which nobody sees). It is 1 over whole ranges of gains, so the abscissa
+               decides where it is equal.
+settling_time  of the step of the reference, with hold and limit, simulated exactly.
+overshoot      of the same step; up to a tenth of a percent counts as none, and the settling time
+               decides where it is equal.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from deadtime._design.problem import Problem, Scenario, Vector
+from deadtime._loop import ControlLoop
+from deadtime._loop_model import rest_of
+from deadtime._sweep import sweep
+
+__all__ = ["NEVER", "Objective", "ObjectiveName", "dominant_damping", "objective_named"]
+
+ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
+
+#: What a loop costs that is unstable or does not settle, so that the search turns away from it.
+NEVER = 1e6
+
+#: The band the search for the settling time keeps to. It is narrower than the 2 % that are
+#: reported, because the best settling time is had by a peak that just touches the band, which the
+#: next rounding would break.
+SEARCH_BAND = 0.018
+BAND = 0.02
+
+#: Poles that decay at most so many times as fast as the slowest are dominant; of a continuous loop
+#: so many are looked at.
+DOMINANT = 3.0
+_POLES = 8
+
+#: Weight of the abscissa, in units of the loop's delay and lag, where the damping decides.
+_TIE = 1e-3
+
+#: Overshoot that counts as none, %, and what more of it costs in settling times of a second.
+NO_OVERSHOOT = 0.1
+_OVERSHOOT_WEIGHT = 10.0
+
+
+class Objective(ABC):
+    """A cost of a loop, and the figure it stands for."""
+
+    name: ObjectiveName
+    #: Whether loops are simulated: many at once then cost little more than one.
+    simulated = False
+    #: How far costs may differ and be the same, relatively.
+    tolerance = 1e-6
+
+    @abstractmethod
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        """Cost of every row of gains in every scenario."""
+
+    @abstractmethod
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        """The figure itself, at its worst over the scenarios."""
+
+    def worst(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        """Cost of one set of gains in its worst scenario."""
+        return float(self.costs(problem, gains[None, :], scenarios).max())
+
+    def lost(self, value: float, reference: float) -> float:
+        """How much worse a figure is than a reference, as a part of that."""
+        return (value - reference) / max(abs(reference), 1e-300)
+
+
+class _Abscissa(Objective):
+    name: ObjectiveName = "abscissa"
+
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        # A loop need not be made for every number.
+        numbers = problem.loop.parameters
+        return np.array(
+            [
+                [problem.loop._abscissa(numbers | problem.named(gains) | one) for one in scenarios]
+                for gains in points
+            ]
+        )
+
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        return self.worst(problem, gains, scenarios)
+
+
+class _Damping(Objective):
+    name: ObjectiveName = "damping"
+    tolerance = 1e-4
+
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        return np.array(
+            [[self._cost(problem.at(gains, one)) for one in scenarios] for gains in points]
+        )
+
+    def _cost(self, loop: ControlLoop) -> float:
+        ratio, abscissa = dominant_damping(loop)
+        if not abscissa < 0.0:
+            return NEVER + abscissa
+        time = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0) + (loop.sample_time or 0.0)
+        return -ratio + _TIE * abscissa * (time or 1.0)
+
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        return min(dominant_damping(problem.at(gains, one))[0] for one in scenarios)
+
+    def lost(self, value: float, reference: float) -> float:
+        return super().lost(-value, -reference)
+
+
+class _ByStep(Objective):
+    simulated = True
+    tolerance = 1e-3
+
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        settling, overshoot = _figures(problem, points, scenarios, SEARCH_BAND)
+        lost = ~np.isfinite(settling)
+        return np.where(lost, NEVER, self._cost(np.where(lost, 0.0, settling), overshoot))
+
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        settling, overshoot = _figures(problem, gains[None, :], scenarios, BAND)
+        return self._figure(settling, overshoot)
+
+    @abstractmethod
+    def _cost(self, settling: Vector, overshoot: Vector) -> Vector: ...
+
+    @abstractmethod
+    def _figure(self, settling: Vector, overshoot: Vector) -> float: ...
+
+
+class _SettlingTime(_ByStep):
+    name: ObjectiveName = "settling_time"
+
+    def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
+        return settling
+
+    def _figure(self, settling: Vector, overshoot: Vector) -> float:
+        return float(settling.max())
+
+
+class _Overshoot(_ByStep):
+    name: ObjectiveName = "overshoot"
+
+    def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
+        return settling + _OVERSHOOT_WEIGHT * np.maximum(overshoot - NO_OVERSHOOT, 0.0)
+
+    def _figure(self, settling: Vector, overshoot: Vector) -> float:
+        return float(overshoot.max())
+
+
+_OBJECTIVES = {one.name: one for one in (_Abscissa(), _Damping(), _SettlingTime(), _Overshoot())}
+
+
+def objective_named(name: str) -> Objective:
+    """The objective of that name."""
+    if name not in _OBJECTIVES:
+        raise ValueError(
+            f"objective={name!r}: give one of {', '.join(map(repr, get_args(ObjectiveName)))}"
+        )
+    return _OBJECTIVES[name]
+
+
+def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
+    """Smallest damping ratio of the dominant poles, and the spectral abscissa in 1/s.
+
+    The chains of a neutral loop oscillate without end: where they are dominant the ratio is zero.
+    """
+    poles = np.asarray(loop._native.poles() if loop.is_sampled else loop.rightmost(_POLES).roots)
+    chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
+    abscissa = max(float(poles.real.max(initial=-np.inf)), chain)
+    if not abscissa < 0.0:
+        return float("nan"), abscissa
+    horizon = DOMINANT * abscissa
+    if chain >= horizon:
+        return 0.0, abscissa
+    near = poles[poles.real >= horizon]
+    return float((-near.real / np.abs(near)).min()), abscissa
+
+
+def _figures(
+    problem: Problem, points: Vector, scenarios: Sequence[Scenario], band: float
+) -> tuple[Vector, Vector]:
+    """Settling time in s, NaN where a loop does not settle, and overshoot in %."""
+    values = {name: points[:, [i]] for i, name in enumerate(problem.free)}
+    for name in problem.intervals:
+        values[name] = np.array([[one[name] for one in scenarios]])
+    found = sweep(
+        problem.loop,
+        values,
+        amplitude=problem.amplitude,
+        settling=band,
+        threads=problem.threads,
+    )
+    # An output that the limit keeps from its rest is not settled, though it may stand still.
+    loop = problem.loop
+    limit = np.inf if loop.limit is None else loop.limit
+    _, command = rest_of(loop.plant, loop.controller, loop.parameters | values)
+    short = np.abs(command * problem.amplitude) > limit
+    return np.where(short, np.nan, found["settling_time"]), found["overshoot"]

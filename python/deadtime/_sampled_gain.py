@@ -1,0 +1,158 @@
+"""Loop gain of a sampled loop, cut at the command, on the unit circle.
+
+Between samples the plant moves by matrix exponentials, and the command u_k arrives m samples and
+a fraction of one later. With the state x_k of plant, controller and the commands that are under
+way within the fraction,
+
+    x_{k+1} = T x_k + b v_k,   u_k = c x_k,   L(z) = -z^(-m) c (z I - T)^(-1) b:
+
+closed by v = u the poles are the zeros of 1 + L. T, b and c are read off the transition matrices
+of the loop with its feedback cut and closed (Åström and Wittenmark, Computer-Controlled Systems,
+3rd ed. 1997, section 2.3, for the fractional delay). L is exact up to rounding at any frequency up
+to pi/Ts; nothing of the hold is approximated. As Ts goes to 0, L(e^(j omega Ts)) goes to the loop
+gain of the continuous loop.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eigvals
+
+from deadtime._loop_model import LoopModel
+from deadtime._validation import real_array
+
+__all__ = ["SampledLoopGain"]
+
+Vector = NDArray[np.float64]
+
+#: A pole so close to z = 1 stands on it: a double one is computed with the root of the rounding.
+_ON_ONE = 1e-6
+
+#: Points from the lowest angle to a half turn, for each turn of the delay, and around each pole
+#: and zero of L on a scale that begins at a quarter of its distance from the circle.
+_POINTS = 400
+_PER_TURN = 16
+_AROUND = 40
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLoopGain:
+    """L(z) of a loop with `sample_time` in s; its matrices, and whole samples of delay."""
+
+    T: Vector
+    b: Vector
+    c: Vector
+    whole: int
+    sample_time: float
+
+    @classmethod
+    def of(cls, model: LoopModel, delay: float, sample_time: float) -> SampledLoopGain:
+        """Cut the loop of `model` at its command."""
+        whole = math.floor(delay / sample_time)
+        part = max(delay - whole * sample_time, 0.0)
+        n = len(model.B)
+        none = np.zeros_like(model.K)
+
+        def matrix(row: Vector, direct: float) -> Vector:
+            cut = replace(model, K=row, L=direct)
+            return cut.native(part, sample_time).transition_matrix()
+
+        # What drives the plant at the sample is the last state; fed back alone, it shows b.
+        T = matrix(none, 0.0)
+        b = matrix(none, 1.0)[:, -1] - T[:, -1]
+        c = matrix(model.K, float(model.L))[n]
+        return cls(T, b, c, whole, sample_time)
+
+    def at(self, angle: Vector) -> NDArray[np.complex128]:
+        """L(e^(j angle)); infinite at a pole."""
+        z = np.exp(1j * angle)
+        size = len(self.b)
+        matrices = z[:, None, None] * np.eye(size) - self.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            try:
+                states = np.linalg.solve(
+                    matrices, np.broadcast_to(self.b[:, None], (len(z), size, 1))
+                )
+            except np.linalg.LinAlgError:
+                return np.concatenate([self._one(m, w) for m, w in zip(matrices, z, strict=True)])
+            return np.asarray(-(states[..., 0] @ self.c) * z ** (-self.whole))
+
+    def _one(self, matrix: NDArray[np.complex128], z: complex) -> NDArray[np.complex128]:
+        try:
+            return np.array([-(self.c @ np.linalg.solve(matrix, self.b)) * z ** (-self.whole)])
+        except np.linalg.LinAlgError:
+            return np.array([complex(math.inf)])
+
+    @cached_property
+    def poles(self) -> NDArray[np.complex128]:
+        """Poles of L but those at zero of the whole samples."""
+        return np.asarray(eigvals(self.T), dtype=np.complex128)
+
+    @cached_property
+    def zeros(self) -> NDArray[np.complex128]:
+        """Zeros of L that are finite."""
+        size = len(self.b)
+        upper = np.column_stack([self.T, self.b])
+        pencil = np.vstack([upper, np.append(self.c, 0.0)])
+        rest = np.diag(np.append(np.ones(size), 0.0))
+        found = cast(Any, eigvals)(pencil, rest, homogeneous_eigvals=True)
+        finite = np.abs(found[1]) > 1e-9 * np.abs(found[0])
+        return np.asarray(found[0][finite] / found[1][finite], dtype=np.complex128)
+
+    @property
+    def integrators(self) -> int:
+        """Poles at z = 1."""
+        return int(np.count_nonzero(np.abs(self.poles - 1.0) < _ON_ONE))
+
+    @cached_property
+    def angles(self) -> Vector:
+        """Angles in (0, pi] so close that no pole, zero or turn of the delay lies between two."""
+        places = np.concatenate([self.poles, self.zeros])
+        away = np.abs(places - 1.0)
+        low = 1e-3 * min(1.0 / (self.whole + 1.0), away[away > _ON_ONE].min(initial=1.0))
+        while self.integrators and abs(self.at(np.array([low]))[0]) < 1.0 and low > 1e-12:
+            low *= 0.01  # below an integrator's crossover
+        pieces = [
+            np.geomspace(low, np.pi, _POINTS),
+            np.linspace(low, np.pi, 50 + _PER_TURN * (self.whole + 1)),
+        ]
+        for place in places[places.imag > 0.0]:
+            near = max(abs(1.0 - abs(place)), 1e-12)
+            reach = np.geomspace(0.25 * near, np.pi, _AROUND)
+            pieces += [np.angle(place) - reach, np.angle(place) + reach]
+        found = np.unique(np.concatenate(pieces))
+        return np.asarray(found[(found >= low) & (found <= np.pi)])
+
+    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """L at frequencies in rad/s from 0 to pi/sample_time."""
+        angle = self._angle(omega)
+        return self.at(angle.ravel()).reshape(angle.shape)
+
+    def phase(self, omega: ArrayLike) -> Vector:
+        """Argument of L in rad, continuous from a quarter turn down for each integrator on."""
+        angle = self._angle(omega)
+        every = np.unique(np.append(self.angles, angle[angle > 0.0].ravel()))
+        turned = np.unwrap(np.angle(self.at(every)))
+        start = turned[0]
+        if self.integrators:
+            wanted = -0.5 * np.pi * self.integrators
+            start = wanted + math.remainder(turned[0] - wanted, 2.0 * np.pi)
+        return np.asarray(np.interp(angle, every, turned - turned[0] + start))
+
+    def _angle(self, omega: ArrayLike) -> Vector:
+        given = real_array("omega", omega) * self.sample_time
+        # The half turn itself is asked for in numbers that were divided and multiplied.
+        if given.size and not (given.min() >= 0.0 and given.max() <= np.pi * (1.0 + 1e-12)):
+            raise ValueError(
+                f"omega from {given.min() / self.sample_time:g} to "
+                f"{given.max() / self.sample_time:g} rad/s: a loop sampled every "
+                f"{self.sample_time:g} s has frequencies from 0 to "
+                f"{np.pi / self.sample_time:g} rad/s"
+            )
+        return np.minimum(given, np.pi)
