@@ -84,8 +84,8 @@ def test_intervals_cover_where_the_noise_circulates():
 @pytest.mark.parametrize(
     ("loop", "match"),
     [
-        (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31)), "only that of a sampled P"),
-        (dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.31, 0.1), sample_time=TS), "sampled P"),
+        (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31)), "continuous controller"),
+        (dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.31, 0.1), sample_time=TS), "only that of a P"),
         (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.02), "did not see"),
     ],
 )

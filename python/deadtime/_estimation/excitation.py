@@ -6,11 +6,14 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._recording import Recording
 
-__all__ = ["ROUNDING", "check_excitation", "check_gain", "start_and_span"]
+__all__ = ["ROUNDING", "check_excitation", "check_gain", "check_moves", "start_and_span"]
+
+Array = NDArray[np.float64]
 
 #: The reference is away from the output at the start by so many standard deviations of the noise,
 #: or does not excite the loop.
@@ -23,19 +26,32 @@ ANSWERS = 3.0
 ROUNDING = 1e-9
 
 
-def check_excitation(data: Recording, numbers: int) -> None:
-    """Refuse a window in which nothing is asked of the loop or nothing moves."""
-    if float(np.ptp(data.output)) == 0.0:
+def check_moves(output: Array, command: Array | None = None) -> None:
+    """Refuse a command that never changes, and an output that never moves."""
+    if command is not None and float(np.ptp(command)) == 0.0:
         raise NotIdentifiableError(
-            f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
+            f"the command is {command[0]:g} throughout the window: nothing excites the vehicle; "
+            "choose a window in which the command changes"
         )
+    if float(np.ptp(output)) == 0.0:
+        raise NotIdentifiableError(
+            f"the output is {output[0]:g} throughout the window: the vehicle did not move"
+        )
+
+
+def check_excitation(data: Recording, numbers: int, *, from_rest: bool = False) -> None:
+    """Refuse a window in which nothing is asked of the loop or nothing moves.
+
+    A loop that is to start from rest has to be asked by a step.
+    """
     steps = data.steps()
     noise = float(np.median(np.abs(np.diff(data.output)))) / 0.6745 / math.sqrt(2.0)
     away = abs(float(data.reference[0] - data.output[0]))
-    if not steps and away <= max(CLEARANCE * noise, ROUNDING * float(np.ptp(data.output))):
+    there = away <= max(CLEARANCE * noise, ROUNDING * float(np.ptp(data.output)))
+    if not steps and (from_rest or there):
         raise NotIdentifiableError(
-            f"the reference is {data.reference[0]:g} throughout the window, where the output is "
-            "already: nothing excites the loop; choose a window with a step"
+            f"the reference is {data.reference[0]:g} throughout the window: nothing excites the "
+            "loop; choose a window with a step"
         )
     left = len(data) - (steps[0].index if steps else 0)
     if left < 2 * (numbers + 1):
@@ -43,6 +59,7 @@ def check_excitation(data: Recording, numbers: int) -> None:
             f"{left} samples after the step are too few for {numbers} numbers and an initial "
             "output: widen the window"
         )
+    check_moves(data.output)
 
 
 def start_and_span(data: Recording) -> tuple[float, float]:
@@ -51,7 +68,7 @@ def start_and_span(data: Recording) -> tuple[float, float]:
     Where the reference does not move, the step is at the first sample.
     """
     steps = data.steps()
-    rest = data.output[: steps[0].index] if steps else data.output[:1]
+    rest = data.output[: max(1, steps[0].index)] if steps else data.output[:1]
     begin = steps[0].time if steps else data.time[0]
     return float(rest.mean()), float(data.time[-1] - begin)
 

@@ -31,7 +31,7 @@ from deadtime._estimation.evidence import (
     embedded,
     standard_errors,
 )
-from deadtime._estimation.excitation import ROUNDING, check_gain
+from deadtime._estimation.excitation import ROUNDING, check_gain, check_moves
 from deadtime._estimation.held_response import HeldResponse
 from deadtime._estimation.held_transfer import held_transfer
 from deadtime._estimation.line_fit import LineProfile, Lines, fit_lines
@@ -82,7 +82,7 @@ def estimate_by_frequency(
     _check_even(data)
     command, source = commands_over_samples(recording, loop)
     response = HeldResponse(recording.time[: rows.stop], command[: rows.stop])
-    _check_moves(data, command[rows])
+    check_moves(data.output, command[rows])
     top = math.inf if highest is None else positive("highest", highest)
     if period is None:
         lines = _record_lines(data, response, len(names), top)
@@ -140,15 +140,6 @@ def _check_even(data: Recording) -> None:
             f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: a DFT "
             "needs even ones; use method='output_error'"
         )
-
-
-def _check_moves(data: Recording, command: Array) -> None:
-    for name, signal in (("command", command), ("output", data.output)):
-        if float(np.ptp(signal)) == 0.0:
-            raise NotIdentifiableError(
-                f"the {name} is {signal[0]:g} throughout the window: nothing excites the vehicle "
-                "or it did not move; choose a window in which it does"
-            )
 
 
 def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest: float) -> Lines:

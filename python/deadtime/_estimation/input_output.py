@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.commands import commands_over_samples
+from deadtime._estimation.excitation import check_moves
 from deadtime._estimation.simulated import SimulatedRecording
 from deadtime._loop import ControlLoop
 from deadtime._plants import FirstOrder, Integrator
@@ -87,15 +88,7 @@ def read_input_output(
             f"{len(data)} samples are too few for the {method} method, {FEWEST} are needed: widen "
             "the window"
         )
-    if float(np.ptp(command)) == 0.0:
-        raise NotIdentifiableError(
-            f"the command is {command[0]:g} throughout the window: nothing excites the vehicle; "
-            "choose a window in which the command changes"
-        )
-    if float(np.ptp(data.output)) == 0.0:
-        raise NotIdentifiableError(
-            f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
-        )
+    check_moves(data.output, command)
     return _undone(command, data.output, loop, h, source)
 
 

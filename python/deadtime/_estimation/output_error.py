@@ -12,18 +12,18 @@ over the delay, so a grid over delay and lag comes first.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._controllers import P
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.commands import known_commands
 from deadtime._estimation.conclusion import Fitted, concluded, without_vanishing
 from deadtime._estimation.evidence import checked_names, excited
+from deadtime._estimation.excitation import check_moves
 from deadtime._estimation.joint import solve_jointly
 from deadtime._estimation.plant_path import Path, path_of
 from deadtime._estimation.result import DelayEstimate
@@ -268,15 +268,7 @@ def _model(
             f"{len(data)} samples are too few for {len(names)} numbers and an initial output: "
             "widen the window"
         )
-    if float(np.ptp(command)) == 0.0:
-        raise NotIdentifiableError(
-            f"the command is {command[0]:g} throughout the window: nothing excites the vehicle; "
-            "choose a window in which the command changes"
-        )
-    if float(np.ptp(data.output)) == 0.0:
-        raise NotIdentifiableError(
-            f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
-        )
+    check_moves(data.output, command)
     return _Model(
         recording=data,
         path=path_of(loop.plant, recording.time[: rows.stop], command),
@@ -289,13 +281,13 @@ def _model(
 
 def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[Array, str]:
     """The command of every row: logged, or as the controller makes it of reference and output."""
-    limit = math.inf if loop.limit is None else loop.limit
     if recording.command is not None and not computed:
-        return np.clip(recording.command, -limit, limit), "logged"
-    if loop.sample_time is None or not isinstance(loop.controller, P):
+        return known_commands(recording, loop)
+    found = known_commands(replace(recording, command=None), loop)
+    if loop.sample_time is None:
         raise NotIdentifiableError(
-            "the recording holds no command, and only that of a sampled P controller can be "
-            "computed from reference and output: log the command, or use method='waveform'"
+            "the recording holds no command, and that of a continuous controller cannot be "
+            "computed between its rows: log the command, or use method='waveform'"
         )
     between = recording.sample_time
     if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
@@ -304,5 +296,4 @@ def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[
             "s: its command cannot be computed from rows it did not see; log the command, or use "
             "method='waveform'"
         )
-    command = loop.controller.Kp * (recording.reference - recording.output)
-    return np.clip(command, -limit, limit), "computed from reference and output"
+    return found

@@ -33,13 +33,13 @@ from deadtime._estimation.evidence import (
     checked_names,
     excited,
 )
+from deadtime._estimation.excitation import check_excitation, start_and_span
 from deadtime._estimation.joint import solve_jointly
 from deadtime._estimation.output_error import estimate_from_commands
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.several import Flights, FlownOnce, Window, each_flight
 from deadtime._estimation.simulated import SimulatedRecording
 from deadtime._loop import ControlLoop
-from deadtime._recording import Recording
 
 __all__ = ["Noise", "estimate_by_waveform"]
 
@@ -166,8 +166,7 @@ class _Model:
 
     @cached_property
     def span(self) -> float:
-        data = self.simulated.recording
-        return float(data.time[-1] - data.steps()[0].time)
+        return start_and_span(self.simulated.recording)[1]
 
     @cached_property
     def size(self) -> float:
@@ -234,9 +233,8 @@ class _Model:
 
     def starts(self) -> list[Array]:
         """The points of a grid over delay and gain, the best first."""
-        data = self.simulated.recording
-        start = [float(np.mean(data.output[: max(1, data.steps()[0].index)]))]
-        along = start if self.offset is None else []
+        start, _ = start_and_span(self.simulated.recording)
+        along = [start] if self.offset is None else []
         points = [np.array([*point, *along]) for point in itertools.product(*self._grid())]
         costs = [float(np.sum(self.misfit(point) ** 2)) for point in points]
         return [points[int(index)] for index in np.argsort(costs)]
@@ -254,26 +252,8 @@ class _Model:
 
 def _model(flight: FlownOnce, names: tuple[str, ...], offset: float | None = None) -> _Model:
     simulated = SimulatedRecording(flight.recording, flight.loop, flight.window)
-    _check_excitation(simulated.recording, len(names))
+    check_excitation(simulated.recording, len(names), from_rest=True)
     return _Model(simulated, names, offset)
-
-
-def _check_excitation(data: Recording, parameters: int) -> None:
-    if not data.steps():
-        raise NotIdentifiableError(
-            f"the reference is {data.reference[0]:g} throughout the window: nothing excites the "
-            "loop; choose a window with a step"
-        )
-    first = data.steps()[0].index
-    if len(data) - first < 2 * (parameters + 1):
-        raise NotIdentifiableError(
-            f"{len(data) - first} samples after the step are too few for {parameters} numbers and "
-            "an initial output: widen the window"
-        )
-    if float(np.ptp(data.output)) == 0.0:
-        raise NotIdentifiableError(
-            f"the output is {data.output[0]:g} throughout the window: the vehicle did not move"
-        )
 
 
 def _check_ends(values: Mapping[str, float], low: Array, high: Array) -> None:
