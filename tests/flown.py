@@ -1,4 +1,4 @@
-"""Flights of the estimation benchmark: one step of 1 m of an integrator, its sensor noisy."""
+"""Flights of the estimation benchmark: one step of an integrator, its sensor noisy."""
 
 import deadtime as dtm
 import numpy as np
@@ -18,6 +18,7 @@ def fly(
     limit=1.0,
     duration=5.0,
     rest=0.5,
+    size=1.0,
     circulates=True,
 ):
     """A flight with its command logged, and what is known of its loop."""
@@ -26,7 +27,7 @@ def fly(
     )
     step = dt or ts
     time = np.arange(round((duration + rest) / step)) * step
-    reference = np.where(time < rest - 1e-9, 0.0, 1.0)
+    reference = np.where(time < rest - 1e-9, 0.0, size)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
     seen = reference - error if circulates else reference
     flown = loop.simulate(time, seen, reference_time=time, initial_output=0.0, reference_before=0.0)

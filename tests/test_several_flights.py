@@ -1,6 +1,7 @@
 """Several recordings of one vehicle, fitted by one set of numbers."""
 
 import deadtime as dtm
+import flown
 import numpy as np
 import pytest
 from deadtime._estimation.joint import JointModel
@@ -9,17 +10,11 @@ from flights import flight_path
 TS = 0.065
 
 
-def fly(Kp, noise, seed, size=1.0, delay=0.36, gain=0.9, lag=0.0, limit=1.0, logged=True):
-    loop = dtm.ControlLoop(
-        dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=TS, limit=limit
+def fly(Kp, noise, seed, size=1.0, lag=0.0, limit=1.0):
+    flight, known = flown.fly(
+        gain=0.9, lag=lag, Kp=Kp, noise=noise, seed=seed, limit=limit, size=size, rest=1.0
     )
-    time = np.arange(0.0, 7.0, TS)
-    reference = np.where(time < 1.0 - 1e-9, 0.0, size)
-    error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
-    flown = loop.simulate(time, reference - error, reference_time=time, initial_output=0.0)
-    command = flown.inputs if logged else None
-    known = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=TS, limit=limit)
-    return dtm.Recording(time, reference, flown.outputs + error, command), known
+    return flight, known.replace(gain=1.0)
 
 
 @pytest.mark.parametrize("method", ["output_error", "waveform"])

@@ -8,15 +8,17 @@ the delay against the lag.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-__all__ = ["Minimum", "Model", "ProfileCost", "minimise", "solve"]
+__all__ = ["Ends", "Minimum", "Model", "ModelOfOne", "ProfileCost", "minimise", "solve"]
 
 Array = NDArray[np.float64]
 
@@ -70,6 +72,42 @@ class Model(Protocol):
 
     def starts(self) -> list[Array]:
         """Points to search from, the most promising first."""
+
+
+class Ends(NamedTuple):
+    """Between which values a parameter is sought, and the size that matters."""
+
+    low: float
+    high: float
+    scale: float
+
+
+class ModelOfOne(ABC):
+    """What the models of one recording share: bounds and sizes by the names of parameters."""
+
+    @property
+    @abstractmethod
+    def labels(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+
+    @abstractmethod
+    def ends(self, label: str) -> Ends:
+        """Bounds and size of one of them."""
+
+    @cached_property
+    def low(self) -> Array:
+        """Lower bounds."""
+        return np.array([self.ends(label).low for label in self.labels])
+
+    @cached_property
+    def high(self) -> Array:
+        """Upper bounds."""
+        return np.array([self.ends(label).high for label in self.labels])
+
+    @cached_property
+    def scale(self) -> Array:
+        """Sizes that matter."""
+        return np.array([self.ends(label).scale for label in self.labels])
 
 
 @dataclass(frozen=True)

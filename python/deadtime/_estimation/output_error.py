@@ -25,6 +25,7 @@ from deadtime._estimation.conclusion import Fitted, concluded, without_vanishing
 from deadtime._estimation.evidence import checked_names, excited
 from deadtime._estimation.excitation import check_moves
 from deadtime._estimation.joint import solve_jointly
+from deadtime._estimation.least_squares import Ends, ModelOfOne
 from deadtime._estimation.plant_path import Path, path_of
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.several import Flights, Window, each_flight
@@ -110,7 +111,7 @@ def estimate_from_commands(
 
 
 @dataclass(frozen=True, eq=False)
-class _Model:
+class _Model(ModelOfOne):
     """Misfit of one recording; parameters are `names`, then the output at the start if free."""
 
     recording: Recording
@@ -140,28 +141,14 @@ class _Model:
     def _sample(self) -> float:
         return self.recording.sample_time
 
-    def _ends(self, name: str) -> tuple[float, float]:
-        size = abs(self.known.get(name, 0.0))
+    def ends(self, label: str) -> Ends:
+        size = abs(self.known.get(label, 1.0))
         return {
-            "delay": (0.0, LONGEST * self.span),
-            "lag": (0.0, self.span),
-            "time_constant": (1e-3 * size, 1e3 * size),
-        }.get(name, (-np.inf, np.inf))
-
-    @cached_property
-    def low(self) -> Array:
-        return np.array([self._ends(label)[0] for label in self.labels])
-
-    @cached_property
-    def high(self) -> Array:
-        return np.array([self._ends(label)[1] for label in self.labels])
-
-    @cached_property
-    def scale(self) -> Array:
-        sizes = {"delay": self._sample, "lag": self._sample, "initial output": self.size}
-        return np.array(
-            [sizes.get(label, abs(self.known.get(label, 1.0))) for label in self.labels]
-        )
+            "delay": Ends(0.0, LONGEST * self.span, self._sample),
+            "lag": Ends(0.0, self.span, self._sample),
+            "time_constant": Ends(1e-3 * size, 1e3 * size, size),
+            "initial output": Ends(-np.inf, np.inf, self.size),
+        }.get(label, Ends(-np.inf, np.inf, size))
 
     def _values(self, point: Array) -> dict[str, float]:
         return {**self.known, **dict(zip(self.names, point.tolist(), strict=False))}

@@ -35,6 +35,7 @@ from deadtime._estimation.evidence import (
 )
 from deadtime._estimation.excitation import check_excitation, start_and_span
 from deadtime._estimation.joint import solve_jointly
+from deadtime._estimation.least_squares import Ends, ModelOfOne
 from deadtime._estimation.output_error import estimate_from_commands
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.several import Flights, FlownOnce, Window, each_flight
@@ -149,7 +150,7 @@ def _by_simulation(
 
 
 @dataclass(frozen=True, eq=False)
-class _Model:
+class _Model(ModelOfOne):
     """Misfit of one recording; parameters are `names`, then the output at the start if free."""
 
     simulated: SimulatedRecording
@@ -179,32 +180,20 @@ class _Model:
         between = self.simulated.recording.sample_time
         return min(SHORTEST_OF_WINDOW * self.span, SHORTEST_OF_SAMPLE * between)
 
-    def _ends(self, name: str) -> tuple[float, float]:
-        if name in ("delay", "lag"):
-            any_delay = name == "delay" and self.simulated.loop.is_sampled
-            return (0.0 if any_delay else self._shortest, self.span)
-        if name == "start":
-            return (-0.25 * self.span, 0.25 * self.span)
-        if name == "initial output":
-            return (-np.inf, np.inf)
-        value = self.simulated.loop.parameters[name]
+    def ends(self, label: str) -> Ends:
+        tenth, shortest = 0.1 * self.span, self._shortest
+        no_delay = 0.0 if self.simulated.loop.is_sampled else shortest
+        found = {
+            "delay": Ends(no_delay, self.span, tenth),
+            "lag": Ends(shortest, self.span, tenth),
+            "start": Ends(-0.25 * self.span, 0.25 * self.span, tenth),
+            "initial output": Ends(-np.inf, np.inf, self.size),
+        }.get(label)
+        if found is not None:
+            return found
+        value = self.simulated.loop.parameters[label]
         low, high = sorted((1e-3 * value, 1e3 * value))
-        return (low, high)
-
-    @cached_property
-    def low(self) -> Array:
-        return np.array([self._ends(label)[0] for label in self.labels])
-
-    @cached_property
-    def high(self) -> Array:
-        return np.array([self._ends(label)[1] for label in self.labels])
-
-    @cached_property
-    def scale(self) -> Array:
-        tenth = 0.1 * self.span
-        sizes = {"delay": tenth, "lag": tenth, "start": tenth, "initial output": self.size}
-        known = self.simulated.loop.parameters
-        return np.array([sizes.get(label) or abs(known[label]) for label in self.labels])
+        return Ends(low, high, abs(value))
 
     def _values(self, point: Array) -> tuple[dict[str, float], float]:
         """Numbers of the loop, and the output at the start."""
