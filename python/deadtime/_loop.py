@@ -708,13 +708,17 @@ class ControlLoop:
 
     @cached_property
     def _rest_at_zero(self) -> tuple[NDArray[np.float64], float]:
-        return state_at_rest(self.plant, self.controller, self.parameters, 0.0, 0.0)
+        return self._at_rest_with(0.0, 0.0)
 
     def _at_rest(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
         """State in which the plant rests at `output`, and the command that keeps it there."""
         if output == 0.0 and reference == 0.0:
             return self._rest_at_zero
-        return state_at_rest(self.plant, self.controller, self.parameters, output, reference)
+        return self._at_rest_with(output, reference)
+
+    def _at_rest_with(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
+        plant = self._model.plant
+        return state_at_rest(self.plant, self.controller, self.parameters, output, reference, plant)
 
     def _refuse_hold(self, why: str) -> None:
         if self.is_sampled:

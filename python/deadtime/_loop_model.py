@@ -42,6 +42,8 @@ class LoopModel:
     impulse: Any
     #: J, G, H of x := J x + G w + H r at samples, where a discretised filter has states.
     update: tuple[Vector, Vector, Vector] | None = None
+    #: The plant alone.
+    plant: StateSpace | None = None
 
     @classmethod
     def build(cls, plant: Plant, controller: Controller, values: Mapping[str, Any]) -> LoopModel:
@@ -70,6 +72,7 @@ class LoopModel:
             D=p.D,
             impulse=number(c.impulse),
             update=None if c.update is None else _update(p, c.update, n + m),
+            plant=p,
         )
 
     def row(self, delay: Any, sample_time: Any = None, limit: Any = None) -> NDArray[Any]:
@@ -155,6 +158,8 @@ def refuse_discretised(controller: Controller, sample_time: float | None, what: 
 
 def _joined(*parts: NDArray[Any]) -> NDArray[Any]:
     """Concatenate vectors whose leading axes broadcast."""
+    if all(part.ndim == 1 for part in parts):
+        return np.concatenate(parts)
     leading = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
     return np.concatenate(
         [np.broadcast_to(part, leading + part.shape[-1:]) for part in parts], axis=-1
@@ -182,7 +187,11 @@ def state_at_rest(
     values: Mapping[str, Any],
     output: float,
     reference: float,
+    space: StateSpace | None = None,
 ) -> tuple[Vector, Any]:
-    """State of a loop whose plant rests at `output`, and the command that holds it there."""
-    state, command = rest(*plant._polynomials(values), output)
+    """State of a loop whose plant rests at `output`, and the command that holds it there.
+
+    `space` is the plant's state space, where that is known.
+    """
+    state, command = rest(*plant._polynomials(values), output, space)
     return np.concatenate([state, controller._rest(values, output, reference, command)]), command

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._deadtime import on_samples
+from deadtime._loop_model import rest_of
 from deadtime._loop_sensitivities import output_and_input_slopes, slope_names
 from deadtime._response import Response
 from deadtime._validation import finite, increasing, one_dimensional, real_array
@@ -154,7 +155,12 @@ def settled_step(loop: ControlLoop, amplitude: float) -> Response:
 
 
 def steady_state(loop: ControlLoop, reference: float) -> float | None:
-    gains = loop._model.rest_gains
+    """Output that a constant reference leads to, None where there is none or the limit is in it."""
+    if loop._model.update is None:
+        output, command = rest_of(loop.plant, loop.controller, loop.parameters)
+        gains = None if np.isnan(output) else (float(output), float(command))
+    else:
+        gains = loop._model.rest_gains
     if gains is None:
         return None
     output, command = gains

@@ -272,9 +272,14 @@ def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
     return StateSpace(matrix(rows), vector(drive), np.eye(1, n)[0], number(direct))
 
 
-def rest(num: Sequence[Any], den: Sequence[Any], output: float) -> tuple[Any, Any]:
-    """State and command of a plant at rest with the given output, for `realise`'s state."""
-    plant = realise(num, den)
+def rest(
+    num: Sequence[Any], den: Sequence[Any], output: float, plant: StateSpace | None = None
+) -> tuple[Any, Any]:
+    """State and command of a plant at rest with the given output, for `realise`'s state.
+
+    `plant` is what `realise` makes of `num` and `den`, where that is known.
+    """
+    plant = realise(num, den) if plant is None else plant
     n = len(plant.B)
     zeros, poles = num[-1], den[-1]
     if poles == 0.0 or output == 0.0:
@@ -296,8 +301,15 @@ def rest(num: Sequence[Any], den: Sequence[Any], output: float) -> tuple[Any, An
 
 def _led(coefficients: Sequence[Any]) -> list[Any]:
     """Drop leading entries that are zero throughout, keep at least one."""
-    first = next((i for i, c in enumerate(coefficients) if np.any(c != 0.0)), -1)
+    first = next((i for i, c in enumerate(coefficients) if _is_something(c)), -1)
     return list(coefficients)[first:]
+
+
+def _is_something(coefficient: Any) -> bool:
+    """Whether a number, or any of an array, is other than zero."""
+    if isinstance(coefficient, float):
+        return coefficient != 0.0
+    return bool(np.any(coefficient != 0.0))
 
 
 def _trimmed(coefficients: Sequence[float]) -> NDArray[np.float64]:
