@@ -344,6 +344,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.usefixtures("listens_to_ctrl_c")
 @pytest.mark.skipif(os.name == "nt", reason="signals to a group of processes are of POSIX")
 def test_an_interrupt_ends_all_processes_cleanly(tmp_path):
     script = tmp_path / "long.py"
