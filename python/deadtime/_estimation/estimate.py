@@ -60,44 +60,54 @@ def estimate_delay(
 
     Parameters
     ----------
-    recording : Recording
-        Reference and output over time, as logged where the controller runs.
-    loop : ControlLoop
+    recording : Recording or list of Recording
+        Reference and output over time, as logged where the controller runs. Several flights of
+        one vehicle are fitted together, by ``"output_error"`` and ``"waveform"``.
+    loop : ControlLoop or list of ControlLoop
         What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
+        One for all recordings, or one each.
     method : str
-        ``"output_error"`` fits the response of the vehicle to the command as it was logged: the
-        best there is, and what ``"auto"`` takes where the recording has a command.
-        ``"waveform"`` fits the simulated loop to the whole window, and is taken elsewhere.
-        ``"overshoot"`` reads one number, as Armah & Yi did.
-        ``"decrement"`` reads successive peaks, ``"decay"`` the tail where nothing overshoots,
-        ``"graphical"`` the beginning of a step.
-        ``"frequency"`` is maximum likelihood at the lines of a spectrum, for periodic experiments.
-        ``"grid"`` is the cost over a range of delays, kept as a curve; ``"cta"`` the waveform with
-        Chebyshev's approximation of the delay.
-        ``"relay"`` reads the period of a limit cycle.
-        ``"gcc"`` is generalised cross-correlation, ``"arx_scan"`` what `delayest` does.
+        What the delay is found from.
+
+        - ``"output_error"``: the response of the vehicle to the command as it was logged. On the
+          Cramér-Rao bound; what ``"auto"`` takes where the recordings have a command.
+        - ``"waveform"``: the response of the whole loop, simulated. ``"auto"`` takes it elsewhere.
+        - ``"frequency"``: maximum likelihood at the lines of a spectrum, for periodic experiments.
+        - ``"grid"``: the cost over a range of delays, kept as a curve; ``"cta"``: the waveform
+          with Chebyshev's approximation of the delay.
+        - ``"overshoot"``: one number, as Armah & Yi did; ``"decrement"``: successive peaks;
+          ``"decay"``: the tail where nothing overshoots; ``"graphical"``: the beginning of a step.
+        - ``"relay"``: the period of a limit cycle.
+        - ``"gcc"``: generalised cross-correlation; ``"arx_scan"``: what `delayest` does.
     free : sequence of str
-        What is fitted: any of ``"delay"``, ``"gain"`` and ``"lag"``. ``"decrement"`` fits delay and
-        gain; ``"overshoot"``, ``"decay"``, ``"graphical"``, ``"relay"``, ``"gcc"`` and
-        ``"arx_scan"`` the delay alone, and take what else they need as given.
-    window : (float or None, float or None), optional
-        The part of the recording to use, s. For ``"waveform"``, ``"grid"``, ``"cta"`` and all that
-        read a step it should begin at rest and hold one step; ``"output_error"``, ``"frequency"``,
-        ``"gcc"`` and ``"arx_scan"`` take any in which the command changes.
+        What is fitted, any of ``"delay"``, ``"gain"``, ``"lag"`` and ``"time_constant"``, as the
+        plant has them; ``"waveform"`` also fits ``"limit"`` and ``"start"``, how much later than
+        that of the reference the clock of the output runs. ``"decrement"`` fits delay and gain;
+        ``"overshoot"``, ``"decay"``, ``"graphical"``, ``"relay"``, ``"gcc"`` and ``"arx_scan"``
+        the delay alone, and take what else they need as given.
+    window : (float or None, float or None) or list of them, optional
+        The part to use, s: one for all recordings, or a list with one each. For ``"waveform"``,
+        ``"grid"``, ``"cta"`` and all that read a step it should begin at rest and hold one step;
+        ``"output_error"``, ``"frequency"``, ``"gcc"`` and ``"arx_scan"`` take any in which the
+        command changes.
     **options
-        For ``"output_error"``: ``initial_output``, the true output at the start where it is known;
-        fitted otherwise.
-        For ``"frequency"``: ``period`` of the excitation, s, with ``left_out=1`` periods of
-        transient; ``highest``, Hz.
-        For ``"grid"``: ``delays`` to try, s; ``initial_output``. For ``"cta"``: ``intervals=8``;
-        ``initial_output``.
-        For ``"decay"``: ``tail=0.3``, the share of the step that is left where it begins.
-        For ``"graphical"``: ``construction="tangent"``, ``"two_point"`` (with two ``shares``) or
-        ``"first_movement"``. For ``"relay"``: its ``amplitude`` where no command was logged.
-        For ``"gcc"``: ``weighting="none"``, ``"scot"``, ``"phat"`` or ``"prewhitened"``.
-        For ``"arx_scan"``: ``na=2``, ``nb=2``, ``fractional=False``.
-        For ``"overshoot"``: ``map="dominant"`` (the paper's), ``"exact"`` (the exact step
-        response) or ``"saturated"`` (the loop simulated with its hold and limit).
+        Options of the method.
+
+        - ``initial_output``: the true output at the start, where it is known and need not be
+          fitted (``"output_error"``, ``"waveform"``, ``"grid"``, ``"cta"``).
+        - ``noise`` (``"waveform"``): ``"recording"`` where noise is in the recording alone,
+          ``"loop"`` where the controller saw it, too, ``"auto"`` for the likelier.
+        - ``period`` of the excitation, s, with ``left_out=1`` periods of transient, and
+          ``highest``, Hz (``"frequency"``).
+        - ``delays`` to try, s (``"grid"``); ``intervals=8`` (``"cta"``).
+        - ``map`` (``"overshoot"``): ``"dominant"`` (the paper's), ``"exact"`` (the exact step
+          response) or ``"saturated"`` (the loop simulated with its hold and limit).
+        - ``tail=0.3``, the share of the step that is left where the tail begins (``"decay"``).
+        - ``construction`` (``"graphical"``): ``"tangent"``, ``"two_point"`` (with two ``shares``)
+          or ``"first_movement"``.
+        - ``amplitude`` of the relay where no command was logged (``"relay"``).
+        - ``weighting`` (``"gcc"``): ``"none"``, ``"scot"``, ``"phat"`` or ``"prewhitened"``.
+        - ``na=2``, ``nb=2``, ``fractional=False`` (``"arx_scan"``).
 
     Returns
     -------
@@ -107,7 +117,9 @@ def estimate_delay(
     ------
     NotIdentifiableError
         When the recording does not determine what was asked for: no step, no overshoot
-        (Kp·Td below 1/e), numbers that cannot be told apart.
+        (Kp·Td below 1/e), an output that noise alone would explain, a setpoint that copies the
+        output, a limit cycle where the method is of linear theory, numbers that cannot be told
+        apart.
     RecordingError
         When the window holds too few samples.
     ValueError
@@ -117,7 +129,9 @@ def estimate_delay(
     -----
     A ground station sees the sum of all delays on the way round the loop; from its own log,
     which part is in the command and which in the measurement cannot be told. A model that does
-    not explain the recording is returned with ``adequate=False``, not refused.
+    not explain the recording is returned with ``adequate=False``, not refused. Several recordings
+    count by the inverse of their noise where residuals are white, and by that of their excitation
+    where they are not.
 
     References
     ----------
