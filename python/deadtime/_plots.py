@@ -115,7 +115,8 @@ def plot_estimate(fit: DelayEstimate) -> Figure:
 
     flights = fit.flights
     profiled = fit.has_profile and "delay" in fit.stderr
-    figure = Figure(figsize=(9.6 if profiled else 7.0, 4.6), layout="constrained")
+    width = max(7.0, 3.5 * len(flights)) + 2.6 * profiled
+    figure = Figure(figsize=(width, 4.6), layout="constrained")
     across = len(flights) + int(profiled)
     ratios = [2.2] * len(flights) + [1.5] * int(profiled)
     grid = figure.add_gridspec(2, across, height_ratios=[3.0, 1.0], width_ratios=ratios)
