@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -230,13 +230,12 @@ def compare_methods(
         estimates["decrement"] = estimate_by_decrement(recording, loop, window, plain)
     with suppress(NotIdentifiableError, ValueError):
         estimates["decay"] = estimate_by_decay(recording, loop, window)
-    fits = {"waveform": estimate_by_waveform}
+    fits: dict[str, Callable[..., DelayEstimate]] = {"waveform": estimate_by_waveform}
     if recording.command is not None:
         fits["output_error"] = estimate_by_output_error
     for method, fit in fits.items():
-        for name, free in {method: plain, f"{method} with lag": named}.items():
-            if name != method and free == plain:
-                continue
+        frees = {method: plain} if named == plain else {method: plain, f"{method} with lag": named}
+        for name, free in frees.items():
             try:
                 estimates[name] = fit(recording, loop, window, free)
             except NotIdentifiableError as error:
