@@ -1,4 +1,4 @@
-"""The Python of the pages on planning runs as it stands, with the results that are printed."""
+"""The Python of the pages on flights runs as it stands, with the results that are printed."""
 
 import doctest
 import re
@@ -9,7 +9,10 @@ import pytest
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
-@pytest.mark.parametrize("page", ["planning-a-flight.md", "what-a-ground-log-cannot-tell.md"])
+PAGES = ["from-recording-to-gains.md", "planning-a-flight.md", "what-a-ground-log-cannot-tell.md"]
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_the_python_of_a_page_runs(page):
     text = (DOCS / page).read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)

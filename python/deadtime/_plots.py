@@ -124,6 +124,8 @@ def plot_estimate(fit: DelayEstimate) -> Figure:
         upper = _bare(figure.add_subplot(grid[0, column]))
         lower = _bare(figure.add_subplot(grid[1, column], sharex=upper))
         _plot_flight(upper, lower, flight, f"{fit.method}, delay {fit.delay:.3f} s")
+        if column == 0:
+            upper.legend(frameon=False, fontsize="small")
         upper.tick_params(labelbottom=False)
         kind = "white" if fit.whiteness.white else "coloured"
         upper.set_ylabel("output" if column == 0 else "")
@@ -145,7 +147,6 @@ def _plot_flight(upper: Axes, lower: Axes, flight: Flight, label: str) -> None:
     upper.plot(recording.time, recording.output, label="recorded", **DATA)
     fitted = recording.output - flight.residuals
     upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
-    upper.legend(frameon=False, fontsize="small")
     lower.plot(recording.time, flight.residuals, **DATA)
     lower.axhline(0.0, color="0.6", lw=0.8)
     lower.set(xlabel="time / s")
