@@ -146,8 +146,47 @@ def designing() -> None:
         print(one.summary(), end="\n\n")
 
 
+def estimating() -> None:
+    """Fits with a lag, without, and of three flights, and a design for what was found."""
+    vehicle = dtm.ControlLoop(
+        dtm.Integrator(gain=0.9, lag=0.1), dtm.P(1.6), delay=0.3, sample_time=0.065, limit=1.0
+    )
+    known = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), sample_time=0.065, limit=1.0)
+    step, free = dtm.Experiment.step(8.0, rest=1.04), ("delay", "gain", "lag")
+    flight = step.fly(vehicle, noise=0.002, seed=2)
+    fit = dtm.estimate_delay(flight, known, free=free)
+    fit.plot().savefig(IMAGES / "estimate-lag.png", dpi=80)
+    dtm.estimate_delay(flight, known).plot().savefig(IMAGES / "estimate-lagless.png", dpi=80)
+
+    gains = (0.8, 1.6, 2.4)
+    flights = [step.fly(vehicle.replace(Kp=Kp), 0.002, seed) for seed, Kp in enumerate(gains)]
+    joint = dtm.estimate_delay(flights, [known.replace(Kp=Kp) for Kp in gains], free=free)
+    joint.plot().savefig(IMAGES / "estimate-joint.png", dpi=65)
+
+    smooth = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0))
+    best = dtm.design(
+        fit.loop,
+        controller=smooth,
+        delay=fit.ci(0.95),
+        objective="settling_time",
+        gain_margin=2.5,
+    )
+    figure, axes = plt.subplots(figsize=(7.0, 3.8), layout="constrained")
+    time = np.linspace(0.0, 6.0, 601)
+    before = vehicle.simulate(time)
+    axes.plot(time, before.outputs, color="0.5", label="as it was flown: Kp 1.6")
+    after = vehicle.replace(controller=best.loop.controller).simulate(time)
+    told = ", ".join(f"{name} {value:.3g}" for name, value in best.gains.items())
+    axes.plot(time, after.outputs, "C0", label=f"the vehicle under the design: {told}")
+    axes.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
+    axes.set(xlabel="time (s)", ylabel="height (m)")
+    axes.legend(frameon=False)
+    figure.savefig(IMAGES / "estimate-design.png", dpi=90)
+
+
 if __name__ == "__main__":
     designing()
+    estimating()
     fixed_steps()
     mackey_glass()
     reproduction()

@@ -25,6 +25,7 @@ from deadtime._errors import (
 from deadtime._estimation import (
     CramerRaoBound,
     DelayEstimate,
+    Flight,
     Identifiability,
     MonteCarlo,
     PlannedBound,
@@ -92,6 +93,7 @@ __all__ = [
     "Experiment",
     "FilterChoice",
     "FirstOrder",
+    "Flight",
     "Identifiability",
     "Integrator",
     "LeastMargins",

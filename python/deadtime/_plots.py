@@ -115,7 +115,8 @@ def plot_estimate(fit: DelayEstimate) -> Figure:
 
     flights = fit.flights
     profiled = fit.has_profile and "delay" in fit.stderr
-    figure = Figure(figsize=(9.6 if profiled else 7.0, 4.6), layout="constrained")
+    width = max(7.0, 3.5 * len(flights)) + 2.6 * profiled
+    figure = Figure(figsize=(width, 4.6), layout="constrained")
     across = len(flights) + int(profiled)
     ratios = [2.2] * len(flights) + [1.5] * int(profiled)
     grid = figure.add_gridspec(2, across, height_ratios=[3.0, 1.0], width_ratios=ratios)
@@ -123,6 +124,8 @@ def plot_estimate(fit: DelayEstimate) -> Figure:
         upper = _bare(figure.add_subplot(grid[0, column]))
         lower = _bare(figure.add_subplot(grid[1, column], sharex=upper))
         _plot_flight(upper, lower, flight, f"{fit.method}, delay {fit.delay:.3f} s")
+        if column == 0:
+            upper.legend(frameon=False, fontsize="small")
         upper.tick_params(labelbottom=False)
         kind = "white" if fit.whiteness.white else "coloured"
         upper.set_ylabel("output" if column == 0 else "")
@@ -144,7 +147,6 @@ def _plot_flight(upper: Axes, lower: Axes, flight: Flight, label: str) -> None:
     upper.plot(recording.time, recording.output, label="recorded", **DATA)
     fitted = recording.output - flight.residuals
     upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
-    upper.legend(frameon=False, fontsize="small")
     lower.plot(recording.time, flight.residuals, **DATA)
     lower.axhline(0.0, color="0.6", lw=0.8)
     lower.set(xlabel="time / s")

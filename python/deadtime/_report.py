@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from deadtime._estimation.compare import COLUMNS, LABELS, truth_row
+from deadtime._estimation.compare import COLUMNS, truth_row
 from deadtime._experiment import Study
 from deadtime._page import escaped, page, picture, table, table_row, write_page
 from deadtime._plots import new_figure, plot_fits, plot_responses
@@ -73,13 +73,7 @@ def _estimates(study: Study) -> str:
 
 def _fits(study: Study) -> str:
     figure, axes = new_figure(7.5, 3.8)
-    estimates = study.comparison.estimates
-    fits = {
-        f"{LABELS[name]}: {estimates[name].delay:.3f} s": estimates[name]
-        for name in ("dominant", "waveform", "waveform with lag")
-        if name in estimates
-    }
-    plot_fits(axes, study.fit.recording, fits)
+    plot_fits(axes, study.fit.recording, study.comparison.pictured())
     return picture("fits", figure, "The recorded step and the loops that the methods make of it.")
 
 

@@ -7,7 +7,7 @@ import os
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -16,6 +16,7 @@ from rich.table import Table
 
 from deadtime._cli import options as opt
 from deadtime._cli.designs import design_gains
+from deadtime._cli.estimates import estimate_delays
 from deadtime._cli.maps import map_gains
 from deadtime._cli.reproduce import reproduce_paper
 from deadtime._cli.show import (
@@ -27,15 +28,11 @@ from deadtime._cli.show import (
     stages,
 )
 from deadtime._errors import DeadtimeError
-from deadtime._estimation import estimate_delay
-from deadtime._estimation.compare import compare_methods
 from deadtime._experiment import demo_flight, study
 from deadtime._loop import ControlLoop
 from deadtime._plots import (
     new_figure,
     plot_certificate,
-    plot_estimate,
-    plot_fits,
     plot_responses,
     plot_root_set,
 )
@@ -55,8 +52,6 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Method = Literal["all", "output_error", "overshoot", "waveform"]
-Map = Literal["dominant", "exact", "saturated"]
 Ends = tuple[float, float]
 
 #: What ends a command with one line; anything else is a defect and shows where it is.
@@ -99,73 +94,7 @@ def run() -> None:
         raise SystemExit(1) from None
 
 
-@app.command()
-def estimate(
-    file: opt.File,
-    kp: opt.Kp,
-    time: opt.Time = "time",
-    reference: opt.Reference = "reference",
-    output: opt.Output = "output",
-    command: opt.Command = None,
-    sample_time: opt.Sample_time = None,
-    limit: opt.Limit = None,
-    gain: opt.Gain = 1.0,
-    window: opt.Window = None,
-    method: Annotated[Method, typer.Option(help="One method, or all beside each other.")] = "all",
-    map: Annotated[  # noqa: A002
-        Map, typer.Option(help="From overshoot to delay, for --method overshoot.")
-    ] = "dominant",
-    free: Annotated[
-        str,
-        typer.Option(help="What waveform and output_error fit: of delay, gain, lag."),
-    ] = "delay,gain",
-    plot: opt.Plot = None,
-    as_json: opt.As_json = False,
-) -> None:
-    """Estimate the delay of a loop from a recording of its step response."""
-    recording = read_recording(file, time=time, reference=reference, output=output, command=command)
-    loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit)
-    if method == "all":
-        _estimate_all(recording, loop, window, plot, as_json)
-        return
-    if method == "overshoot":
-        fit = estimate_delay(recording, loop, method="overshoot", map=map, window=window)
-    else:
-        names = [name.strip() for name in free.split(",") if name.strip()]
-        fit = estimate_delay(recording, loop, method=method, free=names, window=window)
-    if plot is not None:
-        save_figure(plot_estimate(fit), plot)
-    if as_json:
-        print_json(fit.to_dict())
-    else:
-        console.print(fit.summary(), highlight=False, markup=False, soft_wrap=True)
-
-
-def _estimate_all(
-    recording: Recording,
-    loop: ControlLoop,
-    window: Ends | None,
-    plot: Path | None,
-    as_json: bool,
-) -> None:
-    comparison = compare_methods(recording, loop, window)
-    if plot is not None:
-        figure, axes = new_figure(7.5, 4.0)
-        plot_fits(axes, comparison.best.recording, comparison.estimates)
-        save_figure(figure, plot)
-    if as_json:
-        print_json(
-            {
-                "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
-                "refusals": comparison.refusals,
-                "explanation": comparison.explanation(),
-            }
-        )
-        return
-    print_table(estimates_table(comparison))
-    console.print("in brackets: taken as given; sum: delay and lag", style="dim")
-    for sentence in comparison.explanation():
-        console.print(f"• {sentence}", highlight=False, markup=False)
+app.command("estimate")(estimate_delays)
 
 
 @app.command()

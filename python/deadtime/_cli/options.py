@@ -19,6 +19,7 @@ __all__ = [
     "Command",
     "Delay",
     "File",
+    "Files",
     "Filter",
     "Gain",
     "Kp",
@@ -37,6 +38,10 @@ __all__ = [
 ]
 
 File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
+Files = Annotated[
+    list[Path],
+    typer.Argument(help="CSV files with a header line, of one vehicle.", show_default=False),
+]
 Time = Annotated[str, typer.Option(help="Column of the time stamps, s.")]
 Reference = Annotated[str, typer.Option(help="Column of the reference.")]
 Output = Annotated[str, typer.Option(help="Column of the measured output.")]

@@ -7,12 +7,13 @@ from deadtime._estimation.monte_carlo import MonteCarlo
 from deadtime._estimation.overshoot import damping_ratio
 from deadtime._estimation.planned_bound import PlannedBound
 from deadtime._estimation.residuals import Whiteness
-from deadtime._estimation.result import CramerRaoBound, DelayEstimate
+from deadtime._estimation.result import CramerRaoBound, DelayEstimate, Flight
 
 __all__ = [
     "Comparison",
     "CramerRaoBound",
     "DelayEstimate",
+    "Flight",
     "Identifiability",
     "MonteCarlo",
     "PlannedBound",

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.decay import estimate_by_decay
+from deadtime._estimation.decrement import estimate_by_decrement
+from deadtime._estimation.evidence import check_setpoint_active
+from deadtime._estimation.output_error import estimate_by_output_error
 from deadtime._estimation.overshoot import estimate_by_overshoot
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.waveform import estimate_by_waveform
@@ -26,8 +31,18 @@ LABELS = {
     "dominant": "paper's overshoot",
     "exact": "exact overshoot",
     "saturated": "overshoot as flown",
+    "decrement": "decrement",
+    "decay": "decay",
     "waveform": "waveform",
     "waveform with lag": "waveform with lag",
+    "output_error": "output error",
+    "output_error with lag": "output error with lag",
+}
+
+#: What the fits of all samples are called in a sentence.
+TOLD = {
+    "waveform": "the fit of the whole waveform",
+    "output_error": "the fit to the logged command",
 }
 
 
@@ -38,13 +53,20 @@ class Comparison:
     Attributes
     ----------
     estimates : dict of str to DelayEstimate
-        By name: ``dominant``, ``exact``, ``saturated``, ``waveform``, ``waveform with lag``.
+        By name: ``dominant``, ``exact``, ``saturated``, ``waveform``, ``waveform with lag``; where
+        a command was logged ``output_error`` and ``output_error with lag``; ``decrement`` and
+        ``decay`` where they have an answer.
     refusals : dict of str to str
-        The methods that could not answer, and why.
+        The other methods that could not answer, and why.
     """
 
     estimates: Mapping[str, DelayEstimate]
     refusals: Mapping[str, str]
+
+    @property
+    def trusted(self) -> str:
+        """Name of the method to go by: the command as logged tells more than the loop does."""
+        return "output_error" if "output_error" in self.estimates else "waveform"
 
     @property
     def best(self) -> DelayEstimate:
@@ -54,14 +76,26 @@ class Comparison:
         pays for it, on as many independent samples as the residuals' colour leaves; else the
         fit of delay and gain.
         """
-        plain = self.estimates["waveform"]
-        lagged = self.estimates.get("waveform with lag")
+        plain, lagged = self._fits()
         if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
             return plain
         rho = min(0.99, max(0.0, lagged.whiteness.autocorrelation))
         effective = lagged.residuals.size * (1.0 - rho) / (1.0 + rho)
         gain = 2.0 * effective * np.log(plain.rms / lagged.rms) if lagged.rms > 0 else np.inf
         return lagged if gain > np.log(max(effective, 2.0)) else plain
+
+    def _fits(self) -> tuple[DelayEstimate, DelayEstimate | None]:
+        """The trusted fit of delay and gain, and the one with a lag, if there is one."""
+        return self.estimates[self.trusted], self.estimates.get(f"{self.trusted} with lag")
+
+    def pictured(self) -> dict[str, DelayEstimate]:
+        """The estimates that one picture has room for, by what stands in its legend."""
+        names = ("dominant", self.trusted, f"{self.trusted} with lag")
+        return {
+            f"{LABELS[name]}: {self.estimates[name].delay:.3f} s": self.estimates[name]
+            for name in names
+            if name in self.estimates
+        }
 
     def rows(self) -> list[list[str]]:
         """The estimates as cells of a table with the heads `COLUMNS`.
@@ -91,14 +125,13 @@ class Comparison:
 
     def explanation(self) -> list[str]:
         """Why the methods differ, a sentence or two each."""
-        plain = self.estimates["waveform"]
+        plain, lagged = self._fits()
         dominant = self.estimates.get("dominant")
         said = []
         if dominant is None:
             said.append(f"The overshoot method does not answer: {self.refusals['dominant']}.")
         else:
-            said += _overshoot_against_waveform(dominant, plain)
-        lagged = self.estimates.get("waveform with lag")
+            said += _overshoot_against_fit(dominant, plain, TOLD[self.trusted])
         if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
             said.append(
                 f"The vehicle lags: with a lag fitted too the misfit falls from {plain.rms:.3g} to "
@@ -133,16 +166,16 @@ def _number(value: float | None, fitted: bool) -> str:
     return f"{value:.3f}" if fitted else f"({value:g})"
 
 
-def _overshoot_against_waveform(dominant: DelayEstimate, plain: DelayEstimate) -> list[str]:
+def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: str) -> list[str]:
     difference = plain.delay - dominant.delay
     if abs(difference) <= AGREE * plain.delay:
         return [
-            f"The paper's overshoot method ({dominant.delay:.3f} s) and the fit of the whole "
-            f"waveform ({plain.delay:.3f} s) agree."
+            f"The paper's overshoot method ({dominant.delay:.3f} s) and {fit} "
+            f"({plain.delay:.3f} s) agree."
         ]
     said = [
-        f"The paper's overshoot method says {dominant.delay:.3f} s, the fit of the whole waveform "
-        f"{plain.delay:.3f} s: they differ by {abs(difference):.3f} s."
+        f"The paper's overshoot method says {dominant.delay:.3f} s, {fit} {plain.delay:.3f} s: "
+        f"they differ by {abs(difference):.3f} s."
     ]
     assumed, gain = dominant.gain, plain.gain
     if assumed is None or gain is None or "gain" not in plain.stderr:
@@ -180,8 +213,9 @@ def compare_methods(
     Raises
     ------
     NotIdentifiableError
-        When not even the fit of delay and gain has an answer.
+        When no fit of delay and gain has an answer.
     """
+    check_setpoint_active(recording.window(*(window or (None, None))))
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
     named = [name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")]
@@ -191,10 +225,21 @@ def compare_methods(
             estimates[name] = estimate_by_overshoot(recording, loop, window, map=name)
         except (NotIdentifiableError, ValueError) as error:
             refusals[name] = str(error).rstrip(".")
-    estimates["waveform"] = estimate_by_waveform(recording, loop, window, plain)
-    if "lag" in named:
-        try:
-            estimates["waveform with lag"] = estimate_by_waveform(recording, loop, window, named)
-        except NotIdentifiableError as error:
-            refusals["waveform with lag"] = str(error).rstrip(".")
+    # Each is for steps that the other is not for, most recordings for neither: nothing to explain.
+    with suppress(NotIdentifiableError, ValueError):
+        estimates["decrement"] = estimate_by_decrement(recording, loop, window, plain)
+    with suppress(NotIdentifiableError, ValueError):
+        estimates["decay"] = estimate_by_decay(recording, loop, window)
+    fits: dict[str, Callable[..., DelayEstimate]] = {"waveform": estimate_by_waveform}
+    if recording.command is not None:
+        fits["output_error"] = estimate_by_output_error
+    for method, fit in fits.items():
+        frees = {method: plain} if named == plain else {method: plain, f"{method} with lag": named}
+        for name, free in frees.items():
+            try:
+                estimates[name] = fit(recording, loop, window, free)
+            except NotIdentifiableError as error:
+                refusals[name] = str(error).rstrip(".")
+    if not fits.keys() & estimates.keys():
+        raise NotIdentifiableError(refusals["waveform"])
     return Comparison(estimates, refusals)

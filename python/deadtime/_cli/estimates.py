@@ -1,0 +1,139 @@
+"""``deadtime estimate``: the delay in a recording, or in several of one vehicle together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from deadtime._cli import options as opt
+from deadtime._cli.show import (
+    console,
+    estimates_table,
+    print_json,
+    print_table,
+    save_figure,
+)
+from deadtime._estimation import estimate_delay
+from deadtime._estimation.compare import Comparison, compare_methods
+from deadtime._estimation.estimate import JOINT, METHODS
+from deadtime._plots import new_figure, plot_estimate, plot_fits
+from deadtime._readers import read_recording
+
+__all__ = ["estimate_delays"]
+
+Map = Literal["dominant", "exact", "saturated"]
+Noise = Literal["auto", "recording", "loop"]
+
+CHOICES = ("all", "auto", *METHODS)
+
+
+def estimate_delays(
+    files: opt.Files,
+    kp: Annotated[
+        list[float],
+        typer.Option(help="Proportional gain: one, or one for each file.", show_default=False),
+    ],
+    time: opt.Time = "time",
+    reference: opt.Reference = "reference",
+    output: opt.Output = "output",
+    command: opt.Command = None,
+    sample_time: opt.Sample_time = None,
+    limit: opt.Limit = None,
+    gain: opt.Gain = 1.0,
+    window: opt.Window = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            help=f"{', '.join(CHOICES)}. Without: all beside each other, for several files auto.",
+            show_default=False,
+        ),
+    ] = None,
+    free: Annotated[
+        str, typer.Option(help="What is fitted, where the method can: of delay, gain, lag.")
+    ] = "delay,gain",
+    map: Annotated[  # noqa: A002
+        Map | None, typer.Option(help="From overshoot to delay, for overshoot.")
+    ] = None,
+    noise: Annotated[
+        Noise | None,
+        typer.Option(help="Where sensor noise goes, for waveform: round the loop or not."),
+    ] = None,
+    initial_output: Annotated[
+        float | None,
+        typer.Option(
+            help="True output at the start, if known; for output_error, waveform, grid, cta."
+        ),
+    ] = None,
+    plot: opt.Plot = None,
+    as_json: opt.As_json = False,
+) -> None:
+    """Estimate the delay of a loop from a recording of it, or from several together."""
+    given = {"map": map, "noise": noise, "initial_output": initial_output}
+    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    method = _chosen(method, len(files), options)
+    loops = [opt.described_loop(one, gain=gain, sample_time=sample_time, limit=limit) for one in kp]
+    if len(loops) not in (1, len(files)):
+        raise ValueError(
+            f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(loops)} of --kp: give "
+            "one for all, or one for each"
+        )
+    flights = [
+        read_recording(file, time=time, reference=reference, output=output, command=command)
+        for file in files
+    ]
+    if method == "all":
+        _show_all(compare_methods(flights[0], loops[0], window), plot, as_json)
+        return
+    fit = estimate_delay(
+        flights,
+        loops[0] if len(loops) == 1 else loops,
+        method=method,
+        free=[name.strip() for name in free.split(",") if name.strip()],
+        window=window,
+        **options,
+    )
+    if plot is not None:
+        save_figure(plot_estimate(fit), plot)
+    if as_json:
+        print_json(fit.to_dict())
+    else:
+        console.print(fit.summary(), highlight=False, markup=False, soft_wrap=True)
+
+
+def _chosen(method: str | None, number: int, options: dict[str, Any]) -> str:
+    """The method, once it is clear that so many files and these options are for it."""
+    if method is None:
+        method = "all" if number == 1 else "auto"
+    if method not in CHOICES:
+        raise ValueError(f"--method {method} is not one of {', '.join(CHOICES)}")
+    if method == "all" and number > 1:
+        raise ValueError(
+            f"--method all compares methods on one file, these are {number}: fit them together by "
+            f"--method {' or '.join(JOINT)}"
+        )
+    if method == "all" and options:
+        option = next(iter(options)).replace("_", "-")
+        raise ValueError(f"--{option} is for one method: name it by --method")
+    return method
+
+
+def _show_all(comparison: Comparison, plot: Path | None, as_json: bool) -> None:
+    if plot is not None:
+        figure, axes = new_figure(7.5, 4.0)
+        plot_fits(axes, comparison.best.recording, comparison.pictured())
+        save_figure(figure, plot)
+    if as_json:
+        print_json(
+            {
+                "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
+                "refusals": comparison.refusals,
+                "explanation": comparison.explanation(),
+            }
+        )
+        return
+    print_table(estimates_table(comparison))
+    console.print("in brackets: taken as given; sum: delay and lag", style="dim")
+    for sentence in comparison.explanation():
+        console.print(f"• {sentence}", highlight=False, markup=False)
