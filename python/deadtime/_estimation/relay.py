@@ -28,6 +28,7 @@ from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.held_response import HeldResponse
 from deadtime._estimation.read_off import check_delay_alone, estimate_with_residuals
 from deadtime._estimation.result import DelayEstimate
+from deadtime._estimation.step_reading import scatter_of_bends
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 from deadtime._recording import Recording
@@ -140,8 +141,7 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
 def _crossings(time: Array, error: Array) -> Array:
     """Times at which the output crosses the reference, between samples."""
     # Second differences of a path of straight lines are noise, except at the corners.
-    noise = float(np.median(np.abs(np.diff(error, 2)))) / 0.6745 / math.sqrt(6.0)
-    beyond = max(CLEARANCE * noise, 1e-9 * float(np.ptp(error)))
+    beyond = max(CLEARANCE * scatter_of_bends(error), 1e-9 * float(np.ptp(error)))
     rough, side, last = [], 0.0, 0
     for row, value in enumerate(error):
         if abs(value) <= beyond:
