@@ -63,6 +63,11 @@ def estimate_by_gcc(
     simulated = SimulatedRecording(recording, loop, window)
     data = simulated.recording
     read = read_input_output(recording, loop, simulated, "gcc")
+    if int(np.count_nonzero(np.diff(read.command))) < 2:
+        raise NotIdentifiableError(
+            "the command changes once in the window, as one at its limit throughout does: its "
+            "correlation has no peak; use a smaller step, or method='output_error'"
+        )
     p_value = feedback_p_value(data)
     feedback = p_value < FEEDBACK
     if feedback:

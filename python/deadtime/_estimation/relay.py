@@ -91,13 +91,14 @@ def estimate_by_relay(
             f"{plant.lag:g} s is shorter than it is taken to be, or there is no delay"
         )
     path = _Path(data, switches, signs, delay, plant.lag)
+    first, last = data.time[path.rows[[0, -1]]]
     slope = abs(plant.gain) * height if height is not None else path.slope
     waits = float(np.mean(switches - crossings[:-1]))
     peaks = _peaks(data.time, error, crossings)
     return estimate_with_residuals(
         "relay",
         loop,
-        data,
+        data.window(float(first), float(last)),
         {"delay": delay},
         np.array([[stderr**2]]),
         path.residuals(slope),
