@@ -70,3 +70,10 @@ def test_the_profile_of_a_fit_without_lag_holds_the_best_delay():
     low, high = fit.ci()
     assert low < fit.delay < high
     assert fit.profile("delay", [fit.delay])[1] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("window", [3, (1.0,), "1 to 3"])
+def test_a_window_that_is_none_is_shown(window):
+    flight, known = fly(rest=1.0)
+    with pytest.raises(TypeError, match=r"give \(start, stop\) in s"):
+        dtm.estimate_delay(flight, known, window=window)
