@@ -196,3 +196,12 @@ def test_no_interval_and_why(method):
     with pytest.raises(ValueError, match="output_error"):
         fit.ci()
     assert fit.to_dict()["stderr"]["delay"] is None
+
+
+def test_a_command_at_its_limit_throughout_has_no_peak():
+    # The correlation of two steps is flat up to the delay; its first value was taken for a peak.
+    flight, known = fly(Kp=2.0, limit=0.05, duration=8.0, rest=1.0)
+    with pytest.raises(dtm.NotIdentifiableError, match="at its limit"):
+        dtm.estimate_delay(flight, known, method="gcc")
+    fit = dtm.estimate_delay(flight, known, method="output_error")
+    assert fit.delay == pytest.approx(0.36, abs=1e-9)

@@ -358,6 +358,14 @@ def test_an_unknown_delay_is_refused():
         dtm.design(LOOP.replace(delay=None))
 
 
+def test_a_design_without_delay_could_not_be_drawn():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.0, sample_time=0.065)
+    best = dtm.design(loop, controller=dtm.P)
+    # The chart over gain and delay was one line high. Dead beat: 1 - Kp Ts = 0.
+    best.plot().canvas.draw()
+    assert best.gains["Kp"] * 0.065 == pytest.approx(1.0, abs=0.01)
+
+
 def test_a_design_tells_and_draws_itself():
     pyplot = pytest.importorskip("matplotlib.pyplot")
     best = dtm.design(

@@ -116,6 +116,14 @@ def test_sampled_poles_carry_their_rounding_error():
     assert pair[0].imag > 0.0
 
 
+def test_a_sampled_loop_without_delay_subtracted_infinities():
+    # Its one held command is an eigenvalue of zero beside 1 - 2 Ts: a pole at minus infinity.
+    found = dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.0, sample_time=0.1).rightmost(2)
+    assert found[0].real == pytest.approx(math.log(0.8) / 0.1, rel=1e-12)
+    assert found[1].real == -math.inf
+    assert found.resolved.tolist() == [True, False]
+
+
 # Continuous loops through their characteristic function
 
 

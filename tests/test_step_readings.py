@@ -1,5 +1,7 @@
 """Methods that read one step: peaks, tail, the straight beginning; exact, noisy and refused."""
 
+import itertools
+
 import deadtime as dtm
 import numpy as np
 import pytest
@@ -70,7 +72,7 @@ def test_a_gain_that_is_off_is_seen_by_the_decrement():
         ({"Kp": 0.8}, "nothing rings"),
         ({"noise": 0.01, "rest": 1.0}, "one extreme|nothing rings"),
         ({"Kp": 4.3, "limit": None}, "do not die out"),
-        ({"Kp": 4.5, "limit": 0.3, "duration": 30.0}, "at its limit"),
+        ({"Kp": 4.5, "limit": 0.3, "duration": 6.0}, "at its limit of 0.3"),
     ],
 )
 def test_the_decrement_refuses_by_name(change, words):
@@ -204,6 +206,43 @@ def test_graphical_options_are_checked():
 
 
 # --- what all of them refuse ----------------------------------------------------------------
+
+LINEAR = (
+    ("overshoot", {"map": "dominant"}),
+    ("overshoot", {"map": "exact"}),
+    ("decrement", {}),
+    ("decay", {}),
+    ("graphical", {}),
+    ("gcc", {}),
+    ("arx_scan", {}),
+)
+
+
+@pytest.mark.parametrize(("method", "options"), LINEAR)
+def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method, options):
+    # The overshoot of a loop that its limit alone keeps in bounds was read as that of a stable one.
+    flights = ((0.0, 5.0), (0.01, 5.0), (0.03, 20.0))
+    for Kp, (noise, duration) in itertools.product((4.2, 4.5, 6.0), flights):
+        flight, known = fly(Kp=Kp, noise=noise, duration=duration, rest=1.0)
+        with pytest.raises(dtm.NotIdentifiableError, match=r"limit cycle.*'output_error'"):
+            dtm.estimate_delay(flight, known, method=method, **options)
+
+
+@pytest.mark.parametrize(("method", "options"), LINEAR)
+def test_a_loop_that_still_rings_is_no_limit_cycle(method, options):
+    for Kp, seed in itertools.product((3.0, 3.6), range(5)):
+        flight, known = fly(Kp=Kp, noise=0.01, duration=12.0, rest=1.0, seed=seed)
+        if method == "decay":
+            with pytest.raises(dtm.NotIdentifiableError, match="overshoots"):
+                dtm.estimate_delay(flight, known, method=method)
+        else:
+            assert dtm.estimate_delay(flight, known, method=method, **options).delay > 0.0
+
+
+def test_the_saturated_map_knows_the_limit_and_reads_a_limit_cycle():
+    flight, known = fly(Kp=4.5, duration=12.0)
+    fit = dtm.estimate_delay(flight, known, method="overshoot", map="saturated")
+    assert fit.delay == pytest.approx(0.36, abs=1e-6)
 
 
 @pytest.mark.parametrize("method", METHODS)

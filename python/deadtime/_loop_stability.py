@@ -102,7 +102,8 @@ def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> Ro
     # A pole and its mirror image are neighbours, the upper one first: keep n uppers.
     order = order[np.cumsum(z[order].imag >= 0.0) <= n]
     roots, radii = poles[order], radii[order]
-    gaps = np.abs(roots[:, None] - poles[None, :])
+    with np.errstate(invalid="ignore"):  # z = 0 is a pole at minus infinity, never resolved
+        gaps = np.abs(roots[:, None] - poles[None, :])
     gaps[np.arange(len(order)), order] = np.inf
     furthest = float(roots.real.min())
     return RootSet(

@@ -130,7 +130,8 @@ def charts_at(problem: Problem, survey: Survey, gains: Vector) -> tuple[Stabilit
     free, middle = problem.free, problem.middle
     if len(free) == 1:
         low, high = problem.intervals["delay"]
-        wide = np.linspace((1.0 - _BEYOND) * low, (1.0 + _BEYOND) * high, _CHART_DELAYS)
+        top = (1.0 + _BEYOND) * high or problem.loop.sample_time or 1.0  # a chart has a height
+        wide = np.linspace((1.0 - _BEYOND) * low, top, _CHART_DELAYS)
         delays = np.unique(np.append(wide, problem.delays))
         return (_mapped(problem, middle, {free[0]: survey.axes[0], "delay": delays}),)
     held = problem.named(gains)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.extremes import check_dies_out, read_ringing
 from deadtime._estimation.feedback import FEEDBACK, feedback_p_value
 from deadtime._estimation.input_output import InputOutput, read_input_output
 from deadtime._estimation.read_off import check_delay_alone, read_off_estimate
@@ -55,7 +56,10 @@ def estimate_by_arx_scan(
     data = simulated.recording
     read = read_input_output(recording, loop, simulated, "arx_scan")
     # Noise that comes back within the same sample is taken for an answer at no delay.
-    least = 1 if feedback_p_value(data) < FEEDBACK else 0
+    feedback = feedback_p_value(data) < FEEDBACK
+    least = 1 if feedback else 0
+    if feedback:
+        check_dies_out(read_ringing(data), "arx_scan")
     if fractional:
         if read.remark:
             raise ValueError(

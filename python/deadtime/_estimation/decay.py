@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.decrement import read_extremes
+from deadtime._estimation.extremes import check_dies_out, read_extremes
 from deadtime._estimation.held_transfer import held_transfer
 from deadtime._estimation.read_off import check_delay_alone, read_off_estimate
 from deadtime._estimation.residuals import robust_covariance
@@ -57,7 +57,9 @@ def estimate_by_decay(
     share = positive("tail", tail)
     if share >= 1.0:
         raise ValueError(f"tail={tail}: it begins where that share of the step is left, below 1")
-    if read_extremes(answer):
+    extremes = read_extremes(answer)
+    check_dies_out(extremes, "decay")
+    if extremes:
         raise NotIdentifiableError(
             "the output overshoots, so the rightmost roots are no real ones and the tail is no "
             "exponential: use method='decrement', 'overshoot' or 'waveform'"

@@ -8,9 +8,8 @@ equations: with cos φ = σ/abs(s) and no lag, Td = φ/ω_d and K = ω_d e^(-σ 
 gain. In a sampled loop 1 + K H(e^(s h); Td) = 0, H the held plant, takes its place. A known
 gain is used by conditioning: with the covariance C of (Td, K), Td moves by C_TK/C_KK (K_known - K).
 
-Peaks are vertices of cubics fitted around them, so they lie between samples and average noise. Only
-those within the limit of the command are linear and used. The first still holds some per cent of
-other roots, a smaller share of each that follows.
+Only peaks within the limit of the command are linear and used. The first still holds some per cent
+of other roots, a smaller share of each that follows.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +24,12 @@ from scipy.optimize import brentq
 
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.evidence import checked_names
+from deadtime._estimation.extremes import (
+    Extreme,
+    check_dies_out,
+    read_extremes,
+    weighted_slope,
+)
 from deadtime._estimation.held_transfer import held_transfer
 from deadtime._estimation.read_off import read_off_estimate
 from deadtime._estimation.result import DelayEstimate
@@ -34,34 +38,14 @@ from deadtime._estimation.step_reading import StepReading, read_step, stiffness_
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 
-__all__ = ["estimate_by_decrement", "loop_with_root", "read_extremes"]
+__all__ = ["estimate_by_decrement", "loop_with_root"]
 
 Array = NDArray[np.float64]
-
-#: Half of the part of a half period to which a cubic is fitted; a cosine leaves it by
-#: (0.25 π)^4/24 = 1.6 % there, and the vertex far less.
-AROUND = 0.25
 
 #: Share of an extreme that the other roots make up, for the first extreme and from one extreme to
 #: the next. With K Td between 0.5 and 1.5 the second pair decays 30 to 100 times as much per half
 #: period as the first.
 OTHER_ROOTS = 0.03
-
-#: An extreme stands out of the noise by this many standard deviations: the largest of a few hundred
-#: samples of noise, some of which has gone round the loop, stays below.
-CLEAR = 5.0
-
-#: Heights below this share of the step are rounding.
-SMALLEST = 1e-6
-
-
-class Extreme(NamedTuple):
-    """A peak or valley: when, how far from the reference as a share of the step, and how sure."""
-
-    time: float
-    height: float
-    time_error: float
-    height_error: float
 
 
 def estimate_by_decrement(
@@ -82,7 +66,9 @@ def estimate_by_decrement(
     stiffness = stiffness_of(loop, "decrement")
     simulated = SimulatedRecording(recording, loop, window)
     answer = read_step(simulated.recording)
-    extremes = _linear(read_extremes(answer), answer, loop)
+    extremes = read_extremes(answer)
+    check_dies_out(extremes, "decrement")
+    extremes = _linear(extremes, answer, loop)
     pair, pair_cov = _ringing(extremes)
     lag = loop.parameters["lag"]
 
@@ -166,72 +152,6 @@ def loop_with_root(root: complex, lag: float, sample_time: float | None) -> tupl
     return delay, gain_at(delay).real
 
 
-def read_extremes(answer: StepReading) -> list[Extreme]:
-    """Peaks and valleys that stand out of the noise, from the first peak on."""
-    beyond = answer.travelled - 1.0
-    least = max(CLEAR * answer.noise, SMALLEST)
-    places: list[int] = []
-    side = -1.0
-    for row, value in enumerate(beyond):
-        if side * value < -least:  # the other side of the reference, beyond doubt
-            side = -side
-            places.append(row)
-        elif places and side * value > side * beyond[places[-1]]:
-            places[-1] = row
-    found: list[Extreme] = []
-    for index, place in enumerate(places):
-        gaps = np.diff(answer.since[places[max(0, index - 1) : index + 2]])
-        half = float(gaps.mean()) if gaps.size else float(answer.since[place])
-        vertex = _vertex(answer, beyond, place, AROUND * half)
-        if vertex is None:
-            break
-        found.append(vertex)
-    return found
-
-
-def _vertex(answer: StepReading, beyond: Array, place: int, reach: float) -> Extreme | None:
-    """Vertex of a cubic through what lies within `reach` of a sample; None where there is none."""
-    near = np.abs(answer.since - answer.since[place]) <= reach
-    if int(near.sum()) < 5:
-        near = np.abs(np.arange(beyond.size) - place) <= 2
-    if not near[:-1].any() or near[-1] or int(near.sum()) < 5:
-        return None  # the window ends before the extreme has passed
-    times = (answer.since[near] - answer.since[place]) / reach
-    # Noise can take the vertex from a cubic; a parabola always has one.
-    for degree in (3, 2) if times.size > 5 else (2,):
-        powers = np.vander(times, degree + 1, increasing=True)
-        coefficients, *_ = np.linalg.lstsq(powers, beyond[near], rcond=None)
-        curve = np.polynomial.Polynomial(coefficients)
-        vertex = _nearest_extreme(curve)
-        if vertex is not None:
-            break
-    else:
-        return None
-    # Covariance of the coefficients for a noise of one: it matters of the noise-free case too.
-    cov = np.linalg.inv(powers.T @ powers)
-    at = vertex ** np.arange(degree + 1)
-    rate = np.arange(degree + 1) * np.concatenate([[0.0], at[:-1]])
-    noise = max(answer.noise, SMALLEST)
-    return Extreme(
-        time=float(answer.since[place]) + reach * vertex,
-        height=float(abs(curve(vertex))),
-        time_error=noise
-        * math.sqrt(rate @ cov @ rate)
-        / abs(float(curve.deriv(2)(vertex)))
-        * reach,
-        height_error=noise * math.sqrt(at @ cov @ at),
-    )
-
-
-def _nearest_extreme(curve: np.polynomial.Polynomial) -> float | None:
-    """Where the curve is farthest from zero, nearest to the middle of -1 to 1."""
-    found = np.asarray(curve.deriv().roots(), dtype=complex)
-    real = found[(np.abs(found.imag) < 1e-9) & (np.abs(found.real) <= 1.0)].real
-    bend = curve.deriv(2)
-    places = [float(root) for root in real if float(bend(root)) * float(curve(root)) < 0.0]
-    return min(places, key=abs) if places else None
-
-
 def _linear(extremes: list[Extreme], answer: StepReading, loop: ControlLoop) -> list[Extreme]:
     """The extremes from the first on at which the command is within its limit."""
     most = math.inf
@@ -264,10 +184,10 @@ def _ringing(extremes: list[Extreme]) -> tuple[Array, Array]:
     height = np.array([extreme.height for extreme in extremes])
     time = np.array([extreme.time for extreme in extremes])
     impure = OTHER_ROOTS ** (index + 1.0)
-    half, half_error = _line(
+    half, half_error = weighted_slope(
         index, time, np.hypot([e.time_error for e in extremes], impure * np.diff(time).mean())
     )
-    fall, fall_error = _line(
+    fall, fall_error = weighted_slope(
         index, np.log(height), np.hypot([e.height_error for e in extremes] / height, impure)
     )
     omega = math.pi / half
@@ -280,14 +200,6 @@ def _ringing(extremes: list[Extreme]) -> tuple[Array, Array]:
     slopes = np.array([[-1.0 / half, -sigma / half], [0.0, -omega / half]])
     cov = slopes @ np.diag([fall_error**2, half_error**2]) @ slopes.T
     return np.array([sigma, omega]), cov
-
-
-def _line(index: Array, values: Array, errors: Array) -> tuple[float, float]:
-    """Slope of a weighted line, and its standard error."""
-    weights = 1.0 / errors**2
-    centre = np.average(index, weights=weights)
-    power = float(weights @ (index - centre) ** 2)
-    return float(weights @ ((index - centre) * values)) / power, 1.0 / math.sqrt(power)
 
 
 def _message(extremes: list[Extreme], names: tuple[str, ...], pair: Array) -> str:

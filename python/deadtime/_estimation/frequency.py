@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,11 +159,7 @@ def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest
     if nyquist:
         weight[-1] = math.sqrt(1.0 / size)
 
-    def misfit(values: dict[str, float]) -> Array:
-        path = _path(data, response, values)
-        lines = weight * np.fft.rfft(data.output - values["gain"] * path)[kept]
-        return np.concatenate([lines.real, lines.imag])
-
+    misfit = _RecordMisfit(data, response, weight, kept)
     describe = f"{int(kept.sum())} of one record"
     span = float(data.time[-1] - data.time[0])
     return Lines(misfit, False, real - numbers, 1.0, LONGEST * span, data.sample_time, describe)
@@ -170,21 +167,6 @@ def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest
 
 def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) -> Lines:
     """Excited lines of periods, over the standard deviations that the periods show."""
-    z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
-    floor = ROUNDING * float(np.max(np.abs(spectra.output)))
-
-    def misfit(values: dict[str, float]) -> Array:
-        g = values["gain"] * held_transfer(z, values["delay"], values["lag"], sample_time)
-        variance = (
-            spectra.output_variance
-            + np.abs(g) ** 2 * spectra.input_variance
-            - 2.0 * (spectra.covariance * np.conj(g)).real
-        )
-        # Per real part; the power of all parts is then a chi-square.
-        spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
-        lines = (spectra.output - g * spectra.input) / spread
-        return np.concatenate([lines.real, lines.imag])
-
     freedom = 2 * spectra.lines.size - numbers
     if freedom < 2:
         raise NotIdentifiableError(
@@ -195,7 +177,47 @@ def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) 
     widening = spectra.freedom / (spectra.freedom - 1.0)
     describe = f"{spectra.lines.size} of {spectra.periods} periods"
     longest = min(LONGEST * spectra.periods, 1.0) * spectra.samples * sample_time
+    misfit = _PeriodicMisfit(spectra, sample_time)
     return Lines(misfit, True, freedom, widening, longest, sample_time, describe)
+
+
+@dataclass(frozen=True, eq=False)
+class _RecordMisfit:
+    """Misfit at the `kept` lines of one record, times a weight."""
+
+    data: Recording
+    response: HeldResponse
+    weight: Array
+    kept: NDArray[np.bool_]
+
+    def __call__(self, values: dict[str, float]) -> Array:
+        path = _path(self.data, self.response, values)
+        spectrum = np.fft.rfft(self.data.output - values["gain"] * path)
+        lines = self.weight * spectrum[self.kept]
+        return np.concatenate([lines.real, lines.imag])
+
+
+@dataclass(frozen=True, eq=False)
+class _PeriodicMisfit:
+    """Misfit at the excited lines over the standard deviation that the periods show there."""
+
+    spectra: PeriodicSpectra
+    sample_time: float
+
+    def __call__(self, values: dict[str, float]) -> Array:
+        spectra = self.spectra
+        z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
+        floor = ROUNDING * float(np.max(np.abs(spectra.output)))
+        g = values["gain"] * held_transfer(z, values["delay"], values["lag"], self.sample_time)
+        variance = (
+            spectra.output_variance
+            + np.abs(g) ** 2 * spectra.input_variance
+            - 2.0 * (spectra.covariance * np.conj(g)).real
+        )
+        # Per real part; the power of all parts is then a chi-square.
+        spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
+        lines = (spectra.output - g * spectra.input) / spread
+        return np.concatenate([lines.real, lines.imag])
 
 
 def _path(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import signal, special
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.extremes import check_dies_out, read_ringing
 from deadtime._estimation.feedback import FEEDBACK, feedback_p_value
 from deadtime._estimation.input_output import InputOutput, read_input_output
 from deadtime._estimation.read_off import check_delay_alone, read_off_estimate
@@ -62,8 +63,15 @@ def estimate_by_gcc(
     simulated = SimulatedRecording(recording, loop, window)
     data = simulated.recording
     read = read_input_output(recording, loop, simulated, "gcc")
+    if int(np.count_nonzero(np.diff(read.command))) < 2:
+        raise NotIdentifiableError(
+            "the command changes once in the window, as one at its limit throughout does: its "
+            "correlation has no peak; use a smaller step, or method='output_error'"
+        )
     p_value = feedback_p_value(data)
     feedback = p_value < FEEDBACK
+    if feedback:
+        check_dies_out(read_ringing(data), "gcc")
     # Noise that comes back within the same sample makes a peak at no shift.
     least = 1 if feedback else 0
     gain = float(loop.parameters.get("gain", 1.0))

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.extremes import check_dies_out, read_extremes
 from deadtime._estimation.read_off import check_delay_alone, read_off_estimate
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
@@ -59,6 +60,7 @@ def estimate_by_graphical(
         raise ValueError(f"construction={construction!r} is not one of {choices}")
     simulated = SimulatedRecording(recording, loop, window)
     answer = read_step(simulated.recording)
+    check_dies_out(read_extremes(answer), "graphical")
     moved = _first_movement(answer)
     delay, stderr = float(answer.since[moved]), math.nan
     if construction != "first_movement":

@@ -54,6 +54,10 @@ SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 #: Valleys of the curve that are refined; the deepest wins.
 REFINED = 3
 
+#: A lag is none where none raises the cost by no more than this share: next to zero it delays
+#: like a delay, and the two cannot be told apart.
+VANISHING = 1e-6
+
 #: A misfit for simulations that leave all bounds, in units of the output's range.
 HOPELESS = 1e3
 
@@ -245,22 +249,48 @@ class _Problem:
         """The deepest of the deepest valleys, all numbers at their best."""
         valleys = sorted({int(np.argmin(costs)), *_valleys(costs)}, key=lambda row: costs[row])
         found = [self._descended(points[row]) for row in valleys[:REFINED]]
-        return min(found, key=self.cost)
+        return self._without_lag(min(found, key=self.cost))
 
-    def _descended(self, point: Array) -> Array:
-        """Least squares over all numbers, from a point."""
+    def _without_lag(self, point: Array) -> Array:
+        """The shortest lag, the delay taking it over, where that fits as well."""
+        if "lag" not in self.labels:
+            return point
+        delay, lag = self.labels.index("delay"), self.labels.index("lag")
+        without = point.copy()
+        without[delay] += point[lag] - self.low[lag]
+        without[lag] = self.low[lag]
+        without = self._descended(without, held=lag)
+        rounding = len(self.simulated.recording) * (ROUNDING * self.range) ** 2
+        as_well = self.cost(without) <= self.cost(point) * (1.0 + VANISHING) + rounding
+        return without if as_well else point
+
+    def _descended(self, point: Array, held: int | None = None) -> Array:
+        """Least squares over all numbers, or all but one, from a point."""
+        loose = [place for place in range(point.size) if place != held]
+
+        def at(moved: Array) -> Array:
+            whole = point.copy()
+            whole[loose] = moved
+            return whole
+
+        def misfit(moved: Array) -> Array:
+            return self.misfit(at(moved))
+
+        def jacobian(moved: Array) -> Array:
+            return self.jacobian(at(moved))[:, loose]
+
         found = least_squares(
-            self.misfit,
-            np.clip(point, self.low, self.high),
-            jac=self.jacobian,
-            bounds=(self.low, self.high),
-            x_scale=self.scale,
+            misfit,
+            np.clip(point, self.low, self.high)[loose],
+            jac=jacobian,
+            bounds=(self.low[loose], self.high[loose]),
+            x_scale=self.scale[loose],
             xtol=1e-12,
             ftol=1e-12,
             gtol=1e-12,
             max_nfev=60,
         )
-        return np.asarray(found.x)
+        return at(np.asarray(found.x))
 
     def at_least(self, point: Array, place: int) -> bool:
         """Whether a delay or lag came out at the shortest there is."""

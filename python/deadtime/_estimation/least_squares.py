@@ -201,7 +201,16 @@ class ProfileCost:
     def __call__(self, name: str, value: float) -> float:
         """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
         base, free = self._held(name.split("+"), value)
-        return minimise(self.model, self.best.point, base, free, TO_COMPARE).cost
+        least = minimise(self.model, self.best.point, base, free, TO_COMPARE).cost
+        # What the best fit has none of is none here too, unless more of it is better.
+        for place in np.flatnonzero(self.best.point < self.model.low):
+            column = np.flatnonzero(free[place] == 1.0)
+            if column.size:
+                base[place] = self.best.point[place]
+                without = np.delete(free, column, axis=1)
+                found = minimise(self.model, self.best.point, base, without, TO_COMPARE)
+                least = min(least, found.cost)
+        return least
 
     def _held(self, names: Sequence[str], value: float) -> tuple[Array, Array]:
         """Base and directions in which the sum of `names` is `value`."""
@@ -209,8 +218,8 @@ class ProfileCost:
         value -= sum(self.known.get(name, 0.0) for name in names if name not in labels)
         places = [labels.index(name) for name in names if name in labels]
         fixed = places[0]
-        if len(places) == 1:
-            # What cannot be none is as short as is sought.
+        if len(places) == 1 and value != self.best.point[fixed]:
+            # Between none and the shortest that is sought there is nothing.
             value = max(value, float(self.model.low[fixed]))
         base = np.zeros(len(labels))
         base[fixed] = value

@@ -27,10 +27,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 from deadtime._errors import NotIdentifiableError
+from deadtime._estimation.extremes import check_dies_out, read_extremes
 from deadtime._estimation.read_off import read_off_estimate
 from deadtime._estimation.result import DelayEstimate
 from deadtime._estimation.simulated import SimulatedRecording
-from deadtime._estimation.step_reading import CLEARANCE, read_step, stiffness_of
+from deadtime._estimation.step_reading import CLEARANCE, StepReading, read_step, stiffness_of
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording, Step
 
@@ -163,7 +164,10 @@ def estimate_by_overshoot(
         raise ValueError(f"map={map!r} is not one of {', '.join(get_args(OvershootMap))}")
     stiffness = stiffness_of(loop, "overshoot")
     simulated = SimulatedRecording(recording, loop, window)
-    read = read_overshoot(simulated.recording)
+    answer = read_step(simulated.recording)
+    if map != "saturated":  # which knows of the limit
+        check_dies_out(read_extremes(answer), "overshoot")
+    read = read_overshoot(answer)
 
     def delay_of(value: float) -> float:
         if map == "dominant":
@@ -199,9 +203,8 @@ def estimate_by_overshoot(
     )
 
 
-def read_overshoot(recording: Recording) -> Overshoot:
-    """The overshoot of the one step in a recording, refused where there is none."""
-    answer = read_step(recording)
+def read_overshoot(answer: StepReading) -> Overshoot:
+    """The overshoot of the answer to a step, refused where there is none."""
     row = int(np.argmax(answer.travelled))
     value = float(answer.travelled[row]) - 1.0
     settled = max(0.0, float(np.mean(answer.tail)) - 1.0)

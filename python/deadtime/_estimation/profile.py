@@ -77,6 +77,8 @@ class Profile:
             return self.statistic(name, value + offset) - quantile
 
         inner, factor = 0.0, 1.0
+        if excess(inner) > 0.0:  # the best fit is exact to rounding, which is all that is left
+            return value
         while factor <= FARTHEST:
             outer = reach * factor
             if value + outer <= floor:

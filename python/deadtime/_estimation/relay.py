@@ -28,6 +28,7 @@ from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.held_response import HeldResponse
 from deadtime._estimation.read_off import check_delay_alone, estimate_with_residuals
 from deadtime._estimation.result import DelayEstimate
+from deadtime._estimation.step_reading import scatter_of_bends
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 from deadtime._recording import Recording
@@ -90,13 +91,14 @@ def estimate_by_relay(
             f"{plant.lag:g} s is shorter than it is taken to be, or there is no delay"
         )
     path = _Path(data, switches, signs, delay, plant.lag)
+    first, last = data.time[path.rows[[0, -1]]]
     slope = abs(plant.gain) * height if height is not None else path.slope
     waits = float(np.mean(switches - crossings[:-1]))
     peaks = _peaks(data.time, error, crossings)
     return estimate_with_residuals(
         "relay",
         loop,
-        data,
+        data.window(float(first), float(last)),
         {"delay": delay},
         np.array([[stderr**2]]),
         path.residuals(slope),
@@ -140,8 +142,7 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
 def _crossings(time: Array, error: Array) -> Array:
     """Times at which the output crosses the reference, between samples."""
     # Second differences of a path of straight lines are noise, except at the corners.
-    noise = float(np.median(np.abs(np.diff(error, 2)))) / 0.6745 / math.sqrt(6.0)
-    beyond = max(CLEARANCE * noise, 1e-9 * float(np.ptp(error)))
+    beyond = max(CLEARANCE * scatter_of_bends(error), 1e-9 * float(np.ptp(error)))
     rough, side, last = [], 0.0, 0
     for row, value in enumerate(error):
         if abs(value) <= beyond:

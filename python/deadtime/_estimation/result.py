@@ -84,7 +84,8 @@ class DelayEstimate(ReadOnlyArrays):
         What was fitted.
     stderr : dict of str to float
         Standard errors of the free quantities, s or the unit of the gain; ``delay+lag`` is there
-        whenever the delay is. They are robust ones when the residuals are not white.
+        whenever the delay is. They are robust ones when the residuals are not white, and NaN
+        where the method has none (`uncalibrated` says why).
     cov : ndarray, shape (len(free), len(free))
         Their covariance.
     crb : CramerRaoBound or None

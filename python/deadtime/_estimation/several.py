@@ -50,6 +50,8 @@ def each_flight(
             raise TypeError(f"recording {index} is a {type(one).__name__}, not a Recording")
         if not isinstance(its_loop, ControlLoop):
             raise TypeError(f"loop {index} is a {type(its_loop).__name__}, not a ControlLoop")
+        if ends is not None and not (isinstance(ends, (tuple, list)) and len(ends) == 2):
+            raise TypeError(f"window={ends!r}: give (start, stop) in s, None for an open end")
         flights.append(FlownOnce(one, its_loop, ends))
     plants = {type(flight.loop.plant).__name__ for flight in flights}
     if len(plants) > 1:

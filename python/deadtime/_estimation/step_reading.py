@@ -14,7 +14,7 @@ from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 from deadtime._recording import Recording, Step
 
-__all__ = ["CLEARANCE", "StepReading", "read_step", "stiffness_of"]
+__all__ = ["CLEARANCE", "StepReading", "read_step", "scatter_of_bends", "stiffness_of"]
 
 #: What is read has to stand out of the noise by this many standard deviations.
 CLEARANCE = 3.0
@@ -130,6 +130,10 @@ def _noise(before: Array, tail: Array) -> float:
     resting = float(np.std(before, ddof=1)) if before.size >= 5 else 0.0
     if before.size >= ENOUGH:
         return resting
-    # Few samples often show too little; second differences pass over what still moves at the end.
-    bends = np.diff(tail, 2)
-    return max(resting, float(np.median(np.abs(bends))) / 0.6745 / math.sqrt(6.0))
+    # Few samples often show too little.
+    return max(resting, scatter_of_bends(tail))
+
+
+def scatter_of_bends(values: Array) -> float:
+    """Standard deviation of the noise on three values or more of something that moves smoothly."""
+    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / math.sqrt(6.0)
