@@ -53,6 +53,15 @@ def test_where_the_noise_goes_is_found_out(circulates):
     assert right >= 16
 
 
+def test_a_recording_may_begin_with_its_step():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36, sample_time=TS, limit=1.0)
+    flight = dtm.Experiment.step(6.0).fly(loop)
+    fit = dtm.estimate_delay(flight, loop.replace(delay=None), method="waveform")
+    assert (fit.delay, fit.gain) == pytest.approx((0.36, 1.0), abs=1e-6)
+    with pytest.raises(dtm.NotIdentifiableError, match="nothing excites"):
+        dtm.estimate_delay(flight, loop, method="waveform", window=(3.0, 6.0))
+
+
 def test_a_known_start_sharpens_the_waveform():
     flight, known = fly(0.01, seed=3, circulates=False)
     free = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))

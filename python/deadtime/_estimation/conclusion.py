@@ -94,7 +94,6 @@ def concluded(
     *,
     message: str,
     details: Mapping[str, Any],
-    advice: str = "",
 ) -> DelayEstimate:
     """Judge a minimum and return the estimate.
 
@@ -109,8 +108,6 @@ def concluded(
         What was done, in words.
     details : mapping
         Quantities of the method alone.
-    advice : str
-        What to try where the model is not adequate.
     """
     names, labels = model.names, model.labels
     count = len(names)
@@ -157,7 +154,7 @@ def concluded(
         residuals=flights[0].residuals,
         whiteness=whiteness,
         adequate=adequate,
-        message=_message(message, held, reason, adequate, advice),
+        message=_message(message, held, reason, adequate, _advice(names, flights[0].loop)),
         details={**details, **{name: values[name] for name in ("start",) if name in values}},
         others=flights[1:],
         _profile=Profile(
@@ -191,6 +188,14 @@ def _why_not_gauss(values: Mapping[str, float], samples: int, numbers: int) -> s
     if samples < FEW * (numbers + 1):
         return f"{samples} samples are few"
     return ""
+
+
+def _advice(names: Sequence[str], loop: ControlLoop) -> str:
+    """What to try where the model is not adequate."""
+    slow = [name for name in ("lag", "time_constant") if name in loop.parameters]
+    if slow and slow[0] not in names:
+        return f" (try free=('delay', 'gain', '{slow[0]}'))"
+    return " (try a window around one step, a smaller step, or another plant)"
 
 
 def _message(done: str, held: list[str], reason: str, adequate: bool, advice: str) -> str:

@@ -93,7 +93,6 @@ def estimate_from_commands(
         done += " as the controller made it of the recorded output, whose noise goes through it"
     elif sources != {"logged"}:
         done += ", which was not logged but computed from reference and output"
-    advice = "" if {"lag", "time_constant"} & set(names) else " (try free=('delay', 'gain', 'lag'))"
     start = found.point[len(names) :] if initial_output is None else [initial_output]
     return concluded(
         method,
@@ -106,7 +105,6 @@ def estimate_from_commands(
             "command": " or ".join(sorted(sources)),
             **({"noise": "loop"} if computed else {}),
         },
-        advice=advice,
     )
 
 

@@ -297,6 +297,11 @@ class DelayEstimate(ReadOnlyArrays):
             lines.append(line.rstrip())
         if not self.calibrated:
             lines.append(f"  no interval: {self.uncalibrated}")
+        if self.crb is not None and "delay" in self.crb.stderr:
+            lines.append(
+                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for white noise of "
+                f"{self.crb.noise:.3g} with {', '.join(self.crb.free)} free"
+            )
         kind = "white" if self.whiteness.white else "coloured"
         lines.append(
             f"  residuals {self.rms:.4g} rms, {kind} (lag-1 autocorrelation "

@@ -131,7 +131,6 @@ def _by_simulation(
     model, found = solve_jointly(models)
     found = without_vanishing(model, found)
     _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
-    advice = "" if "lag" in names else " (try free=('delay', 'gain', 'lag'))"
     return concluded(
         "waveform",
         model,
@@ -145,7 +144,6 @@ def _by_simulation(
             "initial_output": float([*found.point, initial_output][len(names)]),
             "noise": "recording",
         },
-        advice=advice,
     )
 
 
@@ -241,7 +239,8 @@ class _Model(ModelOfOne):
 
 def _model(flight: FlownOnce, names: tuple[str, ...], offset: float | None = None) -> _Model:
     simulated = SimulatedRecording(flight.recording, flight.loop, flight.window)
-    check_excitation(simulated.recording, len(names), from_rest=True)
+    in_flight = simulated.recording.time[0] > flight.recording.time[0]
+    check_excitation(simulated.recording, len(names), in_flight=in_flight)
     return _Model(simulated, names, offset)
 
 
