@@ -205,3 +205,16 @@ def test_a_command_at_its_limit_throughout_has_no_peak():
         dtm.estimate_delay(flight, known, method="gcc")
     fit = dtm.estimate_delay(flight, known, method="output_error")
     assert fit.delay == pytest.approx(0.36, abs=1e-9)
+
+
+def test_noise_that_the_controller_saw_is_no_answer():
+    # A step of the command explained the offset that the noise of the first sample left.
+    flight, known = fly(Kp=2.0, duration=8.0, rest=1.0)
+    for seed in range(30):
+        noise = 0.05 * noise_for_output(flight, seed).output
+        command = np.clip(2.0 * (flight.reference - noise), -1.0, 1.0)
+        for method in METHODS:
+            with pytest.raises(dtm.NotIdentifiableError):
+                dtm.estimate_delay(
+                    swapped(flight, output=noise, command=command), known, method=method
+                )

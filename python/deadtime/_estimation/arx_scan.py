@@ -68,13 +68,13 @@ def estimate_by_arx_scan(
             )
         gain = float(loop.parameters["gain"])
         samples, losses, none = _held_scan(read, float(np.sign(gain)), least)
-        numbers = 2
+        numbers, best = 2, float(losses[least:].min())
     else:
         poles, zeros = whole_number("na", na, least=0), whole_number("nb", nb, least=1)
         numbers = poles + zeros
-        losses, none = _scan(data.output - data.output[0], read, poles, zeros)
+        losses, best, none = _scan(data.output - data.output[0], read, poles, zeros, least)
         samples = float(least + np.argmin(losses[least:]))
-    _check_answer(float(losses[least:].min()), none, data.output.size, numbers)
+    _check_answer(best, none, data.output.size, numbers)
     delay = max(0.0, samples * read.sample_time - (read.late if fractional else 0.0))
     order = "the plant undone" if fractional else f"na={na}, nb={nb}"
     return read_off_estimate(
@@ -104,8 +104,14 @@ def _delayed(values: Array, samples: int, size: int) -> Array:
     return np.concatenate([np.zeros(samples), values])[:size]
 
 
-def _scan(output: Array, read: InputOutput, na: int, nb: int) -> tuple[Array, float]:
-    """Loss for each whole number of samples, and that without any input."""
+def _scan(
+    output: Array, read: InputOutput, na: int, nb: int, least: int
+) -> tuple[Array, float, float]:
+    """Loss for each whole number of samples; that of the best and that without any input.
+
+    The last two have a constant beside: the noise of the first sample shifts all others, which a
+    step of the command would explain.
+    """
     size = output.size
     past = [_delayed(output, lag, size) for lag in range(1, na + 1)]
 
@@ -119,7 +125,9 @@ def _scan(output: Array, read: InputOutput, na: int, nb: int) -> tuple[Array, fl
     # A held command takes one sample by itself.
     inputs = [_delayed(read.command, lag + 1, size) for lag in range(read.longest + nb)]
     losses = [loss([*past, *inputs[late : late + nb]]) for late in range(read.longest)]
-    return np.array(losses), loss(past)
+    place = least + int(np.argmin(losses[least:]))
+    constant = [*past, np.ones(size)]
+    return np.array(losses), loss([*constant, *inputs[place : place + nb]]), loss(constant)
 
 
 def _held_scan(read: InputOutput, sign: float, least: int) -> tuple[float, Array, float]:
