@@ -377,6 +377,14 @@ def test_a_script_that_would_start_itself_again_is_told_what_to_do(tmp_path):
     assert "processes=1" in run.stderr.splitlines()[-1]
 
 
+def test_what_the_loop_has_is_free_unless_said():
+    experiment = dtm.Experiment.step()
+    plain = dtm.identifiability(held_loop(), experiment, noise=0.01)
+    assert plain.free == ("delay", "gain")
+    lagging = dtm.identifiability(held_loop(lag=0.1), experiment, noise=0.01)
+    assert lagging.free == ("delay", "gain", "lag")
+
+
 # --- how it fails ---------------------------------------------------------------------------
 
 
@@ -390,7 +398,12 @@ def flat(value=0.0):
         (held_loop(lag=0.1), flat(), {}, "excites nothing"),
         (held_loop(lag=0.1), flat(1e3), {}, "1 throughout, at its limit"),
         (held_loop(delay=3.0), dtm.Experiment.step(2.0, 0.5), {"free": ("delay",)}, "for longer"),
-        (held_loop(), dtm.Experiment.step(), {}, "guess a lag"),
+        (
+            held_loop(),
+            dtm.Experiment.step(),
+            {"free": ("delay", "gain", "lag")},
+            "guess a lag",
+        ),
         (
             dtm.ControlLoop(
                 dtm.RationalPlant([1.0, 2.0], [1.0, 1.0]), dtm.P(0.5), delay=0.3, sample_time=TS

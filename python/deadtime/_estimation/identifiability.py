@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.evidence import checked_names
+from deadtime._estimation.evidence import OF_THE_VEHICLE, checked_names
 from deadtime._estimation.monte_carlo import SLOW, MonteCarlo, Plan, flown_many_times
 from deadtime._estimation.planned_bound import (
     PlannedBound,
@@ -207,7 +207,7 @@ def identifiability(
     experiment: Experiment,
     *,
     noise: float,
-    free: Sequence[str] = ("delay", "gain", "lag"),
+    free: Sequence[str] | None = None,
     initial_output: float | None = None,
     flights: int = 0,
     seed: int = 0,
@@ -222,8 +222,9 @@ def identifiability(
         What is to be flown.
     noise : float
         Standard deviation of the noise on the measured output, white, in the output's unit.
-    free : sequence of str
-        What is to be fitted: any of ``"delay"``, ``"gain"`` and ``"lag"``.
+    free : sequence of str, optional
+        What is to be fitted: any of ``"delay"``, ``"gain"``, ``"lag"`` and ``"time_constant"``. By
+        default all of them that the loop has, a lag only where it is above zero.
     initial_output : float, optional
         0.0 where the output at the start is known, as experiments start at zero; by default it
         is fitted too.
@@ -274,6 +275,8 @@ def identifiability(
         raise TypeError(f"loop is a {type(loop).__name__}, not a ControlLoop")
     if not isinstance(experiment, Experiment):
         raise TypeError(f"experiment is a {type(experiment).__name__}, not an Experiment")
+    if free is None:
+        free = ["delay", *(name for name in OF_THE_VEHICLE if loop.parameters.get(name))]
     names = checked_names(free, loop)
     level = positive("noise", noise)
     if initial_output is not None and finite("initial_output", initial_output) != 0.0:
