@@ -41,6 +41,17 @@ def test_the_response_is_that_of_a_fine_simulation(lag):
     np.testing.assert_allclose(found.value, truth, rtol=0, atol=2e-4)
 
 
+@pytest.mark.parametrize("lag", [0.003, 0.06, 2.0])
+def test_even_and_uneven_commands_give_one_response(lag):
+    # One command a little late leaves the filters for the recursion.
+    time = TS * np.arange(200)
+    command = np.random.default_rng(0).normal(size=200)
+    late = time + np.where(np.arange(200) == 150, 1e-10, 0.0)
+    even, uneven = (HeldResponse(t, command).at(time + 0.4 * TS, lag) for t in (time, late))
+    for one, other in zip(even, uneven, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-7)
+
+
 @given(
     steps=st.lists(st.floats(0.01, 1.0), min_size=2, max_size=8),
     lag=st.one_of(st.just(0.0), st.floats(0.02, 2.0)),

@@ -15,10 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 __all__ = ["HeldResponse", "Response"]
 
 Array = NDArray[np.float64]
+
+#: Commands are evenly apart where their distances differ by rounding of the time only.
+EVEN = 1e-11
 
 
 class Response(NamedTuple):
@@ -43,6 +47,8 @@ class HeldResponse:
     def __init__(self, time: Array, command: Array) -> None:
         self.time, self.command = time, command
         self._steps = np.diff(time)
+        self._kept: tuple[float, Array, Array] | None = None
+        self._is_even = bool(np.ptp(self._steps) <= EVEN * self._steps.mean())
         # A lag of less has died away before it matters, and would overflow below.
         self._shortest = 1e-7 * float(self._steps.min(initial=np.inf))
         self._integral = np.concatenate([[0.0], np.cumsum(command[:-1] * self._steps)])
@@ -66,15 +72,30 @@ class HeldResponse:
         return Response(integral - lag * v, v, -v - lag * p)
 
     def _velocities(self, lag: float) -> tuple[Array, Array]:
-        """V and dv/dlag when each command begins."""
-        v, p = np.zeros_like(self.command), np.zeros_like(self.command)
-        decays = np.exp(-self._steps / lag)
-        slopes = self._steps / lag**2
-        now, slope = 0.0, 0.0
-        for k, (u, decay, rate) in enumerate(
-            zip(self.command[:-1].tolist(), decays.tolist(), slopes.tolist(), strict=True), 1
-        ):
-            slope = decay * (slope + (now - u) * rate)
-            now = u + (now - u) * decay
-            v[k], p[k] = now, slope
-        return v, p
+        """V and dv/dlag when each command begins; those of the last lag are kept."""
+        if self._kept is None or self._kept[0] != lag:
+            decays, rates = np.exp(-self._steps / lag), self._steps / lag**2
+            recursion = _even if self._is_even else _uneven
+            self._kept = (lag, *recursion(self.command, decays, rates))
+        return self._kept[1], self._kept[2]
+
+
+def _even(command: Array, decays: Array, rates: Array) -> tuple[Array, Array]:
+    """The recursion of v and dv/dlag where commands are evenly apart: two filters."""
+    d = float(decays[0])
+    v = lfilter([0.0, 1.0 - d], [1.0, -d], command)
+    p = lfilter([0.0, d * float(rates[0])], [1.0, -d], v - command)
+    return np.asarray(v), np.asarray(p)
+
+
+def _uneven(command: Array, decays: Array, rates: Array) -> tuple[Array, Array]:
+    """The recursion of v and dv/dlag, step by step."""
+    v, p = np.zeros_like(command), np.zeros_like(command)
+    now, slope = 0.0, 0.0
+    for k, (u, decay, rate) in enumerate(
+        zip(command[:-1].tolist(), decays.tolist(), rates.tolist(), strict=True), 1
+    ):
+        slope = decay * (slope + (now - u) * rate)
+        now = u + (now - u) * decay
+        v[k], p[k] = now, slope
+    return v, p

@@ -30,7 +30,7 @@ EVALUATIONS = 200
 
 #: Where a search ends, as a change of cost or parameters: at rounding for the answer; earlier where
 #: minima are compared, or only the cost is wanted, which is flat there.
-TO_ROUNDING, TO_COMPARE = 1e-14, 1e-7
+TO_ROUNDING, TO_COMPARE = 1e-14, 1e-6
 
 
 class Model(Protocol):
@@ -189,9 +189,10 @@ def minimise(
 
 @dataclass(frozen=True)
 class ProfileCost:
-    """Least cost with one quantity held, the others free, searched from the best point of all.
+    """Least cost with one quantity held, the others free.
 
-    `known` holds the numbers that were not fitted, which may be part of a sum.
+    Searched from where the linearised model has it. `known` holds the numbers that were not
+    fitted, which may be part of a sum.
     """
 
     model: Model
@@ -201,16 +202,24 @@ class ProfileCost:
     def __call__(self, name: str, value: float) -> float:
         """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
         base, free = self._held(name.split("+"), value)
-        least = minimise(self.model, self.best.point, base, free, TO_COMPARE).cost
+        least = minimise(self.model, self._linear(base, free), base, free, TO_COMPARE).cost
         # What the best fit has none of is none here too, unless more of it is better.
         for place in np.flatnonzero(self.best.point < self.model.low):
             column = np.flatnonzero(free[place] == 1.0)
             if column.size:
                 base[place] = self.best.point[place]
                 without = np.delete(free, column, axis=1)
-                found = minimise(self.model, self.best.point, base, without, TO_COMPARE)
+                start = self._linear(base, without)
+                found = minimise(self.model, start, base, without, TO_COMPARE)
                 least = min(least, found.cost)
         return least
+
+    def _linear(self, base: Array, free: Array) -> Array:
+        """Where the others move to when one is held, by the derivatives at the best point."""
+        jacobian = self.best.jacobian
+        away = jacobian @ (self.best.point - base)
+        moved, *_ = np.linalg.lstsq(jacobian @ free, away, rcond=None)
+        return np.asarray(base + free @ moved)
 
     def _held(self, names: Sequence[str], value: float) -> tuple[Array, Array]:
         """Base and directions in which the sum of `names` is `value`."""

@@ -24,7 +24,10 @@ Array = NDArray[np.float64]
 FARTHEST = 64.0
 
 #: Ends are found to this part of a standard error.
-END = 1e-4
+END = 1e-3
+
+#: They are sought a little farther out than a Gaussian interval ends.
+BEYOND = 1.05
 
 
 def floor_of(name: str) -> float:
@@ -65,7 +68,7 @@ class Profile:
 
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
         """Ends of the interval around the fitted `value`, no lower than it can be."""
-        quantile = float(special.stdtrit(self.freedom, 0.5 + level / 2)) ** 2
+        quantile = float(special.stdtrit(self.freedom, 0.5 + level / 2))
         floor = floor_of(name)
         reach = max(stderr, 1e-9 * abs(value), 1e-12)
         return self._end(name, value, -reach, quantile, floor), self._end(
@@ -73,10 +76,11 @@ class Profile:
         )
 
     def _end(self, name: str, value: float, reach: float, quantile: float, floor: float) -> float:
+        # In t itself, which is nearly a line, so that secants find the end.
         def excess(offset: float) -> float:
-            return self.statistic(name, value + offset) - quantile
+            return float(np.sqrt(self.statistic(name, value + offset)) - quantile)
 
-        inner, factor = 0.0, 1.0
+        inner, factor = 0.0, BEYOND * quantile
         if excess(inner) > 0.0:  # the best fit is exact to rounding, which is all that is left
             return value
         while factor <= FARTHEST:
