@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,11 @@ from deadtime._errors import NotIdentifiableError
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 
-__all__ = ["commands_over_samples", "known_commands"]
+__all__ = ["commands_over_samples", "known_commands", "moves_between_rows"]
+
+#: A logged command is the controller's own where it differs from that by so little of its size:
+#: noise that is in the log alone parts them.
+ALIKE = 0.2
 
 
 def known_commands(recording: Recording, loop: ControlLoop) -> tuple[NDArray[np.float64], str]:
@@ -31,6 +36,18 @@ def known_commands(recording: Recording, loop: ControlLoop) -> tuple[NDArray[np.
         )
     command = loop.controller.Kp * (recording.reference - recording.output)
     return np.clip(command, -limit, limit), "computed from reference and output"
+
+
+def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
+    """Whether a logged command is that of a continuous P controller, and so is held nowhere.
+
+    Anything else that was logged as a command, such as a setpoint, is taken as held.
+    """
+    if loop.is_sampled or recording.command is None or not isinstance(loop.controller, P):
+        return False
+    made, _ = known_commands(replace(recording, command=None), loop)
+    logged, _ = known_commands(recording, loop)
+    return float(np.std(made - logged)) < ALIKE * float(np.std(logged))
 
 
 def commands_over_samples(

@@ -20,7 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._errors import NotIdentifiableError
-from deadtime._estimation.commands import known_commands
+from deadtime._estimation.commands import (
+    commands_over_samples,
+    known_commands,
+    moves_between_rows,
+)
 from deadtime._estimation.conclusion import Fitted, concluded, without_vanishing
 from deadtime._estimation.evidence import checked_names, excited
 from deadtime._estimation.excitation import check_moves
@@ -267,6 +271,8 @@ def _model(
 def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[Array, str]:
     """The command of every row: logged, or as the controller makes it of reference and output."""
     if recording.command is not None and not computed:
+        if moves_between_rows(recording, loop):
+            return commands_over_samples(recording, loop)
         return known_commands(recording, loop)
     found = known_commands(replace(recording, command=None), loop)
     if loop.sample_time is None:
