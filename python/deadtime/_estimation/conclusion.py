@@ -43,6 +43,12 @@ VANISHING = 1e-6
 #: It is tried where its move alone makes the cost no larger than this many times.
 NEARLY = 2.0
 
+#: A lag within so many standard errors of none may be none. There the statistic of the delay is no
+#: chi-square of one degree of freedom, but at most an even mixture of one and two (Self & Liang
+#: 1987), whose 95 % quantile is this many times as large.
+NEAR_BOUND = 1.96
+MIXTURE = 5.138 / 3.841
+
 #: A number this close to its bound, as a part of its range, is at it.
 AT_BOUND = 1e-4
 
@@ -161,9 +167,7 @@ def concluded(
             cost=ProfileCost(model, found, flights[0].loop.parameters),
             best=found.cost,
             freedom=freedom,
-            widening={
-                name: errors[name] / error if error > 0.0 else 1.0 for name, error in plain.items()
-            },
+            widening=_widening(values, errors, plain),
             preferred=reason,
         ),
     )
@@ -188,6 +192,17 @@ def _why_not_gauss(values: Mapping[str, float], samples: int, numbers: int) -> s
     if samples < FEW * (numbers + 1):
         return f"{samples} samples are few"
     return ""
+
+
+def _widening(
+    values: Mapping[str, float], errors: Mapping[str, float], plain: Mapping[str, float]
+) -> dict[str, float]:
+    """Robust over plain standard errors; the delay's interval is wider next to no lag."""
+    found = {name: errors[name] / error if error > 0.0 else 1.0 for name, error in plain.items()}
+    lag = values.get("lag")
+    if lag is not None and "delay" in found and lag <= NEAR_BOUND * plain["lag"]:
+        found["delay"] *= math.sqrt(MIXTURE)
+    return found
 
 
 def _advice(names: Sequence[str], loop: ControlLoop) -> str:
