@@ -64,8 +64,17 @@ def test_a_recording_may_begin_with_its_step():
 
 def test_a_known_start_sharpens_the_waveform():
     flight, known = fly(0.01, seed=3, circulates=False)
-    free = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
-    told = dtm.estimate_delay(flight, known, method="waveform", free=("delay",), initial_output=0.0)
+    free, told = (
+        dtm.estimate_delay(
+            flight,
+            known,
+            method="waveform",
+            free=("delay",),
+            noise="recording",
+            initial_output=start,
+        )
+        for start in (None, 0.0)
+    )
     assert told.crb.free == ("delay",)
     assert free.crb.free == ("delay", "initial output")
     assert told.stderr["delay"] < free.stderr["delay"]

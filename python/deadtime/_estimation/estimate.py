@@ -96,7 +96,8 @@ def estimate_delay(
         - ``initial_output``: the true output at the start, where it is known and need not be
           fitted (``"output_error"``, ``"waveform"``, ``"grid"``, ``"cta"``).
         - ``noise`` (``"waveform"``): ``"recording"`` where noise is in the recording alone,
-          ``"loop"`` where the controller saw it, too, ``"auto"`` for the likelier.
+          ``"loop"`` where the controller saw it, too; ``"auto"`` takes the latter for rows that
+          are the samples of a P controller, unless the former is likelier by far.
         - ``period`` of the excitation, s, with ``left_out=1`` periods of transient, and
           ``highest``, Hz (``"frequency"``).
         - ``delays`` to try, s (``"grid"``); ``intervals=8`` (``"cta"``).

@@ -10,7 +10,8 @@ The residuals are white only if the model is the vehicle and the noise enters at
 but does not circulate through the controller. Where it does (`noise="loop"`), the controller of the
 model reads the recorded output in place of the simulated one: what is left over are the
 innovations, and they are white. Both are predictions with as many numbers, so the one that leaves
-less over is the likelier; the innovations are taken where they are so by far (`noise="auto"`).
+less over is the likelier. What a controller read at its samples is what is in the rows, so the
+innovations are taken unless the other is likelier by far (`noise="auto"`).
 """
 
 from __future__ import annotations
@@ -66,7 +67,8 @@ HOPELESS = 1e3
 #: A misfit below this part of the excitation is rounding.
 ROUNDING = 1e-9
 
-#: Innovations are taken where their log likelihood is larger by this much, a factor of 20.
+#: Noise is taken to be in the recording alone where that is likelier by this log likelihood, a
+#: factor of 20.
 LIKELIER = 3.0
 
 
@@ -90,8 +92,8 @@ def estimate_by_waveform(
         innovations = _by_innovations(recording, loop, window, free, initial_output)
     except NotIdentifiableError:  # the command cannot be computed, or says less than the loop
         return simulated
-    likelier = _unlikelihood(simulated) - _unlikelihood(innovations)
-    return innovations if likelier > LIKELIER else simulated
+    likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
+    return simulated if likelier > LIKELIER else innovations
 
 
 def _unlikelihood(fit: DelayEstimate) -> float:
