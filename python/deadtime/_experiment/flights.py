@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 from deadtime._controllers import PV, P
 from deadtime._recording import Recording, Step
 
-__all__ = ["FlownSteps", "LoopTiming", "StepFigures", "Telemetry", "read_telemetry", "telemetry_of"]
+__all__ = [
+    "FlownSteps",
+    "LoopTiming",
+    "StepFigures",
+    "Telemetry",
+    "named",
+    "read_telemetry",
+    "telemetry_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -116,8 +124,7 @@ class FlownSteps:
     @property
     def name(self) -> str:
         """The controller with its gains."""
-        gains = ", ".join(f"{key} = {value:.3g}" for key, value in self.controller.gains.items())
-        return f"{type(self.controller).__name__}, {gains}"
+        return named(self.controller)
 
     @cached_property
     def steps(self) -> list[StepFigures]:
@@ -162,6 +169,12 @@ class FlownSteps:
         return LoopTiming(
             float(np.median(periods)), float(periods.std()), float(periods.max()), missed
         )
+
+
+def named(controller: P | PV) -> str:
+    """A controller with its gains, in words."""
+    gains = ", ".join(f"{name} = {value:.3g}" for name, value in controller.gains.items())
+    return f"{type(controller).__name__}, {gains}"
 
 
 def read_telemetry(path: Path, recording: Recording) -> Telemetry | None:

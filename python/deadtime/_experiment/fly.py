@@ -1,22 +1,23 @@
 """The paper's experiment from end to end: fly P, learn the delay, design PV for it, fly that.
 
 The vehicle takes off and lands once for each flight. Between learning and checking the link is
-closed: what computes for seconds cannot answer a vehicle's watchdogs.
+closed: what computes for seconds cannot answer a vehicle's watchdogs, and no vehicle waits in the
+air for it.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from contextlib import AbstractAsyncContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 from deadtime._controllers import PV, P
-from deadtime._experiment.flights import FlownSteps
+from deadtime._experiment.flights import FlownSteps, named
 from deadtime._experiment.height_control import PAPER_FILTER, HeightControl
-from deadtime._experiment.learn import FlightStudy, Learned, learn
+from deadtime._experiment.learn import FlightStudy, learn
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain, fly_steps
 from deadtime._readers import read_recording
 from deadtime._validation import positive
@@ -25,6 +26,8 @@ from deadtime.links.safety import Limits
 from deadtime.links.vehicle import Vehicle, VehicleState
 
 __all__ = ["FlightPlan", "TellsAll", "fly_experiment"]
+
+Connect: TypeAlias = Callable[[], AbstractAsyncContextManager[Vehicle]]
 
 #: Columns of a file with every message of the vehicle.
 MESSAGE = (
@@ -133,24 +136,28 @@ class FlightPlan:
         ]
 
 
-async def fly_experiment(
-    connect: Callable[[], Vehicle],
+def fly_experiment(
+    connect: Connect,
     plan: FlightPlan,
     folder: Path,
     progress: Callable[[str], None] = lambda stage: None,
+    run: Callable[[Coroutine[Any, Any, list[FlownSteps]]], list[FlownSteps]] = asyncio.run,
 ) -> FlightStudy:
     """Fly the plan.
 
     Parameters
     ----------
     connect : callable
-        Makes a vehicle that is not connected yet.
+        Makes an asynchronous context manager whose value is a connected vehicle, and that lands it.
     plan : FlightPlan
         What to fly.
     folder : Path
         Recordings are saved there as they come.
     progress : callable
         Called with the name of each stage as it begins: one for each flight, and two between.
+    run : callable
+        Runs a coroutine to its end: `asyncio.run`, or `deadtime.links.run` in virtual time. It is
+        called once to learn and once to check.
 
     Returns
     -------
@@ -168,32 +175,37 @@ async def fly_experiment(
         If the flights do not tell the delay.
     """
     plan.check()
-    flown: list[FlownSteps] = []
-    async with connect() as vehicle:
-        for Kp in plan.gains:
-            progress(f"flying P, Kp = {Kp:g}")
-            flown.append(await _flown(vehicle, P(Kp), plan, plan.hold, folder, len(flown) + 1))
+    tried = [P(Kp) for Kp in plan.gains]
+    flown = run(_fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
     progress("estimating the delay")
     learned = learn(flown, plan.limits.max_climb, plan.step, plan.gain_margin, progress)
-    # Whoever interrupted the computing does not want to see a vehicle take off.
-    await asyncio.sleep(0)
-    checked: list[FlownSteps] = []
-    async with connect() as vehicle:
-        for controller in _designed(learned):
-            progress(f"flying {type(controller).__name__} as designed")
-            number = len(flown) + len(checked) + 1
-            hold = plan.checked_hold
-            checked.append(await _flown(vehicle, controller, plan, hold, folder, number))
+    # The best P first: if it does not fly as it should, PV had better not be tried.
+    made = [design.loop.controller for design in (learned.proportional, learned.designed)]
+    designed = [one for one in made if isinstance(one, (P, PV))]
+    hold = plan.checked_hold
+    checked = run(_fly_all(connect, designed, plan, hold, folder, len(flown) + 1, progress))
     return FlightStudy(plan.step, plan.limits.max_climb, learned, tuple(checked))
 
 
-def _designed(learned: Learned) -> list[P | PV]:
-    """The best P first: if it does not fly as it should, PV had better not be tried."""
-    made = [design.loop.controller for design in (learned.proportional, learned.designed)]
-    return [one for one in made if isinstance(one, (P, PV))]
+async def _fly_all(
+    connect: Connect,
+    controllers: Sequence[P | PV],
+    plan: FlightPlan,
+    hold: float,
+    folder: Path,
+    number: int,
+    progress: Callable[[str], None],
+) -> list[FlownSteps]:
+    """One flight under each controller, over one link."""
+    flown = []
+    async with connect() as vehicle:
+        for place, controller in enumerate(controllers, number):
+            progress(f"flight {place} of {plan.flights}: {named(controller)}")
+            flown.append(await _fly_one(vehicle, controller, plan, hold, folder, place))
+    return flown
 
 
-async def _flown(
+async def _fly_one(
     vehicle: Vehicle, controller: P | PV, plan: FlightPlan, hold: float, folder: Path, number: int
 ) -> FlownSteps:
     """One flight, from taking off to landing."""

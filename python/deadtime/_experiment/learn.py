@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,17 @@ from deadtime._experiment.split import DelaySplit, split_delay
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 
-__all__ = ["FlightStudy", "Learned", "learn"]
+__all__ = ["COLUMNS", "FlightStudy", "Learned", "learn"]
+
+#: Heads of the columns that `FlightStudy.rows` fills.
+COLUMNS = (
+    "flight",
+    "overshoot / %",
+    "settled / s",
+    "paper's delay / s",
+    "period / ms",
+    "missed",
+)
 
 
 @dataclass(frozen=True)
@@ -107,6 +118,77 @@ class FlightStudy:
             f"A step {_did(before)} under {before.name}, and {_did(after)} under {after.name}."
         )
         return " ".join(said)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A line for each flight, under the heads `COLUMNS`."""
+        found = []
+        methods = [*self.learned.overshoot, *([""] * len(self.checked))]
+        for flight, paper in zip(self.flights, methods, strict=True):
+            delay = paper if isinstance(paper, str) else f"{paper.delay:.3f}"
+            settled = flight.settling_time
+            timing = flight.timing
+            found.append(
+                (
+                    flight.name,
+                    f"{flight.overshoot:.1f}",
+                    f"{settled:.2f}" if np.isfinite(settled) else "not",
+                    delay if len(delay) < 8 else "none",
+                    f"{1e3 * timing.period:.1f} ± {1e3 * timing.jitter:.1f}",
+                    f"{timing.missed}",
+                )
+            )
+        return found
+
+    def parts(self) -> list[tuple[str, str, str]]:
+        """What the delay consists of: a name, a value and a 95 % interval, s, for each line."""
+        fit, split = self.learned.fit, self.learned.split
+        lines = [
+            _part(fit, "delay", "delay, from command and height"),
+            _part(fit, "lag", "lag, from command and height"),
+            _part(fit, "delay+lag", "together"),
+        ]
+        if split is not None:
+            lines.append(_part(split.transport, "delay", "link, from the demand it echoes"))
+            late = "delay+time_constant" if "delay" in split.vehicle.free else "time_constant"
+            lines.append(_part(split.vehicle, late, "vehicle, from demand to climb"))
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the recordings, as plain values for JSON."""
+        learned = self.learned
+        split = learned.split
+        return {
+            "verdict": self.verdict(),
+            "fit": learned.fit.to_dict(),
+            "overshoot_method": [
+                one if isinstance(one, str) else one.delay for one in learned.overshoot
+            ],
+            "transport": None if split is None else split.transport.to_dict(),
+            "vehicle": None if split is None else split.vehicle.to_dict(),
+            "no_split_because": learned.unsplit,
+            "designed": learned.designed.gains,
+            "designed_p": learned.proportional.gains,
+            "flights": [
+                {
+                    "controller": flight.name,
+                    "overshoot": flight.overshoot,
+                    "settling_time": flight.settling_time,
+                    "recording": flight.path,
+                    "period": flight.timing.period,
+                    "jitter": flight.timing.jitter,
+                    "longest_period": flight.timing.longest,
+                    "missed": flight.timing.missed,
+                }
+                for flight in self.flights
+            ],
+        }
+
+
+def _part(fit: DelayEstimate, name: str, words: str) -> tuple[str, str, str]:
+    low, high = fit.ci(0.95, name)
+    known = {**fit.loop.parameters}
+    value = sum(known[part] for part in name.split("+"))
+    return words, f"{value:.3f}", f"{low:.3f} to {high:.3f}"
 
 
 def _did(flight: FlownSteps) -> str:

@@ -47,8 +47,8 @@ class DelaySplit:
         From the command to the demand that the vehicle reports: its ``delay``, and a gain that is
         1 if vehicle and ground station mean the same by a command.
     vehicle : DelayEstimate
-        From the demand to the climb: ``delay``, ``gain`` and ``time_constant``, and the sum
-        ``delay+time_constant``, which is known best.
+        From the demand to the climb: ``gain`` and ``time_constant``, and ``delay`` where there is
+        one; then the sum ``delay+time_constant`` is known best.
     """
 
     transport: DelayEstimate
@@ -83,12 +83,14 @@ def split_delay(flights: Sequence[Telemetry]) -> DelaySplit:
         [_followed(one) for one in flights], link, method="output_error", free=("delay", "gain")
     )
     own = link.replace(plant=FirstOrder(1.0, GUESS))
-    vehicle = estimate_delay(
-        [_climbed(one) for one in flights],
-        own,
-        method="output_error",
-        free=("delay", "gain", "time_constant"),
-    )
+    climbed = [_climbed(one) for one in flights]
+    free = ("delay", "gain", "time_constant")
+    vehicle = estimate_delay(climbed, own, method="output_error", free=free)
+    if vehicle.delay == 0.0:
+        # At its bound it is no number with an interval: a lag alone explains the answer.
+        vehicle = estimate_delay(
+            climbed, own.replace(delay=0.0), method="output_error", free=free[1:]
+        )
     return DelaySplit(transport, vehicle)
 
 
@@ -121,4 +123,5 @@ def _kept(flight: Telemetry) -> NDArray[np.bool_]:
     changed = np.append(True, np.diff(flight.demand) != 0.0)
     slots = np.floor(flight.time / SPARSE)
     spaced = np.append(True, np.diff(slots) > 0.0)
-    return np.logical_or(changed, spaced)
+    kept: NDArray[np.bool_] = changed | spaced
+    return kept

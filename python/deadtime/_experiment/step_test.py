@@ -7,6 +7,7 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 
+from deadtime._errors import FlightAbortedError
 from deadtime._experiment.height_control import HeightControl
 from deadtime._validation import finite, positive
 from deadtime.links.journal import Journal
@@ -178,6 +179,8 @@ async def fly_steps(
         while sample < programme.samples:
             await asyncio.sleep(max(0.0, begin + sample * programme.sample_time - clock()))
             state = await vehicle.state()
+            if not state.flying:
+                raise FlightAbortedError("the vehicle no longer flies, without having been told so")
             now = clock()
             reference = programme.reference(sample * programme.sample_time)
             watch.check(state, now, reference)
