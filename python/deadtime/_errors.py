@@ -14,7 +14,10 @@ __all__ = [
     "ConvergenceError",
     "CountMismatchError",
     "DeadtimeError",
+    "FlightAbortedError",
+    "LinkError",
     "NotIdentifiableError",
+    "PacketError",
     "RecordingError",
 ]
 
@@ -105,3 +108,25 @@ class NotIdentifiableError(DeadtimeError):
 
 class RecordingError(DeadtimeError, ValueError):
     """A recording cannot be used as it is; the message says what is wrong and where."""
+
+
+class LinkError(DeadtimeError):
+    """A link to a vehicle or to the other end of a loop cannot be made, or was lost."""
+
+
+class PacketError(LinkError, ValueError):
+    """Bytes that are no valid packet; the message says what is wrong and at which offset."""
+
+
+class FlightAbortedError(LinkError):
+    """A safety rule has ended a flight.
+
+    Attributes
+    ----------
+    reason : str
+        Which rule, with the value that broke it.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason

@@ -1,0 +1,233 @@
+"""What must hold of a command before it leaves, and the rules that end a flight.
+
+A command is a number in [-1, 1] by its type: nothing else can be written to the wire. A flight
+ends (hover, then land) when the vehicle strays from what it was asked, when it tilts, when its
+battery runs low, when a sensor is lost, when its messages are old or missing, and when it says that
+there is an emergency.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Self, SupportsFloat
+
+from deadtime._errors import FlightAbortedError
+from deadtime._validation import finite, positive
+from deadtime.links.vehicle import VehicleState
+
+__all__ = ["Limits", "UnitCommand", "Watch", "largest_gain"]
+
+
+class UnitCommand(float):
+    """A finite number in [-1, 1]: a share of what the vehicle may do.
+
+    Raises
+    ------
+    ValueError
+        If the value is not finite or lies outside; `saturated` clips finite values instead.
+
+    Examples
+    --------
+    >>> UnitCommand.saturated(1.7)
+    UnitCommand(1.0)
+    >>> UnitCommand(float("nan"))
+    Traceback (most recent call last):
+    ValueError: command=nan: give a finite number
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, value: SupportsFloat = 0.0) -> Self:  # noqa: D102
+        number = finite("command", value)
+        if not -1.0 <= number <= 1.0:
+            raise ValueError(f"command={number} is outside [-1, 1]: saturate it, or ask for less")
+        return super().__new__(cls, number)
+
+    @classmethod
+    def saturated(cls, value: SupportsFloat) -> Self:
+        """The command nearest to a finite value."""
+        return cls(max(-1.0, min(1.0, finite("command", value))))
+
+    def __repr__(self) -> str:
+        return f"UnitCommand({float(self)})"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a flight is kept within; none of it is a promise of the vehicle.
+
+    Attributes
+    ----------
+    max_climb : float
+        Largest vertical speed that is ever asked for, m/s.
+    min_height, max_height : float
+        Beyond these a flight is aborted, m. The vehicle is told the upper one, too, where it takes
+        it.
+    max_angle : float
+        Roll or pitch beyond which a flight is aborted, rad.
+    min_battery : float
+        Charge below which a flight is aborted, percent.
+    max_error : float
+        Distance from the reference beyond which a flight is aborted, m.
+    max_jump : float
+        Fastest change of the measured height that is believed, m/s.
+    max_state_age : float
+        Age of the newest message of the vehicle beyond which a flight is aborted, s.
+    max_missing : int
+        Messages in a row that may be lost before a flight is aborted.
+    command_age : float
+        A command older than this is replaced by hovering, s.
+    landing_after : float
+        Time without any new command after which the link lands the vehicle, s.
+    """
+
+    max_climb: float = 0.5
+    min_height: float = 0.2
+    max_height: float = 3.0
+    max_angle: float = math.radians(15.0)
+    min_battery: float = 20.0
+    max_error: float = 1.0
+    max_jump: float = 5.0
+    max_state_age: float = 0.3
+    max_missing: int = 20
+    command_age: float = 0.25
+    landing_after: float = 1.0
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            positive(item.name, getattr(self, item.name))
+        if self.min_height >= self.max_height:
+            raise ValueError(
+                f"min_height={self.min_height} is not below max_height={self.max_height}"
+            )
+        if self.command_age >= self.landing_after:
+            raise ValueError(
+                f"command_age={self.command_age} is not below landing_after={self.landing_after}: "
+                "a vehicle hovers before it lands"
+            )
+
+    def lines(self) -> list[str]:
+        """The limits in words, one a line, to be shown before a flight."""
+        return [
+            f"climbs and sinks at no more than {self.max_climb:g} m/s",
+            f"stays between {self.min_height:g} and {self.max_height:g} m, no more than "
+            f"{self.max_error:g} m from the reference",
+            f"aborts beyond {math.degrees(self.max_angle):g} degrees of roll or pitch, below "
+            f"{self.min_battery:g} % of battery, after {self.max_state_age:g} s without news",
+            f"hovers {self.command_age:g} s after the last command, lands after "
+            f"{self.landing_after:g} s",
+        ]
+
+
+def largest_gain(delay: float, gain: float = 1.0) -> float:
+    r"""The proportional gain that is flown at most before the delay is known.
+
+    Half of the gain pi / (2 delay gain) at which an integrator with this delay loses stability: a
+    gain margin of 2 if the delay is what it is believed to be.
+
+    Parameters
+    ----------
+    delay : float
+        What the delay is believed to be, lags included, s.
+    gain : float
+        Vertical speed per unit of command.
+
+    Examples
+    --------
+    >>> round(largest_gain(0.36, 0.885), 3)
+    2.465
+    """
+    return math.pi / (4.0 * positive("delay", delay) * positive("gain", gain))
+
+
+class Watch:
+    """Watches the states of one flight and ends it when a rule is broken.
+
+    Parameters
+    ----------
+    limits : Limits
+
+    Examples
+    --------
+    >>> watch = Watch(Limits())
+    >>> state = VehicleState(time=0.0, height=1.0, flying=True, landed=False, sequence=1, battery=9)
+    >>> watch.check(state, now=0.0)
+    Traceback (most recent call last):
+    deadtime._errors.FlightAbortedError: the battery is at 9 %, below 20 %
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self._last: VehicleState | None = None
+
+    def check(self, state: VehicleState, now: float, reference: float | None = None) -> None:
+        """Hold the newest state against the limits.
+
+        Parameters
+        ----------
+        state : VehicleState
+            The newest there is; the same one may come again.
+        now : float
+            The event loop's clock, s.
+        reference : float, optional
+            Height that was asked for, m; without it the error is not watched.
+
+        Raises
+        ------
+        FlightAbortedError
+            If a rule is broken.
+        """
+        broken = self._broken(state, now, reference)
+        self._last = state
+        if broken is not None:
+            raise FlightAbortedError(broken)
+
+    def _broken(self, state: VehicleState, now: float, reference: float | None) -> str | None:
+        limits = self.limits
+        if state.emergency:
+            return "the vehicle reports an emergency"
+        if state.sensor_fault is not None:
+            return f"the vehicle reports that {state.sensor_fault}"
+        if not now - state.time <= limits.max_state_age:
+            return (
+                f"the newest message is {now - state.time:.2f} s old, more than "
+                f"{limits.max_state_age:g} s"
+            )
+        if state.missing > limits.max_missing:
+            return f"{state.missing} messages in a row were lost, more than {limits.max_missing}"
+        angle = max(abs(state.roll), abs(state.pitch))
+        if not angle <= limits.max_angle:
+            return (
+                f"the vehicle is tilted by {math.degrees(angle):.0f} degrees, more than "
+                f"{math.degrees(limits.max_angle):g}"
+            )
+        if state.battery is not None and not state.battery >= limits.min_battery:
+            return f"the battery is at {state.battery:g} %, below {limits.min_battery:g} %"
+        if not limits.min_height <= state.height <= limits.max_height:
+            return (
+                f"the height is {state.height:.2f} m, outside {limits.min_height:g} to "
+                f"{limits.max_height:g} m"
+            )
+        if reference is not None and not abs(state.height - reference) <= limits.max_error:
+            return (
+                f"the height is {state.height:.2f} m and the reference {reference:.2f} m, more "
+                f"than {limits.max_error:g} m apart"
+            )
+        return self._broken_since(state)
+
+    def _broken_since(self, state: VehicleState) -> str | None:
+        """What is wrong with a state only in the light of the one before."""
+        last = self._last
+        if last is None or state.sequence == last.sequence:
+            return None
+        passed = state.time - last.time
+        if state.vehicle_time is not None and last.vehicle_time is not None:
+            passed = max(passed, state.vehicle_time - last.vehicle_time)
+        # A millimetre is the resolution of the height; messages may arrive in one burst.
+        if abs(state.height - last.height) > self.limits.max_jump * max(passed, 0.0) + 0.1:
+            return (
+                f"the height jumps from {last.height:.2f} to {state.height:.2f} m within "
+                f"{1e3 * passed:.0f} ms, faster than {self.limits.max_jump:g} m/s"
+            )
+        return None

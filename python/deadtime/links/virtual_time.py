@@ -1,0 +1,310 @@
+"""An event loop whose clock jumps to the next event, with a network in its memory.
+
+A program on asyncio that takes its time from the loop runs in it unchanged: sleeping takes no time,
+the order of events is that of their times, and every run is the same to the bit. Datagrams and
+streams travel between addresses of the same loop, at once and in the order in which they were sent;
+delay, loss and reordering are put between by a relay. Threads, processes and real sockets have no
+place in it: nothing outside can be waited for while the clock jumps.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar, cast
+
+from deadtime._errors import LinkError
+
+__all__ = ["VirtualTimeLoop", "run"]
+
+T = TypeVar("T")
+
+Address = tuple[str, int]
+
+#: Ports that are given out where none is asked for.
+FREE_PORTS = range(49152, 65536)
+
+
+def run(main: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine as `asyncio.run` does, in virtual time that begins at zero.
+
+    Raises
+    ------
+    LinkError
+        If everything waits and nothing is due any more: in virtual time that never ends.
+
+    Examples
+    --------
+    >>> import asyncio
+    >>> async def an_hour():
+    ...     await asyncio.sleep(3600.0)
+    ...     return asyncio.get_running_loop().time()
+    >>> run(an_hour())
+    3600.0
+    """
+    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+        return runner.run(main)
+
+
+class _Jump(selectors.BaseSelector):
+    """Moves the clock where a selector would wait; what is registered is only the loop's waker."""
+
+    def __init__(self) -> None:
+        self.time = 0.0
+        self._real = selectors.DefaultSelector()
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        ready = self._real.select(0)  # a signal, such as Ctrl-C
+        if ready:
+            return ready
+        if timeout is None:
+            raise LinkError("nothing is due any more and everything waits: a wait without an end")
+        self.time += max(timeout, 0.0)
+        return []
+
+    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
+        return self._real.register(fileobj, events, data)
+
+    def unregister(self, fileobj: Any) -> selectors.SelectorKey:
+        return self._real.unregister(fileobj)
+
+    def modify(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
+        return self._real.modify(fileobj, events, data)
+
+    def get_map(self) -> Any:
+        return self._real.get_map()
+
+    def close(self) -> None:
+        self._real.close()
+
+
+class VirtualTimeLoop(asyncio.SelectorEventLoop):
+    """The event loop of `run`."""
+
+    def __init__(self) -> None:
+        self._jump = _Jump()
+        super().__init__(self._jump)
+        self._datagrams: dict[Address, _Datagrams] = {}
+        self._servers: dict[Address, _Server] = {}
+
+    def time(self) -> float:
+        """Seconds since the loop was made."""
+        return self._jump.time
+
+    def _free(self, wanted: Address, taken: dict[Address, Any]) -> Address:
+        host, port = wanted
+        if port == 0:
+            port = next(port for port in FREE_PORTS if (host, port) not in taken)
+        elif (host, port) in taken:
+            raise OSError(98, f"the address {host}:{port} is in use")
+        return host, port
+
+    async def create_datagram_endpoint(  # type: ignore[override]
+        self,
+        protocol_factory: Callable[[], asyncio.DatagramProtocol],
+        local_addr: Address | None = None,
+        remote_addr: Address | None = None,
+        **others: Any,
+    ) -> tuple[asyncio.DatagramTransport, asyncio.DatagramProtocol]:
+        """As of asyncio, between addresses of this loop."""
+        local = self._free(local_addr or ("127.0.0.1", 0), self._datagrams)
+        protocol = protocol_factory()
+        transport = _Datagrams(self, protocol, local, remote_addr)
+        self._datagrams[local] = transport
+        self.call_soon(protocol.connection_made, transport)
+        await asyncio.sleep(0)
+        return transport, protocol
+
+    async def create_server(  # type: ignore[override]
+        self,
+        protocol_factory: Callable[[], asyncio.Protocol],
+        host: str | None = None,
+        port: int | None = None,
+        **others: Any,
+    ) -> _Server:
+        """As of asyncio, between addresses of this loop."""
+        local = self._free((host or "127.0.0.1", port or 0), self._servers)
+        self._servers[local] = _Server(self, protocol_factory, local)
+        return self._servers[local]
+
+    async def create_connection(  # type: ignore[override]
+        self,
+        protocol_factory: Callable[[], asyncio.Protocol],
+        host: str | None = None,
+        port: int | None = None,
+        **others: Any,
+    ) -> tuple[asyncio.Transport, asyncio.Protocol]:
+        """As of asyncio, between addresses of this loop."""
+        there = (host or "127.0.0.1", port or 0)
+        server = self._servers.get(there)
+        if server is None:
+            raise ConnectionRefusedError(111, f"nothing listens on {there[0]}:{there[1]}")
+        here = self._free((there[0], 0), self._servers)
+        near_protocol, far_protocol = protocol_factory(), server.protocol_factory()
+        near = _Stream(self, near_protocol, here, there)
+        far = _Stream(self, far_protocol, there, here)
+        near.peer, far.peer = far, near
+        self.call_soon(far_protocol.connection_made, far)
+        self.call_soon(near_protocol.connection_made, near)
+        await asyncio.sleep(0)
+        return near, near_protocol
+
+    async def create_unix_connection(self, *given: Any, **others: Any) -> Any:
+        """Refused: there is no such thing in the memory of this loop."""
+        raise NotImplementedError("in virtual time there are only datagrams and TCP streams")
+
+
+class _Datagrams(asyncio.DatagramTransport):
+    """One end of a network that loses nothing and takes no time."""
+
+    def __init__(
+        self,
+        loop: VirtualTimeLoop,
+        protocol: asyncio.DatagramProtocol,
+        local: Address,
+        remote: Address | None,
+    ) -> None:
+        super().__init__({"sockname": local, "peername": remote})
+        self._loop, self._protocol = loop, protocol
+        self._local, self._remote = local, remote
+        self._closing = False
+
+    def sendto(self, data: Any, addr: Any = None) -> None:
+        if self._closing:
+            return
+        target = addr or self._remote
+        if target is None:
+            raise ValueError("no address to send to: the endpoint is not connected")
+        if len(data) > 65507:
+            raise OSError(90, f"a datagram of {len(data)} bytes: 65507 at most")
+        there = self._loop._datagrams.get((target[0], target[1]))
+        if there is not None:
+            self._loop.call_soon(there._receive, bytes(data), self._local)
+        elif self._remote is not None:
+            # As the system does on one machine: a connected socket learns that nobody listens.
+            error = ConnectionRefusedError(111, f"nobody receives at {target[0]}:{target[1]}")
+            self._loop.call_soon(self._protocol.error_received, error)
+
+    def _receive(self, data: bytes, sender: Address) -> None:
+        if not self._closing and self._remote in (None, sender):
+            self._protocol.datagram_received(data, sender)
+
+    def close(self) -> None:
+        if not self._closing:
+            self._closing = True
+            self._loop._datagrams.pop(self._local, None)
+            self._loop.call_soon(self._protocol.connection_lost, None)
+
+    def abort(self) -> None:
+        self.close()
+
+    def is_closing(self) -> bool:
+        return self._closing
+
+
+class _Stream(asyncio.Transport):
+    """One end of a connection; what is written arrives at the other in order."""
+
+    peer: _Stream | None = None
+
+    def __init__(
+        self, loop: VirtualTimeLoop, protocol: asyncio.BaseProtocol, local: Address, remote: Address
+    ) -> None:
+        super().__init__({"sockname": local, "peername": remote})
+        self._loop, self._protocol = loop, protocol
+        self._closing = False
+
+    def write(self, data: Any) -> None:
+        if not self._closing and self.peer is not None:
+            self._loop.call_soon(self.peer._receive, bytes(data))
+
+    def _receive(self, data: bytes) -> None:
+        if not self._closing:
+            cast(asyncio.Protocol, self._protocol).data_received(data)
+
+    def _end(self) -> None:
+        """The other end has nothing more to say."""
+        if self._closing:
+            return
+        if not cast(asyncio.Protocol, self._protocol).eof_received():
+            self.close()
+
+    def write_eof(self) -> None:
+        if self.peer is not None:
+            self._loop.call_soon(self.peer._end)
+
+    def can_write_eof(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        if not self._closing:
+            self._closing = True
+            self._loop.call_soon(self._protocol.connection_lost, None)
+            self.write_eof()
+
+    def abort(self) -> None:
+        self.close()
+
+    def is_closing(self) -> bool:
+        return self._closing
+
+    def pause_reading(self) -> None:
+        """Nothing to pause: what is on its way is in memory already."""
+
+    def resume_reading(self) -> None:
+        """Nothing to resume."""
+
+    def get_write_buffer_size(self) -> int:
+        return 0
+
+    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
+        self._protocol = protocol
+
+    def get_protocol(self) -> asyncio.BaseProtocol:
+        return self._protocol
+
+
+class _Listening:
+    """What a server says of its socket."""
+
+    def __init__(self, local: Address) -> None:
+        self._local = local
+
+    def getsockname(self) -> Address:
+        return self._local
+
+
+class _Server(asyncio.AbstractServer):
+    """A listener at one address."""
+
+    def __init__(
+        self,
+        loop: VirtualTimeLoop,
+        protocol_factory: Callable[[], asyncio.Protocol],
+        local: Address,
+    ) -> None:
+        self._loop, self.protocol_factory, self._local = loop, protocol_factory, local
+        self.sockets = (_Listening(local),)
+
+    def close(self) -> None:
+        self._loop._servers.pop(self._local, None)
+
+    def is_serving(self) -> bool:
+        return self._local in self._loop._servers
+
+    def get_loop(self) -> asyncio.AbstractEventLoop:
+        return self._loop
+
+    async def wait_closed(self) -> None:
+        """Closing takes no time."""
+
+    async def start_serving(self) -> None:
+        """It has served from the start."""
+
+    async def serve_forever(self) -> None:
+        """Wait until it is cancelled."""
+        try:
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self.close()

@@ -1,0 +1,172 @@
+"""What every link shares: commands that cannot be wrong, limits, the watch, the journal."""
+
+import copy
+import math
+import pickle
+from dataclasses import replace
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime import FlightAbortedError
+from deadtime.links import Journal, Limits, UnitCommand, VehicleState, Watch, largest_gain
+from hypothesis import given
+from hypothesis import strategies as st
+
+STATE = VehicleState(
+    time=10.0, height=1.0, flying=True, landed=False, sequence=7, vehicle_time=3.0, battery=80.0
+)
+
+
+@given(st.floats())
+def test_a_command_is_finite_and_within_one_or_is_refused(value):
+    if math.isfinite(value):
+        assert -1.0 <= UnitCommand.saturated(value) <= 1.0
+        assert abs(UnitCommand.saturated(value) - value) == max(0.0, abs(value) - 1.0)
+    else:
+        with pytest.raises(ValueError, match="finite"):
+            UnitCommand.saturated(value)
+    if math.isfinite(value) and abs(value) <= 1.0:
+        assert UnitCommand(value) == value
+    else:
+        with pytest.raises(ValueError, match="command="):
+            UnitCommand(value)
+
+
+@pytest.mark.parametrize("wrong", ["0.5", None, 1j, b"1", [0.1]])
+def test_a_command_of_another_kind_is_refused(wrong):
+    with pytest.raises(TypeError, match="command="):
+        UnitCommand(wrong)
+
+
+def test_a_command_survives_copies():
+    command = UnitCommand(-0.25)
+    assert pickle.loads(pickle.dumps(command)) == copy.deepcopy(command) == command
+    assert type(pickle.loads(pickle.dumps(command))) is UnitCommand
+
+
+@pytest.mark.parametrize("name", list(Limits.__dataclass_fields__))
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, 0.0, -1.0])
+def test_a_limit_that_limits_nothing_is_refused(name, wrong):
+    with pytest.raises(ValueError, match=name):
+        Limits(**{name: wrong})
+
+
+def test_limits_that_contradict_each_other_are_refused():
+    with pytest.raises(ValueError, match="max_height"):
+        Limits(min_height=2.0, max_height=1.0)
+    with pytest.raises(ValueError, match="landing_after"):
+        Limits(command_age=2.0)
+
+
+def test_the_largest_gain_leaves_a_factor_of_two_to_instability():
+    loop = dtm.ControlLoop(dtm.Integrator(0.8), dtm.P(1.0), delay=0.3)
+    limit = loop.stable_range("Kp")[1]
+    assert largest_gain(0.3, 0.8) == pytest.approx(limit / 2.0, rel=1e-9)
+    for wrong in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(ValueError, match="delay"):
+            largest_gain(wrong)
+
+
+BROKEN = {
+    "emergency": ({"emergency": True}, {}),
+    "deaf": ({"sensor_fault": "its ultrasound is deaf"}, {}),
+    "0.31 s old": ({}, {"now": 10.31}),
+    "nan s old": ({}, {"now": math.nan}),
+    "21 messages": ({"missing": 21}, {}),
+    "16 degrees": ({"pitch": math.radians(-16.0)}, {}),
+    "tilted by nan": ({"pitch": 0.1, "roll": math.nan}, {}),
+    "battery": ({"battery": 19.0}, {}),
+    "battery is at nan": ({"battery": math.nan}, {}),
+    "height is 0.10": ({"height": 0.1}, {}),
+    "height is 3.50": ({"height": 3.5}, {}),
+    "height is nan": ({"height": math.nan}, {}),
+    "apart": ({}, {"reference": 2.2}),
+}
+
+
+@pytest.mark.parametrize("reason", BROKEN)
+def test_each_rule_ends_a_flight_and_names_itself(reason):
+    state, others = BROKEN[reason]
+    with pytest.raises(FlightAbortedError, match=reason) as caught:
+        Watch(Limits()).check(replace(STATE, **state), **{"now": 10.0, **others})
+    assert reason in caught.value.reason
+
+
+def test_what_is_within_the_limits_passes():
+    watch = Watch(Limits())
+    watch.check(STATE, now=10.29, reference=1.9)
+    watch.check(STATE, now=10.29, reference=0.1)
+    later = replace(STATE, time=10.1, sequence=8, vehicle_time=3.1, height=1.3, battery=None)
+    watch.check(later, now=10.1)
+
+
+def test_a_height_that_jumps_is_not_believed():
+    watch = Watch(Limits())
+    watch.check(STATE, now=10.0)
+    jumped = replace(STATE, time=10.01, sequence=8, vehicle_time=3.01, height=1.2)
+    with pytest.raises(FlightAbortedError, match=r"jumps from 1\.00 to 1\.20 m within 10 ms"):
+        watch.check(jumped, now=10.01)
+
+
+def test_messages_that_arrive_in_a_burst_are_judged_by_the_clock_of_the_vehicle():
+    watch = Watch(Limits())
+    watch.check(STATE, now=10.0)
+    watch.check(replace(STATE, sequence=9, vehicle_time=3.2, height=1.5), now=10.0)
+
+
+def test_the_limits_can_be_shown():
+    lines = " ".join(Limits().lines())
+    for number in ("0.5 m/s", "3 m", "15 degrees", "20 %", "0.25 s", "1 s"):
+        assert number in lines
+
+
+COLUMNS = ("time_s", "reference_m", "height_m")
+
+
+def test_every_row_is_in_the_file_before_the_next_is_written(tmp_path):
+    path = tmp_path / "folder" / "flight.csv"
+    journal = Journal(path, COLUMNS)
+    for row in range(10):
+        journal.write((0.065 * row, float(row > 4), 0.1 * row))
+        assert len(path.read_text().splitlines()) == row + 2
+    journal.close()
+    journal.close()
+    flight = dtm.read_recording(path, time="time_s", reference="reference_m", output="height_m")
+    np.testing.assert_allclose(flight.output, 0.1 * np.arange(10), rtol=1e-12)
+
+
+def test_a_recording_is_never_written_over(tmp_path):
+    path = tmp_path / "flight.csv"
+    Journal(path, COLUMNS).close()
+    with pytest.raises(FileExistsError):
+        Journal(path, COLUMNS)
+
+
+@pytest.mark.parametrize("row", [(0.0, 1.0), (0.0, 1.0, math.nan), (0.0, math.inf, 1.0)])
+def test_a_row_that_cannot_be_read_back_is_refused_and_leaves_the_file_whole(tmp_path, row):
+    with Journal(tmp_path / "flight.csv", COLUMNS) as journal:
+        journal.write((0.0, 1.0, None))
+        with pytest.raises(ValueError, match="row"):
+            journal.write(row)
+    assert journal.path.read_text() == "time_s,reference_m,height_m\n0.0,1.0,\n"
+    with pytest.raises(ValueError, match="closed"):
+        journal.write((0.0, 1.0, 2.0))
+
+
+@pytest.mark.parametrize("columns", [(), ("a", "a"), ("a,b",), ('a"',), ("a\n",), ("",)])
+def test_columns_that_cannot_be_read_back_are_refused(tmp_path, columns):
+    with pytest.raises(ValueError, match="name"):
+        Journal(tmp_path / "flight.csv", columns)
+    assert not (tmp_path / "flight.csv").exists()
+
+
+@given(st.floats(-1e9, 1e9))
+def test_twelve_digits_are_kept(value):
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory() as folder:
+        with Journal(Path(folder) / "one.csv", ["x"]) as journal:
+            journal.write([value])
+        assert float(journal.path.read_text().split()[1]) == pytest.approx(value, rel=1e-11)
