@@ -15,8 +15,14 @@ __all__ = [
     "LinearSystem",
     "QuasiPolynomial",
     "Signal",
+    "at_read",
+    "at_write",
+    "configuration_read",
+    "configuration_write",
     "dde_root_number",
     "dde_roots",
+    "doubles_read",
+    "doubles_write",
     "lambertw",
     "lambertw0",
     "lambertw0_number",
@@ -29,8 +35,14 @@ __all__ = [
     "largest_stable_box",
     "legendre_tables",
     "limit_threads",
+    "loop_packet_read",
+    "loop_packet_write",
     "loop_sensitivities",
     "nap",
+    "navdata_full",
+    "navdata_layouts",
+    "navdata_read",
+    "navdata_write",
     "proved_boxes",
     "robust_map",
     "sampled_abscissa_grid",
@@ -442,3 +454,23 @@ def solve_delay_equation(
     events: list[tuple[Any, int, int]],
     jumps: list[tuple[float, Any]],
 ) -> DelayRun: ...
+
+_Words: TypeAlias = tuple[int, int, int, int]
+_LoopFields: TypeAlias = tuple[int, float, int, float, float, float, float, int]
+
+def at_write(commands: Sequence[tuple[str, tuple[Any, ...]]], first: int) -> bytes: ...
+def at_read(datagram: bytes) -> list[tuple[int, str, tuple[Any, ...]]]: ...
+def navdata_read(
+    packet: bytes, verify: bool
+) -> tuple[_Words, list[tuple[int, bytes, tuple[float, ...] | None]], bool]: ...
+def navdata_write(
+    head: _Words, options: Sequence[tuple[int, bytes, tuple[float, ...] | None]]
+) -> bytes: ...
+def navdata_layouts() -> list[tuple[int, int, str, list[str]]]: ...
+def navdata_full() -> list[tuple[int, int]]: ...
+def configuration_read(dump: bytes) -> list[tuple[str, str]]: ...
+def configuration_write(settings: Sequence[tuple[str, str]]) -> bytes: ...
+def loop_packet_read(packet: bytes) -> _LoopFields: ...
+def loop_packet_write(fields: _LoopFields) -> bytes: ...
+def doubles_read(packet: bytes, count: int) -> list[float]: ...
+def doubles_write(values: Sequence[float]) -> bytes: ...

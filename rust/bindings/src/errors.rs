@@ -41,7 +41,7 @@ pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
 }
 
 /// An instance of a class of `deadtime._errors`.
-fn own<'py, A>(py: Python<'py>, class: &str, arguments: A) -> PyErr
+pub(crate) fn own<'py, A>(py: Python<'py>, class: &str, arguments: A) -> PyErr
 where
     A: pyo3::call::PyCallArgs<'py>,
 {

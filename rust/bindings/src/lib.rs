@@ -15,6 +15,7 @@ mod stability;
 mod sweeps;
 mod systems;
 mod ufunc;
+mod wire;
 
 use pyo3::prelude::*;
 
@@ -45,6 +46,12 @@ mod _deadtime {
     use super::systems::{PyLinearSystem, PySignal, legendre_tables};
     #[pymodule_export]
     use super::ufunc::limit_threads;
+    #[pymodule_export]
+    use super::wire::{
+        at_read, at_write, configuration_read, configuration_write, doubles_read, doubles_write,
+        loop_packet_read, loop_packet_write, navdata_full, navdata_layouts, navdata_read,
+        navdata_write,
+    };
     use pyo3::prelude::*;
 
     #[pymodule_init]

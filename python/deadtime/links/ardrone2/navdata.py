@@ -1,0 +1,301 @@
+"""Navdata: what the drone says of itself, UDP 5554.
+
+A packet is a head, options and a checksum. Firmwares add options and lengthen them; they are read
+by the sizes that they give themselves. `Navdata.options` keeps the bytes of all of them, so that
+what was read is written again bit by bit; known fields are written over those bytes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntFlag
+from typing import Any, TypeAlias
+
+from deadtime.links._wire import navdata_full, navdata_layouts, navdata_read, navdata_write
+from deadtime.links.ardrone2.navdata_options import (
+    AltitudeOption,
+    Demo,
+    KalmanPressure,
+    PhysicalMeasures,
+    Pressure,
+    Pwm,
+    RawMeasures,
+    RcReferences,
+    References,
+    VideoStream,
+    Wifi,
+)
+
+__all__ = [
+    "DEMO_OPTIONS",
+    "FULL_OPTIONS",
+    "AltitudeOption",
+    "Demo",
+    "KalmanPressure",
+    "Navdata",
+    "PhysicalMeasures",
+    "Pressure",
+    "Pwm",
+    "RawMeasures",
+    "RcReferences",
+    "References",
+    "State",
+    "VideoStream",
+    "Wifi",
+    "build_navdata",
+    "parse_navdata",
+]
+
+Options: TypeAlias = tuple[tuple[int, bytes], ...]
+
+HEADER = 0x55667788
+
+#: Every option of a full packet of 2190 bytes, all zero.
+FULL_OPTIONS: Options = tuple((tag, bytes(length)) for tag, length in navdata_full())
+#: The options of a short packet of 500 bytes, all zero: fields of `Demo` and the camera's findings.
+DEMO_OPTIONS: Options = tuple(option for option in FULL_OPTIONS if option[0] in (0, 16))
+
+
+class State(IntFlag):
+    """Bits of `Navdata.state`."""
+
+    FLYING = 1 << 0
+    VIDEO = 1 << 1
+    VISION = 1 << 2
+    ANGULAR_RATE_CONTROL = 1 << 3
+    ALTITUDE_CONTROL = 1 << 4
+    USER_FEEDBACK = 1 << 5
+    COMMAND_ACKNOWLEDGED = 1 << 6
+    CAMERA_READY = 1 << 7
+    TRAVELLING = 1 << 8
+    USB = 1 << 9
+    DEMO = 1 << 10
+    BOOTSTRAP = 1 << 11
+    MOTORS_PROBLEM = 1 << 12
+    COMMUNICATION_LOST = 1 << 13
+    SOFTWARE_FAULT = 1 << 14
+    BATTERY_LOW = 1 << 15
+    USER_EMERGENCY_LANDING = 1 << 16
+    TIMER_ELAPSED = 1 << 17
+    MAGNETOMETER_UNCALIBRATED = 1 << 18
+    ANGLES_OUT_OF_RANGE = 1 << 19
+    TOO_MUCH_WIND = 1 << 20
+    ULTRASOUND_DEAF = 1 << 21
+    CUTOUT = 1 << 22
+    PIC_VERSION_OK = 1 << 23
+    COMMAND_THREAD = 1 << 24
+    NAVDATA_THREAD = 1 << 25
+    VIDEO_THREAD = 1 << 26
+    ACQUISITION_THREAD = 1 << 27
+    CONTROL_WATCHDOG = 1 << 28
+    ADC_WATCHDOG = 1 << 29
+    COM_WATCHDOG = 1 << 30
+    EMERGENCY = 1 << 31
+
+
+def _bit(flag: State, says: str) -> property:
+    bit = int(flag)
+
+    def is_set(self: Navdata) -> bool:
+        return bool(self.state & bit)
+
+    return property(is_set, doc=says)
+
+
+@dataclass(frozen=True)
+class Navdata:
+    """One packet of navdata.
+
+    Attributes
+    ----------
+    state : int
+        Bits of `State`; the properties name those that matter.
+    sequence : int
+        Number of the packet, counted from 1 after a connection.
+    vision : int
+        Whether the camera's findings are defined.
+    clock : float, optional
+        The drone's clock, s. It starts again after 2048 s; later times are written so.
+    demo, raw_measures, physical_measures, references, rc_references, pwm, altitude, \
+video_stream, pressure, kalman_pressure, wifi
+        The options whose fields are known, None where they are not in the packet or too short.
+    options : tuple of (int, bytes)
+        Tag and bytes of every option, the known ones among them, in the order of the packet. To
+        build a packet of the drone's sizes give `FULL_OPTIONS` or `DEMO_OPTIONS`.
+    header : int
+        0x55667788; of some firmwares 0x55667789.
+    checksum_matches : bool
+        Whether the checksum of the packet that was read is that of its bytes.
+    """
+
+    state: int
+    sequence: int
+    vision: int = 0
+    demo: Demo | None = None
+    clock: float | None = None
+    raw_measures: RawMeasures | None = None
+    physical_measures: PhysicalMeasures | None = None
+    references: References | None = None
+    rc_references: RcReferences | None = None
+    pwm: Pwm | None = None
+    altitude: AltitudeOption | None = None
+    video_stream: VideoStream | None = None
+    pressure: Pressure | None = None
+    kalman_pressure: KalmanPressure | None = None
+    wifi: Wifi | None = None
+    options: Options = ()
+    header: int = HEADER
+    checksum_matches: bool = True
+
+    flying = _bit(State.FLYING, "In the air, from take-off to touching down.")
+    command_acknowledged = _bit(
+        State.COMMAND_ACKNOWLEDGED, "A setting was received, and waits for ``Control(5)``."
+    )
+    demo_mode = _bit(State.DEMO, "Packets are short and come 15 times a second.")
+    bootstrap = _bit(State.BOOTSTRAP, "Not configured yet: packets are a head alone.")
+    motors_problem = _bit(State.MOTORS_PROBLEM, "A motor does not turn as it should.")
+    communication_lost = _bit(State.COMMUNICATION_LOST, "Without commands for 2 s.")
+    software_fault = _bit(State.SOFTWARE_FAULT, "The drone's program has failed.")
+    battery_low = _bit(State.BATTERY_LOW, "Charge for no more than landing.")
+    angles_out_of_range = _bit(State.ANGLES_OUT_OF_RANGE, "Tilted too far.")
+    too_much_wind = _bit(State.TOO_MUCH_WIND, "More wind than it can hold against.")
+    ultrasound_deaf = _bit(State.ULTRASOUND_DEAF, "The height is lost.")
+    cutout = _bit(State.CUTOUT, "The motors have been stopped.")
+    com_watchdog = _bit(State.COM_WATCHDOG, "Without commands for 50 ms: information, no alarm.")
+    emergency = _bit(State.EMERGENCY, "Motors cut until the emergency is ended.")
+
+    @property
+    def height(self) -> float | None:
+        """Height, m."""
+        return None if self.demo is None else self.demo.height
+
+    @property
+    def climb(self) -> float | None:
+        """Vertical speed, m/s, up positive, where the packet says a finite one."""
+        if self.kalman_pressure is not None:
+            return _finite(self.kalman_pressure.est_zdot)
+        return None if self.altitude is None else _finite(-self.altitude.altitude_vz)
+
+    @property
+    def climb_demand(self) -> float | None:
+        """The vertical speed that the drone follows, m/s, up positive, where it says a finite one.
+
+        The echo of the commands that have reached it.
+        """
+        return None if self.pwm is None else _finite(self.pwm.vz_ref)
+
+    @property
+    def roll(self) -> float | None:
+        """Roll, rad, where the packet says a finite one."""
+        return None if self.demo is None else _finite(self.demo.roll)
+
+    @property
+    def pitch(self) -> float | None:
+        """Pitch, rad, where the packet says a finite one."""
+        return None if self.demo is None else _finite(self.demo.pitch)
+
+    @property
+    def yaw(self) -> float | None:
+        """Yaw, rad, where the packet says a finite one."""
+        return None if self.demo is None else _finite(self.demo.yaw)
+
+    @property
+    def battery(self) -> int | None:
+        """Charge left, percent."""
+        return None if self.demo is None else self.demo.battery
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+_KINDS: dict[str, Any] = {
+    "demo": Demo,
+    "raw_measures": RawMeasures,
+    "physical_measures": PhysicalMeasures,
+    "references": References,
+    "rc_references": RcReferences,
+    "pwm": Pwm,
+    "altitude": AltitudeOption,
+    "video_stream": VideoStream,
+    "pressure": Pressure,
+    "kalman_pressure": KalmanPressure,
+    "wifi": Wifi,
+}
+_FIELDS = {1: ("clock", float)} | {kind.tag: (name, kind) for name, kind in _KINDS.items()}
+_LENGTHS = {tag: length for tag, length, _, _ in navdata_layouts()}
+
+
+def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
+    """Read a packet of navdata.
+
+    Of an option that is there twice the first counts.
+
+    Parameters
+    ----------
+    packet : bytes
+        One datagram.
+    checksum : bool, optional
+        Refuse a packet whose checksum does not match; otherwise `Navdata.checksum_matches` tells.
+
+    Raises
+    ------
+    PacketError
+        If the header is another one, an option is smaller than its own head or ends beyond the
+        packet, or the checksum is missing, wrong or not the last option.
+
+    Examples
+    --------
+    >>> sent = Navdata(State.FLYING | State.DEMO, 7, demo=Demo(major=3, battery=80, height=1.25))
+    >>> packet = build_navdata(sent)
+    >>> parse_navdata(packet).height
+    1.25
+    >>> parse_navdata(packet[:-8])
+    Traceback (most recent call last):
+    deadtime._errors.PacketError: navdata: the last option is no checksum, at byte 164
+    """
+    (header, state, sequence, vision), read, matches = navdata_read(packet, checksum)
+    known: dict[str, Any] = {}
+    for tag, _, values in read:
+        if values is not None:
+            name, kind = _FIELDS[tag]
+            if name not in known:
+                known[name] = kind(*values)
+    options = tuple((tag, body) for tag, body, _ in read)
+    return Navdata(
+        state,
+        sequence,
+        vision,
+        options=options,
+        header=header,
+        checksum_matches=matches,
+        **known,
+    )
+
+
+def build_navdata(navdata: Navdata) -> bytes:
+    """Write a packet of navdata, with the checksum that is right for it.
+
+    The options of `navdata.options` come first and in their order, with the known fields written
+    over their bytes; then, by tag, those that are only in fields. None leaves bytes as they are.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or has no place on the wire.
+    """
+    fields = {
+        tag: (value,) if tag == 1 else tuple(vars(value).values())
+        for tag, (name, _) in _FIELDS.items()
+        if (value := getattr(navdata, name)) is not None
+    }
+    options: list[tuple[int, bytes, tuple[float, ...] | None]] = [
+        (tag, body, fields.pop(tag, None)) for tag, body in navdata.options
+    ]
+    options += [(tag, bytes(_LENGTHS[tag]), fields[tag]) for tag in sorted(fields)]
+    head = (navdata.header, navdata.state, navdata.sequence, navdata.vision)
+    try:
+        return navdata_write(head, options)
+    except OverflowError as error:
+        raise ValueError(f"header, state, sequence, vision = {head}: {error}") from None

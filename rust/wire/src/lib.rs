@@ -1,0 +1,27 @@
+//! Wire formats: the AR.Drone 2.0's commands, navdata and configuration, and a loop's UDP packets.
+//!
+//! Bytes come from a network, so a reader takes any: it never panics, never reads past the end,
+//! and its work grows linearly with the number of bytes. What it gives out is checked: a command's
+//! value is finite and in [-1, 1] by its type. Writers refuse what no reader may see.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`at`] | commands to the drone, UDP 5556 |
+//! | [`navdata`] | messages of the drone, UDP 5554 |
+//! | [`configuration`] | the drone's settings, TCP 5559 |
+//! | [`loop_packet`] | packets between the two ends of a control loop, and bare doubles |
+
+#![forbid(unsafe_code)]
+#![deny(clippy::indexing_slicing)]
+#![cfg_attr(test, allow(clippy::indexing_slicing))]
+
+pub mod at;
+mod bytes;
+pub mod configuration;
+mod error;
+pub mod loop_packet;
+pub mod navdata;
+mod unit;
+
+pub use error::{Error, Fault};
+pub use unit::Unit;
