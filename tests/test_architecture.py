@@ -86,9 +86,16 @@ FLOORS = [
     {"_experiment"},
     {"paper"},
     {"_plots"},
-    {"_stability_plots", "_box_plots", "_design_plots", "_planning_plots", "_paper_plots"},
+    {
+        "_stability_plots",
+        "_box_plots",
+        "_design_plots",
+        "_planning_plots",
+        "_paper_plots",
+        "_flight_plots",
+    },
     {"_page"},
-    {"_report", "_paper_page"},
+    {"_report", "_paper_page", "_flight_page"},
     {"_cli"},
 ]
 NUMERICS = FLOORS[2]

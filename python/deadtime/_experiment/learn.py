@@ -121,7 +121,7 @@ class FlightStudy:
 
     def rows(self) -> list[tuple[str, ...]]:
         """A line for each flight, under the heads `COLUMNS`."""
-        found = []
+        found: list[tuple[str, ...]] = []
         methods = [*self.learned.overshoot, *([""] * len(self.checked))]
         for flight, paper in zip(self.flights, methods, strict=True):
             delay = paper if isinstance(paper, str) else f"{paper.delay:.3f}"
@@ -139,10 +139,10 @@ class FlightStudy:
             )
         return found
 
-    def parts(self) -> list[tuple[str, str, str]]:
+    def parts(self) -> list[tuple[str, ...]]:
         """What the delay consists of: a name, a value and a 95 % interval, s, for each line."""
         fit, split = self.learned.fit, self.learned.split
-        lines = [
+        lines: list[tuple[str, ...]] = [
             _part(fit, "delay", "delay, from command and height"),
             _part(fit, "lag", "lag, from command and height"),
             _part(fit, "delay+lag", "together"),

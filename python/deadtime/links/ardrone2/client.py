@@ -476,7 +476,7 @@ class _Door(asyncio.DatagramProtocol):
         else:
             self._drone._take(data)
 
-    def error_received(self, exc: OSError) -> None:
+    def error_received(self, exc: Exception) -> None:
         """A refused datagram is like a lost one: the silence that follows says it."""
 
 

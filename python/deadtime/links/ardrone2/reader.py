@@ -10,6 +10,7 @@ whoever holds the link is told.
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 
 from deadtime._errors import PacketError
@@ -26,6 +27,9 @@ MOST_PACKETS, BURST = 1000.0, 100
 
 #: How long nothing is heard before numbers may begin anew after a com watchdog, s.
 SILENCE = 0.5
+
+#: How long a state tells of messages that were lost, s.
+RECENT = 1.0
 
 #: Change of the height that is believed at any speed, m: bump and noise of the ultrasound.
 BUMP = 0.1
@@ -105,6 +109,7 @@ class NavdataReader:
         self._counts = LinkStatistics()
         self._first: float | None = None
         self._clock: float | None = None
+        self._lost: deque[tuple[float, int]] = deque()
 
     @property
     def statistics(self) -> LinkStatistics:
@@ -151,7 +156,10 @@ class NavdataReader:
             self._count(implausible=1)
             return None
         if last is not None and navdata.sequence > last:
-            self._count(missing=navdata.sequence - last - 1)
+            lost = navdata.sequence - last - 1
+            self._count(missing=lost)
+            if lost:
+                self._lost.append((now, lost))
         return self._taken(navdata, clock, now)
 
     def _follows(self, navdata: Navdata, last: int, now: float) -> bool:
@@ -198,7 +206,10 @@ class NavdataReader:
         return not abs(height - self.newest.height) <= self.max_jump * passed + BUMP
 
     def _taken(self, navdata: Navdata, clock: float | None, now: float) -> VehicleState | None:
-        state = _state_of(navdata, clock, now)
+        while self._lost and self._lost[0][0] < now - RECENT:
+            self._lost.popleft()
+        missing = max((lost for _, lost in self._lost), default=0)
+        state = _state_of(navdata, clock, now, missing)
         gap = 0.0 if self.newest is None else now - self.newest.time
         self._first = now if self._first is None else self._first
         self._count(states=1)
@@ -222,7 +233,7 @@ def on_ground(navdata: Navdata) -> bool:
     return not navdata.flying and phase_of(navdata) not in in_air
 
 
-def _state_of(navdata: Navdata, clock: float | None, now: float) -> VehicleState:
+def _state_of(navdata: Navdata, clock: float | None, now: float, missing: int) -> VehicleState:
     return VehicleState(
         time=now,
         height=navdata.height or 0.0,
@@ -238,4 +249,5 @@ def _state_of(navdata: Navdata, clock: float | None, now: float) -> VehicleState
         battery=navdata.battery,
         emergency=navdata.emergency,
         sensor_fault="its ultrasound is deaf" if navdata.ultrasound_deaf else None,
+        missing=missing,
     )
