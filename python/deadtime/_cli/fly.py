@@ -191,9 +191,7 @@ def _flown_on(
 
 def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
     navdata, command, control = ports
-    return ARDrone2(
-        host, limits, navdata_port=navdata, command_port=command, control_port=control
-    )
+    return ARDrone2(host, limits, navdata_port=navdata, command_port=command, control_port=control)
 
 
 def _emulated(plant: Plant, seed: int, limits: Limits) -> Connect:

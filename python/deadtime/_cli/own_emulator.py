@@ -31,6 +31,8 @@ def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
     """
     command = [sys.executable, "-m", "deadtime", "emulate", "ardrone2", "--json"]
     command += ["--port-base", "0", "--plant", plant, "--seed", str(seed)]
+    # Its input ends with this process, however that ends.
+    command.append("--until-input-ends")
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
     )

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "ERRORS",
+    "console",
     "counted",
     "estimates_table",
     "plain",
