@@ -22,6 +22,7 @@ class SimulatedVehicle:
 
     async def connect(self):
         self.clock = asyncio.get_running_loop().time
+        self.commands, self.sequence, self.newest = [], 0, None
         self.task = asyncio.create_task(self._fly())
         self.log.append("connected")
 

@@ -71,7 +71,7 @@ def fly_drone(
         ),
     ] = None,
     max_height: Annotated[float, typer.Option(help="Height that ends a flight, m.")] = 3.0,
-    hold: Annotated[float, typer.Option(help="Time on each step that is learnt from, s.")] = 7.0,
+    hold: Annotated[float, typer.Option(help="Time on each step that is learnt from, s.")] = 6.5,
     folder: Annotated[
         Path | None,
         typer.Option(

@@ -87,8 +87,8 @@ class FlightPlan:
     step: float = 0.25
     base: float = 1.0
     settle: float = 5.0
-    hold: float = 7.0
-    checked_hold: float = 5.0
+    hold: float = 6.5
+    checked_hold: float = 4.5
     sample_time: float = 0.065
     limits: Limits = field(default_factory=lambda: Limits(max_climb=1.0))
     prior_delay: float = 0.36

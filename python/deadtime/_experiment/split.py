@@ -100,9 +100,10 @@ def _period(times: Array) -> float:
 
 def _followed(flight: Telemetry) -> Recording:
     """Command, and the integral of the demand, whenever one of them may change."""
-    low, high = flight.command_time[0], flight.command_time[-1]
-    inside = flight.time[_kept(flight) & (flight.time > low) & (flight.time < high)]
-    times = np.union1d(flight.command_time, inside)
+    times = np.union1d(flight.command_time, flight.time[_kept(flight)])
+    low = max(flight.command_time[0], flight.time[0])
+    high = min(flight.command_time[-1], flight.time[-1])
+    times = times[(times >= low) & (times <= high)]
     # The demand holds from message to message: its integral is straight between them.
     steps = np.diff(flight.time) * flight.demand[:-1]
     integral = np.interp(times, flight.time, np.append(0.0, np.cumsum(steps)))
