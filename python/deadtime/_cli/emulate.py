@@ -15,14 +15,14 @@ from rich.console import Console
 from rich.live import Live
 
 from deadtime._cli import options as opt
-from deadtime._cli.show import ERRORS, console
+from deadtime._cli.show import console
 from deadtime._validation import positive
 from deadtime.links import Journal
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase, Truth
 from deadtime.links.ardrone2.emulator.motion import PlantName
 from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
 
-__all__ = ["emulators"]
+__all__ = ["emulators", "tell"]
 
 emulators = typer.Typer(
     help="Stand in for a vehicle, on its own ports and in its own protocol.",
@@ -102,7 +102,7 @@ async def _emulate(
     with ExitStack() as stack:
         journal = None if record is None else stack.enter_context(Journal(record, COLUMNS))
         async with Emulator(options) as emulator:
-            _tell(emulator, as_json)
+            tell(emulator, as_json)
             live = None
             if not as_json and console.is_terminal:
                 live = stack.enter_context(Live(console=console, auto_refresh=False))
@@ -125,7 +125,7 @@ async def _emulate(
                     task.cancel()
 
 
-def _tell(emulator: Emulator, as_json: bool) -> None:
+def tell(emulator: Emulator, as_json: bool) -> None:
     """Say where the drone is, when it is."""
     options = emulator.options
     warning = (
@@ -133,7 +133,7 @@ def _tell(emulator: Emulator, as_json: bool) -> None:
         "sent to an address that they forge: nothing authenticates them. Keep to a closed network."
     )
     if not options.only_here:
-        ERRORS.print(f"deadtime: {warning}", markup=False, highlight=False, soft_wrap=True)
+        print(f"deadtime: {warning}", file=sys.stderr)
     if as_json:
         found = {
             "host": emulator.host,

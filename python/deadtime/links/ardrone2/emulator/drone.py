@@ -166,12 +166,13 @@ class Drone:
     def packets(self, now: float, oldest: float = math.inf) -> list[tuple[bytes, Address]]:
         """Take the navdata that leave by now, and whom they go to.
 
-        Those that should have left more than `oldest` seconds ago are dropped.
+        Those that should have left more than `oldest` seconds ago are dropped, but for the newest.
         """
         time, left = self._micros(now), []
         while self._packets and self._packets[0][0] <= time:
             leaves, packet, address = self._packets.popleft()
-            if seconds(time - leaves) <= oldest:
+            newest = not self._packets or self._packets[0][0] > time
+            if newest or seconds(time - leaves) <= oldest:
                 left.append((packet, address))
         return left
 

@@ -8,11 +8,13 @@ rounding, at the same cost whether it is asked for often or seldom.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from operator import mul
 from typing import Literal, TypeAlias
 
 import numpy as np
-from scipy.linalg import expm
 
 from deadtime._plants import Integrator, Plant, kit_plant, rest
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
@@ -34,6 +36,9 @@ DELAYS: dict[str, float] = {"kit": 0.26, "paper": 0.36, "real": 0.34, "thrust": 
 
 #: Standard gravity, m/s^2.
 GRAVITY = 9.80665
+
+#: Terms of Taylor's series: 0.5^17 / 17! is below the rounding error of 1.
+TERMS = 16
 
 Row: TypeAlias = tuple[float, ...]
 
@@ -83,44 +88,52 @@ class LinearMotion(Motion):
             raise ValueError(f"{plant} answers its command at once: no vehicle does")
         n = len(space.B)
         self._plant = plant
-        self._flow = np.zeros((n + 1, n + 1))
-        self._flow[:n, :n], self._flow[:n, n] = space.A, space.B
+        flow = np.zeros((n + 1, n + 1))
+        flow[:n, :n], flow[:n, n] = space.A, space.B
         value = np.append(space.C, 0.0)
+        self._flow: list[list[float]] = flow.tolist()
         self._value: Row = tuple(value.tolist())
-        self._rate: Row = tuple((value @ self._flow).tolist())
+        self._rate: Row = tuple((value @ flow).tolist())
         self._since: Micros = 0
         self._state: Row = (0.0,) * (n + 1)
         self._powers: list[tuple[Row, ...]] = []
+        # The last answer: one time is asked for by the autopilot, the sensors and the navdata.
+        self._looked: tuple[Micros, Row] = (0, self._state)
 
     def settle(self, time: Micros, value: float) -> None:
         """Be at rest at a value, under the demand that keeps it there."""
         num, den = (part.tolist() for part in self._plant.polynomials())
         state, demand = rest(num, den, value)
-        self._since, self._state = time, (*state.tolist(), float(demand))
+        self._start(time, (*state.tolist(), float(demand)))
 
     def demand(self, time: Micros, value: float) -> None:
         """Change the demand from this time on."""
-        self._state = (*self._flown(time)[:-1], value)
-        self._since = time
+        self._start(time, (*self._flown(time)[:-1], value))
 
     def at(self, time: Micros) -> tuple[float, float]:
         """Value and its rate per second."""
         state = self._flown(time)
         return _dot(self._value, state), _dot(self._rate, state)
 
+    def _start(self, time: Micros, state: Row) -> None:
+        self._since, self._state, self._looked = time, state, (time, state)
+
     def _flown(self, time: Micros) -> Row:
+        if time == self._looked[0]:
+            return self._looked[1]
         left, state, k = time - self._since, self._state, 0
         while left:
             if left & 1:
-                state = tuple(_dot(row, state) for row in self._power(k))
+                state = tuple([_dot(row, state) for row in self._power(k)])
             left, k = left >> 1, k + 1
+        self._looked = (time, state)
         return state
 
     def _power(self, k: int) -> tuple[Row, ...]:
         """The transition over 2^k microseconds."""
         while len(self._powers) <= k:
-            over = expm(self._flow * (2.0 ** len(self._powers) / SECOND))
-            self._powers.append(tuple(tuple(row) for row in over.tolist()))
+            over = 2.0 ** len(self._powers) / SECOND
+            self._powers.append(_exponential([[over * x for x in row] for row in self._flow]))
         return self._powers[k]
 
 
@@ -159,5 +172,33 @@ def linear_plant(name: PlantName) -> Plant:
     raise ValueError(f"the plant {name!r} is not linear")
 
 
-def _dot(left: Row, right: Row) -> float:
-    return sum(a * b for a, b in zip(left, right, strict=True))
+def _exponential(matrix: list[list[float]]) -> tuple[Row, ...]:
+    """The exponential of a small matrix, by Taylor's series of a part of it and squaring.
+
+    In plain Python: threads of a BLAS can make one product of two such matrices take as long as
+    ten packets, and give other bits on another machine.
+    """
+    size = max(sum(map(abs, row)) for row in matrix)
+    squarings = max(0, math.frexp(size)[1] + 1)  # the part is below a half
+    part = [[math.ldexp(x, -squarings) for x in row] for row in matrix]
+    n = len(part)
+    identity = [[float(i == j) for j in range(n)] for i in range(n)]
+    total = identity
+    for term in range(TERMS, 0, -1):
+        product = _product(part, total)
+        total = [
+            [one + x / term for one, x in zip(*rows, strict=True)]
+            for rows in zip(identity, product, strict=True)
+        ]
+    for _ in range(squarings):
+        total = _product(total, total)
+    return tuple(map(tuple, total))
+
+
+def _product(left: list[list[float]], right: list[list[float]]) -> list[list[float]]:
+    columns = list(zip(*right, strict=True))
+    return [[_dot(row, column) for column in columns] for row in left]
+
+
+def _dot(left: Sequence[float], right: Sequence[float]) -> float:
+    return sum(map(mul, left, right), 0.0)

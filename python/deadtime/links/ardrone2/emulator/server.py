@@ -55,12 +55,17 @@ class _Control(asyncio.Protocol):
 
     def write(self, dump: bytes) -> None:
         """Send a configuration, to whoever reads what is sent."""
-        if self.transport is None or self.transport.is_closing():
+        if self.transport is None:
             return
         if self.transport.get_write_buffer_size() > MOST_UNREAD:
             self.transport.abort()
         else:
             self.transport.write(dump)
+
+    @property
+    def reads(self) -> bool:
+        """Whether the other end is still there."""
+        return self.transport is not None and not self.transport.is_closing()
 
 
 class Emulator:
@@ -208,7 +213,7 @@ class Emulator:
 
         Some ask first and connect then.
         """
-        readers = [reader for reader in self._readers if reader.host == host]
+        readers = [one for one in self._readers if one.host == host and one.reads]
         for reader in readers:
             reader.write(dump)
         if not readers:
