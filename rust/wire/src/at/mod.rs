@@ -5,6 +5,7 @@
 
 mod command;
 mod read;
+mod text;
 mod write;
 
 pub use command::Command;

@@ -1,5 +1,6 @@
 //! Bytes to commands, as a drone reads them: what it cannot make sense of, it ignores.
 
+use super::text::{is_one_argument, is_other, printable, split};
 use super::{Command, LIMIT};
 use crate::unit::Unit;
 
@@ -72,14 +73,12 @@ fn command(line: &str) -> Option<(u32, Command)> {
             device: arguments.integer()?,
         },
         _ => {
-            let known =
-                |byte: u8| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_';
-            if name.is_empty() || !name.bytes().all(known) {
+            if !is_other(name) {
                 return None;
             }
             let mut others = Vec::new();
             while let Some(argument) = arguments.next() {
-                if !argument.bytes().all(|byte| (b' '..=b'~').contains(&byte)) {
+                if !argument.bytes().all(printable) || !is_one_argument(argument) {
                     return None;
                 }
                 others.push(argument.to_owned());
@@ -97,19 +96,9 @@ fn command(line: &str) -> Option<(u32, Command)> {
 struct Arguments<'a>(Option<&'a str>);
 
 impl<'a> Arguments<'a> {
-    /// The next argument, quotes included; a comma between quotes belongs to it.
     fn next(&mut self) -> Option<&'a str> {
-        let rest = self.0.take()?;
-        let mut inside = false;
-        let end = rest.bytes().position(|byte| {
-            inside ^= byte == b'"';
-            byte == b',' && !inside
-        });
-        let (argument, others) = match end.and_then(|end| rest.split_at_checked(end)) {
-            Some((argument, others)) => (argument, others.strip_prefix(',')),
-            None => (rest, None),
-        };
-        self.0 = others;
+        let (argument, rest) = split(self.0.take()?);
+        self.0 = rest;
         Some(argument)
     }
 
@@ -136,9 +125,7 @@ impl<'a> Arguments<'a> {
             .trim_matches(' ')
             .strip_prefix('"')?
             .strip_suffix('"')?;
-        let readable = inside
-            .bytes()
-            .all(|byte| (b' '..=b'~').contains(&byte) && byte != b'"');
+        let readable = inside.bytes().all(|byte| printable(byte) && byte != b'"');
         readable.then(|| inside.to_owned())
     }
 }
