@@ -89,7 +89,7 @@ fn damage(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
             _ => {}
         }
     }
-    bytes.truncate(70_000);
+    bytes.truncate(20_000);
 }
 
 /// A checksum that is right: otherwise few damaged packets would be read to their end.

@@ -7,8 +7,8 @@ use crate::unit::Unit;
 /// The commands of a datagram in their order, each with its sequence number.
 ///
 /// A malformed command is left out: one without a carriage return or line feed at its end (its rest
-/// may be missing), longer than [`LIMIT`], with too few arguments or with some of another kind. Of
-/// values of a motion, finite ones are clipped to [-1, 1]; a command with any other is left out.
+/// may be missing) or not within the first [`LIMIT`] bytes, with too few arguments or with some of
+/// another kind. Of values of a motion, finite ones are clipped to [-1, 1]; a command with any other is left out.
 /// Missing base bits of `REF` and arguments beyond those known are no fault.
 ///
 /// ```
@@ -19,10 +19,9 @@ use crate::unit::Unit;
 /// assert_eq!(read[1], (3, Command::Ref { take_off: true, emergency: false }));
 /// ```
 pub fn read(datagram: &[u8]) -> Vec<(u32, Command)> {
-    datagram
-        .split_inclusive(|byte| matches!(byte, b'\r' | b'\n'))
+    let read = datagram.get(..LIMIT).unwrap_or(datagram);
+    read.split_inclusive(|byte| matches!(byte, b'\r' | b'\n'))
         .filter_map(|line| line.strip_suffix(b"\r").or(line.strip_suffix(b"\n")))
-        .filter(|line| line.len() < LIMIT)
         .filter_map(|line| command(std::str::from_utf8(line).ok()?))
         .collect()
 }
