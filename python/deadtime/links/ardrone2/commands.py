@@ -217,8 +217,8 @@ def decode(datagram: bytes) -> list[tuple[int, Command]]:
     r"""Read the commands of a datagram, each with its sequence number, in their order.
 
     A malformed command is left out, as the drone ignores it: one without a carriage return or line
-    feed at its end, longer than 1024 bytes, with arguments missing or of another kind. Finite
-    values of a motion are clipped to [-1, 1]; a motion with any other is left out.
+    feed at its end or not within the first 1024 bytes, with arguments missing or of another kind.
+    Finite values of a motion are clipped to [-1, 1]; a motion with any other is left out.
 
     Examples
     --------
