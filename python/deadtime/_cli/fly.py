@@ -28,7 +28,7 @@ from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
 
-__all__ = ["fly_drone"]
+__all__ = ["emulated_drone", "fly_drone"]
 
 Plant = Literal["kit", "paper", "real", "thrust"]
 
@@ -90,14 +90,15 @@ def fly_drone(
     as_json: opt.As_json = False,
 ) -> None:
     """Fly steps under P control, learn the delay, design PV for it, fly that; land."""
-    climb = max_climb or (EMULATED_CLIMB if host is None else REAL_CLIMB)
+    if max_climb is None:
+        max_climb = EMULATED_CLIMB if host is None else REAL_CLIMB
     plan = FlightPlan(
         gains=_numbers(gains),
         step=step,
         base=base,
         hold=hold,
         checked_hold=min(hold, FlightPlan().checked_hold),
-        limits=Limits(max_climb=climb, max_height=max_height),
+        limits=Limits(max_climb=max_climb, max_height=max_height),
     )
     plan.check()
     if host is not None:
@@ -179,7 +180,7 @@ def _flown_on(
 ) -> Iterator[_FlownOn]:
     name = f"an emulated AR.Drone 2.0 ({plant})"
     if virtual_time:
-        yield _FlownOn(_emulated(plant, seed, plan.limits), name, run_virtual)
+        yield _FlownOn(emulated_drone(plant, seed, plan.limits), name, run_virtual)
     elif host is not None:
         with terminated_like_interrupted():
             yield _FlownOn(lambda: _client(host, plan.limits, ports), host, run_landing)
@@ -194,8 +195,8 @@ def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
     return ARDrone2(host, limits, navdata_port=navdata, command_port=command, control_port=control)
 
 
-def _emulated(plant: Plant, seed: int, limits: Limits) -> Connect:
-    """An emulator and its client in one event loop; each link has noise of its own."""
+def emulated_drone(plant: Plant, seed: int, limits: Limits) -> Connect:
+    """Connects to an emulator in the same event loop; each link has noise of its own."""
     seeds = itertools.count(seed, APART)
 
     @asynccontextmanager

@@ -25,7 +25,7 @@ from deadtime.links.journal import Journal
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import Vehicle, VehicleState
 
-__all__ = ["FlightPlan", "TellsAll", "fly_experiment"]
+__all__ = ["Connect", "FlightPlan", "TellsAll", "fly_all", "fly_experiment"]
 
 Connect: TypeAlias = Callable[[], AbstractAsyncContextManager[Vehicle]]
 
@@ -176,27 +176,27 @@ def fly_experiment(
     """
     plan.check()
     tried = [P(Kp) for Kp in plan.gains]
-    flown = run(_fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
+    flown = run(fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
     progress("estimating the delay")
     learned = learn(flown, plan.limits.max_climb, plan.step, plan.gain_margin, progress)
     # The best P first: if it does not fly as it should, PV had better not be tried.
     made = [design.loop.controller for design in (learned.proportional, learned.designed)]
     designed = [one for one in made if isinstance(one, (P, PV))]
     hold = plan.checked_hold
-    checked = run(_fly_all(connect, designed, plan, hold, folder, len(flown) + 1, progress))
+    checked = run(fly_all(connect, designed, plan, hold, folder, len(flown) + 1, progress))
     return FlightStudy(plan.step, plan.limits.max_climb, learned, tuple(checked))
 
 
-async def _fly_all(
+async def fly_all(
     connect: Connect,
     controllers: Sequence[P | PV],
     plan: FlightPlan,
     hold: float,
     folder: Path,
     number: int,
-    progress: Callable[[str], None],
+    progress: Callable[[str], None] = lambda stage: None,
 ) -> list[FlownSteps]:
-    """One flight under each controller, over one link."""
+    """One flight under each controller, over one link; `number` is that of the first."""
     flown = []
     async with connect() as vehicle:
         for place, controller in enumerate(controllers, number):
