@@ -360,6 +360,24 @@ def test_cutting_the_motors_is_a_thing_of_its_own():
     run(fly())
 
 
+def test_a_listener_that_fails_is_told_with_the_next_state():
+    # A full disk under the file of all messages.
+    async def fly():
+        async with connected() as (_, drone):
+            calls = []
+
+            def full(state):
+                calls.append(state)
+                raise OSError("no space left")
+
+            drone.listen(full)
+            with pytest.raises(LinkError, match="no space left"):
+                await look(drone, 0.1)
+            assert len(calls) == 1
+
+    run(fly())
+
+
 def test_a_drone_that_forgot_its_client_is_not_flown_on():
     async def fly():
         async with connected() as (emulated, drone):

@@ -64,8 +64,8 @@ class HeightControl:
     --------
     >>> HeightControl(P(2.0), 0.065).command(reference=1.25, height=1.0, climb=0.1)
     0.5
-    >>> HeightControl(PV(2.0, 0.4), 0.065).command(reference=1.25, height=1.0, climb=0.1)
-    0.46
+    >>> HeightControl(PV(2.0, 0.5), 0.065).command(reference=1.25, height=1.0, climb=0.1)
+    0.45
     """
 
     def __init__(

@@ -102,6 +102,7 @@ class ARDrone2:
         self._sender = CommandSender(self.limits)
         self._arrived = asyncio.Event()
         self._listener: Callable[[VehicleState], None] | None = None
+        self._failure: Exception | None = None
         self._sockets: list[asyncio.DatagramTransport] = []
         self._cycle: asyncio.Task[None] | None = None
         self._restarts = 0
@@ -242,6 +243,10 @@ class ARDrone2:
         return state
 
     def _check_link(self) -> None:
+        if self._failure is not None:
+            raise LinkError(
+                f"what listens to {self.host} has failed: {self._failure}"
+            ) from self._failure
         if self._sender.expired is not None:
             raise FlightAbortedError(self._sender.expired)
         silent = self._silent()
@@ -290,7 +295,10 @@ class ARDrone2:
         self._send()
 
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
-        """Call `listener` with every state from now on; None: no longer."""
+        """Call `listener` with every state from now on; None: no longer.
+
+        If it raises, it is not called again, and the next `state` raises `LinkError` from that.
+        """
         self._listener = listener
 
     # Coming down
@@ -409,8 +417,13 @@ class ARDrone2:
     def _take(self, packet: bytes) -> None:
         state = self._reader.accept(packet, self._now())
         self._arrived.set()
-        if state is not None and self._listener is not None:
+        if state is None or self._listener is None:
+            return
+        try:
             self._listener(state)
+        except Exception as error:
+            # Here nobody could catch it; whoever flies is told with the next state.
+            self._listener, self._failure = None, error
 
     async def _until(self, holds: Callable[[Navdata], bool], timeout: float) -> bool:
         """Wait until navdata are so; False if they are not before the timeout."""
