@@ -249,6 +249,28 @@ def test_a_dead_drone_ends_the_context_in_bounded_time():
     run(fly())
 
 
+def test_a_landing_that_nobody_confirms_is_noted_on_what_ended_the_flight():
+    async def fly():
+        async with emulator() as emulated:
+
+            async def hover():
+                async with client_of(emulated) as drone:
+                    await drone.take_off()
+                    while True:
+                        drone.hover()
+                        await asyncio.sleep(0.05)
+
+            task = asyncio.create_task(hover())
+            await asyncio.sleep(7.0)
+            await emulated.close()
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError) as ended:
+                await task
+            assert "while landing" in ended.value.__notes__[0]
+
+    run(fly())
+
+
 def test_forged_navdata_from_another_port_are_ignored():
     async def fly():
         async with connected() as (_, drone):

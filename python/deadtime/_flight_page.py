@@ -29,9 +29,10 @@ def render(study: FlightStudy, vehicle: str) -> str:
         "<h2>Before and after</h2>",
         _checked(study),
         table(COLUMNS, [table_row(row, "td", len(COLUMNS)) for row in study.rows()]),
-        "<p>Settled: the mean time until a step stays within 5 %. The paper's delay is read from "
-        "the overshoot, with a gain of 1 and no lag; where the overshoot says nothing there is "
-        "none. Missed: samples that the control loop left out.</p>",
+        "<p>Settled: the mean time until a step stays within 5 %, or within three times the noise "
+        "of the height where that is more. The paper's delay is read from the overshoot, with a "
+        "gain of 1 and no lag; where the overshoot says nothing there is none. Missed: samples "
+        "that the control loop left out.</p>",
         "<h2>What the delay consists of</h2>",
         table(PARTS, [table_row(row, "td", len(PARTS)) for row in study.parts()]),
         f"<p>{escaped(_fitted(study))}</p>",

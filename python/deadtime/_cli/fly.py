@@ -115,7 +115,9 @@ def fly_drone(
             stages(plan.flights + 2, quiet=as_json) as begin,
         ):
             study = fly_experiment(flown.connect, plan, where, begin, flown.run)
-    except BaseException:
+    except BaseException as error:
+        for note in getattr(error, "__notes__", ()):
+            ERRORS.print(f"deadtime: {note}", highlight=False, markup=False, soft_wrap=True)
         _tell_what_is_kept(where)
         raise
     page = write_flight_page(study, where / "report.html", flown.name)

@@ -49,8 +49,11 @@ def run_landing(main: Coroutine[Any, Any, T]) -> T:
 
     try:
         return asyncio.run(guarded())
-    except asyncio.CancelledError:
-        raise KeyboardInterrupt from None
+    except asyncio.CancelledError as cancelled:
+        interrupt = KeyboardInterrupt()
+        for note in getattr(cancelled, "__notes__", ()):  # such as a landing that nobody confirmed
+            interrupt.add_note(note)
+        raise interrupt from None
 
 
 @contextmanager

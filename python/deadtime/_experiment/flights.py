@@ -27,8 +27,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 #: Half width of the band a flown step settles into, as a part of it: noise of the height is no
-#: small part of the 2 % that are usual on paper.
-BAND = 0.05
+#: small part of the 2 % that are usual on paper. And as a multiple of that noise, at least.
+BAND, NOISES = 0.05, 3.0
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,8 @@ class StepFigures:
     overshoot : float
         Percent of the step, as sampled.
     settling_time : float
-        Time until the height stays within 5 % of the step, s; NaN if it does not before the end.
+        Time until the height stays within 5 % of the step, or within three times its noise where
+        that is more, s; NaN if it does not before the end.
     """
 
     step: Step
@@ -136,12 +137,22 @@ class FlownSteps:
     def _figures(self, step: Step, end: int) -> StepFigures:
         height = self.recording.output[step.index : end]
         beyond = (height - step.after) / step.amplitude
-        outside = np.flatnonzero(np.abs(beyond) > BAND)
+        band = max(BAND, NOISES * self.noise / abs(step.amplitude))
+        outside = np.flatnonzero(np.abs(beyond) > band)
         settling = 0.0
         if outside.size:
             last = step.index + int(outside[-1]) + 1
             settling = np.nan if last >= end else float(self.recording.time[last] - step.time)
         return StepFigures(step, 100.0 * max(0.0, float(beyond.max())), settling)
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of the height's noise, m: of what no motion explains.
+
+        From its second differences, to which motion adds little but around steps, by their median.
+        """
+        bends = np.abs(np.diff(self.recording.output, 2))
+        return float(1.4826 * np.median(bends) / np.sqrt(6.0))
 
     @property
     def overshoot(self) -> float:
