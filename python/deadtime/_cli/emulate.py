@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.live import Live
+from rich.text import Text
 
 from deadtime._cli import options as opt
 from deadtime._cli.show import console
@@ -161,20 +162,21 @@ async def _show(emulator: Emulator, live: Live) -> None:
         await asyncio.sleep(SHOWN_EVERY)
 
 
-def _line(truth: Truth) -> str:
+def _line(truth: Truth) -> Text:
     parts = [
-        f"{truth.time:7.1f} s",
+        f"{truth.time:6.1f} s",
         f"{truth.phase.value:<10}",
-        f"height {truth.height:6.3f} m",
-        f"climb {truth.climb:+6.3f} m/s of {truth.demand:+6.3f} demanded",
-        f"battery {truth.battery:3.0f} %",
-        "navdata sent" if truth.connected else "nobody listens",
+        f"{truth.height:6.3f} m",
+        f"{truth.climb:+6.3f} m/s of {truth.demand:+6.3f}",
+        f"battery {truth.battery:.0f} %",
     ]
     if truth.emergency:
         parts.append("EMERGENCY")
-    if truth.link_lost:
+    elif truth.link_lost:
         parts.append("link lost")
-    return "  ".join(parts)
+    elif truth.connected:
+        parts.append("heard")
+    return Text("  ".join(parts), no_wrap=True, overflow="crop")
 
 
 async def _keep(emulator: Emulator, journal: Journal) -> None:

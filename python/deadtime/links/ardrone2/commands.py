@@ -8,7 +8,7 @@ last one's; 1 starts again.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
 
 from deadtime.links._wire import at_read, at_write
@@ -45,9 +45,9 @@ class _Command:
 
 class _Motion(_Command):
     def __post_init__(self) -> None:
-        for field in fields(self):  # type: ignore[arg-type]
-            if field.name != "flag":
-                object.__setattr__(self, field.name, UnitCommand(getattr(self, field.name)))
+        for name, value in vars(self).items():
+            if name != "flag" and type(value) is not UnitCommand:
+                object.__setattr__(self, name, UnitCommand(value))
 
     def _arguments(self) -> tuple[Any, ...]:
         *motion, flag = vars(self).values()

@@ -8,8 +8,8 @@ use crate::unit::Unit;
 ///
 /// A malformed command is left out: one without a carriage return or line feed at its end (its rest
 /// may be missing) or not within the first [`LIMIT`] bytes, with too few arguments or with some of
-/// another kind. Of values of a motion, finite ones are clipped to [-1, 1]; a command with any other is left out.
-/// Missing base bits of `REF` and arguments beyond those known are no fault.
+/// another kind. Of values of a motion, finite ones are clipped to [-1, 1]; a command with any
+/// other is left out. Missing base bits of `REF` and arguments beyond those known are no fault.
 ///
 /// ```
 /// use deadtime_wire::at::{self, Command};

@@ -91,8 +91,8 @@ impl Packet<'_> {
 ///
 /// # Errors
 ///
-/// More than [`LIMIT`] bytes, an unknown header, an option smaller than its own head or ending beyond the packet, and a
-/// checksum that is missing or not the last option.
+/// More than [`LIMIT`] bytes, an unknown header, an option smaller than its own head or ending
+/// beyond the packet, and a checksum that is missing or not the last option.
 ///
 /// ```
 /// use deadtime_wire::navdata;

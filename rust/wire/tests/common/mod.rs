@@ -2,6 +2,8 @@
 
 #![allow(dead_code, clippy::unwrap_used, clippy::indexing_slicing)]
 
+pub(crate) mod checks;
+
 use deadtime_wire::at::{self, Command};
 use deadtime_wire::loop_packet::{self, LoopPacket};
 use deadtime_wire::navdata::{self, Demo, Head, KalmanPressure, Known, OptionView, Pwm};

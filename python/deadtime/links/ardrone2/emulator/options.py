@@ -93,7 +93,7 @@ class EmulatorOptions:
     @property
     def only_here(self) -> bool:
         """Whether only this machine can reach it."""
-        return self.host == "localhost" or self.host.startswith("127.")
+        return self.host in ("localhost", "::1") or self.host.startswith("127.")
 
 
 def ports_from(base: int) -> dict[str, int]:
