@@ -83,7 +83,7 @@ FLOORS = [
     {"_recording", "_waves", "_circulating_noise", "_excitation", "_gallery_entries", "gallery"},
     {"_readers", "links"},
     {"_estimation", "_design"},
-    {"_experiment"},
+    {"_experiment", "_internet_loop"},
     {"paper"},
     {"_plots"},
     {"_stability_plots", "_box_plots", "_design_plots", "_planning_plots", "_paper_plots"},
