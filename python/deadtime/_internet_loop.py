@@ -51,6 +51,9 @@ METHODS = {
     "output_error": False,
 }
 
+#: Part of the sample time by which ages differ where processes just wake up late.
+UNSTEADY = 0.3
+
 Mode = Literal["virtual", "real", "processes"]
 
 
@@ -130,6 +133,14 @@ class InternetRun:
         fit = self.estimates.get("dominant") or self.estimates.get("exact")
         return math.nan if fit is None else float(fit.details["overshoot"])
 
+    @property
+    def is_unsteady(self) -> bool:
+        """Whether the age of commands differs by more than waking up late explains."""
+        ages = self.plant["age_when_applied"]
+        lost = self.plant["link"]["lost"] + self.controller["link"]["lost"]
+        spread = _number(ages["p95"]) - _number(ages["p50"])
+        return lost > 0 or not spread < UNSTEADY * self.trial.sample_time
+
     def delay(self, method: str) -> float:
         """The delay by a method, s; NaN where it refused."""
         fit = self.estimates.get(method)
@@ -191,6 +202,13 @@ class InternetLoop:
             f"and {mean['waiting']:.1f} ms for packets that were lost, overtaken or buffered and "
             "processes that wake up late (below zero where the newest packets are faster than all)."
         ]
+        unsteady = [run for run in self.runs if run.is_unsteady]
+        if unsteady:
+            said.append(
+                "The delay is not constant: a step meets few of its values, and the interval of a "
+                "single fit is for those. For the mean of the network go by the spread of the "
+                "runs, or make the delay constant with a jitter buffer."
+            )
         for method, label in (("dominant", "The paper's overshoot method"), ("waveform", FIT)):
             found = self.spread(method)
             if found.count == 0:

@@ -17,6 +17,7 @@ from rich.table import Table
 from deadtime._cli import options as opt
 from deadtime._cli.designs import design_gains
 from deadtime._cli.estimates import estimate_delays
+from deadtime._cli.internet_loop import run_loop
 from deadtime._cli.maps import map_gains
 from deadtime._cli.reproduce import reproduce_paper
 from deadtime._cli.show import (
@@ -174,6 +175,7 @@ def _roots_table(found: RootSet) -> Table:
 app.command("map")(map_gains)
 app.command("design")(design_gains)
 app.command("reproduce")(reproduce_paper)
+app.command("internet-loop")(run_loop)
 
 
 @app.command()

@@ -110,8 +110,10 @@ class PlantReport:
     age : float
         Age of the measurement behind the command in force, on average over time, s: the delay
         of the loop, measured. NaN without time stamps.
+    oldest : float
+        Largest age that a command in force reached, s.
     age_when_applied : Percentiles
-        The same at the moment a command is applied, s.
+        Age at the moment a command is applied, s.
     trips, safe_time : int, float
         How often the safe command took over after the first command, and for how long, s.
     largest_command, largest_output : float
@@ -125,6 +127,7 @@ class PlantReport:
     overruns: int
     applied: int
     age: float
+    oldest: float
     age_when_applied: Percentiles
     trips: int
     safe_time: float
@@ -174,7 +177,7 @@ class _Plant:
         self._rows: list[tuple[float, ...]] = []
         self._periods: list[float] = []
         self._ages: list[float] = []
-        self._age_area = self._age_time = 0.0
+        self._age_area = self._age_time = self._oldest = 0.0
         self._overruns = self._applied = self._trips = 0
         self._safe_since: float | None = None
         self._safe_time = 0.0
@@ -216,6 +219,7 @@ class _Plant:
             old, new = before - self._stamp, self._clock - self._stamp
             self._age_area += 0.5 * (new * new - old * old)
             self._age_time += self._clock - before
+            self._oldest = max(self._oldest, new)
 
     def _sample(self) -> None:
         """Measure, send, record, and see to the next time."""
@@ -369,6 +373,7 @@ class _Plant:
             overruns=self._overruns,
             applied=self._applied,
             age=self._age_area / self._age_time if self._age_time else math.nan,
+            oldest=self._oldest,
             age_when_applied=Percentiles.of(self._ages),
             trips=self._trips,
             safe_time=self._safe_time,
