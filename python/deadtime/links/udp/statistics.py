@@ -27,6 +27,9 @@ __all__ = ["ClockOffset", "LinkReport", "LinkStatistics", "Percentiles", "histog
 #: Sequence numbers that are remembered to tell a duplicate from a packet that was overtaken.
 REMEMBERED = 4096
 
+#: Width of a bin at least, s: no clock tells less.
+NARROWEST = 1e-6
+
 #: Part by which each packet moves the running jitter (RFC 3550, section 6.4.1).
 JITTER_PART = 1.0 / 16.0
 
@@ -63,7 +66,8 @@ def histogram(values: Sequence[float], bins: int = 20) -> tuple[list[float], lis
     """Edges (s) and counts of a sample, from its smallest to its largest value."""
     if not len(values):
         return [], []
-    counts, edges = np.histogram(values, bins=bins)
+    low, high = min(values), max(values)
+    counts, edges = np.histogram(values, bins, (low, max(high, low + bins * NARROWEST)))
     return edges.tolist(), counts.tolist()
 
 
