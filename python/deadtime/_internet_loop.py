@@ -10,8 +10,9 @@ and it is measured, packet by packet. Methods that know of the hold estimate the
 the overshoot read as that of a continuous loop has the hold in its delay, too.
 
 A step sees few of the random delays, and what a fit takes for noise is not what makes it miss: its
-interval is for the delay that this one step met. How much the mean of a network is uncertain shows
-in how much the runs differ (`Spread`).
+interval is for the delay that this one step met. How uncertain the mean delay of a network is shows
+in how much the runs differ, and better in what the steps would have shown at other moments of the
+network as it was measured (`_internet_replay`).
 """
 
 from __future__ import annotations
@@ -25,11 +26,19 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from deadtime._controllers import P
 from deadtime._errors import NotIdentifiableError, RecordingError
 from deadtime._estimation import DelayEstimate, estimate_delay
+from deadtime._internet_replay import (
+    MAPS,
+    age_error,
+    answer_times,
+    interval_of_mean,
+    replayed_errors,
+)
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 from deadtime._readers import read_recording
@@ -51,6 +60,9 @@ METHODS = {
     "output_error": False,
 }
 
+#: Steps that are replayed for each gain.
+REPLAYS = 200
+
 #: Part of the sample time by which ages differ where processes just wake up late.
 UNSTEADY = 0.3
 
@@ -68,13 +80,17 @@ class Spread:
     mean : float
         Their mean, s.
     low, high : float
-        Its interval of 95 % by how much the runs differ (Student's t), s; NaN for one run.
+        Interval of 95 % for what was to be found, s: by replaying the steps (`replayed`), or by
+        how much the runs differ (Student's t); NaN where neither can be had.
+    replayed : bool
+        Whether it is by replaying; it then has the error of the method in it.
     """
 
     count: int
     mean: float
     low: float
     high: float
+    replayed: bool = False
 
     @staticmethod
     def of(values: Sequence[float]) -> Spread:
@@ -175,11 +191,19 @@ class InternetLoop:
     """
 
     runs: tuple[InternetRun, ...]
+    _errors: tuple[Mapping[str, NDArray[np.float64]], ...] = ()
+    _age_error: float = math.nan
 
     def spread(self, method: str) -> Spread:
         """What the runs together say by a method; NaN where none answered."""
-        found = [run.delay(method) for run in self.runs]
-        return Spread.of([delay for delay in found if math.isfinite(delay)])
+        delays = [run.delay(method) for run in self.runs]
+        answered = [index for index, delay in enumerate(delays) if math.isfinite(delay)]
+        found = Spread.of([delays[index] for index in answered])
+        if method not in MAPS or not self._errors or not answered:
+            return found
+        errors = [self._errors[index][method] for index in answered]
+        low, high = interval_of_mean(found.mean, errors, self._age_error)
+        return replace(found, low=low, high=high, replayed=True)
 
     @property
     def age(self) -> float:
@@ -206,8 +230,8 @@ class InternetLoop:
         if unsteady:
             said.append(
                 "The delay is not constant: a step meets few of its values, and the interval of a "
-                "single fit is for those. For the mean of the network go by the spread of the "
-                "runs, or make the delay constant with a jitter buffer."
+                "single fit is for those. For the mean delay go by the intervals of the replayed "
+                "steps, or make the delay constant with a jitter buffer."
             )
         for method, label in (("dominant", "The paper's overshoot method"), ("waveform", FIT)):
             found = self.spread(method)
@@ -217,8 +241,9 @@ class InternetLoop:
             wanted = self.expected(method)
             knows = "which has the hold in it" if METHODS[method] else "the hold taken out"
             interval = ""
-            if found.count > 1:
-                interval = f" ({1e3 * found.low:.1f} to {1e3 * found.high:.1f} by the runs' spread)"
+            if math.isfinite(found.low):
+                how = "by replaying the steps" if found.replayed else "by the runs' spread"
+                interval = f" ({1e3 * found.low:.1f} to {1e3 * found.high:.1f} {how})"
             said.append(
                 f"{label} finds {1e3 * found.mean:.1f} ms{interval}, where "
                 f"{1e3 * wanted:.1f} ms was measured, {knows}."
@@ -234,7 +259,7 @@ class InternetLoop:
                     "overshoot": run.overshoot,
                     "age": run.age,
                     "budget": run.budget(),
-                    "plant": run.plant,
+                    "plant": {k: v for k, v in run.plant.items() if k != "arrivals"},
                     "controller": run.controller,
                     "estimates": {name: fit.to_dict() for name, fit in run.estimates.items()},
                     "refusals": run.refusals,
@@ -307,7 +332,13 @@ def run_internet_loop(
                 one, reports["plant"], reports["controller"], recordings, estimates, refusals
             )
         )
-    return InternetLoop(tuple(runs))
+    progress("replaying the steps")
+    times = np.concatenate([answer_times(run.plant["arrivals"]) for run in runs])
+    age = float(np.mean([run.age for run in runs]))
+    if not (np.isfinite(times).any() and math.isfinite(age)):
+        return InternetLoop(tuple(runs))
+    errors = [replayed_errors(run.trial, times, age, REPLAYS, run.trial.seed) for run in runs]
+    return InternetLoop(tuple(runs), tuple(errors), age_error(times, trial.sample_time))
 
 
 def _run(

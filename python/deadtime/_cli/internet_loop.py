@@ -104,7 +104,7 @@ def run_loop(
             f"--duration {duration:g} leaves less than 1 s after the step at {trial.rest:g} s: "
             "give a longer one"
         )
-    with stages(2 * len(gains), quiet=as_json) as begin:
+    with stages(2 * len(gains) + 1, quiet=as_json) as begin:
         found = run_internet_loop(
             trial,
             gains,

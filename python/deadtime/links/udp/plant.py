@@ -118,6 +118,9 @@ class PlantReport:
         How often the safe command took over after the first command, and for how long, s.
     largest_command, largest_output : float
         Largest sizes.
+    arrivals : tuple of (int, float)
+        Number of each measurement that was answered, and when after it the answer came, s; empty
+        without time stamps.
     recording : Recording or None
         Time, reference, output and the command in force; None where the run was too short.
     """
@@ -133,6 +136,7 @@ class PlantReport:
     safe_time: float
     largest_command: float
     largest_output: float
+    arrivals: tuple[tuple[int, float], ...]
     recording: Recording | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -177,6 +181,7 @@ class _Plant:
         self._rows: list[tuple[float, ...]] = []
         self._periods: list[float] = []
         self._ages: list[float] = []
+        self._arrivals: list[tuple[int, float]] = []
         self._age_area = self._age_time = self._oldest = 0.0
         self._overruns = self._applied = self._trips = 0
         self._safe_since: float | None = None
@@ -287,6 +292,7 @@ class _Plant:
                 statistics.invalid += 1
                 return
             statistics.exchanged(packet, read)
+            self._arrivals.append((number, age))
             if age > self.options.watchdog:
                 statistics.came_late(age - self.options.watchdog)
                 return
@@ -379,6 +385,7 @@ class _Plant:
             safe_time=self._safe_time,
             largest_command=self._largest_command,
             largest_output=self._largest_output,
+            arrivals=tuple(self._arrivals),
             recording=recording,
         )
 
