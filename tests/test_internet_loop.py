@@ -18,7 +18,6 @@ from deadtime.links.udp import (
     Normal,
     PlantOptions,
     RelayOptions,
-    ShiftedGamma,
     Trial,
 )
 from deadtime.links.udp.controller import ControllerOptions
@@ -82,21 +81,23 @@ def test_a_lag_is_found_apart_from_the_delay():
 @pytest.mark.parametrize(
     "way",
     [
-        Network(delay=ShiftedGamma(0.04, 0.05, 0.005)),
         Network(delay=Normal(0.05, 0.01), loss=0.05),
         Network(delay=0.05, loss=Bursts.of(0.05, 4.0)),
     ],
-    ids=["jitter", "jitter and loss", "bursts"],
+    ids=["jitter and loss", "bursts"],
 )
-def test_intervals_of_replayed_steps_cover_the_mean_age(way):
-    trials = [Trial(gain=8.0, there=way, back=way, seed=100 * index) for index in range(12)]
-    loops = [run_internet_loop(trial, gains=(6.0, 8.0, 10.0)) for trial in trials]
+def test_intervals_of_replayed_steps_cover_the_mean_age(way, monkeypatch):
+    monkeypatch.setattr("deadtime._internet_loop.REPLAYS", 100)
+    trials = [Trial(gain=8.0, there=way, back=way, seed=100 * index) for index in range(10)]
+    methods = ("dominant", "exact")
+    loops = [run_internet_loop(one, (6.0, 8.0, 10.0), methods=methods) for one in trials]
     age = float(np.mean([loop.age for loop in loops]))
-    for method in ("dominant", "exact"):
+    for method in methods:
         spreads = [loop.spread(method) for loop in loops]
         assert all(one.replayed for one in spreads)
-        # of twelve intervals of 95 % ten or more hold the truth, in 98 of a hundred such tests
-        assert sum(one.low <= age <= one.high for one in spreads) >= 10
+        # of ten intervals of 95 % eight or more hold the truth, in 99 of a hundred such tests
+        assert sum(one.low <= age <= one.high for one in spreads) >= 8
+        assert all(one.high - one.low < 0.06 for one in spreads)
     for loop in loops:
         assert any("interval of a single fit" in sentence for sentence in loop.explanation())
 
@@ -112,7 +113,7 @@ def test_a_jitter_buffer_gives_the_exact_delay_on_a_network_that_jitters():
 
 def test_both_ends_keep_recordings_that_can_be_read(tmp_path, calm):
     trial = Trial(gain=8.0, there=WAY, back=WAY)
-    found = run_internet_loop(trial, gains=(8.0,), folder=tmp_path)
+    found = run_internet_loop(trial, (8.0,), folder=tmp_path, methods=["output_error"])
     names = sorted(file.name for file in tmp_path.iterdir())
     assert names == ["01-gain-8-controller.csv", "01-gain-8-plant.csv"]
     flight = read_recording(tmp_path / names[0], time="time_s", output="output", command="command")
@@ -139,6 +140,7 @@ def test_a_spread_of_one_or_none_has_no_interval():
         ({"gains": ()}, "empty"),
         ({"gains": (-1.0,)}, "above zero"),
         ({"mode": "dream"}, "not one of"),
+        ({"methods": ["guess"]}, "none of"),
     ],
 )
 def test_what_cannot_be_run_says_why(change, words):

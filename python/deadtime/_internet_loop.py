@@ -282,6 +282,7 @@ def run_internet_loop(
     *,
     mode: Mode = "virtual",
     folder: Path | None = None,
+    methods: Sequence[str] = tuple(METHODS),
     progress: Callable[[str], None] = lambda stage: None,
 ) -> InternetLoop:
     """Run the loop once for each gain, and estimate its delay from every run.
@@ -298,6 +299,9 @@ def run_internet_loop(
         process; ``"processes"``: over UDP, plant, relay and controller in a process each.
     folder : Path, optional
         Where both ends write what they record.
+    methods : sequence of str
+        What the delay is estimated by: ``"dominant"`` (the paper's overshoot), ``"exact"``,
+        ``"waveform"``, ``"output_error"``.
     progress : callable, optional
         Called with the name of each stage as it begins.
 
@@ -320,13 +324,16 @@ def run_internet_loop(
     ]
     if mode not in get_args(Mode):
         raise ValueError(f"mode={mode!r} is not one of {', '.join(get_args(Mode))}")
+    unknown = set(methods) - set(METHODS)
+    if unknown:
+        raise ValueError(f"methods {sorted(unknown)} are none of {', '.join(METHODS)}")
     runs = []
     for index, one in enumerate(trials):
         stem = f"{index + 1:02d}-gain-{one.gain:g}-"
         progress(f"K = {one.gain:g}: running")
         reports, recordings = _run(one, mode, folder, stem)
         progress(f"K = {one.gain:g}: estimating")
-        estimates, refusals = _estimate(one, recordings)
+        estimates, refusals = _estimate(one, recordings, methods)
         runs.append(
             InternetRun(
                 one, reports["plant"], reports["controller"], recordings, estimates, refusals
@@ -361,7 +368,7 @@ def _run(
 
 
 def _estimate(
-    trial: Trial, recordings: Mapping[str, Recording]
+    trial: Trial, recordings: Mapping[str, Recording], methods: Sequence[str]
 ) -> tuple[dict[str, DelayEstimate], dict[str, str]]:
     """The delay by every method, and why some have no answer."""
     known = ControlLoop(
@@ -379,7 +386,7 @@ def _estimate(
         "waveform": {"method": "waveform", "free": free},
         "output_error": {"method": "output_error", "free": free},
     }
-    for name, option in options.items():
+    for name in methods:
         end = "controller" if name == "output_error" else "plant"
         if end not in recordings:
             refusals[name] = f"the recording of the {end} is too short"
@@ -388,7 +395,7 @@ def _estimate(
         if end == "plant":
             data = _as_sampled(data, trial.sample_time)
         try:
-            estimates[name] = estimate_delay(data, known, **option)
+            estimates[name] = estimate_delay(data, known, **options[name])
         except (NotIdentifiableError, RecordingError) as error:
             refusals[name] = str(error).rstrip(".")
     return estimates, refusals
