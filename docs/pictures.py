@@ -9,6 +9,9 @@ import deadtime as dtm
 import matplotlib.pyplot as plt
 import numpy as np
 from deadtime import paper
+from deadtime._internet_loop import run_internet_loop
+from deadtime._internet_plots import plot_internet_loop
+from deadtime.links import udp, virtual_time
 
 IMAGES = Path(__file__).parent / "images"
 NUMBERS = Path(__file__).parent / "reproduction-numbers.md"
@@ -184,6 +187,37 @@ def estimating() -> None:
     figure.savefig(IMAGES / "estimate-design.png", dpi=90)
 
 
+def internet_loop() -> None:
+    """The Internet loop on a network that jitters and loses, and what policies make of a burst."""
+    bad = udp.Network(delay=udp.Normal(0.05, 0.01), loss=udp.Bursts.of(0.05, 4.0))
+    jitters = udp.Network(delay=udp.Normal(0.05, 0.01), loss=0.05)
+    found = run_internet_loop(udp.Trial(gain=8.0, there=jitters, back=jitters))
+    printed = {
+        float(gain): paper.delay_by_dominant_root(gain, percent / 100.0)
+        for gain, percent in paper.PRINTED_OVERSHOOTS.items()
+    }
+    plot_internet_loop(found, printed).savefig(IMAGES / "internet-loop.png", dpi=90)
+
+    policies = {
+        "newest wins": udp.NewestWins(),
+        "hold 5, then zero": udp.HoldThenZero(5),
+        "jitter buffer of 140 ms": udp.JitterBuffer(0.14),
+    }
+    figure, axes = plt.subplots(
+        1, 3, sharey=True, sharex=True, figsize=(10.0, 3.4), layout="constrained"
+    )
+    for ax, (name, policy) in zip(axes, policies.items(), strict=True):
+        for seed in range(40):
+            trial = udp.Trial(gain=6.0, there=bad, back=bad, seed=seed, policy=policy, duration=4.0)
+            recording = virtual_time.run(udp.run_trial(trial)).plant.recording
+            ax.plot(recording.time - 1.0, recording.output, "C0", alpha=0.25, linewidth=0.8)
+        ax.plot(recording.time - 1.0, recording.reference, "k--", linewidth=0.8)
+        ax.set(xlabel="time (s)", title=name, xlim=(-0.2, 3.0))
+        ax.grid(alpha=0.25)
+    axes[0].set(ylabel="output")
+    figure.savefig(IMAGES / "internet-policies.png", dpi=90)
+
+
 if __name__ == "__main__":
     designing()
     estimating()
@@ -192,3 +226,4 @@ if __name__ == "__main__":
     reproduction()
     planned_step()
     hold()
+    internet_loop()

@@ -124,7 +124,8 @@ def test_both_ends_keep_recordings_that_can_be_read(tmp_path, calm):
 
 
 def test_answers_are_put_in_the_order_of_the_measurements():
-    assert answer_times([(3, 0.3), (1, 0.1)]).tolist() == [0.1, math.inf, 0.3]
+    assert answer_times([(7, 0.3), (5, 0.1)]).tolist() == [0.1, math.inf, 0.3]
+    assert answer_times([]).size == 0
 
 
 def test_a_spread_of_one_or_none_has_no_interval():

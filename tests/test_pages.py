@@ -10,7 +10,12 @@ import pytest
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
-PAGES = ["from-recording-to-gains.md", "planning-a-flight.md", "what-a-ground-log-cannot-tell.md"]
+PAGES = [
+    "from-recording-to-gains.md",
+    "internet-loop.md",
+    "planning-a-flight.md",
+    "what-a-ground-log-cannot-tell.md",
+]
 
 
 @pytest.mark.parametrize("page", PAGES)

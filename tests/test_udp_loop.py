@@ -54,8 +54,24 @@ FAULTS = {
 POLICIES = (NewestWins(), DropLate(0.2), HoldThenZero(5), JitterBuffer(0.15))
 
 
+async def watched(work):
+    """The result of a coroutine; what goes wrong in a callback is raised, not printed."""
+    wrong = []
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(lambda _, context: wrong.append(context))
+    result = await work
+    for _ in range(10):  # what is still to be called
+        await asyncio.sleep(0)
+    assert not wrong, wrong
+    return result
+
+
+def in_virtual_time(work):
+    return virtual_time.run(watched(work))
+
+
 def run(trial, **more):
-    return virtual_time.run(run_trial(trial, **more))
+    return in_virtual_time(run_trial(trial, **more))
 
 
 def loop_of(trial, delay):
@@ -103,6 +119,30 @@ def test_a_run_follows_from_its_seed_to_the_byte(tmp_path):
 
     assert written(7, "a") == written(7, "b")
     assert written(8, "c") != written(7, "d")
+
+
+def test_a_recording_that_cannot_be_written_ends_the_run(tmp_path):
+    options = PlantOptions(
+        controller=("127.0.0.1", 9), recording=tmp_path / "plant.csv", duration=5.0
+    )
+
+    class FullError(Exception):
+        pass
+
+    async def disk_fills_up(monkeypatch):
+        loop = asyncio.get_running_loop()
+
+        def write(self, row):
+            if loop.time() > 1.0:
+                raise FullError
+
+        monkeypatch.setattr("deadtime.links.journal.Journal.write", write)
+        with pytest.raises(FullError):
+            await run_plant(options)
+        return loop.time()
+
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        assert in_virtual_time(disk_fills_up(monkeypatch)) == pytest.approx(1.01, abs=0.01)
 
 
 def test_losses_are_counted_as_they_happened():
@@ -196,7 +236,7 @@ def test_a_controller_that_ends_says_so_and_a_new_one_takes_over():
                 async with Controller(second):
                     return await plant
 
-    report = virtual_time.run(change_of_controllers())
+    report = in_virtual_time(change_of_controllers())
     recording = report.recording
     still = (recording.time > 1.26) & (recording.time < 2.05)
     assert (recording.command[still] == 0.0).all()
@@ -315,7 +355,7 @@ async def attacked(packets, *, from_the_peer):
 
 def test_packets_from_elsewhere_are_not_obeyed():
     forged = LoopPacket(10**6, 0.5, echo_sequence=50, echo_sent=0.49, value=3.0).encode()
-    report = virtual_time.run(attacked([forged] * 5, from_the_peer=False))
+    report = in_virtual_time(attacked([forged] * 5, from_the_peer=False))
     assert report.link.strangers == 5
     assert report.largest_command == 0.0
 
@@ -331,7 +371,7 @@ def test_packets_from_elsewhere_are_not_obeyed():
     ],
 )
 def test_answers_that_cannot_be_are_not_obeyed(packet):
-    report = virtual_time.run(attacked([packet.encode()], from_the_peer=True))
+    report = in_virtual_time(attacked([packet.encode()], from_the_peer=True))
     assert report.applied == 0
     assert report.link.invalid + report.link.late == 1
 
@@ -339,7 +379,7 @@ def test_answers_that_cannot_be_are_not_obeyed(packet):
 @given(st.lists(st.binary(max_size=80), max_size=20))
 @settings(max_examples=25)
 def test_bytes_that_are_no_packets_are_counted_and_left(packets):
-    report = virtual_time.run(attacked(packets, from_the_peer=True))
+    report = in_virtual_time(attacked(packets, from_the_peer=True))
     assert report.link.invalid == len(packets)
     assert report.applied == 0
 
@@ -353,7 +393,7 @@ def test_bytes_that_are_no_packets_are_counted_and_left(packets):
 @settings(max_examples=50)
 def test_whatever_the_peer_commands_stays_within_the_limit(value, echo, age, flags):
     packet = LoopPacket(1, 0.5, echo_sequence=echo, echo_sent=0.5 - age, value=value, flags=flags)
-    report = virtual_time.run(attacked([packet.encode()], from_the_peer=True))
+    report = in_virtual_time(attacked([packet.encode()], from_the_peer=True))
     assert np.abs(report.recording.command).max() <= 20.0
 
 
@@ -367,12 +407,17 @@ def test_bare_doubles_close_the_loop_without_being_measured():
             plant = PlantOptions(controller=relay.address, doubles=(1, 2))
             return await run_plant(plant), controller.report()
 
-    report, other = virtual_time.run(simulink())
+    report, other = in_virtual_time(simulink())
     assert report.recording.output[-1] == pytest.approx(1.0, abs=1e-3)
     assert report.link.round_trip.count == 0
     assert math.isnan(report.age)
     assert report.trips == 0
     assert other.answered > 490
+
+
+def test_a_watchdog_that_would_bite_between_two_commands_is_refused():
+    with pytest.raises(ValueError, match="bite between"):
+        Trial(gain=1.0, sample_time=0.5, watchdog=0.5)
 
 
 def test_what_needs_times_is_refused_for_bare_doubles():

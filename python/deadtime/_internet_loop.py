@@ -22,6 +22,7 @@ import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from errno import EEXIST
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -30,7 +31,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from deadtime._controllers import P
-from deadtime._errors import NotIdentifiableError, RecordingError
+from deadtime._errors import DeadtimeError
 from deadtime._estimation import DelayEstimate, estimate_delay
 from deadtime._internet_replay import (
     MAPS,
@@ -217,6 +218,8 @@ class InternetLoop:
 
     def explanation(self) -> list[str]:
         """The estimates against what was measured, a sentence or two each."""
+        if not math.isfinite(self.age):
+            return ["No command came in time in a run, so that no delay was measured."]
         budgets = [run.budget() for run in self.runs]
         mean = {name: 1e3 * float(np.mean([one[name] for one in budgets])) for name in budgets[0]}
         said = [
@@ -327,9 +330,12 @@ def run_internet_loop(
     unknown = set(methods) - set(METHODS)
     if unknown:
         raise ValueError(f"methods {sorted(unknown)} are none of {', '.join(METHODS)}")
+    stems = [f"{index + 1:02d}-gain-{one.gain:g}-" for index, one in enumerate(trials)]
+    for file in [] if folder is None else [folder / f"{a}{b}.csv" for a in stems for b in ENDS]:
+        if file.exists():  # said before the first of them runs
+            raise FileExistsError(EEXIST, "there already; choose another folder", str(file))
     runs = []
-    for index, one in enumerate(trials):
-        stem = f"{index + 1:02d}-gain-{one.gain:g}-"
+    for one, stem in zip(trials, stems, strict=True):
         progress(f"K = {one.gain:g}: running")
         reports, recordings = _run(one, mode, folder, stem)
         progress(f"K = {one.gain:g}: estimating")
@@ -396,7 +402,7 @@ def _estimate(
             data = _as_sampled(data, trial.sample_time)
         try:
             estimates[name] = estimate_delay(data, known, **options[name])
-        except (NotIdentifiableError, RecordingError) as error:
+        except DeadtimeError as error:
             refusals[name] = str(error).rstrip(".")
     return estimates, refusals
 

@@ -42,14 +42,16 @@ def _steps(ax: Axes, found: InternetLoop) -> None:
     from matplotlib import colormaps
 
     shades = colormaps["viridis"]
-    for index, run in enumerate(found.runs):
+    recorded = [run for run in found.runs if "plant" in run.recordings]
+    for index, run in enumerate(recorded):
         data = run.recordings["plant"]
         if index == 0:
             ax.step(data.time, data.reference, where="post", label="reference", **REFERENCE)
-        shade = shades(0.9 * index / max(1, len(found.runs) - 1))
+        shade = shades(0.9 * index / max(1, len(recorded) - 1))
         ax.plot(data.time, data.output, color=shade, lw=1.2, label=f"K = {run.trial.gain:g}")
     ax.set(xlabel="time / s", ylabel="output")
-    ax.legend(frameon=False, fontsize="small")
+    if recorded:
+        ax.legend(frameon=False, fontsize="small")
 
 
 def _delays(ax: Axes, found: InternetLoop, printed: Mapping[float, float]) -> None:

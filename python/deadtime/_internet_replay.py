@@ -38,11 +38,13 @@ DRAWS = 4000
 def answer_times(arrivals: Sequence[tuple[int, float]]) -> Array:
     """How long each measurement's answer took, s, in the order of the measurements.
 
-    Infinite where none came; up to the last that was answered.
+    Infinite where none came; from the first to the last that was answered.
     """
-    times = np.full(max((number for number, _ in arrivals), default=0), np.inf)
-    for number, age in arrivals:
-        times[number - 1] = age
+    if not arrivals:
+        return np.empty(0)
+    numbers, ages = zip(*arrivals, strict=True)
+    times = np.full(max(numbers) - min(numbers) + 1, np.inf)
+    times[np.array(numbers) - min(numbers)] = ages
     return times
 
 

@@ -80,7 +80,7 @@ async def _run_controller(given: argparse.Namespace) -> None:
     async with Controller(options) as controller:
         _ready("controller", controller.address)
         try:
-            await asyncio.sleep(given.duration)
+            await controller.running(given.duration)
         finally:
             _say(report=controller.report().to_dict())
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
+from collections import deque
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from deadtime._validation import finite, positive
 from deadtime.links.journal import Journal
 from deadtime.links.udp.endpoint import Address, Endpoint
 from deadtime.links.udp.packets import LoopPacket
-from deadtime.links.udp.statistics import LinkReport, Percentiles
+from deadtime.links.udp.statistics import KEPT, LinkReport, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
 
 __all__ = ["Controller", "ControllerOptions", "ControllerReport"]
@@ -78,7 +79,7 @@ class ControllerOptions:
 
 @dataclass(frozen=True, eq=False)
 class ControllerReport:
-    """What happened at the controller.
+    """What happened at the controller; recording and times are those of the last 100 000.
 
     Attributes
     ----------
@@ -130,7 +131,7 @@ class Controller:
         self._last: tuple[LoopPacket, float] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self._started = math.nan
-        self._rows: list[tuple[float, ...]] = []
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=KEPT)
         self._answered = self._drained = self._trips = 0
         self._largest = 0.0
 
@@ -142,11 +143,17 @@ class Controller:
             self._journal = self._stack.enter_context(Journal(self.options.recording, COLUMNS))
         return self
 
-    async def __aexit__(self, *_: object) -> None:
+    async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if self._watchdog is not None:
             self._watchdog.cancel()
         self._send_safe()  # told now, the plant need not wait for its watchdog
         self._stack.close()
+        if kind is None:
+            self._endpoint.check()
+
+    async def running(self, time: float) -> None:
+        """Work for so long, s; raises what it cannot work on with, such as a full disk."""
+        await self._endpoint.running(time)
 
     @property
     def address(self) -> Address:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import ipaddress
+import math
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeAlias, cast
 
 from deadtime._errors import LinkError, PacketError
@@ -127,10 +129,12 @@ class Endpoint:
         self.peer = peer
         self._batch: list[tuple[LoopPacket, float]] = []
         self._socket: Socket | None = None
+        self._failure: Exception | None = None
 
     async def open(self, address: Address) -> None:
         """Open the socket on this address; port 0 takes a free one."""
         self._loop = asyncio.get_running_loop()
+        self._closed = asyncio.Event()
         if self._fixed_peer is not None:
             self._fixed_peer = self.peer = await resolved(self._fixed_peer)
         self._socket = await open_socket(self._receive, address)
@@ -153,11 +157,31 @@ class Endpoint:
             self._socket.send(self._wire.encode(packet), self.peer)
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the socket; what has come and was not taken yet is left."""
         if self._socket is not None:
             self._socket.close()
+            self._closed.set()
+        self._batch.clear()
+
+    def fail(self, error: Exception) -> None:
+        """Close the socket because of an error, which `running` raises."""
+        self._failure = self._failure or error
+        self.close()
+
+    async def running(self, time: float) -> None:
+        """Wait for so long, s, or until the endpoint fails; raises the error then."""
+        with suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._closed.wait(), None if math.isinf(time) else time)
+        self.check()
+
+    def check(self) -> None:
+        """Raise the error that the endpoint failed by, if it did."""
+        if self._failure is not None:
+            raise self._failure
 
     def _receive(self, data: bytes, address: Address) -> None:
+        if self._closed.is_set():
+            return
         now = self._loop.time()
         if self.peer is not None and address != self.peer:
             self.statistics.strangers += 1
@@ -191,4 +215,8 @@ class Endpoint:
 
     def _hand_over(self) -> None:
         batch, self._batch = self._batch, []
-        self._take(batch)
+        try:
+            self._take(batch)
+        except Exception as error:
+            # In a callback of the event loop it would be printed and forgotten.
+            self.fail(error)

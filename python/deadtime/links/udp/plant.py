@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -23,7 +24,7 @@ from deadtime.links.udp.endpoint import Address, Endpoint
 from deadtime.links.udp.integrator import HeldIntegrator
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.policies import NewestWins, Policy
-from deadtime.links.udp.statistics import LinkReport, Percentiles
+from deadtime.links.udp.statistics import KEPT, LinkReport, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
 
 __all__ = ["PlantOptions", "PlantReport", "run_plant"]
@@ -82,6 +83,11 @@ class PlantOptions:
     def __post_init__(self) -> None:
         for name in ("sample_time", "duration", "limit", "watchdog"):
             positive(name, getattr(self, name))
+        if self.watchdog <= self.sample_time:
+            raise ValueError(
+                f"watchdog={self.watchdog} s is no longer than sample_time={self.sample_time} s: "
+                "it would bite between any two commands; give a longer one"
+            )
         non_negative("rest", self.rest)
         finite("amplitude", self.amplitude)
         if abs(finite("safe", self.safe)) > self.limit:
@@ -95,7 +101,7 @@ class PlantOptions:
 
 @dataclass(frozen=True, eq=False)
 class PlantReport:
-    """What happened at the plant.
+    """What happened at the plant; recording, arrivals and times are those of the last 100 000.
 
     Attributes
     ----------
@@ -156,11 +162,13 @@ async def run_plant(options: PlantOptions) -> PlantReport:
     ------
     LinkError
         When there is no such address, or no socket to be had.
+    OSError
+        When the recording cannot be written; the safe command is in force by then.
     """
     plant = _Plant(options)
     await plant.open()
     with plant.at_work():
-        await asyncio.sleep(options.duration)
+        await plant.running()
     return plant.report()
 
 
@@ -176,12 +184,12 @@ class _Plant:
         self._echo: tuple[LoopPacket, float] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self._hold: asyncio.TimerHandle | None = None
-        self._tick: asyncio.TimerHandle | None = None
+        self._tick: asyncio.Handle | None = None
         self._waiting: set[asyncio.TimerHandle] = set()
-        self._rows: list[tuple[float, ...]] = []
-        self._periods: list[float] = []
-        self._ages: list[float] = []
-        self._arrivals: list[tuple[int, float]] = []
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=KEPT)
+        self._periods: deque[float] = deque(maxlen=KEPT)
+        self._ages: deque[float] = deque(maxlen=KEPT)
+        self._arrivals: deque[tuple[int, float]] = deque(maxlen=KEPT)
         self._age_area = self._age_time = self._oldest = 0.0
         self._overruns = self._applied = self._trips = 0
         self._safe_since: float | None = None
@@ -191,6 +199,9 @@ class _Plant:
     async def open(self) -> None:
         self._loop = asyncio.get_running_loop()
         await self._endpoint.open(self.options.listen)
+
+    async def running(self) -> None:
+        await self._endpoint.running(self.options.duration)
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
@@ -203,7 +214,7 @@ class _Plant:
             self._started = self._clock = self._loop.time()
             self._due = 0
             stack.callback(self._stop)
-            self._sample()
+            self._tick = self._loop.call_soon(self._sample)
             yield
 
     def _stop(self) -> None:
@@ -227,7 +238,22 @@ class _Plant:
             self._oldest = max(self._oldest, new)
 
     def _sample(self) -> None:
-        """Measure, send, record, and see to the next time."""
+        """Measure, send and record, and see to the next time."""
+        try:
+            self._measure()
+        except Exception as error:  # such as a full disk: without samples there is no loop
+            self._endpoint.fail(error)
+            self._make_safe(self.options.safe)
+            return
+        due = self._due + 1
+        latest = math.floor((self._loop.time() - self._started) / self.options.sample_time + 1e-6)
+        self._overruns += max(0, latest - due)
+        self._due = max(due, latest)
+        self._tick = self._loop.call_at(
+            self._started + self._due * self.options.sample_time, self._sample
+        )
+
+    def _measure(self) -> None:
         now = self._loop.time()
         self._pass_time(now)
         elapsed = now - self._started
@@ -256,13 +282,6 @@ class _Plant:
             if self._journal is not None:
                 age = now - self._stamp
                 self._journal.write((*row, age if math.isfinite(age) else None))
-        due = self._due + 1
-        latest = math.floor((self._loop.time() - self._started) / self.options.sample_time + 1e-6)
-        self._overruns += max(0, latest - due)
-        self._due = max(due, latest)
-        self._tick = self._loop.call_at(
-            self._started + self._due * self.options.sample_time, self._sample
-        )
 
     def _take(self, batch: list[tuple[LoopPacket, float]]) -> None:
         for packet, read in batch:

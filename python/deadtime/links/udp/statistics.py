@@ -22,7 +22,10 @@ import numpy as np
 
 from deadtime.links.udp.packets import LoopPacket
 
-__all__ = ["ClockOffset", "LinkReport", "LinkStatistics", "Percentiles", "histogram"]
+__all__ = ["KEPT", "ClockOffset", "LinkReport", "LinkStatistics", "Percentiles", "histogram"]
+
+#: Packets whose times are kept, the newest: an end may run for days.
+KEPT = 100_000
 
 #: Sequence numbers that are remembered to tell a duplicate from a packet that was overtaken.
 REMEMBERED = 4096
@@ -170,21 +173,26 @@ class LinkReport:
         return {**asdict(self), "loss": self.loss}
 
 
+def _newest() -> deque[float]:
+    return deque(maxlen=KEPT)
+
+
 @dataclass
 class LinkStatistics:
-    """Counts and times of one stream, packet by packet."""
+    """Counts of one stream, and the times of its last 100 000 packets."""
 
     received: int = 0
     duplicates: int = 0
     reordered: int = 0
     strangers: int = 0
     invalid: int = 0
-    round_trips: list[float] = field(default_factory=list)
-    held: list[float] = field(default_factory=list)
-    lateness: list[float] = field(default_factory=list)
+    round_trips: deque[float] = field(default_factory=_newest)
+    held: deque[float] = field(default_factory=_newest)
+    lateness: deque[float] = field(default_factory=_newest)
+    late: int = 0
     clock: ClockOffset = field(default_factory=ClockOffset)
-    _there: list[float] = field(default_factory=list)
-    _back: list[float] = field(default_factory=list)
+    _there: deque[float] = field(default_factory=_newest)
+    _back: deque[float] = field(default_factory=_newest)
     _jitter: float = 0.0
     _first: int | None = None
     _highest: int = -1
@@ -250,6 +258,7 @@ class LinkStatistics:
 
     def came_late(self, by: float) -> None:
         """Take in that a packet could not be used, being late by so much."""
+        self.late += 1
         self.lateness.append(by)
 
     def report(self) -> LinkReport:
@@ -263,7 +272,7 @@ class LinkStatistics:
             lost=self._lost(),
             duplicates=self.duplicates,
             reordered=self.reordered,
-            late=len(self.lateness),
+            late=self.late,
             strangers=self.strangers,
             invalid=self.invalid,
             round_trip=Percentiles.of(self.round_trips),
