@@ -245,8 +245,8 @@ class InternetLoop:
             knows = "which has the hold in it" if METHODS[method] else "the hold taken out"
             interval = ""
             if math.isfinite(found.low):
-                how = "by replaying the steps" if found.replayed else "by the runs' spread"
-                interval = f" ({1e3 * found.low:.1f} to {1e3 * found.high:.1f} {how})"
+                how = "corrected by replaying" if found.replayed else "by the spread of the runs"
+                interval = f" ({how} {1e3 * found.low:.1f} to {1e3 * found.high:.1f})"
             said.append(
                 f"{label} finds {1e3 * found.mean:.1f} ms{interval}, where "
                 f"{1e3 * wanted:.1f} ms was measured, {knows}."

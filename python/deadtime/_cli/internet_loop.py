@@ -122,6 +122,7 @@ def run_loop(
         print_json({**found.to_dict(), "table_1": printed})
         return
     print_table(_table(found, printed))
+    console.print("means, 95 % intervals, and what was measured, in ms", style="dim")
     for name, said in _spreads(found).items():
         console.print(f"{name:<20}{said}", highlight=False, markup=False)
     for sentence in found.explanation():
@@ -184,7 +185,8 @@ def _spreads(found: InternetLoop) -> dict[str, str]:
 
 
 def _told(spread: Spread, expected: float) -> str:
-    interval = (
-        f", 95 % interval {_ms(spread.low)} to {_ms(spread.high)}" if spread.count > 1 else ""
-    )
-    return f"{_ms(spread.mean)} ms{interval}; measured {_ms(expected)}"
+    interval = ""
+    if math.isfinite(spread.low):
+        how = "corrected by replaying" if spread.replayed else "by the spread of the runs"
+        interval = f"; {how} {_ms(spread.low)} to {_ms(spread.high)}"
+    return f"mean {_ms(spread.mean)}{interval}; measured {_ms(expected)}"
