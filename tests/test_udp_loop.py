@@ -320,81 +320,100 @@ def test_twenty_seeds_of_a_bad_network_leave_the_output_bounded():
 
 
 class Hostile(asyncio.DatagramProtocol):
-    """Sends what it likes to whom it likes."""
+    """Sends what it likes to whom it likes; it has read the last measurement."""
+
+    heard = LoopPacket(0, 0.0)
 
     def connection_made(self, transport):
         self.transport = transport
 
+    def datagram_received(self, data, addr):
+        self.heard = LoopPacket.decode(data)
 
-async def attacked(packets, *, from_the_peer):
-    """The plant's report when such packets arrive at its port while it runs undisturbed."""
+
+async def attacked(packets, *, from_the_peer=True):
+    """The plant's report when what `packets` makes of a measurement arrives while it runs."""
     loop = asyncio.get_running_loop()
-    port = 40_000
-    if from_the_peer:
-        transport, _ = await loop.create_datagram_endpoint(
-            Hostile, local_addr=("127.0.0.1", 41_000)
-        )
-        options = PlantOptions(
-            controller=("127.0.0.1", 41_000), listen=("127.0.0.1", port), duration=1.0
-        )
-        plant = asyncio.ensure_future(run_plant(options))
-    else:
-        transport, _ = await loop.create_datagram_endpoint(Hostile, local_addr=("127.0.0.1", 0))
-        controller = await Controller(ControllerOptions(gain=2.0)).__aenter__()
-        options = PlantOptions(
-            controller=controller.address, listen=("127.0.0.1", port), duration=1.0
-        )
-        plant = asyncio.ensure_future(run_plant(options))
-    await asyncio.sleep(0.5)
-    for packet in packets:
-        transport.sendto(packet, ("127.0.0.1", port))
+    _, hostile = await loop.create_datagram_endpoint(Hostile, local_addr=("127.0.0.1", 41_000))
+    peer = ("127.0.0.1", 41_000 if from_the_peer else 42_000)
+    options = PlantOptions(controller=peer, listen=("127.0.0.1", 40_000), duration=1.0)
+    plant = asyncio.ensure_future(run_plant(options))
+    await asyncio.sleep(0.505)
+    for packet in packets(hostile.heard):
+        hostile.transport.sendto(packet, options.listen)
     report = await plant
-    transport.close()
+    hostile.transport.close()
     return report
 
 
+def answer(measurement, **change):
+    """A command that the plant has no reason to refuse, but for what is changed in it."""
+    words = {
+        "sequence": 1,
+        "sent": measurement.sent,
+        "echo_sequence": measurement.sequence,
+        "echo_sent": measurement.sent,
+        "value": 3.0,
+    }
+    return LoopPacket(**{**words, **change}).encode()
+
+
+def test_an_answer_to_the_last_measurement_is_obeyed():
+    report = in_virtual_time(attacked(lambda measured: [answer(measured)]))
+    assert (report.applied, report.largest_command) == (1, 3.0)
+
+
 def test_packets_from_elsewhere_are_not_obeyed():
-    forged = LoopPacket(10**6, 0.5, echo_sequence=50, echo_sent=0.49, value=3.0).encode()
-    report = in_virtual_time(attacked([forged] * 5, from_the_peer=False))
+    def forged(_):
+        number, sent = 51, 0.5  # what is being measured while they are sent can be guessed
+        return [LoopPacket(1, sent, echo_sequence=number, echo_sent=sent, value=3.0).encode()] * 5
+
+    report = in_virtual_time(attacked(forged, from_the_peer=False))
     assert report.link.strangers == 5
-    assert report.largest_command == 0.0
+    assert report.applied == 0
 
 
 @pytest.mark.parametrize(
-    "packet",
+    "change",
     [
-        LoopPacket(1, 0.5, value=3.0),  # answers nothing
-        LoopPacket(1, 0.5, echo_sequence=9999, echo_sent=0.49, value=3.0),  # was never sent
-        LoopPacket(1, 0.5, echo_sequence=50, echo_sent=0.9, value=3.0),  # is not sent yet
-        LoopPacket(1, 0.5, echo_sequence=50, echo_sent=0.4, held=0.2, value=3.0),  # held too long
-        LoopPacket(1, 0.5, echo_sequence=1, echo_sent=-9.0, value=3.0),  # too old
+        {"echo_sequence": 0},  # answers nothing
+        {"echo_sequence": 9999},  # was never sent
+        {"echo_sequence": 7},  # not at that time
+        {"echo_sent": 0.9},  # is not sent yet
+        {"held": 0.2},  # held for longer than it can be
     ],
 )
-def test_answers_that_cannot_be_are_not_obeyed(packet):
-    report = in_virtual_time(attacked([packet.encode()], from_the_peer=True))
+def test_answers_that_cannot_be_are_not_obeyed(change):
+    report = in_virtual_time(attacked(lambda measured: [answer(measured, **change)]))
     assert report.applied == 0
-    assert report.link.invalid + report.link.late == 1
+    assert report.link.invalid == 1
 
 
 @given(st.lists(st.binary(max_size=80), max_size=20))
 @settings(max_examples=25)
 def test_bytes_that_are_no_packets_are_counted_and_left(packets):
-    report = in_virtual_time(attacked(packets, from_the_peer=True))
+    report = in_virtual_time(attacked(lambda _: packets))
     assert report.link.invalid == len(packets)
     assert report.applied == 0
 
 
 @given(
-    value=st.floats(-1e300, 1e300),
-    echo=st.integers(1, 50),
-    age=st.floats(0.0, 0.5),
+    value=st.floats(allow_nan=False, allow_infinity=False),
     flags=st.integers(0, 3),
+    times=st.integers(1, 200),
 )
 @settings(max_examples=50)
-def test_whatever_the_peer_commands_stays_within_the_limit(value, echo, age, flags):
-    packet = LoopPacket(1, 0.5, echo_sequence=echo, echo_sent=0.5 - age, value=value, flags=flags)
-    report = in_virtual_time(attacked([packet.encode()], from_the_peer=True))
+def test_whatever_the_peer_commands_stays_within_the_limit(value, flags, times):
+    def commands(measured):
+        return [
+            answer(measured, value=value, flags=flags, sequence=1 + number)
+            for number in range(times)
+        ]
+
+    report = in_virtual_time(attacked(commands))
     assert np.abs(report.recording.command).max() <= 20.0
+    assert report.applied <= 1
+    assert report.trips + report.applied >= 1
 
 
 def test_bare_doubles_close_the_loop_without_being_measured():
@@ -418,6 +437,8 @@ def test_bare_doubles_close_the_loop_without_being_measured():
 def test_a_watchdog_that_would_bite_between_two_commands_is_refused():
     with pytest.raises(ValueError, match="bite between"):
         Trial(gain=1.0, sample_time=0.5, watchdog=0.5)
+    with pytest.raises(ValueError, match="older than"):
+        Trial(gain=1.0, policy=JitterBuffer(0.6), watchdog=0.5)
 
 
 def test_what_needs_times_is_refused_for_bare_doubles():

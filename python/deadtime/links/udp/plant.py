@@ -23,8 +23,8 @@ from deadtime.links.journal import Journal
 from deadtime.links.udp.endpoint import Address, Endpoint
 from deadtime.links.udp.integrator import HeldIntegrator
 from deadtime.links.udp.packets import LoopPacket
-from deadtime.links.udp.policies import NewestWins, Policy
-from deadtime.links.udp.statistics import KEPT, LinkReport, Percentiles
+from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
+from deadtime.links.udp.statistics import KEPT, REMEMBERED, LinkReport, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
 
 __all__ = ["PlantOptions", "PlantReport", "run_plant"]
@@ -87,6 +87,12 @@ class PlantOptions:
             raise ValueError(
                 f"watchdog={self.watchdog} s is no longer than sample_time={self.sample_time} s: "
                 "it would bite between any two commands; give a longer one"
+            )
+        buffer = self.policy
+        if isinstance(buffer, JitterBuffer) and buffer.delay > self.watchdog:
+            raise ValueError(
+                f"{buffer} makes every command older than watchdog={self.watchdog} s bears: give a "
+                "shorter delay or a longer watchdog"
             )
         non_negative("rest", self.rest)
         finite("amplitude", self.amplitude)
@@ -181,6 +187,7 @@ class _Plant:
         self._command, self._stamp = options.safe, math.nan
         self._newest = 0
         self._sequence = 0
+        self._sent: dict[int, float] = {}
         self._echo: tuple[LoopPacket, float] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self._hold: asyncio.TimerHandle | None = None
@@ -263,6 +270,8 @@ class _Plant:
         output = self._model.output
         echo, read = self._echo or (None, now)
         self._sequence += 1
+        self._sent[self._sequence] = now
+        self._sent.pop(self._sequence - REMEMBERED, None)
         self._endpoint.send(
             LoopPacket(
                 sequence=self._sequence,
@@ -285,7 +294,6 @@ class _Plant:
 
     def _take(self, batch: list[tuple[LoopPacket, float]]) -> None:
         for packet, read in batch:
-            self._echo = (packet, read)
             self._judge(packet, read)
 
     def _judge(self, packet: LoopPacket, read: float) -> None:
@@ -305,11 +313,12 @@ class _Plant:
         age = 0.0
         if self._wire.has_times:
             age = read - packet.echo_sent
-            # Of a measurement that was never sent, or is not yet: such a packet is no answer.
-            possible = 0 < packet.echo_sequence <= self._sequence
-            if not (possible and 0.0 <= packet.held <= age < math.inf):
+            # Only what answers a measurement of this plant, and could have done so, is an answer.
+            own = self._sent.get(number) == packet.echo_sent
+            if not (own and packet.held <= age):
                 statistics.invalid += 1
                 return
+            self._echo = (packet, read)
             statistics.exchanged(packet, read)
             self._arrivals.append((number, age))
             if age > self.options.watchdog:

@@ -103,11 +103,13 @@ def run_processes(trial: Trial, folder: Path, *, stem: str = "") -> dict[str, di
         When a process does not start, or ends before its time.
     """
     files = {end: folder / f"{stem}{end}.csv" for end in ENDS}
+    # If this process is killed, the others end by themselves.
+    until = ["--duration", repr(trial.duration + 3.0 * PATIENCE)]
     with ExitStack() as stack:
         options = trial.controller_options(files["controller"])
-        controller = stack.enter_context(part("controller", arguments_of(options)))
+        controller = stack.enter_context(part("controller", [*arguments_of(options), *until]))
         between = arguments_of(trial.relay_options(controller.address()))
-        relay = stack.enter_context(part("relay", between))
+        relay = stack.enter_context(part("relay", [*between, *until]))
         wanted = trial.plant_options(relay.address(), files["plant"])
         plant = stack.enter_context(part("plant", arguments_of(wanted)))
         reports = {"plant": plant.report(trial.duration + PATIENCE)}

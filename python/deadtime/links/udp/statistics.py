@@ -22,12 +22,21 @@ import numpy as np
 
 from deadtime.links.udp.packets import LoopPacket
 
-__all__ = ["KEPT", "ClockOffset", "LinkReport", "LinkStatistics", "Percentiles", "histogram"]
+__all__ = [
+    "KEPT",
+    "REMEMBERED",
+    "ClockOffset",
+    "LinkReport",
+    "LinkStatistics",
+    "Percentiles",
+    "histogram",
+]
 
 #: Packets whose times are kept, the newest: an end may run for days.
 KEPT = 100_000
 
-#: Sequence numbers that are remembered to tell a duplicate from a packet that was overtaken.
+#: Sequence numbers that are remembered: which came, to tell a duplicate from a packet that was
+#: overtaken, and when which was sent.
 REMEMBERED = 4096
 
 #: Width of a bin at least, s: no clock tells less.
