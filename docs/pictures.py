@@ -12,6 +12,8 @@ from deadtime import paper
 from deadtime._internet_loop import run_internet_loop
 from deadtime._internet_plots import plot_internet_loop
 from deadtime.links import udp, virtual_time
+from deadtime.links.ardrone2.emulator import Thruster, ThrustMotion
+from scipy.optimize import least_squares
 
 IMAGES = Path(__file__).parent / "images"
 NUMBERS = Path(__file__).parent / "reproduction-numbers.md"
@@ -218,7 +220,100 @@ def internet_loop() -> None:
     figure.savefig(IMAGES / "internet-policies.png", dpi=90)
 
 
+TS = 0.065
+
+
+def thrust_flight(gain: float, step: float, noise: float = 0.0) -> dtm.Recording:
+    """A step of the height under P control, flown by rotors: four samples of transport delay."""
+    motion, random = ThrustMotion(Thruster()), np.random.default_rng(1)
+    motion.settle(0, 0.0)
+    heights, commands = [], []
+    reference = np.where(np.arange(160) >= 16, step, 0.0)
+    for k, wanted in enumerate(reference):
+        now = k * 65_000
+        if k >= 4:
+            motion.demand(now, commands[k - 4])
+        heights.append(motion.at(now)[0] + noise * random.standard_normal())
+        commands.append(float(np.clip(gain * (wanted - heights[-1]), -2.0, 2.0)))
+    return dtm.Recording(np.arange(160) * TS, reference, heights, commands)
+
+
+def first_order_climb(amplitude: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The climb after a step of its demand, over the step, and lag and delay fitted to it."""
+    motion = ThrustMotion(Thruster())
+    motion.settle(0, 0.0)
+    motion.demand(0, amplitude)
+    climb = np.array([motion.at(round(1e6 * t))[1] for t in time]) / amplitude
+
+    def error(numbers: np.ndarray) -> np.ndarray:
+        lag, delay = numbers
+        return -np.expm1(-np.maximum(time - delay, 0.0) / lag) - climb
+
+    return climb, least_squares(error, [0.12, 0.04]).x
+
+
+def thrust() -> None:
+    """Climb and height of the thrust model, beside first-order fits to them."""
+    figure, axes = plt.subplots(1, 3, figsize=(12.5, 3.8), layout="constrained")
+    time = np.arange(0.0, 0.8, 0.002)
+    print("demand (m/s)  lag (s)  delay (s)  lag + delay (s)")
+    for amplitude in (0.1, 1.0, -1.0, 2.0, -2.0):
+        climb, (lag, delay) = first_order_climb(amplitude, time)
+        print(f"{amplitude:4.1f}  {lag:.3f}  {delay:.3f}  {lag + delay:.3f}")
+        axes[0].plot(time, climb, linewidth=1.2, label=f"demand {amplitude:+.1f} m/s")
+        if amplitude == 0.1:
+            first = -np.expm1(-np.maximum(time - delay, 0.0) / lag)
+    axes[0].plot(time, first, "k--", linewidth=1.0, label="first order behind a delay")
+    axes[0].set(xlabel="time (s)", ylabel="climb / demand", title="A step of the demanded climb")
+    axes[0].legend(frameon=False)
+
+    thruster, gain = Thruster(), 2.0
+    c = thruster.speed_gain
+    exact = dtm.RationalPlant([c], [thruster.motor_lag, 1.0, c, 0.0])
+    lag, more = first_order_climb(0.1, time)[1]
+    print("transport delay (s)  largest gain  by first order")
+    for transport in (0.0, 0.02, 0.05, 0.1, 0.26):
+        loops = (
+            dtm.ControlLoop(exact, dtm.P(1.0), delay=transport),
+            dtm.ControlLoop(dtm.Integrator(1.0, lag), dtm.P(1.0), delay=transport + more),
+        )
+        largest, by_first_order = (loop.margin().gain_margin for loop in loops)
+        print(f"{transport}  {largest:.2f}  {by_first_order:.2f}")
+    loop = dtm.ControlLoop(exact, dtm.P(gain), delay=0.26, sample_time=TS)
+    known = dtm.ControlLoop(dtm.Integrator(), dtm.P(gain), sample_time=TS, limit=2.0)
+    print("step (m)  overshoot (%)  of the fit  delay  lag  sum  gain  gain margin  delay margin")
+    margin = loop.margin()
+    overshoot = loop.simulate(np.arange(160) * TS).info()["overshoot"]
+    print(
+        f"linear: {overshoot:.1f} %, margins {margin.gain_margin:.3f}, {margin.delay_margin:.3f} s"
+    )
+    for number, step in enumerate((0.1, 0.4, 0.8, 1.6)):
+        flown, noisy = (thrust_flight(gain, step, noise) for noise in (0.0, 0.002))
+        fit = dtm.estimate_delay(
+            noisy, known, free=("delay", "gain", "lag"), method="waveform", initial_output=0.0
+        )
+        margin = fit.loop.replace(limit=None).margin()
+        fitted = fit.loop.simulate(np.arange(144) * TS, step).outputs
+        print(
+            f"{step}  {100 * (np.max(flown.output) / step - 1):.1f}  "
+            f"{100 * (np.max(fitted) / step - 1):.1f}  {fit.delay:.3f}  {fit.lag:.3f}  "
+            f"{fit.delay + fit.lag:.3f}  {fit.gain:.3f}  {margin.gain_margin:.3f}  "
+            f"{margin.delay_margin:.3f}  {fit.adequate}"
+        )
+        late = flown.time[16:] - flown.time[16]
+        color, height = f"C{number}", flown.output[16:]
+        axes[1].plot(late, height / step, color, linewidth=1.4, label=f"step {step} m")
+        axes[2].plot(late, 100 * (fitted - height) / step, color, linewidth=1.2)
+    axes[1].set(xlabel="time (s)", ylabel="height / step", title="Height: Kp 2, limit 2 m/s")
+    axes[1].legend(frameon=False)
+    axes[2].set(
+        xlabel="time (s)", ylabel="percent of the step", title="First-order fit less height"
+    )
+    figure.savefig(IMAGES / "thrust.png", dpi=90)
+
+
 if __name__ == "__main__":
+    thrust()
     designing()
     estimating()
     fixed_steps()

@@ -2,12 +2,14 @@
 
 import ast
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "rust" / "core" / "src"
+WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 PACKAGE = ROOT / "python" / "deadtime"
 
@@ -138,6 +140,24 @@ def test_the_foundation_of_the_core_stands_alone():
 def test_the_core_knows_nothing_of_python():
     for path in rust_sources(CORE):
         assert not re.search(r"\b(pyo3|numpy::)", path.read_text(encoding="utf-8")), path.name
+
+
+def test_the_wire_formats_stand_alone():
+    # What reads bytes from a network has nothing around it that could be unsafe or panic.
+    manifest = tomllib.loads((WIRE_FORMATS / "Cargo.toml").read_text(encoding="utf-8"))
+    assert manifest["dependencies"] == {}
+    table_of_contents = (WIRE_FORMATS / "src" / "lib.rs").read_text(encoding="utf-8")
+    assert "#![forbid(unsafe_code)]" in table_of_contents
+    assert "#![deny(clippy::indexing_slicing)]" in table_of_contents
+
+
+def test_only_one_file_of_the_seam_knows_the_wire_formats():
+    users = [
+        path.relative_to(ROOT).as_posix()
+        for path in rust_sources(CORE) + rust_sources(BINDINGS)
+        if "deadtime_wire" in path.read_text(encoding="utf-8")
+    ]
+    assert users == ["rust/bindings/src/wire.rs"]
 
 
 def test_the_seam_holds_no_formula():

@@ -11,6 +11,7 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
 PAGES = [
+    "emulator.md",
     "from-recording-to-gains.md",
     "internet-loop.md",
     "planning-a-flight.md",

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from deadtime._cli import options as opt
 from deadtime._cli.designs import design_gains
+from deadtime._cli.emulate import emulators
 from deadtime._cli.estimates import estimate_delays
 from deadtime._cli.internet_loop import run_loop
 from deadtime._cli.maps import map_gains
@@ -176,6 +177,7 @@ app.command("map")(map_gains)
 app.command("design")(design_gains)
 app.command("reproduce")(reproduce_paper)
 app.command("internet-loop")(run_loop)
+app.add_typer(emulators, name="emulate")
 
 
 @app.command()

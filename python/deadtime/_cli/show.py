@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "console",
     "counted",
     "estimates_table",
     "print_json",

@@ -3,8 +3,8 @@
 use crate::error::{Error, Fault};
 use std::collections::HashMap;
 
-/// The most bytes that are taken for a configuration; real ones have some 4000.
-pub const LIMIT: usize = 65_536;
+/// The most bytes that are taken for a configuration: several times what the drone's settings take.
+pub const LIMIT: usize = 16_384;
 
 /// The settings in their order, keys with their section.
 ///

@@ -79,6 +79,8 @@ pub enum Fault {
         /// The byte.
         byte: u8,
     },
+    /// A name that is no name, or that of a command which has a type of its own.
+    Name(String),
     /// Bytes that are no UTF-8 text.
     Text,
     /// A line of the configuration without "section:key = value".
@@ -135,6 +137,7 @@ impl fmt::Display for Fault {
                     "{name} holds the byte 0x{byte:02x}, which has no place in it"
                 )?;
             }
+            Fault::Name(name) => write!(f, "\"{name}\" is no name of another command")?,
             Fault::Text => f.write_str("these bytes are no UTF-8 text")?,
             Fault::Line => f.write_str("a line that is not of the form \"section:key = value\"")?,
             Fault::Twice(key) => write!(f, "the key {key} has two different values")?,
@@ -150,5 +153,7 @@ impl fmt::Display for Error {
         write!(f, "{}, at byte {}", self.fault, self.offset)
     }
 }
+
+impl std::error::Error for Fault {}
 
 impl std::error::Error for Error {}

@@ -8,7 +8,7 @@ last one's; 1 starts again.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
 
 from deadtime.links._wire import at_read, at_write
@@ -45,9 +45,9 @@ class _Command:
 
 class _Motion(_Command):
     def __post_init__(self) -> None:
-        for field in fields(self):  # type: ignore[arg-type]
-            if field.name != "flag":
-                object.__setattr__(self, field.name, UnitCommand(getattr(self, field.name)))
+        for name, value in vars(self).items():
+            if name != "flag" and type(value) is not UnitCommand:
+                object.__setattr__(self, name, UnitCommand(value))
 
     def _arguments(self) -> tuple[Any, ...]:
         *motion, flag = vars(self).values()
@@ -217,8 +217,8 @@ def decode(datagram: bytes) -> list[tuple[int, Command]]:
     r"""Read the commands of a datagram, each with its sequence number, in their order.
 
     A malformed command is left out, as the drone ignores it: one without a carriage return or line
-    feed at its end, longer than 1024 bytes, with arguments missing or of another kind. Finite
-    values of a motion are clipped to [-1, 1]; a motion with any other is left out.
+    feed at its end or not within the first 1024 bytes, with arguments missing or of another kind.
+    Finite values of a motion are clipped to [-1, 1]; a motion with any other is left out.
 
     Examples
     --------

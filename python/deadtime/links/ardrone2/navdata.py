@@ -223,7 +223,9 @@ _KINDS: dict[str, Any] = {
     "kalman_pressure": KalmanPressure,
     "wifi": Wifi,
 }
-_FIELDS = {1: ("clock", float)} | {kind.tag: (name, kind) for name, kind in _KINDS.items()}
+_FIELDS: dict[int, tuple[str, Any]] = {1: ("clock", float)} | {
+    kind.tag: (name, kind) for name, kind in _KINDS.items()
+}
 _LENGTHS = {tag: length for tag, length, _, _ in navdata_layouts()}
 
 
@@ -242,8 +244,9 @@ def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
     Raises
     ------
     PacketError
-        If the header is another one, an option is smaller than its own head or ends beyond the
-        packet, or the checksum is missing, wrong or not the last option.
+        If it has more than 8192 bytes, its header is another one, an option is smaller than its
+        own head or ends beyond the packet, or the checksum is missing, wrong or not the last
+        option.
 
     Examples
     --------
@@ -258,10 +261,9 @@ def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
     (header, state, sequence, vision), read, matches = navdata_read(packet, checksum)
     known: dict[str, Any] = {}
     for tag, _, values in read:
-        if values is not None:
+        if tag in _FIELDS and _FIELDS[tag][0] not in known:
             name, kind = _FIELDS[tag]
-            if name not in known:
-                known[name] = kind(*values)
+            known[name] = None if values is None else kind(*values)
     options = tuple((tag, body) for tag, body, _ in read)
     return Navdata(
         state,
@@ -283,7 +285,8 @@ def build_navdata(navdata: Navdata) -> bytes:
     Raises
     ------
     ValueError
-        If a value is not finite or has no place on the wire.
+        If a value is not finite or has no place on the wire, or the packet has more than 8192
+        bytes.
     """
     fields = {
         tag: (value,) if tag == 1 else tuple(vars(value).values())
@@ -298,4 +301,4 @@ def build_navdata(navdata: Navdata) -> bytes:
     try:
         return navdata_write(head, options)
     except OverflowError as error:
-        raise ValueError(f"header, state, sequence, vision = {head}: {error}") from None
+        raise ValueError(f"a word of the head {head}, or a tag: {error}") from None

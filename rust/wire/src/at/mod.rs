@@ -5,11 +5,12 @@
 
 mod command;
 mod read;
+mod text;
 mod write;
 
 pub use command::Command;
 pub use read::read;
 pub use write::write;
 
-/// The most bytes a datagram of commands may have; a longer line is dropped by the drone.
+/// The most bytes a datagram of commands may have; of a longer one the drone reads no more.
 pub const LIMIT: usize = 1024;

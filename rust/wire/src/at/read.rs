@@ -1,14 +1,15 @@
 //! Bytes to commands, as a drone reads them: what it cannot make sense of, it ignores.
 
+use super::text::{is_one_argument, is_other, printable, split};
 use super::{Command, LIMIT};
 use crate::unit::Unit;
 
 /// The commands of a datagram in their order, each with its sequence number.
 ///
 /// A malformed command is left out: one without a carriage return or line feed at its end (its rest
-/// may be missing), longer than [`LIMIT`], with too few arguments or with some of another kind. Of
-/// values of a motion, finite ones are clipped to [-1, 1]; a command with any other is left out.
-/// Missing base bits of `REF` and arguments beyond those known are no fault.
+/// may be missing) or not within the first [`LIMIT`] bytes, with too few arguments or with some of
+/// another kind. Of values of a motion, finite ones are clipped to [-1, 1]; a command with any
+/// other is left out. Missing base bits of `REF` and arguments beyond those known are no fault.
 ///
 /// ```
 /// use deadtime_wire::at::{self, Command};
@@ -18,10 +19,9 @@ use crate::unit::Unit;
 /// assert_eq!(read[1], (3, Command::Ref { take_off: true, emergency: false }));
 /// ```
 pub fn read(datagram: &[u8]) -> Vec<(u32, Command)> {
-    datagram
-        .split_inclusive(|byte| matches!(byte, b'\r' | b'\n'))
+    let read = datagram.get(..LIMIT).unwrap_or(datagram);
+    read.split_inclusive(|byte| matches!(byte, b'\r' | b'\n'))
         .filter_map(|line| line.strip_suffix(b"\r").or(line.strip_suffix(b"\n")))
-        .filter(|line| line.len() < LIMIT)
         .filter_map(|line| command(std::str::from_utf8(line).ok()?))
         .collect()
 }
@@ -72,14 +72,12 @@ fn command(line: &str) -> Option<(u32, Command)> {
             device: arguments.integer()?,
         },
         _ => {
-            let known =
-                |byte: u8| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_';
-            if name.is_empty() || !name.bytes().all(known) {
+            if !is_other(name) {
                 return None;
             }
             let mut others = Vec::new();
             while let Some(argument) = arguments.next() {
-                if !argument.bytes().all(|byte| (b' '..=b'~').contains(&byte)) {
+                if !argument.bytes().all(printable) || !is_one_argument(argument) {
                     return None;
                 }
                 others.push(argument.to_owned());
@@ -97,19 +95,9 @@ fn command(line: &str) -> Option<(u32, Command)> {
 struct Arguments<'a>(Option<&'a str>);
 
 impl<'a> Arguments<'a> {
-    /// The next argument, quotes included; a comma between quotes belongs to it.
     fn next(&mut self) -> Option<&'a str> {
-        let rest = self.0.take()?;
-        let mut inside = false;
-        let end = rest.bytes().position(|byte| {
-            inside ^= byte == b'"';
-            byte == b',' && !inside
-        });
-        let (argument, others) = match end.and_then(|end| rest.split_at_checked(end)) {
-            Some((argument, others)) => (argument, others.strip_prefix(',')),
-            None => (rest, None),
-        };
-        self.0 = others;
+        let (argument, rest) = split(self.0.take()?);
+        self.0 = rest;
         Some(argument)
     }
 
@@ -136,9 +124,7 @@ impl<'a> Arguments<'a> {
             .trim_matches(' ')
             .strip_prefix('"')?
             .strip_suffix('"')?;
-        let readable = inside
-            .bytes()
-            .all(|byte| (b' '..=b'~').contains(&byte) && byte != b'"');
+        let readable = inside.bytes().all(|byte| printable(byte) && byte != b'"');
         readable.then(|| inside.to_owned())
     }
 }

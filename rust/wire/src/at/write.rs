@@ -1,5 +1,6 @@
 //! Commands to bytes.
 
+use super::text::{is_one_argument, is_other, printable};
 use super::{Command, LIMIT};
 use crate::error::{Error, Fault};
 use crate::unit::Unit;
@@ -108,17 +109,19 @@ fn line(text: &mut String, command: &Command, sequence: i64) -> Result<(), Error
             number(text, *device);
         }
         Command::Other { name, arguments } => {
-            let allowed =
-                |byte: u8| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_';
-            check("name", name, text.len(), allowed)?;
-            if name.is_empty() {
-                let (length, needed) = (0, 1);
-                return Err(Fault::Short { length, needed }.at(text.len()));
+            // Nobody writes a motion past its type under another one.
+            if !is_other(name) {
+                return Err(Fault::Name(name.clone()).at(text.len()));
             }
             head(text, name, sequence);
             for argument in arguments {
                 text.push(',');
-                check("argument", argument, text.len(), printable)?;
+                let (name, offset) = ("argument", text.len());
+                check(name, argument, offset, printable)?;
+                if !is_one_argument(argument) {
+                    let byte = if argument.contains('"') { b'"' } else { b',' };
+                    return Err(Fault::Sign { name, byte }.at(offset));
+                }
                 text.push_str(argument);
             }
         }
@@ -149,10 +152,6 @@ fn quoted(text: &mut String, name: &'static str, value: &str) -> Result<(), Erro
     text.push_str(value);
     text.push('"');
     Ok(())
-}
-
-fn printable(byte: u8) -> bool {
-    (b' '..=b'~').contains(&byte)
 }
 
 /// Refuses a byte that would end the text, the line or the datagram it stands in.

@@ -13,7 +13,7 @@ mod packet;
 mod table;
 
 pub use option::{Known, Layout, Value};
-pub use packet::{Head, OptionView, Packet, read, write};
+pub use packet::{Head, LIMIT, OptionView, Packet, read, write};
 pub use table::{
     Altitude, Clock, Demo, FULL, KalmanPressure, LAYOUTS, PhysicalMeasures, Pressure, Pwm,
     RawMeasures, RcReferences, References, VideoStream, Wifi,

@@ -15,8 +15,8 @@ const CHECKSUM: u16 = 0xffff;
 const HEAD: usize = 16;
 /// Bytes of the checksum with its tag and size.
 const LAST: usize = 8;
-/// The most bytes a UDP datagram can carry.
-const LIMIT: usize = 65_507;
+/// The most bytes of a packet, several times those of a full one: it bounds the work for one.
+pub const LIMIT: usize = 8192;
 
 /// The words before the options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,8 +91,8 @@ impl Packet<'_> {
 ///
 /// # Errors
 ///
-/// An unknown header, an option smaller than its own head or ending beyond the packet, and a
-/// checksum that is missing or not the last option.
+/// More than [`LIMIT`] bytes, an unknown header, an option smaller than its own head or ending
+/// beyond the packet, and a checksum that is missing or not the last option.
 ///
 /// ```
 /// use deadtime_wire::navdata;
@@ -108,6 +108,10 @@ impl Packet<'_> {
 /// ```
 pub fn read(packet: &[u8], verify: bool) -> Result<Packet<'_>, Error> {
     let length = packet.len();
+    if length > LIMIT {
+        let limit = LIMIT;
+        return Err(Fault::Long { length, limit }.at(limit));
+    }
     let short = Fault::Short {
         length,
         needed: HEAD + LAST,
@@ -172,8 +176,7 @@ pub fn read(packet: &[u8], verify: bool) -> Result<Packet<'_>, Error> {
 ///
 /// # Errors
 ///
-/// A header that no reader takes, an option with the checksum's tag, or more bytes than an option
-/// or a datagram can have.
+/// A header that no reader takes, an option with the checksum's tag, or more than [`LIMIT`] bytes.
 pub fn write(head: &Head, options: &[OptionView<'_>]) -> Result<Vec<u8>, Error> {
     if head.header != HEADER && head.header != OTHER_HEADER {
         return Err(Fault::Header(head.header).at(0));
@@ -197,7 +200,7 @@ pub fn write(head: &Head, options: &[OptionView<'_>]) -> Result<Vec<u8>, Error> 
             return Err(Fault::Tag(option.tag).at(packet.len()));
         }
         packet.extend_from_slice(&option.tag.to_le_bytes());
-        // No longer than the datagram, whose length 16 bits hold.
+        // No longer than the packet, whose length 16 bits hold.
         packet.extend_from_slice(&((option.bytes.len() + 4) as u16).to_le_bytes());
         packet.extend_from_slice(option.bytes);
     }
@@ -208,9 +211,7 @@ pub fn write(head: &Head, options: &[OptionView<'_>]) -> Result<Vec<u8>, Error> 
     Ok(packet)
 }
 
-/// The sum of the bytes; no datagram is long enough to overflow it.
+/// The sum of the bytes; no packet is long enough to overflow it.
 fn sum(bytes: &[u8]) -> u32 {
-    bytes
-        .iter()
-        .fold(0u32, |sum, &byte| sum.wrapping_add(u32::from(byte)))
+    bytes.iter().map(|&byte| u32::from(byte)).sum()
 }

@@ -45,7 +45,8 @@ options! {
     Demo: tag 0, size 148 {
         /// Detail of the control state.
         minor: u16 as u16 = 4,
-        /// Control state: 2 landed, 3 flying, 4 hovering, 6 taking off, 7 going to its place, 8 landing.
+        /// Control state: 2 landed, 3 flying, 4 hovering, 6 taking off, 7 going to its place, 8
+        /// landing.
         major: u16 as u16 = 6,
         /// Percent.
         battery: u32 as u32 = 8,

@@ -1,0 +1,201 @@
+"""The commands that stand in for a vehicle."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+import threading
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from deadtime._cli import options as opt
+from deadtime._cli.show import console
+from deadtime._validation import positive
+from deadtime.links import Journal
+from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase, Truth
+from deadtime.links.ardrone2.emulator.motion import PlantName
+from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
+
+__all__ = ["emulators", "tell"]
+
+emulators = typer.Typer(
+    help="Stand in for a vehicle, on its own ports and in its own protocol.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+#: Between two looks at the drone, s: for the status line, and for the record.
+SHOWN_EVERY, RECORDED_EVERY = 0.2, 0.02
+
+COLUMNS = ("time_s", "height_m", "climb_m_s", "demand_m_s", "battery_percent", "landed")
+
+Port = Annotated[int | None, typer.Option(min=0, max=65535, help="This port; 0: a free one.")]
+
+
+@emulators.callback()
+def _group() -> None:
+    """Stand in for a vehicle, on its own ports and in its own protocol."""
+
+
+@emulators.command()
+def ardrone2(
+    plant: Annotated[
+        PlantName, typer.Option(help="How height answers the demanded climb.")
+    ] = "kit",
+    delay: Annotated[
+        float | None, typer.Option(min=0.0, help="Transport delay, s. Without: the plant's.")
+    ] = None,
+    jitter: Annotated[
+        float, typer.Option(min=0.0, help="Motion commands take up to this much longer, s.")
+    ] = 0.0,
+    downlink: Annotated[float, typer.Option(min=0.0, help="Delay of navdata, s.")] = 0.0,
+    noise: Annotated[float, typer.Option(min=0.0, help="Noise of the height, m.")] = 0.002,
+    battery: Annotated[float, typer.Option(min=0.0, max=100.0, help="Charge, percent.")] = 100.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of noise and jitter.")] = 0,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; others than 127.* can be reached from afar.")
+    ] = LOOPBACK,
+    port_base: Annotated[
+        int, typer.Option(min=0, max=65000, help="Ports from here: +4, +6, +9. 0: free ones.")
+    ] = PORT_BASE,
+    navdata_port: Port = None,
+    command_port: Port = None,
+    control_port: Port = None,
+    duration: Annotated[float | None, typer.Option(help="End after so long, s.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Write what the drone does, without noise, as CSV.")
+    ] = None,
+    until_input_ends: Annotated[
+        bool, typer.Option(help="End when standard input does, as whoever started this does.")
+    ] = False,
+    as_json: opt.As_json = False,
+) -> None:
+    """Emulate an AR.Drone 2.0 until Ctrl-C: navdata, commands and configuration, in real time."""
+    ports = ports_from(port_base)
+    chosen = {
+        "navdata_port": navdata_port,
+        "command_port": command_port,
+        "control_port": control_port,
+    }
+    ports |= {name: port for name, port in chosen.items() if port is not None}
+    if duration is not None:
+        positive("--duration", duration)
+    options = EmulatorOptions(
+        plant, delay, jitter, downlink, noise, battery, seed, host=host, **ports
+    )
+    asyncio.run(_emulate(options, duration, record, until_input_ends, as_json))
+
+
+async def _emulate(
+    options: EmulatorOptions,
+    duration: float | None,
+    record: Path | None,
+    until_input_ends: bool,
+    as_json: bool,
+) -> None:
+    with ExitStack() as stack:
+        journal = None if record is None else stack.enter_context(Journal(record, COLUMNS))
+        async with Emulator(options) as emulator:
+            tell(emulator, as_json)
+            live = None
+            if not as_json and console.is_terminal:
+                live = stack.enter_context(Live(console=console, auto_refresh=False))
+            ended = asyncio.Event()
+            if until_input_ends:
+                _watch_input(ended)
+            tasks: list[asyncio.Task[object]] = [asyncio.create_task(ended.wait())]
+            if journal is not None:
+                tasks.append(asyncio.create_task(_keep(emulator, journal)))
+            if live is not None:
+                tasks.append(asyncio.create_task(_show(emulator, live)))
+            try:
+                done, _ = await asyncio.wait(
+                    tasks, timeout=duration, return_when=asyncio.FIRST_COMPLETED
+                )
+                for task in done:
+                    task.result()
+            finally:
+                for task in tasks:
+                    task.cancel()
+
+
+def tell(emulator: Emulator, as_json: bool) -> None:
+    """Say where the drone is, when it is."""
+    options = emulator.options
+    warning = (
+        f"{options.host} can be reached by others, who can command this drone and have navdata "
+        "sent to an address that they forge: nothing authenticates them. Keep to a closed network."
+    )
+    if not options.only_here:
+        print(f"deadtime: {warning}", file=sys.stderr)
+    if as_json:
+        found = {
+            "host": emulator.host,
+            "navdata_port": emulator.navdata_port,
+            "command_port": emulator.command_port,
+            "control_port": emulator.control_port,
+            "plant": options.plant,
+            "delay": options.transport_delay,
+        }
+        print(json.dumps(found), flush=True)
+        return
+    # Not by the shared console: its lines would be wrapped in files.
+    Console(soft_wrap=True, highlight=False).print(
+        f"An AR.Drone 2.0 (plant {options.plant}, transport delay {options.transport_delay:g} s) "
+        f"is on {emulator.host}: navdata on UDP {emulator.navdata_port}, commands on UDP "
+        f"{emulator.command_port}, configuration on TCP {emulator.control_port}. Ctrl-C ends it.",
+        markup=False,
+    )
+    sys.stdout.flush()
+
+
+async def _show(emulator: Emulator, live: Live) -> None:
+    while True:
+        live.update(_line(emulator.truth()), refresh=True)
+        await asyncio.sleep(SHOWN_EVERY)
+
+
+def _line(truth: Truth) -> Text:
+    parts = [
+        f"{truth.time:6.1f} s",
+        f"{truth.phase.value:<10}",
+        f"{truth.height:6.3f} m",
+        f"{truth.climb:+6.3f} m/s of {truth.demand:+6.3f}",
+        f"battery {truth.battery:.0f} %",
+    ]
+    if truth.emergency:
+        parts.append("EMERGENCY")
+    elif truth.link_lost:
+        parts.append("link lost")
+    elif truth.connected:
+        parts.append("heard")
+    return Text("  ".join(parts), no_wrap=True, overflow="crop")
+
+
+async def _keep(emulator: Emulator, journal: Journal) -> None:
+    while True:
+        truth = emulator.truth()
+        landed = float(truth.phase is Phase.LANDED)
+        row = (truth.time, truth.height, truth.climb, truth.demand, truth.battery, landed)
+        journal.write(row)
+        await asyncio.sleep(RECORDED_EVERY)
+
+
+def _watch_input(ended: asyncio.Event) -> None:
+    """Set an event at the end of standard input, which ends with the process that holds it."""
+    loop = asyncio.get_running_loop()
+
+    def read() -> None:
+        while sys.stdin.buffer.read(4096):
+            pass
+        loop.call_soon_threadsafe(ended.set)
+
+    # A daemon: nobody waits for input that may never end.
+    threading.Thread(target=read, daemon=True).start()

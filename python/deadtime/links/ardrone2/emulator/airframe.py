@@ -1,0 +1,139 @@
+"""The body of the emulated drone: height, attitude, heading and horizontal speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from deadtime._plants import FirstOrder, Integrator, RationalPlant
+from deadtime.links.ardrone2.emulator.clock import Micros
+from deadtime.links.ardrone2.emulator.motion import (
+    GRAVITY,
+    FreeFall,
+    LinearMotion,
+    Motion,
+    PlantName,
+    linear_plant,
+)
+from deadtime.links.ardrone2.emulator.thrust import Thruster, ThrustMotion
+
+__all__ = ["Airframe", "Pose"]
+
+#: How roll, pitch and turning speed follow their demands, s.
+ATTITUDE_LAG = 0.15
+
+#: Rate at which the drag of the air takes up horizontal speed, 1/s.
+DRAG = 1.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the drone is and how it moves; SI units, angles in rad.
+
+    Attributes
+    ----------
+    height, climb : float
+        m and m/s, up positive.
+    demand : float
+        The climb that is followed, m/s.
+    roll, pitch, heading : float
+        Right, backwards (nose up) and clockwise positive.
+    forward, right : float
+        Horizontal speeds, m/s.
+    """
+
+    height: float
+    climb: float
+    demand: float
+    roll: float
+    pitch: float
+    heading: float
+    forward: float
+    right: float
+
+
+class Airframe:
+    """Follows demands; knows nothing of links, states and limits.
+
+    Parameters
+    ----------
+    plant : str
+        Name of the vertical plant.
+    """
+
+    def __init__(self, plant: PlantName) -> None:
+        self._hover: Motion = (
+            ThrustMotion(Thruster()) if plant == "thrust" else LinearMotion(linear_plant(plant))
+        )
+        self._fall = FreeFall()
+        self._vertical: Motion = self._hover
+        self.demand = 0.0
+        self._roll, self._pitch = (LinearMotion(FirstOrder(1.0, ATTITUDE_LAG)) for _ in "rp")
+        self._heading = LinearMotion(Integrator(1.0, ATTITUDE_LAG))
+        sideways = RationalPlant((GRAVITY,), np.polymul((ATTITUDE_LAG, 1.0), (1.0, DRAG)).tolist())
+        self._forward, self._right = LinearMotion(sideways), LinearMotion(sideways)
+        self._angles = (0.0, 0.0, 0.0)
+        self._moved = False
+        self.stand(0)
+
+    def stand(self, time: Micros) -> None:
+        """Stand on the ground, level, with the motors off."""
+        self._vertical = self._hover
+        self._hover.settle(time, 0.0)
+        self.demand = 0.0
+        for motion in (self._roll, self._pitch, self._forward, self._right):
+            motion.settle(time, 0.0)
+        self._heading.settle(time, self._heading.at(time)[0])
+        self._angles, self._moved = (0.0, 0.0, 0.0), False
+
+    def climb_at(self, time: Micros, climb: float) -> None:
+        """Follow this climb from now on, m/s."""
+        if climb != self.demand:
+            self.demand = climb
+            self._vertical.demand(time, climb)
+
+    def lean(self, time: Micros, roll: float, pitch: float, turning: float) -> None:
+        """Follow these angles (rad) and this turning speed (rad/s) from now on."""
+        if (roll, pitch, turning) == self._angles:
+            return
+        self._angles, self._moved = (roll, pitch, turning), True
+        self._roll.demand(time, roll)
+        self._right.demand(time, roll)
+        self._pitch.demand(time, pitch)
+        self._forward.demand(time, -pitch)
+        self._heading.demand(time, turning)
+
+    def settle_tilt(self, time: Micros) -> None:
+        """Tell the thrust how far the drone leans; the loop on board does not make up for it."""
+        if isinstance(self._vertical, ThrustMotion) and self._moved:
+            roll, pitch = self._roll.at(time)[0], self._pitch.at(time)[0]
+            self._vertical.tilt(time, math.cos(roll) * math.cos(pitch))
+
+    def cut(self, time: Micros) -> None:
+        """Cut the motors: fall."""
+        height, climb = self._vertical.at(time)
+        self._fall.drop(time, height, climb)
+        self._vertical, self.demand = self._fall, 0.0
+
+    def height_at(self, time: Micros) -> float:
+        """Height, m."""
+        return self._vertical.at(time)[0]
+
+    def at(self, time: Micros) -> Pose:
+        """Everything about the body at a time not before the last demand."""
+        height, climb = self._vertical.at(time)
+        if not self._moved:
+            heading = self._heading.at(time)[0]
+            return Pose(height, climb, self.demand, 0.0, 0.0, heading, 0.0, 0.0)
+        return Pose(
+            height,
+            climb,
+            self.demand,
+            self._roll.at(time)[0],
+            self._pitch.at(time)[0],
+            self._heading.at(time)[0],
+            self._forward.at(time)[0],
+            self._right.at(time)[0],
+        )

@@ -1,0 +1,385 @@
+"""The emulated drone without sockets: datagrams and times go in, navdata come out.
+
+Everything happens at times of the drone's own clock and in one order, so that what comes out
+depends on the datagrams, their times, the options and the seed, and on nothing else: not on how
+often the drone is asked to go on, nor on when.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from deadtime.links.ardrone2.commands import (
+    Command,
+    Config,
+    ConfigIds,
+    Control,
+    Move,
+    MoveFrom,
+    Ref,
+    decode,
+)
+from deadtime.links.ardrone2.configuration import write_configuration
+from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, micros, seconds
+from deadtime.links.ardrone2.emulator.flight import HOVER, TICK, Demand, Flight, Phase
+from deadtime.links.ardrone2.emulator.link import Address, Listener, Order
+from deadtime.links.ardrone2.emulator.options import EmulatorOptions
+from deadtime.links.ardrone2.emulator.sensors import Reading, Sensors
+from deadtime.links.ardrone2.emulator.settings import Settings
+
+__all__ = ["Drone", "Truth"]
+
+#: A motion command is followed for so long; without a newer one the drone hovers.
+HOVER_AFTER: Micros = SECOND // 4
+
+#: Navdata a second of the short kind; the long kind comes at every tick.
+DEMO_RATE = 15
+
+#: Motion commands under way at most: more than these are a flood.
+MOST_UNDER_WAY = 1024
+
+#: Navdata kept at most for whoever takes them.
+MOST_WAITING = 4096
+
+SEND_CONFIGURATION, ACKNOWLEDGE, SEND_IDS = 4, 5, 6
+
+NEVER: Micros = 1 << 62
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the emulated drone does, without noise.
+
+    Attributes
+    ----------
+    time : float
+        Of the drone's clock, s.
+    phase : Phase
+    height : float
+        m.
+    climb : float
+        m/s, up positive.
+    demand : float
+        The climb that is followed, m/s.
+    battery : float
+        Percent.
+    emergency, link_lost, connected : bool
+        Whether the motors are cut, commands are missing for two seconds, navdata have a listener.
+    """
+
+    time: float
+    phase: Phase
+    height: float
+    climb: float
+    demand: float
+    battery: float
+    emergency: bool
+    link_lost: bool
+    connected: bool
+
+
+class Drone:
+    r"""An emulated AR.Drone 2.0.
+
+    Parameters
+    ----------
+    options : EmulatorOptions
+    start : float
+        Time at which it is switched on, s, of the clock that all times given to it are of.
+
+    Attributes
+    ----------
+    settings : Settings
+        Its configuration.
+    deaf : bool
+        Set it to have the drone say that its ultrasound hears nothing.
+
+    Examples
+    --------
+    >>> drone = Drone(EmulatorOptions(noise=0.0))
+    >>> here = ("127.0.0.1", 5556)
+    >>> for tick in range(250):                           # hold take-off for five seconds
+    ...     drone.commanded(b"AT*REF=%d,512\r" % (tick + 1), here, now=0.02 * tick)
+    >>> drone.truth(5.0).phase, round(drone.truth(5.0).height, 2)
+    (<Phase.FLYING: 'flying'>, 0.75)
+    >>> drone.truth(12.0).phase                           # nobody commands any more
+    <Phase.LANDED: 'landed'>
+    """
+
+    def __init__(self, options: EmulatorOptions, start: float = 0.0) -> None:
+        self.options = options
+        self.settings = Settings()
+        self.deaf = False
+        self._start = start
+        self._time: Micros = 0
+        self._flight = Flight(options, self.settings)
+        self._sensors = Sensors(options)
+        self._order, self._listener = Order(), Listener()
+        self._jitter = np.random.default_rng((options.seed, 1))
+        self._under_way: deque[tuple[Micros, Demand]] = deque()
+        self._last_arrival: Micros = 0
+        self._moved_at: Micros | None = None
+        self._bootstrap, self._to_acknowledge = True, False
+        self._sequence = 0
+        self._ref, self._ref_number, self._asked = Ref(), 0, False
+        self._ids: ConfigIds | None = None
+        self._ticked: Micros = 0
+        self._sent: Micros = 0
+        self._packets: deque[tuple[Micros, bytes, Address]] = deque(maxlen=MOST_WAITING)
+        self._dumps: list[tuple[str, bytes]] = []
+
+    # What comes in.
+
+    def commanded(self, datagram: bytes, source: Address, now: float) -> None:
+        """Take a datagram of the command port."""
+        time = self._go_on(now)
+        for number, command in decode(datagram):
+            if not self._order.accept(number, time):
+                continue
+            self._listener.commanded(source, time)
+            self._carry_out(number, command, source, time)
+
+    def woken(self, datagram: bytes, source: Address, now: float) -> None:
+        """Take a datagram of the navdata port."""
+        time = self._go_on(now)
+        if self._listener.wake(datagram, source, time):
+            self._sequence, self._sent = 0, time
+        if self._bootstrap and self._listener.may_answer(source, time):
+            self._send(time)
+
+    # What goes out.
+
+    def advance(self, now: float) -> None:
+        """Let everything happen that is due by now."""
+        self._go_on(now)
+
+    def due(self) -> float:
+        """When something happens next if nothing comes in, s; infinite if nothing will."""
+        event = min(self._next_event()[0], self._packets[0][0] if self._packets else NEVER)
+        return math.inf if event == NEVER else self._start + seconds(event)
+
+    def packets(self, now: float, oldest: float = math.inf) -> list[tuple[bytes, Address]]:
+        """Take the navdata that leave by now, and whom they go to.
+
+        Those that should have left more than `oldest` seconds ago are dropped, but for the newest.
+        """
+        time, left = self._micros(now), []
+        while self._packets and self._packets[0][0] <= time:
+            leaves, packet, address = self._packets.popleft()
+            newest = not self._packets or self._packets[0][0] > time
+            if newest or seconds(time - leaves) <= oldest:
+                left.append((packet, address))
+        return left
+
+    def dumps(self) -> list[tuple[str, bytes]]:
+        """Take the configurations that were asked for, and by which hosts."""
+        dumps, self._dumps = self._dumps, []
+        return dumps
+
+    def truth(self, now: float) -> Truth:
+        """What the drone does now."""
+        time = self._go_on(now)
+        pose = self._flight.airframe.at(time)
+        return Truth(
+            seconds(time),
+            self._flight.phase,
+            pose.height,
+            pose.climb,
+            pose.demand,
+            self._flight.charge(time),
+            self._flight.emergency,
+            self._order.lost,
+            self._listener.address is not None,
+        )
+
+    # Commands.
+
+    def _carry_out(self, number: int, command: Command, source: Address, time: Micros) -> None:
+        ids, self._ids = self._ids, None
+        if isinstance(command, Ref):
+            self._refer(number, command, time)
+        elif isinstance(command, (Move, MoveFrom)):
+            self._move(command, time)
+        elif isinstance(command, ConfigIds):
+            self._ids = command
+        elif isinstance(command, Config):
+            self._configure(command, ids)
+        elif isinstance(command, Control):
+            self._control(command.mode, source)
+
+    def _refer(self, number: int, ref: Ref, time: Micros) -> None:
+        """Take the wish to be in the air or on the ground, and the emergency switch.
+
+        A drone that has landed by itself must not take off again because somebody goes on
+        repeating the wish of before: the wish counts from when it is expressed anew.
+        """
+        before = Ref() if self._order.begins(number) else self._ref
+        self._ref, self._ref_number = ref, number
+        flight = self._flight
+        if ref.emergency and not before.emergency:
+            flight.toggle_emergency(time)
+        if not ref.take_off:
+            flight.land(time)
+        if not ref.take_off or flight.phase in (Phase.TAKING_OFF, Phase.FLYING):
+            self._asked = False
+        elif not before.take_off:
+            self._asked = True
+        if self._asked and not flight.airborne:
+            flight.take_off(time)
+            if flight.airborne:
+                self._asked, self._ticked = False, time
+
+    def _move(self, command: Move | MoveFrom, time: Micros) -> None:
+        self._moved_at = time
+        late = self.options.transport_delay + self.options.jitter * self._jitter.random()
+        self._last_arrival = max(self._last_arrival, time + micros(late))
+        if len(self._under_way) < MOST_UNDER_WAY:
+            self._under_way.append((self._last_arrival, self._asked_for(command)))
+
+    def _asked_for(self, command: Move | MoveFrom) -> Demand:
+        """A motion in SI units, by what the drone is configured to do at most."""
+        if not command.flag & 1:
+            return HOVER
+        limits = self.settings
+        return (
+            # A zero with a sign is a zero.
+            0.0 + float(command.gaz) * limits.climb_limit,
+            0.0 + float(command.roll) * limits.angle_limit,
+            0.0 + float(command.pitch) * limits.angle_limit,
+            0.0 + float(command.yaw) * limits.turn_limit,
+        )
+
+    def _configure(self, command: Config, ids: ConfigIds | None) -> None:
+        """Take a setting, one at a time: the next one after the acknowledgement of the last."""
+        settings = self.settings
+        told = None if ids is None else (ids.session, ids.user, ids.application)
+        entering = command.key.startswith("custom:")
+        if settings.asks_for_ids and not entering and told != settings.ids:
+            return
+        if self._to_acknowledge or not settings.set(command.key, command.value):
+            return
+        self._to_acknowledge = True
+        if command.key == "general:navdata_demo":
+            self._bootstrap = False
+
+    def _control(self, mode: int, source: Address) -> None:
+        if mode == ACKNOWLEDGE:
+            self._to_acknowledge = False
+        elif mode in (SEND_CONFIGURATION, SEND_IDS):
+            only = "" if mode == SEND_CONFIGURATION else "custom:"
+            values = self.settings.values
+            told = {key: value for key, value in values.items() if key.startswith(only)}
+            # One answer to a host at a time: more questions are no reason for more answers.
+            if all(host != source[0] for host, _ in self._dumps):
+                self._dumps.append((source[0], write_configuration(told)))
+
+    # What happens by itself.
+
+    def _micros(self, now: float) -> Micros:
+        return micros(now - self._start)
+
+    def _go_on(self, now: float) -> Micros:
+        """Let what is due happen, in the order of its times; the clock never goes back."""
+        until = max(self._time, self._micros(now))
+        while True:
+            time, happen = self._next_event()
+            if time > until:
+                break
+            self._time = max(self._time, time)
+            happen(self._time)
+        self._time = until
+        return until
+
+    def _next_event(self) -> tuple[Micros, Callable[[Micros], None]]:
+        """The next event; of several at one time, the first in this list."""
+        flying = self._flight.phase is Phase.FLYING
+        asked = bool(self._under_way) or (flying and not self._flight.hovering)
+        hover = None if self._moved_at is None or not asked else self._moved_at + HOVER_AFTER
+        events = (
+            (self._under_way[0][0] if self._under_way else None, self._arrive),
+            (hover, self._hover),
+            (self._order.loses_at, self._lose_link),
+            (self._listener.leaves_at, self._listener_leaves),
+            (_after(self._ticked) if self._flight.airborne else None, self._tick),
+            (self._next_navdata(), self._stream),
+        )
+        return min(
+            ((NEVER if time is None else time, happen) for time, happen in events),
+            key=lambda event: event[0],
+        )
+
+    def _arrive(self, time: Micros) -> None:
+        _, demand = self._under_way.popleft()
+        self._flight.follow(time, demand)
+
+    def _hover(self, time: Micros) -> None:
+        """The last motion command is too old: forget it and those under way."""
+        self._under_way.clear()
+        self._flight.follow(time, HOVER)
+
+    def _lose_link(self, time: Micros) -> None:
+        self._order.lose()
+        self._asked = self._to_acknowledge = False
+        self._listener.commander_left()
+        self._bootstrap = True
+        self._flight.land(time)
+
+    def _listener_leaves(self, time: Micros) -> None:
+        self._listener.leave(time)
+        self._bootstrap, self._sequence = True, 0
+
+    def _tick(self, time: Micros) -> None:
+        self._ticked = time
+        self._flight.tick(time)
+        self._sensors.tick(time, self._flight.airframe.height_at(time))
+
+    def _next_navdata(self) -> Micros | None:
+        if self._bootstrap or self._listener.address is None:
+            return None
+        if not self.settings.demo:
+            return _after(self._sent)
+        count = self._sent * DEMO_RATE // SECOND + 1
+        if count * SECOND // DEMO_RATE <= self._sent:
+            count += 1
+        return count * SECOND // DEMO_RATE
+
+    def _stream(self, time: Micros) -> None:
+        self._sent = time
+        self._send(time)
+
+    def _send(self, time: Micros) -> None:
+        address = self._listener.address
+        if address is None:
+            return
+        self._sequence += 1
+        flight, settings = self._flight, self.settings
+        reading = Reading(
+            time=time,
+            sequence=self._sequence,
+            pose=flight.airframe.at(time),
+            phase=flight.phase,
+            lifted=flight.lifted(time),
+            hovering=flight.hovering,
+            emergency=flight.emergency,
+            charge=flight.charge(time),
+            ref=self._ref,
+            ref_number=self._ref_number,
+            to_acknowledge=self._to_acknowledge,
+            link_late=self._order.late(time),
+            link_lost=self._order.lost,
+            bootstrap=self._bootstrap,
+            options=settings.options if settings.demo else None,
+            deaf=self.deaf,
+        )
+        leaves = time + micros(self.options.downlink)
+        self._packets.append((leaves, self._sensors.packet(reading), address))
+
+
+def _after(time: Micros) -> Micros:
+    """The first tick after a time."""
+    return (time // TICK + 1) * TICK

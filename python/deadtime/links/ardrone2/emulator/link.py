@@ -1,0 +1,142 @@
+"""Who the drone listens to and whom it answers: sequence numbers, silence, and its one listener.
+
+Nothing authenticates anybody on this link. What an emulator can do against being used to flood
+others: answer a wake-up to its sender only, and by no more than one packet of 24 bytes until a
+valid command has come from the same host; send navdata to one address; and stop after two seconds
+without a sign of life from it.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
+
+__all__ = ["LINK_LOST_AFTER", "Address", "Listener", "Order"]
+
+Address: TypeAlias = tuple[str, int]
+
+#: Without commands for so long the drone warns of it in its navdata (state bit 30).
+COM_WATCHDOG: Micros = 50_000
+
+#: Without commands for so long the link is lost (state bit 13): the drone lands.
+LINK_LOST_AFTER: Micros = 2 * SECOND
+
+#: Without a sign of life for so long navdata stop.
+LISTENER_LEAVES_AFTER: Micros = 2 * SECOND
+
+#: Wake-ups are answered no more often than this.
+BETWEEN_ANSWERS: Micros = SECOND // 20
+
+WAKE_UP_SIZES = (1, 2, 4)
+UNICAST = 1
+
+
+class Order:
+    """The sequence numbers of commands, and the silence between them.
+
+    A command is executed if its number is above the last; number 1 begins anew, and so does any
+    number after the link was lost.
+
+    Examples
+    --------
+    >>> order = Order()
+    >>> [order.accept(number, time=0) for number in (0, 1, 3, 2, 3, 4, 1, 2)]
+    [True, True, True, False, False, True, True, True]
+    """
+
+    def __init__(self) -> None:
+        self._last: int | None = None
+        #: When the last command was accepted; None before the first.
+        self.heard: Micros | None = None
+        self.lost = False
+
+    def accept(self, number: int, time: Micros) -> bool:
+        """Whether a command with this number is to be executed."""
+        if number < 0 or (self._last is not None and number != 1 and number <= self._last):
+            return False
+        self._last, self.heard, self.lost = number, time, False
+        return True
+
+    def begins(self, number: int) -> bool:
+        """Whether this number is a client's first."""
+        return number <= 1
+
+    @property
+    def loses_at(self) -> Micros | None:
+        """When the link is lost if nothing comes; None if it is lost already or was never there."""
+        if self.heard is None or self.lost:
+            return None
+        return self.heard + LINK_LOST_AFTER
+
+    def lose(self) -> None:
+        """The link is lost: the next command may have any number."""
+        self._last, self.lost = None, True
+
+    def late(self, time: Micros) -> bool:
+        """Whether the communication watchdog warns."""
+        return self.heard is None or time - self.heard > COM_WATCHDOG
+
+
+class Listener:
+    """The one address that navdata go to.
+
+    Another address is kept in mind until the listener has left.
+    """
+
+    def __init__(self) -> None:
+        self.address: Address | None = None
+        self._waiting: Address | None = None
+        self._commander: Address | None = None
+        self._heard: Micros = 0
+        self._answered: Micros | None = None
+
+    def wake(self, datagram: bytes, source: Address, time: Micros) -> bool:
+        """Take a wake-up; True if its sender has become the listener."""
+        if len(datagram) not in WAKE_UP_SIZES or datagram[0] != UNICAST:
+            return False
+        if self._commander is not None and source[0] != self._commander[0]:
+            return False
+        if self.address is None:
+            self.address, self._heard = source, time
+            return True
+        if source == self.address:
+            self._heard = time
+        else:
+            self._waiting = source
+        return False
+
+    def may_answer(self, source: Address, time: Micros) -> bool:
+        """Whether a packet may go out in answer to a wake-up, now."""
+        if source != self.address:
+            return False
+        if self._answered is not None and time - self._answered < BETWEEN_ANSWERS:
+            return False
+        self._answered = time
+        return True
+
+    def commanded(self, source: Address, time: Micros) -> None:
+        """A command was executed: a sign of life of the listener if it comes from its socket.
+
+        Commands and wake-ups come from two sockets of one host; which belong together is told by
+        who was first.
+        """
+        if self._commander is None:
+            self._commander = source
+        here = self.address is not None and self.address[0] == source[0]
+        if here and source == self._commander:
+            self._heard = time
+
+    @property
+    def leaves_at(self) -> Micros | None:
+        """When the listener is taken to have left, if nothing comes."""
+        return None if self.address is None else self._heard + LISTENER_LEAVES_AFTER
+
+    def leave(self, time: Micros) -> None:
+        """The listener has left; who has waited takes its place."""
+        self.address, self._waiting = self._waiting, None
+        self._commander, self._heard = None, time
+
+    def commander_left(self) -> None:
+        """The link of the commands is lost: anybody may be the next to command."""
+        self._commander = None

@@ -1,0 +1,204 @@
+r"""How an emulated vehicle moves: exactly where it is linear, in small fixed steps where it is not.
+
+A linear plant x' = A x + B w under a w that is constant since the last change is
+exp(M t) (x, w) with M = [[A, B], [0, 0]]. Times are whole microseconds, so exp(M t) is a product of
+exp(M 2^k us) over the set bits of t: a few dozen exponentials, made once, give every time to
+rounding, at the same cost whether it is asked for often or seldom.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from operator import mul
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from deadtime._plants import Integrator, Plant, kit_plant, rest
+from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
+
+__all__ = [
+    "DELAYS",
+    "GRAVITY",
+    "FreeFall",
+    "LinearMotion",
+    "Motion",
+    "PlantName",
+    "linear_plant",
+]
+
+PlantName: TypeAlias = Literal["kit", "paper", "real", "thrust"]
+
+#: Transport delay that belongs to each plant, s.
+DELAYS: dict[str, float] = {"kit": 0.26, "paper": 0.36, "real": 0.34, "thrust": 0.26}
+
+#: Standard gravity, m/s^2.
+GRAVITY = 9.80665
+
+#: Terms of Taylor's series: 0.5^17 / 17! is below the rounding error of 1.
+TERMS = 16
+
+Row: TypeAlias = tuple[float, ...]
+
+
+class Motion(ABC):
+    """A quantity that follows a demand, which is constant between changes.
+
+    Looking at it changes nothing: what is read at a time is the same, however often and whenever
+    it was read before.
+    """
+
+    @abstractmethod
+    def settle(self, time: Micros, value: float) -> None:
+        """Be at rest at a value, under the demand that keeps it there."""
+
+    @abstractmethod
+    def demand(self, time: Micros, value: float) -> None:
+        """Change the demand from this time on; times do not go back."""
+
+    @abstractmethod
+    def at(self, time: Micros) -> tuple[float, float]:
+        """Value and its rate per second at a time not before the last change."""
+
+
+class LinearMotion(Motion):
+    """The motion of a strictly proper linear plant, exact to rounding.
+
+    Parameters
+    ----------
+    plant : Plant
+        From the demand to the value.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> height = LinearMotion(dtm.Integrator(gain=0.5))
+    >>> height.settle(0, 1.0)
+    >>> height.demand(1_000_000, 0.4)
+    >>> above, climb = height.at(6_000_000)
+    >>> round(above, 12), round(climb, 12)
+    (2.0, 0.2)
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        space = plant.state_space()
+        if space.D != 0.0:
+            raise ValueError(f"{plant} answers its command at once: no vehicle does")
+        n = len(space.B)
+        self._plant = plant
+        flow = np.zeros((n + 1, n + 1))
+        flow[:n, :n], flow[:n, n] = space.A, space.B
+        value = np.append(space.C, 0.0)
+        self._flow: list[list[float]] = flow.tolist()
+        self._value: Row = tuple(value.tolist())
+        self._rate: Row = tuple((value @ flow).tolist())
+        self._since: Micros = 0
+        self._state: Row = (0.0,) * (n + 1)
+        self._powers: list[tuple[Row, ...]] = []
+        # The last answer: one time is asked for by the autopilot, the sensors and the navdata.
+        self._looked: tuple[Micros, Row] = (0, self._state)
+
+    def settle(self, time: Micros, value: float) -> None:
+        """Be at rest at a value, under the demand that keeps it there."""
+        num, den = (part.tolist() for part in self._plant.polynomials())
+        state, demand = rest(num, den, value)
+        self._start(time, (*state.tolist(), float(demand)))
+
+    def demand(self, time: Micros, value: float) -> None:
+        """Change the demand from this time on."""
+        self._start(time, (*self._flown(time)[:-1], value))
+
+    def at(self, time: Micros) -> tuple[float, float]:
+        """Value and its rate per second."""
+        state = self._flown(time)
+        return _dot(self._value, state), _dot(self._rate, state)
+
+    def _start(self, time: Micros, state: Row) -> None:
+        self._since, self._state, self._looked = time, state, (time, state)
+
+    def _flown(self, time: Micros) -> Row:
+        if time == self._looked[0]:
+            return self._looked[1]
+        left, state, k = time - self._since, self._state, 0
+        while left:
+            if left & 1:
+                state = tuple([_dot(row, state) for row in self._power(k)])
+            left, k = left >> 1, k + 1
+        self._looked = (time, state)
+        return state
+
+    def _power(self, k: int) -> tuple[Row, ...]:
+        """The transition over 2^k microseconds."""
+        while len(self._powers) <= k:
+            over = 2.0 ** len(self._powers) / SECOND
+            self._powers.append(_exponential([[over * x for x in row] for row in self._flow]))
+        return self._powers[k]
+
+
+class FreeFall(Motion):
+    """The height of what has no thrust any more; it follows no demand."""
+
+    def __init__(self) -> None:
+        self._start: tuple[Micros, float, float] = (0, 0.0, 0.0)
+
+    def settle(self, time: Micros, value: float) -> None:
+        """Begin to fall from a height, at rest."""
+        self._start = (time, value, 0.0)
+
+    def drop(self, time: Micros, height: float, climb: float) -> None:
+        """Begin to fall from a height with a vertical speed."""
+        self._start = (time, height, climb)
+
+    def demand(self, time: Micros, value: float) -> None:
+        """Without thrust there is nothing to follow a demand."""
+
+    def at(self, time: Micros) -> tuple[float, float]:
+        """Height and climb."""
+        since, height, climb = self._start
+        t = (time - since) / SECOND
+        return height + (climb - 0.5 * GRAVITY * t) * t, climb - GRAVITY * t
+
+
+def linear_plant(name: PlantName) -> Plant:
+    """The linear plant of a name: from demanded climb to height, without the transport delay."""
+    if name == "kit":
+        return kit_plant()
+    if name == "paper":
+        return Integrator()
+    if name == "real":
+        return Integrator(gain=0.79, lag=0.135)  # fitted to flights of the vehicle
+    raise ValueError(f"the plant {name!r} is not linear")
+
+
+def _exponential(matrix: list[list[float]]) -> tuple[Row, ...]:
+    """The exponential of a small matrix, by Taylor's series of a part of it and squaring.
+
+    In plain Python: threads of a BLAS can make one product of two such matrices take as long as
+    ten packets, and give other bits on another machine.
+    """
+    size = max(sum(map(abs, row)) for row in matrix)
+    squarings = max(0, math.frexp(size)[1] + 1)  # the part is below a half
+    part = [[math.ldexp(x, -squarings) for x in row] for row in matrix]
+    n = len(part)
+    identity = [[float(i == j) for j in range(n)] for i in range(n)]
+    total = identity
+    for term in range(TERMS, 0, -1):
+        product = _product(part, total)
+        total = [
+            [one + x / term for one, x in zip(*rows, strict=True)]
+            for rows in zip(identity, product, strict=True)
+        ]
+    for _ in range(squarings):
+        total = _product(total, total)
+    return tuple(map(tuple, total))
+
+
+def _product(left: list[list[float]], right: list[list[float]]) -> list[list[float]]:
+    columns = list(zip(*right, strict=True))
+    return [[_dot(row, column) for column in columns] for row in left]
+
+
+def _dot(left: Sequence[float], right: Sequence[float]) -> float:
+    return sum(map(mul, left, right), 0.0)

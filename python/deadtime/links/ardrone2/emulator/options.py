@@ -1,0 +1,101 @@
+"""What an emulated drone is made of: plant, delays, noise, battery, ports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import get_args
+
+from deadtime._validation import non_negative
+from deadtime.links.ardrone2.emulator.motion import DELAYS, PlantName
+
+__all__ = ["LOOPBACK", "PORT_BASE", "EmulatorOptions", "ports_from"]
+
+LOOPBACK = "127.0.0.1"
+
+#: The ports of the vehicle count from here: navdata, commands and control.
+PORT_BASE = 5550
+PORTS_FROM_BASE = {"navdata_port": 4, "command_port": 6, "control_port": 9}
+
+
+@dataclass(frozen=True)
+class EmulatorOptions:
+    """What an emulated drone is made of, and where it listens.
+
+    Parameters
+    ----------
+    plant : {"kit", "paper", "real", "thrust"}
+        How height answers the demanded climb.
+    delay : float, optional
+        Transport delay of motion commands, s; by default that of the plant.
+    jitter : float
+        Each motion command takes up to this much longer, uniformly, s; none overtakes another.
+    downlink : float
+        Delay of navdata, s.
+    noise : float
+        Standard deviation of the measured height, m; of the measured climb it is ten times as
+        much in m/s.
+    battery : float
+        Charge at the start, percent.
+    seed : int
+        Of noise and jitter.
+    host : str
+        Address to listen on.
+    navdata_port, command_port, control_port : int
+        0 takes a free one.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range or the plant is unknown.
+
+    Examples
+    --------
+    >>> EmulatorOptions(plant="paper").transport_delay
+    0.36
+    >>> EmulatorOptions(plant="kite")
+    Traceback (most recent call last):
+    ValueError: plant='kite' is none of kit, paper, real, thrust
+    """
+
+    plant: PlantName = "kit"
+    delay: float | None = None
+    jitter: float = 0.0
+    downlink: float = 0.0
+    noise: float = 0.002
+    battery: float = 100.0
+    seed: int = 0
+    host: str = LOOPBACK
+    navdata_port: int = 5554
+    command_port: int = 5556
+    control_port: int = 5559
+
+    def __post_init__(self) -> None:
+        if self.plant not in DELAYS:
+            raise ValueError(f"plant={self.plant!r} is none of {', '.join(get_args(PlantName))}")
+        for name in ("jitter", "downlink", "noise"):
+            object.__setattr__(self, name, non_negative(name, getattr(self, name)))
+        if self.delay is not None:
+            object.__setattr__(self, "delay", non_negative("delay", self.delay))
+        if not 0.0 <= self.battery <= 100.0:
+            raise ValueError(f"battery={self.battery} is no percentage: give 0 to 100")
+        if self.seed < 0:
+            raise ValueError(f"seed={self.seed} is negative: give 0 or more")
+        for name in PORTS_FROM_BASE:
+            port = getattr(self, name)
+            if not 0 <= port <= 65535:
+                raise ValueError(f"{name}={port} is no port: give 1 to 65535, or 0 for a free one")
+
+    @property
+    def transport_delay(self) -> float:
+        """Delay of motion commands without jitter, s."""
+        return DELAYS[self.plant] if self.delay is None else self.delay
+
+    @property
+    def only_here(self) -> bool:
+        """Whether only this machine can reach it."""
+        return self.host in ("localhost", "::1") or self.host.startswith("127.")
+
+
+def ports_from(base: int) -> dict[str, int]:
+    """The three ports that lie as the vehicle's do, from a base on; 0 asks for free ones."""
+    return {name: base and base + offset for name, offset in PORTS_FROM_BASE.items()}

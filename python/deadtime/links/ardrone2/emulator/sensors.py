@@ -1,0 +1,218 @@
+"""What the emulated drone measures, and the navdata that it tells it in.
+
+The noise of a time is a function of the seed and the time alone, so that it does not depend on
+which navdata are sent, or when.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.links.ardrone2.commands import Ref
+from deadtime.links.ardrone2.emulator.airframe import Pose
+from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, seconds
+from deadtime.links.ardrone2.emulator.flight import LOW_BATTERY, TICK, Phase
+from deadtime.links.ardrone2.emulator.options import EmulatorOptions
+from deadtime.links.ardrone2.navdata import (
+    FULL_OPTIONS,
+    AltitudeOption,
+    Demo,
+    KalmanPressure,
+    Navdata,
+    Pressure,
+    Pwm,
+    RawMeasures,
+    State,
+    VideoStream,
+    build_navdata,
+)
+
+__all__ = ["Reading", "Sensors"]
+
+#: The ultrasound is heard so often, and up to this height, m.
+ECHO_EVERY: Micros = SECOND // 25
+HEARS_UP_TO = 6.0
+
+#: Noise of the climb (1/s) and of the angles (rad/m) per noise of the height.
+CLIMB_NOISE = 10.0
+ANGLE_NOISE = 0.4
+
+#: Times at once whose noise is made together.
+BLOCK = 1024
+
+#: Bits that are set in a drone that works.
+WORKING = (
+    State.ALTITUDE_CONTROL
+    | State.CAMERA_READY
+    | State.PIC_VERSION_OK
+    | State.COMMAND_THREAD
+    | State.NAVDATA_THREAD
+    | State.VIDEO_THREAD
+    | State.ACQUISITION_THREAD
+)
+
+#: Tags of the options that are filled in, by their names in `Navdata`; the others are zero.
+TAGS = {
+    "demo": Demo.tag,
+    "clock": 1,
+    "raw_measures": RawMeasures.tag,
+    "pwm": Pwm.tag,
+    "altitude": AltitudeOption.tag,
+    "video_stream": VideoStream.tag,
+    "pressure": Pressure.tag,
+    "kalman_pressure": KalmanPressure.tag,
+}
+
+#: Control states: the upper half of the word in navdata.
+DEFAULT, LANDED, FLYING, HOVERING, TAKING_OFF, GOING_UP, LANDING = 0, 2, 3, 4, 6, 7, 8
+
+#: Sent of the motors while they turn, of 255; the emulator has no better number.
+TURNING = 150
+
+EMPTY_VOLTAGE, FULL_VOLTAGE = 10_500.0, 12_500.0
+SEA_LEVEL, PER_METRE = 101_325.0, 12.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The drone at one time: what navdata tell of. Names as in `Flight` and the link."""
+
+    time: Micros
+    sequence: int
+    pose: Pose
+    phase: Phase
+    lifted: bool
+    hovering: bool
+    emergency: bool
+    charge: float
+    ref: Ref
+    ref_number: int
+    to_acknowledge: bool
+    link_late: bool
+    link_lost: bool
+    bootstrap: bool
+    #: The options of short navdata, one bit a tag; None for the long ones.
+    options: int | None
+    deaf: bool
+
+
+class _Noise:
+    """Standard normal numbers by time and channel."""
+
+    def __init__(self, seed: int, channels: int) -> None:
+        self._seed, self._channels = seed, channels
+        self._number = -1
+        self._block: NDArray[np.float64] = np.empty((0, channels))
+
+    def at(self, count: int) -> tuple[float, ...]:
+        number, row = divmod(count, BLOCK)
+        if number != self._number:
+            made = np.random.default_rng((self._seed, self._channels, number))
+            self._block, self._number = made.standard_normal((BLOCK, self._channels)), number
+        return tuple(self._block[row].tolist())
+
+
+class Sensors:
+    """Measures with noise, and writes navdata.
+
+    Parameters
+    ----------
+    options : EmulatorOptions
+        Whose noise and seed are used.
+    """
+
+    def __init__(self, options: EmulatorOptions) -> None:
+        self._size = options.noise
+        self._noise = _Noise(options.seed, channels=5)
+        self._echo_noise = _Noise(options.seed, channels=1)
+        self._echo = 0.0
+
+    def tick(self, time: Micros, height: float) -> None:
+        """Listen to the echo, if this tick is one of those; on the ground it stays what it was."""
+        if time % ECHO_EVERY == 0 and height <= HEARS_UP_TO:
+            self._echo = height
+
+    def packet(self, reading: Reading) -> bytes:
+        """The navdata of one time."""
+        told = Navdata(self._state(reading), reading.sequence)
+        if not reading.bootstrap:
+            told = self._measured(reading, told)
+        return build_navdata(told)
+
+    def _state(self, reading: Reading) -> int:
+        state = WORKING
+        for flag, holds in (
+            (State.FLYING, reading.lifted),
+            (State.USER_FEEDBACK, reading.ref.take_off),
+            (State.COMMAND_ACKNOWLEDGED, reading.to_acknowledge),
+            (State.DEMO, reading.bootstrap or reading.options is not None),
+            (State.BOOTSTRAP, reading.bootstrap),
+            (State.COMMUNICATION_LOST, reading.link_lost),
+            (State.BATTERY_LOW, reading.charge < LOW_BATTERY),
+            (State.ULTRASOUND_DEAF, reading.deaf or reading.pose.height > HEARS_UP_TO),
+            (State.COM_WATCHDOG, reading.link_late),
+            (State.EMERGENCY, reading.emergency),
+        ):
+            if holds:
+                state |= flag
+        return int(state)
+
+    def _measured(self, reading: Reading, head: Navdata) -> Navdata:
+        noise = self._noise.at(reading.time // TICK)
+        (echo_noise,) = self._echo_noise.at(reading.time // ECHO_EVERY)
+        size, angle = self._size, self._size * ANGLE_NOISE
+        pose = reading.pose
+        height = pose.height + size * noise[0]
+        climb = pose.climb + size * CLIMB_NOISE * noise[1]
+        echo = self._echo + size * echo_noise
+        turning = TURNING if reading.phase not in (Phase.LANDED, Phase.FALLING) else 0
+        volts = EMPTY_VOLTAGE + (FULL_VOLTAGE - EMPTY_VOLTAGE) * reading.charge / 100.0
+        told: dict[str, Any] = {
+            "demo": Demo(
+                major=_control_state(reading),
+                battery=round(reading.charge),
+                pitch=pose.pitch + angle * noise[2],
+                roll=pose.roll + angle * noise[3],
+                yaw=math.remainder(pose.heading + angle * noise[4], math.tau),
+                height=height,
+                vx=pose.forward,
+                vy=pose.right,
+                vz=0.0,  # as on the vehicle
+            ),
+            "clock": seconds(reading.time),
+            "raw_measures": RawMeasures(battery_voltage=round(volts), height=echo),
+            "pwm": Pwm(turning, turning, turning, turning, vz_ref=pose.demand),
+            "altitude": AltitudeOption(
+                altitude_vision=height, altitude_vz=-climb, altitude_raw=echo
+            ),
+            "video_stream": VideoStream(atcmd_ref_seq=reading.ref_number),
+            "pressure": Pressure(pressure=round(SEA_LEVEL - PER_METRE * height)),
+            "kalman_pressure": KalmanPressure(est_z=height, est_zdot=climb),
+        }
+        bits = reading.options
+        if bits is not None:
+            told = {name: part for name, part in told.items() if bits >> TAGS[name] & 1}
+        options = FULL_OPTIONS if bits is None else _chosen(bits)
+        return replace(head, options=options, **told)
+
+
+@lru_cache(maxsize=8)
+def _chosen(bits: int) -> tuple[tuple[int, bytes], ...]:
+    """The options of a mask, with nothing in them yet."""
+    return tuple(option for option in FULL_OPTIONS if bits >> option[0] & 1)
+
+
+def _control_state(reading: Reading) -> int:
+    if reading.phase is Phase.LANDED:
+        return LANDED
+    if reading.phase is Phase.TAKING_OFF:
+        return GOING_UP if reading.lifted else TAKING_OFF
+    if reading.phase is Phase.FLYING:
+        return HOVERING if reading.hovering else FLYING
+    return LANDING if reading.phase is Phase.LANDING else DEFAULT

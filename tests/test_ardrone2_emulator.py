@@ -1,0 +1,749 @@
+"""The emulated AR.Drone 2.0 without sockets: links, states, watchdogs, navdata, plants."""
+
+import math
+from itertools import pairwise
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.links.ardrone2.commands import (
+    Config,
+    ConfigIds,
+    Control,
+    FlatTrim,
+    Move,
+    Other,
+    Ref,
+    Watchdog,
+    encode,
+)
+from deadtime.links.ardrone2.configuration import parse_configuration
+from deadtime.links.ardrone2.emulator import (
+    Drone,
+    EmulatorOptions,
+    Phase,
+    Thruster,
+    ThrustMotion,
+)
+from deadtime.links.ardrone2.emulator.motion import GRAVITY, LinearMotion, linear_plant
+from deadtime.links.ardrone2.navdata import parse_navdata
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+NAVDATA, COMMANDS = ("127.0.0.1", 40001), ("127.0.0.1", 40002)
+UP, DOWN = Ref(take_off=True), Ref()
+WAKE = b"\x01\x00\x00\x00"
+
+
+class Pilot:
+    """A client without sockets: sends commands at its times and reads the navdata that come."""
+
+    def __init__(self, **options):
+        options.setdefault("noise", 0.0)
+        self.drone = Drone(EmulatorOptions(**options))
+        self.time, self.number, self.sent = 0.0, 1, []
+
+    def send(self, *commands):
+        self.drone.commanded(encode(commands, self.number), COMMANDS, self.time)
+        self.number += len(commands)
+        self.take()
+
+    def wake(self, datagram=WAKE, source=NAVDATA):
+        self.drone.woken(datagram, source, self.time)
+        return [packet for packet, _ in self.take()]
+
+    def take(self):
+        new = self.drone.packets(self.time)
+        self.sent += [packet for packet, _ in new]
+        return new
+
+    def wait(self, duration, *commands, every=0.02):
+        """Let time pass, sending the same commands again and again, or nothing."""
+        until = round(self.time + duration, 6)
+        while commands and round(self.time + every, 6) <= until:
+            self.time = round(self.time + every, 6)
+            self.send(*commands)
+        self.time = until
+        self.drone.advance(until)
+        self.take()
+        return self.truth
+
+    @property
+    def truth(self):
+        return self.drone.truth(self.time)
+
+    @property
+    def last(self):
+        return parse_navdata(self.sent[-1])
+
+    def connect(self, demo=True):
+        self.wake()
+        self.send(Config("general:navdata_demo", "TRUE" if demo else "FALSE"))
+        self.send(Control(5))
+        return self
+
+    def fly(self):
+        """Take off and hover until everything has settled."""
+        self.wait(12.0, UP)
+        assert self.truth.phase is Phase.FLYING
+        return self
+
+
+# --- the link --------------------------------------------------------------------------------
+
+
+def test_the_handshake_leads_from_24_bytes_to_navdata():
+    pilot = Pilot()
+    (packet,) = pilot.wake()
+    assert len(packet) == 24
+    assert packet[:4] == bytes.fromhex("88776655")
+    first = parse_navdata(packet)
+    assert first.bootstrap
+    assert first.com_watchdog
+    assert first.sequence == 1
+    pilot.wait(1.0)
+    assert len(pilot.sent) == 1  # nothing of its own accord before the handshake
+    pilot.send(Config("general:navdata_demo", "TRUE"))
+    pilot.wait(0.1, Watchdog())
+    assert not pilot.last.bootstrap
+    assert pilot.last.command_acknowledged
+    assert pilot.last.demo_mode
+    pilot.wait(0.1, Control(5))
+    assert not pilot.last.command_acknowledged
+    assert not pilot.last.com_watchdog
+    numbers = [parse_navdata(packet).sequence for packet in pilot.sent]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+@pytest.mark.parametrize("wake", [b"\x01", b"\x01\x0d", b"\x01\x00\x00\x00"])
+def test_wake_ups_of_one_two_and_four_bytes_are_answered(wake):
+    assert len(Pilot().wake(wake)) == 1
+
+
+@pytest.mark.parametrize(
+    "wake", [b"", b"\x00", b"\x02\x00\x00\x00", b"\x01\x00\x00", b"\x01" * 500]
+)
+def test_other_datagrams_are_not(wake):
+    assert Pilot().wake(wake) == []
+
+
+def test_a_flood_of_wake_ups_is_answered_twenty_times_a_second():
+    pilot = Pilot()
+    for _ in range(1000):
+        pilot.time = round(pilot.time + 0.001, 6)
+        pilot.wake(b"\x01")
+    assert len(pilot.sent) == 20
+    assert sum(map(len, pilot.sent)) <= 24 * 1000
+
+
+def test_navdata_go_to_one_address_until_it_is_silent():
+    pilot = Pilot().connect()
+    other = ("127.0.0.1", 50000)
+    pilot.wait(0.5, Watchdog())
+    pilot.wake(b"\x01", other)
+    pilot.wake(b"\x01", ("10.0.0.9", 50000))  # of another host than the commands: never
+    pilot.wait(0.5, Watchdog())
+    listeners = set()
+    for _ in range(300):  # the commands stop
+        pilot.time = round(pilot.time + 0.01, 6)
+        pilot.drone.advance(pilot.time)
+        listeners |= {address for _, address in pilot.drone.packets(pilot.time)}
+    assert listeners == {NAVDATA}
+    pilot.drone.woken(b"\x01", other, pilot.time)
+    assert [address for _, address in pilot.drone.packets(pilot.time)] == [other]
+
+
+def test_navdata_stop_two_seconds_after_the_last_sign_of_life():
+    pilot = Pilot().connect(demo=False)
+    pilot.wait(1.0, Watchdog())
+    silent = pilot.time
+    pilot.wait(5.0)
+    # The last command was at 1 s; the packet at 3 s does not leave any more.
+    assert parse_navdata(pilot.sent[-1]).clock == pytest.approx(silent + 1.995, abs=1e-9)
+    assert len(pilot.wake()[-1]) == 24  # back to the beginning
+
+
+def test_sequence_numbers():
+    def ups(numbers):
+        drone = Drone(EmulatorOptions())
+        for number, command in numbers:
+            drone.commanded(encode([command], number), COMMANDS, 0.0)
+        return drone.truth(0.0).phase is Phase.TAKING_OFF
+
+    assert ups([(0, UP)])  # some begin at 0
+    assert ups([(1, DOWN), (2, UP)])
+    assert not ups([(5, DOWN), (5, UP)])  # not above the last
+    assert not ups([(5, DOWN), (4, UP)])
+    assert not ups([(1, DOWN), (0, UP)])
+    assert ups([(500, DOWN), (1, UP)])  # 1 begins anew
+    assert ups([(5, DOWN), (900, UP)])  # gaps are losses, no more
+
+
+def test_after_two_seconds_of_silence_any_number_is_the_first():
+    drone = Drone(EmulatorOptions())
+    drone.commanded(encode([DOWN], 100), COMMANDS, 0.0)
+    drone.commanded(encode([UP], 7), COMMANDS, 1.999999)
+    assert drone.truth(1.999999).phase is Phase.LANDED
+    drone.commanded(encode([UP], 7), COMMANDS, 2.0)
+    assert drone.truth(2.0).phase is Phase.TAKING_OFF
+
+
+def test_commands_that_mean_nothing_here_are_taken_politely():
+    pilot = Pilot().connect()
+    pilot.send(Other("PMODE", ("1", "2")), Other("MISC", ("2", "2", "20", "2000", "3000")))
+    pilot.send(FlatTrim(), Other("LED", ("1", "0", "1")), Other("ANIM", ("16", "5")))
+    before = pilot.number
+    pilot.drone.commanded(b"AT*REF=nonsense\rAT*PCMD=1\r\xff\x00", COMMANDS, pilot.time)
+    assert pilot.truth.phase is Phase.LANDED
+    pilot.send(UP)
+    assert pilot.number == before + 1
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+# --- states ----------------------------------------------------------------------------------
+
+
+def test_take_off_and_landing_as_the_vehicle_does_them():
+    pilot = Pilot().connect(demo=False)
+    pilot.wait(4.5, UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF  # since the first of them, at 0.02 s
+    pilot.wait(0.02, UP)
+    assert pilot.truth.phase is Phase.FLYING
+    assert pilot.truth.height == pytest.approx(0.75, abs=0.02)
+    pilot.wait(3.0, UP)
+    assert pilot.last.flying
+    assert pilot.truth.height == pytest.approx(0.75, abs=0.02)
+    assert pilot.truth.climb == pytest.approx(0.0, abs=1e-6)
+    pilot.wait(4.0, DOWN)
+    assert pilot.truth.phase is Phase.LANDED
+    assert pilot.truth.height == 0.0
+    assert not pilot.last.flying
+    states = [parse_navdata(packet).demo for packet in pilot.sent if len(packet) > 24]
+    majors = [demo.major for demo in states]
+    assert [m for m, n in zip(majors, [*majors[1:], None], strict=True) if m != n] == [
+        2, 6, 7, 4, 8, 2,
+    ]  # fmt: skip
+    assert all(demo.vz == 0.0 for demo in states)
+
+
+def test_bits_eight_and_nine_of_a_bare_ref_are_enough():
+    drone = Drone(EmulatorOptions())
+    drone.commanded(b"AT*REF=0,512\r", COMMANDS, 0.0)
+    assert drone.truth(0.0).phase is Phase.TAKING_OFF
+    drone.commanded(b"AT*REF=1,256\r", COMMANDS, 0.1)
+    assert drone.truth(0.1).emergency
+
+
+def test_a_released_take_off_lands():
+    pilot = Pilot()
+    pilot.wait(2.0, UP)
+    pilot.send(DOWN)
+    assert pilot.truth.phase is Phase.LANDING
+
+
+def test_an_emergency_cuts_the_motors_and_toggles_on_the_rising_edge():
+    pilot = Pilot().connect(demo=False).fly()
+    begun = pilot.truth.height
+    pilot.wait(0.2, Ref(take_off=True, emergency=True))  # held: one edge
+    truth = pilot.truth
+    assert truth.emergency
+    assert truth.phase is Phase.FALLING
+    fallen = 0.2 - 0.02  # since the first of those commands
+    assert truth.height == pytest.approx(begun - 0.5 * GRAVITY * fallen**2, abs=1e-9)
+    assert truth.climb == pytest.approx(-GRAVITY * fallen, abs=1e-9)
+    pilot.wait(1.0, UP)  # nothing helps
+    assert pilot.truth.phase is Phase.LANDED
+    assert pilot.last.emergency
+    assert pilot.last.demo.major == 2
+    pilot.send(Ref(emergency=True))
+    pilot.send(DOWN)
+    assert not pilot.truth.emergency
+    pilot.send(UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+def test_a_drone_that_landed_by_itself_stays_down_for_who_only_repeats_himself():
+    pilot = Pilot().fly()
+    pilot.wait(9.0)
+    assert pilot.truth.phase is Phase.LANDED
+    pilot.wait(1.0, UP)  # back, and still holding take-off
+    assert pilot.truth.phase is Phase.LANDED
+    pilot.send(DOWN)
+    pilot.send(UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+def test_a_new_client_may_begin_with_take_off():
+    pilot = Pilot().fly()
+    pilot.wait(9.0)
+    pilot.number = 1
+    pilot.send(UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+def test_a_low_battery_is_told_forbids_to_take_off_and_ends_a_flight():
+    low = Pilot(battery=19.9).connect(demo=False)
+    low.wait(1.0, UP)
+    assert low.last.battery_low
+    assert low.truth.phase is Phase.LANDED
+    pilot = Pilot(battery=20.5).connect(demo=False)
+    pilot.wait(130.0, UP, every=0.04)
+    assert pilot.truth.phase in (Phase.LANDING, Phase.LANDED)
+    assert pilot.last.battery_low
+    assert pilot.truth.battery < 4.0
+
+
+def test_a_deaf_ultrasound_is_told():
+    pilot = Pilot().connect(demo=False)
+    pilot.drone.deaf = True
+    pilot.wait(0.1, Watchdog())
+    assert pilot.last.ultrasound_deaf
+
+
+# --- watchdogs, to the microsecond -----------------------------------------------------------
+
+
+def test_motion_ends_a_quarter_of_a_second_after_its_last_command():
+    pilot = Pilot(delay=0.1).fly()
+    pilot.wait(1.0, UP, Move(gaz=0.5))
+    last = pilot.time
+    assert pilot.truth.demand == pytest.approx(0.35)
+    # A thread that keeps the link alive does not keep the motion alive.
+    pilot.wait(0.249, Watchdog(), every=0.01)
+    assert pilot.truth.demand == pytest.approx(0.35)
+    pilot.wait(0.000999)
+    assert pilot.drone.truth(last + 0.249999).demand != 0.0
+    assert pilot.drone.truth(last + 0.25).demand == 0.0
+    assert pilot.drone.truth(last + 0.25).phase is Phase.FLYING
+
+
+def test_commands_under_way_are_forgotten_with_the_motion():
+    pilot = Pilot(plant="paper").fly()  # 0.36 s under way
+    pilot.send(UP, Move(gaz=1.0))
+    for _ in range(100):
+        pilot.wait(0.01)
+        assert pilot.truth.demand == 0.0
+
+
+def test_landing_begins_two_seconds_after_the_last_command():
+    pilot = Pilot(delay=0.0).connect(demo=False).fly()
+    pilot.wait(1.0, UP, Move(gaz=1.0))
+    last = pilot.time
+    assert pilot.drone.truth(last + 1.999999).phase is Phase.FLYING
+    assert not pilot.drone.truth(last + 1.999999).link_lost
+    truth = pilot.drone.truth(last + 2.0)
+    assert truth.phase is Phase.LANDING
+    assert truth.link_lost
+    assert truth.demand < 0.0
+    assert pilot.drone.truth(last + 12.0).phase is Phase.LANDED
+
+
+def test_the_communication_watchdog_warns_after_fifty_milliseconds():
+    pilot = Pilot().connect(demo=False)
+    pilot.wait(0.1, Watchdog(), every=0.01)
+    warned = {}
+    for _ in range(20):
+        pilot.wait(0.005)
+        warned[round(pilot.last.clock - 0.1, 6)] = pilot.last.com_watchdog
+    assert {late for late, told in warned.items() if not told} == {
+        round(0.005 * k, 6) for k in range(1, 11)
+    }
+    pilot.wait(0.01, Watchdog(), every=0.005)
+    assert not pilot.last.com_watchdog
+
+
+def test_a_lost_link_is_told_to_who_still_listens():
+    pilot = Pilot().connect(demo=False)
+    for _ in range(30):
+        pilot.wait(0.1)
+        pilot.wake()
+    assert pilot.last.communication_lost
+
+
+# --- configuration ---------------------------------------------------------------------------
+
+
+def configured(pilot, key, value):
+    pilot.send(Control(5))
+    pilot.send(Config(key, value))
+    pilot.send(Control(4))
+    ((host, dump),) = pilot.drone.dumps()
+    assert host == COMMANDS[0]
+    return parse_configuration(dump)
+
+
+def test_a_setting_is_acknowledged_and_read_back():
+    pilot = Pilot().connect(demo=False)
+    found = configured(pilot, "control:control_vz_max", "1000")
+    assert float(found["control:control_vz_max"]) == 1000.0
+    pilot.wait(0.01)
+    assert pilot.last.command_acknowledged
+    pilot.send(Control(5))
+    pilot.wait(0.01)
+    assert not pilot.last.command_acknowledged
+
+
+def test_the_next_setting_waits_for_the_acknowledgement():
+    pilot = Pilot()
+    pilot.send(Config("control:altitude_max", "2000"))
+    pilot.send(Config("control:altitude_max", "2500"))
+    pilot.send(Control(4))
+    ((_, dump),) = pilot.drone.dumps()
+    assert parse_configuration(dump)["control:altitude_max"] == "2000"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "kept"),
+    [
+        ("control:control_vz_max", "9000", 2000.0),
+        ("control:control_vz_max", "1", 200.0),
+        ("control:altitude_max", "-3", 500.0),
+        ("control:euler_angle_max", "3.0", 0.52),
+    ],
+)
+def test_numbers_out_of_range_become_the_nearest(key, value, kept):
+    assert float(configured(Pilot(), key, value)[key]) == kept
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("control:control_vz_max", "nan"),
+        ("control:control_vz_max", "fast"),
+        ("control:control_vz_max", "1e3" + "0" * 90),
+        ("control:outdoor", "PERHAPS"),
+        ("control:flight_anim", "16,5"),
+        ("general:num_version_soft", "9"),
+        ("custom:session_id", "xyz"),
+        ("no:such_key", "1"),
+        ("general:ardrone_name", "x" * 65),
+    ],
+)
+def test_what_is_no_value_is_refused_without_acknowledgement(key, value):
+    pilot = Pilot().connect(demo=False)
+    before = dict(pilot.drone.settings.values)
+    assert configured(pilot, key, value) == before
+    pilot.wait(0.01)
+    assert not pilot.last.command_acknowledged
+
+
+def test_outdoors_has_limits_of_its_own():
+    pilot = Pilot()
+    found = configured(pilot, "control:outdoor", "TRUE")
+    assert float(found["control:control_vz_max"]) == 1000.0
+    configured(pilot, "control:control_vz_max", "1500")
+    found = configured(pilot, "control:outdoor", "FALSE")
+    assert float(found["control:control_vz_max"]) == 700.0
+    assert float(found["control:outdoor_control_vz_max"]) == 1500.0
+
+
+def test_with_a_session_a_setting_needs_its_identifiers_right_before_it():
+    pilot = Pilot()
+    configured(pilot, "custom:session_id", "0000abcd")
+    key = "control:altitude_max"
+    assert configured(pilot, key, "2000")[key] == "3000"
+    pilot.send(Control(5))
+    pilot.send(ConfigIds("0000abcd", "00000000", "00000000"), Watchdog(), Config(key, "2000"))
+    assert pilot.drone.settings.values[key] == "3000"
+    pilot.send(ConfigIds("11111111", "00000000", "00000000"), Config(key, "2000"))
+    assert pilot.drone.settings.values[key] == "3000"
+    pilot.send(ConfigIds("0000abcd", "00000000", "00000000"), Config(key, "2000"))
+    assert pilot.drone.settings.values[key] == "2000"
+    configured(pilot, "custom:session_id", "-all")
+    assert configured(pilot, key, "2500")[key] == "2500"
+
+
+def test_the_heights_of_the_configuration_hold():
+    pilot = Pilot(delay=0.0)
+    configured(pilot, "control:altitude_max", "1500")
+    configured(pilot, "control:control_vz_max", "2000")
+    pilot.fly()
+    highest = 0.0
+    for _ in range(300):
+        pilot.wait(0.02, UP, Move(gaz=1.0))
+        highest = max(highest, pilot.truth.height)
+    assert pilot.truth.height == pytest.approx(1.5, abs=1e-3)
+    assert highest < 1.55
+    for _ in range(300):
+        pilot.wait(0.02, UP, Move(gaz=-1.0))
+    assert pilot.truth.height == pytest.approx(0.05, abs=0.02)
+    assert pilot.truth.phase is Phase.FLYING
+
+
+# --- navdata ---------------------------------------------------------------------------------
+
+
+def test_short_and_long_packets_and_their_rates():
+    pilot = Pilot().connect()
+    pilot.wait(1.0, Watchdog())
+    pilot.sent.clear()
+    pilot.wait(10.0, Watchdog())
+    assert {len(packet) for packet in pilot.sent} == {500}
+    assert len(pilot.sent) == 150
+    pilot.send(Config("general:navdata_demo", "FALSE"))
+    pilot.sent.clear()
+    pilot.wait(10.0, Watchdog())
+    assert {len(packet) for packet in pilot.sent} == {2190}
+    assert len(pilot.sent) == 2000
+    clocks = [parse_navdata(packet).clock for packet in pilot.sent]
+    assert np.allclose(np.diff(clocks), 0.005, atol=1e-9)
+
+
+def test_options_of_short_packets_can_be_chosen():
+    pilot = Pilot().connect()
+    configured(pilot, "general:navdata_options", str(1 << 0 | 1 << 9 | 1 << 24))
+    pilot.wait(0.2, Watchdog())
+    assert [tag for tag, _ in pilot.last.options if tag != 0xFFFF] == [0, 9, 24]
+    assert len(pilot.sent[-1]) == 16 + 148 + 92 + 72 + 8
+    assert pilot.last.clock is None
+
+
+def test_the_demand_is_echoed_when_it_reaches_the_vehicle():
+    pilot = Pilot().connect(demo=False).fly()
+    asked = pilot.time
+    pilot.sent.clear()
+    pilot.wait(1.0, UP, Move(gaz=0.5), every=0.02)
+    told = [parse_navdata(packet) for packet in pilot.sent]
+    follows = [one.clock for one in told if one.climb_demand > 0.0]
+    assert min(follows) == pytest.approx(asked + 0.02 + 0.26, abs=0.005)
+    last = told[-1]
+    assert last.climb_demand == pytest.approx(0.35)
+    assert last.climb == pytest.approx(pilot.truth.climb, abs=1e-4)
+    assert last.altitude.altitude_vz == pytest.approx(-last.kalman_pressure.est_zdot)
+    assert last.height == pytest.approx(pilot.truth.height, abs=6e-4)
+    assert last.kalman_pressure.est_z == pytest.approx(pilot.truth.height, abs=1e-6)
+
+
+def test_the_ultrasound_is_heard_25_times_a_second():
+    pilot = Pilot(noise=0.003).connect(demo=False).fly()
+    pilot.sent.clear()
+    pilot.wait(4.0, UP)
+    raw = [parse_navdata(packet).altitude.altitude_raw for packet in pilot.sent]
+    changes = sum(a != b for a, b in pairwise(raw))
+    assert 70 <= changes <= 100  # a millimetre is the resolution: some repeat
+
+
+def test_the_last_ref_is_told_by_its_number():
+    pilot = Pilot().connect(demo=False)
+    pilot.send(Watchdog(), DOWN, Watchdog())
+    pilot.wait(0.01)
+    assert pilot.last.video_stream.atcmd_ref_seq == pilot.number - 2
+
+
+def test_angles_follow_and_nothing_else_does():
+    pilot = Pilot().connect(demo=False).fly()
+    before = pilot.truth.height
+    pilot.wait(3.0, UP, Move(roll=0.5, pitch=-1.0, yaw=1.0))
+    largest = pilot.drone.settings.angle_limit
+    assert pilot.last.roll == pytest.approx(0.5 * largest, abs=1e-4)
+    assert pilot.last.pitch == pytest.approx(-largest, abs=1e-4)
+    assert pilot.last.demo.vx > 0.5
+    assert pilot.last.demo.vy > 0.25
+    assert pilot.last.yaw != 0.0
+    assert pilot.truth.height == pytest.approx(before, abs=1e-9)
+
+
+def noisy_flight(seed, stops=(), **options):
+    """All bytes of a flight; `stops` are times at which somebody merely looks."""
+    pilot = Pilot(noise=0.002, jitter=0.03, seed=seed, **options).connect(demo=False)
+    packets = []
+    stops = sorted(stops)
+    for k in range(280):
+        pilot.time = round(0.02 * k, 6)
+        while stops and stops[0] <= pilot.time:
+            pilot.drone.advance(stops.pop(0))
+        pilot.send(UP, Move(gaz=0.5 * math.sin(0.1 * k), roll=0.2))
+    packets = pilot.sent
+    return b"".join(packets)
+
+
+@pytest.mark.parametrize("plant", ["kit", "thrust"])
+def test_the_same_seed_gives_the_same_bytes(plant):
+    first = noisy_flight(3, plant=plant)
+    assert first == noisy_flight(3, plant=plant)
+    assert first != noisy_flight(4, plant=plant)
+
+
+@settings(max_examples=8)
+@given(st.lists(st.floats(0.0, 6.0), max_size=50), st.sampled_from(["real", "thrust"]))
+def test_looking_changes_nothing(stops, plant):
+    assert noisy_flight(1, stops, plant=plant) == noisy_flight(1, plant=plant)
+
+
+def test_jitter_delays_and_never_reorders():
+    pilot = Pilot(delay=0.1, jitter=0.05).connect(demo=False).fly()
+    pilot.sent.clear()
+    sent = {}
+    for k in range(1, 200):
+        sent[k] = pilot.time
+        pilot.send(UP, Move(gaz=k / 200))
+        pilot.wait(0.01)
+    echoes = [parse_navdata(packet) for packet in pilot.sent]
+    demands = [echo.climb_demand for echo in echoes]
+    assert demands == sorted(demands)
+    late = [
+        echo.clock - sent[round(echo.climb_demand / 0.7 * 200)]
+        for before, echo in pairwise(echoes)
+        if echo.climb_demand != before.climb_demand
+    ]
+    assert min(late) >= 0.1 - 1e-6
+    assert max(late) <= 0.155 + 1e-6  # packets are 5 ms apart
+    assert max(late) - min(late) > 0.03
+
+
+# --- plants ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["kit", "paper", "real"])
+def test_a_linear_plant_is_stepped_exactly(name):
+    plant = linear_plant(name)
+    times = np.arange(1, 60) * 0.137
+    motion = LinearMotion(plant)
+    motion.settle(0, 0.0)
+    motion.demand(0, 0.4)
+    heights = [motion.at(round(1e6 * t))[0] for t in times]
+    exact = plant.transfer_function().step_response(np.concatenate([[0.0], times]))
+    assert np.allclose(heights, 0.4 * np.ravel(exact.outputs)[1:], rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("name", "delay", "gain"), [("kit", 0.26, 2.4), ("paper", 0.36, 2.0), ("real", 0.34, 1.8)]
+)
+def test_a_loop_over_the_drone_is_the_loop_of_the_package(name, delay, gain):
+    """P control of the drone's height at 65 ms, against the exact simulation of the same loop."""
+    sample, step = 0.065, 0.25
+    pilot = Pilot(plant=name)
+    configured(pilot, "control:control_vz_max", "1000")
+    pilot.fly().wait(20.0, UP)
+    start, begun = pilot.time, pilot.truth.height
+    heights = []
+    for k in range(150):
+        pilot.time = round(start + k * sample, 6)
+        height = pilot.truth.height
+        heights.append(height - begun)
+        error = gain * (begun + step - height)
+        pilot.send(UP, Move(gaz=max(-1.0, min(1.0, error))))
+    loop = dtm.ControlLoop(
+        linear_plant(name), dtm.P(gain), delay=delay, sample_time=sample, limit=1.0
+    )
+    exact = loop.simulate(np.arange(150) * sample, step).outputs
+    # Commands travel as single-precision numbers.
+    assert np.allclose(heights, exact, rtol=0.0, atol=1e-6)
+
+
+def test_thrust_near_hover_is_two_equal_lags():
+    thruster = Thruster()
+    motion = ThrustMotion(thruster)
+    motion.settle(0, 1.0)
+    small = 1e-4
+    motion.demand(0, small)
+    times = np.arange(1, 100) * 0.01
+    climbs = [motion.at(round(1e6 * t))[1] for t in times]
+    rate = 0.5 / thruster.motor_lag
+    assert thruster.speed_gain * 4.0 * thruster.motor_lag == pytest.approx(1.0)
+    exact = small * (1.0 - (1.0 + rate * times) * np.exp(-rate * times))
+    assert np.allclose(climbs, exact, rtol=0.0, atol=1e-4 * small)
+
+
+def test_thrust_is_that_of_the_equations():
+    thruster = Thruster()
+    weight = thruster.mass * GRAVITY
+    assert 4.0 * thruster.thrust_factor * thruster.hover_speed**2 == pytest.approx(weight)
+    down, up = thruster.accelerations
+    assert down == pytest.approx(-8.513, abs=0.01)
+    assert up == pytest.approx(10.887, abs=0.01)
+    # A demand far beyond what the rotors give: their limits accelerate the drone.
+    motion = ThrustMotion(thruster)
+    motion.settle(0, 0.0)
+    motion.demand(0, 50.0)
+    early, late = motion.at(400_000)[1], motion.at(500_000)[1]
+    assert (late - early) / 0.1 == pytest.approx(up, rel=1e-3)
+    # Tilted, thrust carries less: m z'' = T cos(roll) cos(pitch) - m g, held by the speed loop.
+    motion.settle(1_000_000, 5.0)
+    motion.demand(1_000_000, 0.0)
+    motion.tilt(1_000_000, math.cos(0.2))
+    lost = GRAVITY * (1.0 / math.cos(0.2) - 1.0) / thruster.speed_gain
+    assert motion.at(4_000_000)[1] == pytest.approx(-lost, rel=1e-3)
+
+
+def test_thrust_is_the_same_whoever_looks():
+    seldom, often = (ThrustMotion(Thruster()) for _ in "ab")
+    for motion in (seldom, often):
+        motion.settle(0, 1.0)
+        motion.demand(1234, 0.7)
+    for time in range(1300, 900_000, 777):
+        often.at(time)
+    assert seldom.at(900_000) == often.at(900_000)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"plant": "kite"}, "none of kit, paper, real, thrust"),
+        ({"delay": -0.1}, "delay"),
+        ({"jitter": float("nan")}, "jitter"),
+        ({"battery": 101.0}, "percentage"),
+        ({"seed": -1}, "seed"),
+        ({"navdata_port": 70000}, "no port"),
+    ],
+)
+def test_options_say_what_is_wrong(given, told):
+    with pytest.raises(ValueError, match=told):
+        EmulatorOptions(**given)
+
+
+@pytest.mark.parametrize("field", ["mass", "motor_lag"])
+def test_a_thruster_has_positive_numbers(field):
+    with pytest.raises(ValueError, match=field):
+        Thruster(**{field: 0.0})
+    with pytest.raises(ValueError, match="cannot hover"):
+        Thruster(hover_speed=1.0)
+
+
+# --- whoever means harm ----------------------------------------------------------------------
+
+TOKENS = st.sampled_from(
+    [
+        b"AT*REF=", b"AT*PCMD=", b"AT*CONFIG=", b"AT*CTRL=", b"AT*CONFIG_IDS=", b"AT*COMWDG=",
+        b"\r", b"\n", b",", b'"', b"1", b"2", b"512", b"256", b"2143289344", b"-1", b"1056964608",
+        b"99999999999999999999", b'"control:altitude_max"', b'"general:navdata_demo","FALSE"',
+        b"4,0", b"5,0", b"\x00", b"\xff",
+    ]
+)  # fmt: skip
+DATAGRAMS = st.one_of(st.binary(max_size=200), st.lists(TOKENS, max_size=40).map(b"".join))
+
+
+@settings(max_examples=150)
+@given(st.lists(st.tuples(st.booleans(), DATAGRAMS, st.floats(0.0, 0.3)), max_size=30))
+def test_no_datagrams_break_the_drone_or_make_it_talk(datagrams):
+    drone, now, received, sent = Drone(EmulatorOptions()), 0.0, 0, []
+    configured_at = None
+    for commands, datagram, later in datagrams:
+        now += later
+        if commands:
+            drone.commanded(datagram, COMMANDS, now)
+        else:
+            drone.woken(datagram, NAVDATA, now)
+        received += 1
+        sent += drone.packets(now)
+        if configured_at is None and any(len(packet) > 24 for packet, _ in sent):
+            configured_at = now
+        truth = drone.truth(now)
+        assert math.isfinite(truth.height)
+        assert abs(truth.demand) <= 2.0
+    if configured_at is None:  # nobody got through the handshake
+        assert len(sent) <= received
+    drone.advance(now + 30.0)
+    sent += drone.packets(now + 30.0)
+    # The last sign of life is worth two seconds, no more.
+    assert all(address == NAVDATA for _, address in sent)
+    drone.advance(now + 60.0)
+    assert drone.packets(now + 60.0) == []
+    assert drone.truth(now + 60.0).phase is Phase.LANDED
+
+
+def test_a_flood_of_motions_does_not_pile_up():
+    pilot = Pilot(delay=100.0).fly()
+    for _ in range(3000):
+        pilot.send(Move(gaz=0.1))
+    assert len(pilot.drone._under_way) <= 1024
