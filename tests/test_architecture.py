@@ -85,7 +85,7 @@ FLOORS = [
     {"_recording", "_waves", "_circulating_noise", "_excitation", "_gallery_entries", "gallery"},
     {"_readers", "links"},
     {"_estimation", "_design"},
-    {"_experiment", "_internet_loop", "_internet_replay"},
+    {"_experiment", "_internet_loop", "_internet_replay", "_internet_result"},
     {"paper"},
     {"_plots"},
     {

@@ -9,8 +9,9 @@ import time
 import numpy as np
 import pytest
 from deadtime import estimate_delay, read_recording
-from deadtime._internet_loop import GAINS, Spread, run_internet_loop
+from deadtime._internet_loop import GAINS, run_internet_loop
 from deadtime._internet_replay import answer_times
+from deadtime._internet_result import Spread
 from deadtime.links.udp import (
     Bursts,
     JitterBuffer,

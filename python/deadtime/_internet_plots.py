@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from deadtime._internet_loop import InternetLoop
+from deadtime._internet_result import InternetLoop
 from deadtime._plots import COLOURS, REFERENCE, new_figure
 
 if TYPE_CHECKING:

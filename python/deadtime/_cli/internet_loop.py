@@ -12,8 +12,9 @@ from rich.table import Table
 
 from deadtime._cli import options as opt
 from deadtime._cli.show import console, print_json, print_table, save_figure, stages
-from deadtime._internet_loop import GAINS, InternetLoop, InternetRun, Spread, run_internet_loop
+from deadtime._internet_loop import GAINS, run_internet_loop
 from deadtime._internet_plots import plot_internet_loop
+from deadtime._internet_result import InternetLoop, InternetRun, Spread
 from deadtime.links.udp import Trial, network_of, policy_of
 from deadtime.paper import PRINTED_OVERSHOOTS, delay_by_dominant_root
 

@@ -7,20 +7,13 @@ is measured while the loop runs. All parts work in the running event loop, real 
 """
 
 from deadtime.links.udp.controller import Controller, ControllerOptions, ControllerReport
+from deadtime.links.udp.delays import Constant, Delays, LogNormal, Normal, ShiftedGamma
 from deadtime.links.udp.described import DELAYS, POLICIES, network_of, policy_of
 from deadtime.links.udp.integrator import HeldIntegrator
-from deadtime.links.udp.network import (
-    Bursts,
-    Constant,
-    Delays,
-    LogNormal,
-    Network,
-    Normal,
-    Path,
-    ShiftedGamma,
-)
+from deadtime.links.udp.network import Bursts, Network, Path
 from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_doubles
-from deadtime.links.udp.plant import PlantOptions, PlantReport, run_plant
+from deadtime.links.udp.plant import run_plant
+from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.policies import DropLate, HoldThenZero, JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.processes import run_processes
 from deadtime.links.udp.relay import Relay, RelayOptions

@@ -29,7 +29,8 @@ from deadtime.links.udp.described import (
     policy_of,
 )
 from deadtime.links.udp.endpoint import Address, is_loopback
-from deadtime.links.udp.plant import PlantOptions, run_plant
+from deadtime.links.udp.plant import run_plant
+from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.relay import Relay, RelayOptions
 
 __all__ = ["main"]

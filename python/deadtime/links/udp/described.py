@@ -9,16 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from deadtime.links.udp.controller import ControllerOptions
-from deadtime.links.udp.network import (
-    Bursts,
-    Constant,
-    Delays,
-    LogNormal,
-    Network,
-    Normal,
-    ShiftedGamma,
-)
-from deadtime.links.udp.plant import PlantOptions
+from deadtime.links.udp.delays import Constant, Delays, LogNormal, Normal, ShiftedGamma
+from deadtime.links.udp.network import Bursts, Network
+from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.policies import DropLate, HoldThenZero, JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.relay import RelayOptions
 

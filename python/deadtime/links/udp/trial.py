@@ -10,7 +10,8 @@ from typing import Any
 from deadtime._validation import positive
 from deadtime.links.udp.controller import Controller, ControllerOptions, ControllerReport
 from deadtime.links.udp.network import Network
-from deadtime.links.udp.plant import PlantOptions, PlantReport, run_plant
+from deadtime.links.udp.plant import run_plant
+from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.relay import Relay, RelayOptions
 
