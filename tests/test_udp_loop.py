@@ -454,3 +454,22 @@ def test_the_integrator_does_not_mind_how_its_time_is_divided(lag):
         parts.advance(1.0 / 64.0, 0.7)
     assert parts.output == pytest.approx(whole.output, rel=1e-13)
     assert parts.velocity == pytest.approx(whole.velocity, rel=1e-13)
+
+
+def test_other_hosts_than_this_one_work_and_are_warned_of(capsys):
+    async def two_computers():
+        options = ControllerOptions(gain=4.0, listen=("192.0.2.1", 5600))
+        async with Controller(options) as controller:
+            plant = PlantOptions(controller=controller.address, listen=("192.0.2.2", 0))
+            return await run_plant(plant)
+
+    report = in_virtual_time(two_computers())
+    assert report.recording.output[-1] == pytest.approx(1.0, abs=1e-3)
+    said = capsys.readouterr().err
+    assert "192.0.2.1" in said
+    assert "from outside" in said
+
+
+def test_on_this_computer_nothing_is_warned_of(capsys):
+    run(Trial(gain=4.0, duration=1.0))
+    assert capsys.readouterr().err == ""
