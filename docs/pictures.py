@@ -14,8 +14,10 @@ from deadtime._cli.fly import emulated_drone
 from deadtime._experiment import FlightPlan, fly_experiment
 from deadtime._experiment.flights import read_telemetry
 from deadtime._flight_plots import plot_checked, plot_learned, plot_told
+from deadtime._internet_loop import run_internet_loop
+from deadtime._internet_plots import plot_internet_loop
 from deadtime._plots import new_figure
-from deadtime.links import run
+from deadtime.links import udp, virtual_time
 from deadtime.links.ardrone2.emulator import Thruster, ThrustMotion
 from scipy.optimize import least_squares
 
@@ -197,7 +199,7 @@ def flying() -> None:
     """The experiment of `deadtime fly`, on the emulator in virtual time."""
     with tempfile.TemporaryDirectory() as folder:
         connect = emulated_drone("kit", 0, FlightPlan().limits)
-        found = fly_experiment(connect, FlightPlan(), Path(folder), run=run)
+        found = fly_experiment(connect, FlightPlan(), Path(folder), run=virtual_time.run)
         figure, axes = new_figure(7.5, 4.6, rows=2)
         plot_checked(axes, [found.before, *found.checked])
         figure.savefig(IMAGES / "flying-before-after.png", dpi=90)
@@ -209,6 +211,37 @@ def flying() -> None:
         plot_told(axes, told, found.before)
         figure.savefig(IMAGES / "flying-told.png", dpi=90)
     print(found.verdict())
+
+
+def internet_loop() -> None:
+    """The Internet loop on a network that jitters and loses, and what policies make of a burst."""
+    bad = udp.Network(delay=udp.Normal(0.05, 0.01), loss=udp.Bursts.of(0.05, 4.0))
+    jitters = udp.Network(delay=udp.Normal(0.05, 0.01), loss=0.05)
+    found = run_internet_loop(udp.Trial(gain=8.0, there=jitters, back=jitters))
+    printed = {
+        float(gain): paper.delay_by_dominant_root(gain, percent / 100.0)
+        for gain, percent in paper.PRINTED_OVERSHOOTS.items()
+    }
+    plot_internet_loop(found, printed).savefig(IMAGES / "internet-loop.png", dpi=90)
+
+    policies = {
+        "newest wins": udp.NewestWins(),
+        "hold 5, then zero": udp.HoldThenZero(5),
+        "jitter buffer of 140 ms": udp.JitterBuffer(0.14),
+    }
+    figure, axes = plt.subplots(
+        1, 3, sharey=True, sharex=True, figsize=(10.0, 3.4), layout="constrained"
+    )
+    for ax, (name, policy) in zip(axes, policies.items(), strict=True):
+        for seed in range(40):
+            trial = udp.Trial(gain=6.0, there=bad, back=bad, seed=seed, policy=policy, duration=4.0)
+            recording = virtual_time.run(udp.run_trial(trial)).plant.recording
+            ax.plot(recording.time - 1.0, recording.output, "C0", alpha=0.25, linewidth=0.8)
+        ax.plot(recording.time - 1.0, recording.reference, "k--", linewidth=0.8)
+        ax.set(xlabel="time (s)", title=name, xlim=(-0.2, 3.0))
+        ax.grid(alpha=0.25)
+    axes[0].set(ylabel="output")
+    figure.savefig(IMAGES / "internet-policies.png", dpi=90)
 
 
 TS = 0.065
@@ -313,3 +346,4 @@ if __name__ == "__main__":
     reproduction()
     planned_step()
     hold()
+    internet_loop()

@@ -85,7 +85,7 @@ FLOORS = [
     {"_recording", "_waves", "_circulating_noise", "_excitation", "_gallery_entries", "gallery"},
     {"_readers", "links"},
     {"_estimation", "_design"},
-    {"_experiment"},
+    {"_experiment", "_internet_loop", "_internet_replay", "_internet_result"},
     {"paper"},
     {"_plots"},
     {
@@ -95,6 +95,7 @@ FLOORS = [
         "_planning_plots",
         "_paper_plots",
         "_flight_plots",
+        "_internet_plots",
     },
     {"_page"},
     {"_report", "_paper_page", "_flight_page"},

@@ -1,11 +1,13 @@
 """The emulated AR.Drone 2.0 without sockets: links, states, watchdogs, navdata, plants."""
 
+import asyncio
 import math
 from itertools import pairwise
 
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime import links
 from deadtime.links.ardrone2.commands import (
     Config,
     ConfigIds,
@@ -20,6 +22,7 @@ from deadtime.links.ardrone2.commands import (
 from deadtime.links.ardrone2.configuration import parse_configuration
 from deadtime.links.ardrone2.emulator import (
     Drone,
+    Emulator,
     EmulatorOptions,
     Phase,
     Thruster,
@@ -747,3 +750,38 @@ def test_a_flood_of_motions_does_not_pile_up():
     for _ in range(3000):
         pilot.send(Move(gaz=0.1))
     assert len(pilot.drone._under_way) <= 1024
+
+
+def test_where_others_can_reach_it_the_clients_have_to_be_named():
+    with pytest.raises(ValueError, match="name the clients"):
+        EmulatorOptions(host="0.0.0.0")
+    with pytest.raises(ValueError, match="'anybody' is no IP address"):
+        EmulatorOptions(host="0.0.0.0", clients=("anybody",))
+    assert EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)).answers("192.168.1.2")
+
+
+def test_hosts_that_are_not_named_are_neither_heard_nor_answered():
+    heard = []
+
+    class Ear(asyncio.DatagramProtocol):
+        def datagram_received(self, data, address):
+            heard.append(data)
+
+    async def call(host):
+        loop = asyncio.get_running_loop()
+        async with Emulator(EmulatorOptions(clients=("127.0.0.1",))) as emulator:
+            for port, said in (
+                (5554, WAKE),
+                (5556, encode([Config("general:navdata_demo", "TRUE"), UP], 1)),
+            ):
+                ear, _ = await loop.create_datagram_endpoint(
+                    Ear, local_addr=(host, 0), remote_addr=("127.0.0.1", port)
+                )
+                ear.sendto(said)
+            await asyncio.sleep(0.5)
+            return emulator.truth()
+
+    assert links.run(call("127.0.0.2")).phase is Phase.LANDED
+    assert not heard
+    assert links.run(call("127.0.0.1")).phase is Phase.TAKING_OFF
+    assert heard

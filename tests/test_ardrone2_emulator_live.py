@@ -352,7 +352,7 @@ def test_ctrl_c_ends_the_command(listens_to_ctrl_c):
 
 def test_an_address_that_others_reach_is_warned_of(capsys):
     # Not opened: tests stay on this machine.
-    emulator = Emulator(EmulatorOptions(host="0.0.0.0"))
+    emulator = Emulator(EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)))
     tell(emulator, as_json=True)
     out, errors = capsys.readouterr()
     assert "nothing authenticates" in errors

@@ -13,6 +13,7 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = [
     "emulator.md",
     "from-recording-to-gains.md",
+    "internet-loop.md",
     "planning-a-flight.md",
     "what-a-ground-log-cannot-tell.md",
 ]

@@ -62,6 +62,10 @@ def ardrone2(
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than 127.* can be reached from afar.")
     ] = LOOPBACK,
+    client: Annotated[
+        list[str] | None,
+        typer.Option(help="Answer this IP address only; again for more. Needed with --host."),
+    ] = None,
     port_base: Annotated[
         int, typer.Option(min=0, max=65000, help="Ports from here: +4, +6, +9. 0: free ones.")
     ] = PORT_BASE,
@@ -88,7 +92,16 @@ def ardrone2(
     if duration is not None:
         positive("--duration", duration)
     options = EmulatorOptions(
-        plant, delay, jitter, downlink, noise, battery, seed, host=host, **ports
+        plant,
+        delay,
+        jitter,
+        downlink,
+        noise,
+        battery,
+        seed,
+        host=host,
+        clients=tuple(client or ()),
+        **ports,
     )
     asyncio.run(_emulate(options, duration, record, until_input_ends, as_json))
 
@@ -130,8 +143,8 @@ def tell(emulator: Emulator, as_json: bool) -> None:
     """Say where the drone is, when it is."""
     options = emulator.options
     warning = (
-        f"{options.host} can be reached by others, who can command this drone and have navdata "
-        "sent to an address that they forge: nothing authenticates them. Keep to a closed network."
+        f"{options.host} can be reached by others. Only {', '.join(options.clients)} is answered, "
+        "but addresses can be forged and nothing authenticates them: keep to a closed network."
     )
     if not options.only_here:
         print(f"deadtime: {warning}", file=sys.stderr)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from ipaddress import ip_address
 from typing import get_args
 
 from deadtime._validation import non_negative
@@ -40,13 +41,18 @@ class EmulatorOptions:
         Of noise and jitter.
     host : str
         Address to listen on.
+    clients : tuple of str
+        Addresses of the hosts that are listened to and answered; without any, every host that can
+        reach the emulator. Needed where others than this machine can: nothing that they forge then
+        has it send navdata to an address that is not one of these.
     navdata_port, command_port, control_port : int
         0 takes a free one.
 
     Raises
     ------
     ValueError
-        If a number is outside its range or the plant is unknown.
+        If a number is outside its range, the plant is unknown, or others can reach it and no
+        clients are named.
 
     Examples
     --------
@@ -68,6 +74,7 @@ class EmulatorOptions:
     navdata_port: int = 5554
     command_port: int = 5556
     control_port: int = 5559
+    clients: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.plant not in DELAYS:
@@ -84,6 +91,16 @@ class EmulatorOptions:
             port = getattr(self, name)
             if not 0 <= port <= 65535:
                 raise ValueError(f"{name}={port} is no port: give 1 to 65535, or 0 for a free one")
+        for client in self.clients:
+            try:
+                ip_address(client)
+            except ValueError:
+                raise ValueError(f"clients: {client!r} is no IP address") from None
+        if not self.only_here and not self.clients:
+            raise ValueError(
+                f"host={self.host!r} can be reached by others: name the clients that it answers, "
+                "by their IP addresses"
+            )
 
     @property
     def transport_delay(self) -> float:
@@ -94,6 +111,10 @@ class EmulatorOptions:
     def only_here(self) -> bool:
         """Whether only this machine can reach it."""
         return self.host in ("localhost", "::1") or self.host.startswith("127.")
+
+    def answers(self, host: str) -> bool:
+        """Whether a host is listened to."""
+        return not self.clients or host in self.clients
 
 
 def ports_from(base: int) -> dict[str, int]:

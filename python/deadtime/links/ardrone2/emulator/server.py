@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import Callable
 from functools import partial
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from deadtime._errors import LinkError
 from deadtime.links.ardrone2.emulator.drone import Drone, Truth
@@ -29,11 +30,14 @@ MOST_UNREAD = 65536
 class _Port(asyncio.DatagramProtocol):
     """Hands datagrams on; errors of replies that nobody wanted are no business of the drone."""
 
-    def __init__(self, received: Any) -> None:
-        self._received = received
+    def __init__(
+        self, received: Callable[[bytes, Address], None], answers: Callable[[str], bool]
+    ) -> None:
+        self._received, self._answers = received, answers
 
     def datagram_received(self, data: bytes, addr: Address) -> None:
-        self._received(data, (addr[0], addr[1]))
+        if self._answers(addr[0]):
+            self._received(data, (addr[0], addr[1]))
 
 
 class _Control(asyncio.Protocol):
@@ -72,7 +76,7 @@ class Emulator:
     """An emulated AR.Drone 2.0 that listens on sockets of the running event loop.
 
     Use it as an asynchronous context manager. It answers to whoever can reach it, as the vehicle
-    does: by default that is this machine only.
+    does: by default that is this machine only, and where it is more, the clients that are named.
 
     Parameters
     ----------
@@ -141,7 +145,7 @@ class Emulator:
         self.drone = Drone(self.options, start=loop.time())
         for name, received in (("navdata", self._woken), ("command", self._commanded)):
             transport, _ = await loop.create_datagram_endpoint(
-                partial(_Port, received),
+                partial(_Port, received, self.options.answers),
                 local_addr=(self.host, getattr(self, f"{name}_port")),
             )
             setattr(self, f"{name}_port", transport.get_extra_info("sockname")[1])
@@ -200,7 +204,8 @@ class Emulator:
             self._timer = loop.call_at(due, self._go_on)
 
     def _connected(self, reader: _Control) -> None:
-        if len(self._readers) >= MOST_CONNECTIONS and reader.transport is not None:
+        welcome = len(self._readers) < MOST_CONNECTIONS and self.options.answers(reader.host)
+        if not welcome and reader.transport is not None:
             reader.transport.abort()
             return
         self._readers.add(reader)

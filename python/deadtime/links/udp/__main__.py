@@ -1,0 +1,209 @@
+"""``python -m deadtime.links.udp controller|relay|plant``: each part as a process of its own.
+
+Each says where it listens in one line of JSON when it is ready, and what happened in another when
+it ends: after its time, or by Ctrl-C or SIGTERM. Nothing but the base of the package is needed, so
+that either end can run on a small computer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import math
+import signal
+import sys
+from collections.abc import Coroutine, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from deadtime._errors import DeadtimeError
+from deadtime.links.udp.controller import Controller, ControllerOptions
+from deadtime.links.udp.described import (
+    DELAYS,
+    POLICIES,
+    network_from,
+    network_of,
+    plain,
+    policy_of,
+)
+from deadtime.links.udp.endpoint import Address, is_loopback
+from deadtime.links.udp.plant import run_plant
+from deadtime.links.udp.plant_options import PlantOptions
+from deadtime.links.udp.relay import Relay, RelayOptions
+
+__all__ = ["main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one part of the loop; the exit code is 0 on success only."""
+    given = _parser().parse_args(arguments)
+    try:
+        asyncio.run(_until_told(given.run(given)))
+    except (DeadtimeError, OSError, ValueError) as error:
+        print(f"deadtime.links.udp: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+    return 0
+
+
+async def _until_told(work: Coroutine[Any, Any, None]) -> None:
+    """Run, and end in an orderly way when told to."""
+    task = asyncio.ensure_future(work)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with suppress(NotImplementedError, RuntimeError):  # Windows has no such handlers
+            loop.add_signal_handler(number, task.cancel)
+    with suppress(asyncio.CancelledError):
+        await task
+
+
+def _say(**what: Any) -> None:
+    print(json.dumps(plain(what), allow_nan=False), flush=True)
+
+
+def _ready(part: str, address: Address) -> None:
+    _say(ready=part, host=address[0], port=address[1])
+
+
+async def _run_controller(given: argparse.Namespace) -> None:
+    options = ControllerOptions(
+        gain=given.gain,
+        listen=given.listen,
+        plant=given.plant,
+        limit=given.limit,
+        watchdog=given.watchdog,
+        safe=given.safe,
+        every=given.every,
+        recording=given.recording,
+        doubles=given.doubles,
+    )
+    async with Controller(options) as controller:
+        _ready("controller", controller.address)
+        try:
+            await controller.running(given.duration)
+        finally:
+            _say(report=controller.report().to_dict())
+
+
+async def _run_relay(given: argparse.Namespace) -> None:
+    words = {name: getattr(given, name) for name in WAYS}
+    both = network_of(
+        given.delays,
+        given.delay,
+        given.jitter,
+        given.loss,
+        given.burst,
+        given.duplication,
+        given.ordered,
+    )
+    ways = {name: both if text is None else network_from(text) for name, text in words.items()}
+    options = RelayOptions(given.to, **ways, seed=given.seed, listen=given.listen)
+    async with Relay(options) as relay:
+        _ready("relay", relay.address)
+        try:
+            await asyncio.sleep(given.duration)
+        finally:
+            paths = {name: getattr(relay, name) for name in WAYS}
+            _say(report={name: path.counts() for name, path in paths.items()})
+
+
+async def _run_plant(given: argparse.Namespace) -> None:
+    listen = given.listen
+    if not is_loopback(given.controller[0]) and listen == LOOPBACK:
+        listen = ("0.0.0.0", 0)  # a socket on the loopback cannot send elsewhere
+    options = PlantOptions(
+        controller=given.controller,
+        listen=listen,
+        gain=given.gain,
+        lag=given.lag,
+        sample_time=given.sample_time,
+        duration=given.duration,
+        rest=given.rest,
+        amplitude=given.amplitude,
+        limit=given.limit,
+        policy=policy_of(given.policy, given.policy_number),
+        watchdog=given.watchdog,
+        safe=given.safe,
+        recording=given.recording,
+        doubles=given.doubles,
+    )
+    report = await run_plant(options)
+    _say(report=report.to_dict())
+
+
+#: From the plant to the controller, and back.
+WAYS = ("there", "back")
+
+LOOPBACK = ("127.0.0.1", 0)
+
+
+def _address(text: str) -> Address:
+    host, colon, port = text.rpartition(":")
+    if not colon or not port.isdigit() or int(port) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT, such as 127.0.0.1:5600")
+    return host or "127.0.0.1", int(port)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m deadtime.links.udp", description=__doc__)
+    parts = parser.add_subparsers(required=True, metavar="controller|relay|plant")
+
+    controller = parts.add_parser("controller", help="answers measurements with commands")
+    controller.set_defaults(run=_run_controller)
+    controller.add_argument("--gain", type=float, required=True, help="K, 1/s")
+    controller.add_argument("--plant", type=_address, help="answer this address alone")
+    controller.add_argument(
+        "--every", action="store_true", help="answer every measurement, for a jitter buffer"
+    )
+
+    relay = parts.add_parser("relay", help="stands for the network between")
+    relay.set_defaults(run=_run_relay)
+    relay.add_argument("--to", type=_address, required=True, help="the controller")
+    relay.add_argument("--delay", type=float, default=0.05, help="mean one-way delay, s")
+    relay.add_argument("--jitter", type=float, default=0.0, help="its standard deviation, s")
+    relay.add_argument("--delays", choices=DELAYS, default="gamma", help="its distribution")
+    relay.add_argument("--loss", type=float, default=0.0, help="part of the packets lost")
+    relay.add_argument("--burst", type=float, default=1.0, help="mean length of a burst of losses")
+    relay.add_argument("--duplication", type=float, default=0.0, help="part that comes twice")
+    relay.add_argument("--ordered", action="store_true", help="no packet overtakes another")
+    for way, which in zip(WAYS, ("to the controller", "to the plant"), strict=True):
+        relay.add_argument(
+            f"--{way}", metavar="JSON", help=f"the network {which}, in place of the options above"
+        )
+    relay.add_argument("--seed", type=int, default=0, help="of delays and losses")
+
+    plant = parts.add_parser("plant", help="an integrator that samples and obeys")
+    plant.set_defaults(run=_run_plant)
+    plant.add_argument(
+        "--controller", type=_address, required=True, help="the controller, or a relay"
+    )
+    plant.add_argument("--gain", type=float, default=1.0, help="of the integrator")
+    plant.add_argument("--lag", type=float, default=0.0, help="of the integrator, s")
+    plant.add_argument("--sample-time", type=float, default=0.01, help="between measurements, s")
+    plant.add_argument("--rest", type=float, default=1.0, help="time before the step, s")
+    plant.add_argument("--amplitude", type=float, default=1.0, help="of the step")
+    plant.add_argument("--policy", choices=POLICIES, default="newest", help="for late commands")
+    plant.add_argument("--policy-number", type=float, help="time in s, or number of samples")
+
+    for part, duration in ((controller, math.inf), (relay, math.inf), (plant, 6.0)):
+        part.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
+        part.add_argument("--duration", type=float, default=duration, help="how long to run, s")
+    for part in (controller, plant):
+        part.add_argument("--limit", type=float, default=20.0, help="largest size of the command")
+        part.add_argument("--watchdog", type=float, default=0.5, help="longest silence, s")
+        part.add_argument("--safe", type=float, default=0.0, help="command after such a silence")
+        part.add_argument("--recording", type=Path, help="CSV file to write")
+        part.add_argument(
+            "--doubles",
+            type=int,
+            nargs=2,
+            metavar=("IN", "OUT"),
+            help="speak in bare doubles as Simulink does, so many in a datagram from the other end "
+            "and to it",
+        )
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,265 @@
+"""The end with the controller: it answers the newest measurement, at once.
+
+Safety: a measurement that is not finite or older than the last one is not answered, the answer is
+within the limit. When measurements stop coming, the plant is told to be safe, in case the way to it
+still works, for a while; then the controller falls silent and is ready for another plant.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import math
+from collections import deque
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from deadtime._recording import MINIMUM_SAMPLES, Recording
+from deadtime._validation import finite, positive
+from deadtime.links.journal import Journal
+from deadtime.links.udp.endpoint import Address, Endpoint
+from deadtime.links.udp.packets import LoopPacket
+from deadtime.links.udp.statistics import KEPT, LinkReport, Percentiles
+from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
+
+__all__ = ["Controller", "ControllerOptions", "ControllerReport"]
+
+#: Columns of the controller's recording.
+COLUMNS = ("time_s", "reference", "output", "command", "measured_s")
+
+#: Times the watchdog's that the safe command is repeated, and how often in each.
+REPEATED, EACH = 4, 10
+
+
+@dataclass(frozen=True)
+class ControllerOptions:
+    """The controller's end, as a description: command = gain (reference - output).
+
+    Parameters
+    ----------
+    gain : float
+        Of the controller, 1/s for an integrator.
+    listen : (str, int)
+        Where to listen; port 0 takes a free one.
+    plant : (str, int) or None
+        Who is answered; None: whoever sends a measurement first, until they fall silent.
+    limit : float
+        Largest size of the command.
+    watchdog : float
+        Longest time without a measurement, s.
+    safe : float
+        The command that is sent when the watchdog bites.
+    every : bool
+        Answer every measurement, as a plant with a jitter buffer needs it; else the newest alone.
+    recording : Path or None
+        CSV file, written row by row.
+    doubles : (int, int) or None
+        Speak in bare doubles, so many from the plant and to it.
+    """
+
+    gain: float
+    listen: Address = ("127.0.0.1", 0)
+    plant: Address | None = None
+    limit: float = 20.0
+    watchdog: float = 0.5
+    safe: float = 0.0
+    every: bool = False
+    recording: Path | None = None
+    doubles: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        finite("gain", self.gain)
+        positive("limit", self.limit)
+        positive("watchdog", self.watchdog)
+        if abs(finite("safe", self.safe)) > self.limit:
+            raise ValueError(f"safe={self.safe} is beyond limit={self.limit}: give a smaller one")
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerReport:
+    """What happened at the controller; recording and times are those of the last 100 000.
+
+    Attributes
+    ----------
+    link : LinkReport
+        The packets from the plant.
+    period : Percentiles
+        Time between two answers, s.
+    answered : int
+        Measurements that were answered.
+    drained : int
+        Measurements that were left for a newer one that was there already.
+    trips : int
+        How often measurements stopped coming.
+    largest_command : float
+        Largest size.
+    recording : Recording or None
+        Time by this clock from the first measurement on, reference, output as it was received,
+        command as it was sent; None where the run was too short.
+    """
+
+    link: LinkReport
+    period: Percentiles
+    answered: int
+    drained: int
+    trips: int
+    largest_command: float
+    recording: Recording | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON; without the recording."""
+        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        del plain["recording"]
+        plain["link"] = self.link.to_dict()
+        plain["period"] = vars(self.period)
+        return plain
+
+
+class Controller:
+    """A controller at work: ``async with Controller(options) as controller``."""
+
+    def __init__(self, options: ControllerOptions) -> None:
+        self.options = options
+        self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
+        self._endpoint = Endpoint(self._wire, self._take, options.plant)
+        self._stack = ExitStack()
+        self._journal: Journal | None = None
+        self._newest = 0
+        self._sequence = 0
+        self._last: tuple[LoopPacket, float] | None = None
+        self._watchdog: asyncio.TimerHandle | None = None
+        self._started = math.nan
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=KEPT)
+        self._answered = self._drained = self._trips = 0
+        self._largest = 0.0
+
+    async def __aenter__(self) -> Controller:
+        self._loop = asyncio.get_running_loop()
+        await self._endpoint.open(self.options.listen)
+        self._stack.callback(self._endpoint.close)
+        if self.options.recording is not None:
+            self._journal = self._stack.enter_context(Journal(self.options.recording, COLUMNS))
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if self._watchdog is not None:
+            self._watchdog.cancel()
+        self._send_safe()  # told now, the plant need not wait for its watchdog
+        self._stack.close()
+        if kind is None:
+            self._endpoint.check()
+
+    async def running(self, time: float) -> None:
+        """Work for so long, s; raises what it cannot work on with, such as a full disk."""
+        await self._endpoint.running(time)
+
+    @property
+    def address(self) -> Address:
+        """Where the controller listens."""
+        return self._endpoint.address
+
+    def _take(self, batch: list[tuple[LoopPacket, float]]) -> None:
+        """Answer the newest measurement of a batch, or every one."""
+        statistics = self._endpoint.statistics
+        fresh = []
+        for packet, read in batch:
+            if not (math.isfinite(packet.value) and math.isfinite(packet.reference)):
+                statistics.invalid += 1
+                continue
+            if self._echoes(packet, read):
+                statistics.exchanged(packet, read)
+            if self.options.every:
+                self._answer(packet, read)
+            elif packet.sequence > self._newest:
+                fresh.append((packet, read))
+            else:
+                statistics.came_late(self._behind(packet))
+        if not fresh:
+            return
+        packet, read = max(fresh, key=lambda one: one[0].sequence)
+        self._drained += len(fresh) - 1
+        self._answer(packet, read)
+
+    def _echoes(self, packet: LoopPacket, read: float) -> bool:
+        """Whether a packet echoes one of this end in a way that can be."""
+        known = self._wire.has_times and 0 < packet.echo_sequence <= self._sequence
+        return known and 0.0 <= packet.held <= read - packet.echo_sent
+
+    def _behind(self, packet: LoopPacket) -> float:
+        """How much older than the last one that was answered a measurement is."""
+        return max(0.0, self._last[0].sent - packet.sent) if self._last is not None else 0.0
+
+    def _answer(self, packet: LoopPacket, read: float) -> None:
+        limit = self.options.limit
+        error = packet.reference - packet.value
+        command = max(-limit, min(limit, self.options.gain * error))
+        now = self._send(command, packet, read)
+        self._answered += 1
+        self._largest = max(self._largest, abs(command))
+        if math.isnan(self._started):
+            self._started = now
+        fresh = packet.sequence > self._newest
+        if fresh and (not self._rows or now - self._started > self._rows[-1][0]):
+            row = (now - self._started, packet.reference, packet.value, command, packet.sent)
+            self._rows.append(row)
+            if self._journal is not None:
+                self._journal.write(row)
+        if fresh:
+            self._newest, self._last = packet.sequence, (packet, read)
+        if self._watchdog is not None:
+            self._watchdog.cancel()
+        self._watchdog = self._loop.call_later(self.options.watchdog, self._bite, 0)
+
+    def _send(self, command: float, packet: LoopPacket, read: float, flags: int = 0) -> float:
+        """Send a command in answer to a measurement; the time at which it was."""
+        now = self._loop.time()
+        self._sequence += 1
+        self._endpoint.send(
+            LoopPacket(
+                sequence=self._sequence,
+                sent=now,
+                echo_sequence=packet.sequence,
+                echo_sent=packet.sent,
+                held=now - read,
+                value=command,
+                reference=packet.reference,
+                flags=flags,
+            )
+        )
+        return now
+
+    def _send_safe(self) -> None:
+        if self._last is not None:
+            self._send(self.options.safe, *self._last, flags=SAFE)
+
+    def _bite(self, times: int) -> None:
+        """Measurements stopped coming: say so for a while, then be ready for another plant."""
+        if times == 0:
+            self._trips += 1
+            self._newest = 0  # the same plant may start anew
+        if times == REPEATED * EACH:
+            self._last, self._watchdog = None, None
+            self._endpoint.forget_peer()
+            return
+        self._send_safe()
+        again = self.options.watchdog / EACH
+        self._watchdog = self._loop.call_later(again, self._bite, times + 1)
+
+    def report(self) -> ControllerReport:
+        """What happened until now."""
+        recording = None
+        times = [row[0] for row in self._rows]
+        if len(self._rows) >= MINIMUM_SAMPLES:
+            time, reference, output, command, _ = zip(*self._rows, strict=True)
+            recording = Recording(time, reference, output, command, source="the controller")
+        return ControllerReport(
+            link=self._endpoint.statistics.report(),
+            period=Percentiles.of([b - a for a, b in itertools.pairwise(times)]),
+            answered=self._answered,
+            drained=self._drained,
+            trips=self._trips,
+            largest_command=self._largest,
+            recording=recording,
+        )

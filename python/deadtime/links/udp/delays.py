@@ -1,0 +1,127 @@
+"""Distributions of one-way delays."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass
+from typing import Protocol
+
+from deadtime._validation import non_negative, positive
+
+__all__ = ["Constant", "Delays", "LogNormal", "Normal", "ShiftedGamma"]
+
+
+class Delays(Protocol):
+    """A distribution of one-way delays."""
+
+    @property
+    def mean(self) -> float:
+        """Mean delay, s."""
+
+    def draw(self, numbers: random.Random) -> float:
+        """One delay, s."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """Every packet takes the same time.
+
+    Parameters
+    ----------
+    mean : float
+        The delay, s.
+    """
+
+    mean: float
+
+    def __post_init__(self) -> None:
+        non_negative("mean", self.mean)
+
+    def draw(self, numbers: random.Random) -> float:
+        """The delay, s."""
+        return self.mean
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normally distributed delays; those below zero are zero.
+
+    Parameters
+    ----------
+    mean, deviation : float
+        Mean and standard deviation, s.
+    """
+
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        non_negative("mean", self.mean)
+        non_negative("deviation", self.deviation)
+
+    def draw(self, numbers: random.Random) -> float:
+        """One delay, s."""
+        return max(0.0, numbers.gauss(self.mean, self.deviation))
+
+
+@dataclass(frozen=True)
+class ShiftedGamma:
+    """A shortest delay, and a gamma-distributed wait on top of it, as queues make it.
+
+    Parameters
+    ----------
+    least : float
+        The shortest delay, s.
+    mean : float
+        Mean delay, above `least`, s.
+    deviation : float
+        Standard deviation, s.
+    """
+
+    least: float
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        non_negative("least", self.least)
+        positive("deviation", self.deviation)
+        if not self.mean > self.least:
+            raise ValueError(f"mean={self.mean} is not above least={self.least}: give a longer one")
+
+    def draw(self, numbers: random.Random) -> float:
+        """One delay, s."""
+        wait = self.mean - self.least
+        shape = (wait / self.deviation) ** 2
+        return self.least + numbers.gammavariate(shape, wait / shape)
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """A shortest delay, and a log-normally distributed wait on top of it, with its long tail.
+
+    Parameters
+    ----------
+    least : float
+        The shortest delay, s.
+    mean : float
+        Mean delay, above `least`, s.
+    deviation : float
+        Standard deviation, s.
+    """
+
+    least: float
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        non_negative("least", self.least)
+        positive("deviation", self.deviation)
+        if not self.mean > self.least:
+            raise ValueError(f"mean={self.mean} is not above least={self.least}: give a longer one")
+
+    def draw(self, numbers: random.Random) -> float:
+        """One delay, s."""
+        wait = self.mean - self.least
+        spread = math.log1p((self.deviation / wait) ** 2)
+        return self.least + numbers.lognormvariate(math.log(wait) - 0.5 * spread, math.sqrt(spread))

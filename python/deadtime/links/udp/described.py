@@ -1,0 +1,190 @@
+"""Networks, policies and options in words: as options of a command, as JSON, and back."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from deadtime.links.udp.controller import ControllerOptions
+from deadtime.links.udp.delays import Constant, Delays, LogNormal, Normal, ShiftedGamma
+from deadtime.links.udp.network import Bursts, Network
+from deadtime.links.udp.plant_options import PlantOptions
+from deadtime.links.udp.policies import DropLate, HoldThenZero, JitterBuffer, NewestWins, Policy
+from deadtime.links.udp.relay import RelayOptions
+
+__all__ = [
+    "DELAYS",
+    "POLICIES",
+    "arguments_of",
+    "network_from",
+    "network_of",
+    "plain",
+    "policy_of",
+]
+
+#: Kinds of delays and policies by the names that options have for them.
+DELAYS = ("normal", "gamma", "lognormal")
+POLICIES = ("newest", "drop-late", "hold", "jitter-buffer")
+
+KINDS = {"constant": Constant, "normal": Normal, "gamma": ShiftedGamma, "lognormal": LogNormal}
+
+#: Part of the mean delay that is the shortest one, where a distribution has such.
+LEAST = 0.8
+
+
+def delays_of(kind: str, mean: float, deviation: float) -> Delays:
+    """One-way delays of this kind; constant ones where there is no deviation."""
+    if kind not in DELAYS:
+        raise ValueError(f"the delays {kind!r} are none of {', '.join(DELAYS)}")
+    if deviation == 0.0:
+        return Constant(mean)
+    if kind == "normal":
+        return Normal(mean, deviation)
+    return (ShiftedGamma if kind == "gamma" else LogNormal)(LEAST * mean, mean, deviation)
+
+
+def network_of(
+    kind: str = "gamma",
+    delay: float = 0.05,
+    jitter: float = 0.0,
+    loss: float = 0.0,
+    burst: float = 1.0,
+    duplication: float = 0.0,
+    ordered: bool = False,
+) -> Network:
+    """One direction of a network, by the numbers that options give.
+
+    Parameters
+    ----------
+    kind : str
+        Distribution of the delays: ``"normal"``, ``"gamma"`` or ``"lognormal"``; the last two
+        begin at 0.8 of the mean.
+    delay, jitter : float
+        Mean and standard deviation of the one-way delay, s.
+    loss : float
+        Part of the packets that are lost.
+    burst : float
+        Mean number of packets that are lost together; 1 loses each by itself.
+    duplication : float
+        Part of the packets that arrive twice.
+    ordered : bool
+        Whether no packet overtakes another.
+
+    Examples
+    --------
+    >>> from deadtime.links.udp import network_of
+    >>> network_of("normal", delay=0.05, jitter=0.01).delay
+    Normal(mean=0.05, deviation=0.01)
+    """
+    return Network(
+        delay=delays_of(kind, delay, jitter),
+        loss=loss if burst == 1.0 else Bursts.of(loss, burst),
+        duplication=duplication,
+        ordered=ordered,
+    )
+
+
+def policy_of(name: str, number: float | None = None) -> Policy:
+    """The policy of this name.
+
+    Parameters
+    ----------
+    name : str
+        ``"newest"``, ``"drop-late"``, ``"hold"`` or ``"jitter-buffer"``.
+    number : float, optional
+        Its time in s, or how many samples are held.
+    """
+    if name not in POLICIES:
+        raise ValueError(f"the policy {name!r} is none of {', '.join(POLICIES)}")
+    if name == "newest":
+        if number is not None:
+            raise ValueError(f"the policy 'newest' takes no number, {number:g} was given")
+        return NewestWins()
+    if number is None:
+        what = "a number of samples" if name == "hold" else "a time in s"
+        raise ValueError(f"the policy {name!r} needs {what}")
+    if name == "hold":
+        if not number.is_integer():
+            raise ValueError(f"the policy 'hold' needs a whole number of samples, not {number:g}")
+        return HoldThenZero(int(number))
+    return (DropLate if name == "drop-late" else JitterBuffer)(number)
+
+
+def plain(value: Any) -> Any:
+    """The value with None in place of what JSON has no word for."""
+    if isinstance(value, dict):
+        return {key: plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def network_text(network: Network) -> str:
+    """A network as JSON, for `network_from`."""
+    words = asdict(network)
+    for kind, made in KINDS.items():
+        if type(network.delay) is made:
+            words["delay"]["kind"] = kind
+    if isinstance(words["delay"], dict) and "kind" not in words["delay"]:
+        raise ValueError(f"the delays {network.delay} have no name that another process knows")
+    return json.dumps(words)
+
+
+def network_from(text: str) -> Network:
+    """The network that `network_text` put into words."""
+    try:
+        words = json.loads(text)
+        if isinstance(words["delay"], dict):
+            kind = words["delay"].pop("kind")
+            words["delay"] = KINDS[kind](**words["delay"])
+        if isinstance(words["loss"], dict):
+            words["loss"] = Bursts(**words["loss"])
+        words["blackouts"] = tuple((start, stop) for start, stop in words["blackouts"])
+        return Network(**words)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{text!r} does not describe a network: {error}") from None
+
+
+def policy_words(policy: Policy) -> tuple[str, float | None]:
+    """Name and number of a policy, for `policy_of`."""
+    if isinstance(policy, NewestWins):
+        return "newest", None
+    if isinstance(policy, HoldThenZero):
+        return "hold", float(policy.samples)
+    if isinstance(policy, DropLate):
+        return "drop-late", policy.older_than
+    if isinstance(policy, JitterBuffer):
+        return "jitter-buffer", policy.delay
+    raise ValueError(f"{policy} has no name that another process knows")
+
+
+def arguments_of(options: ControllerOptions | RelayOptions | PlantOptions) -> list[str]:
+    """The options as arguments of ``python -m deadtime.links.udp <part>``."""
+    arguments = []
+    for field in fields(options):
+        name, value = field.name.replace("_", "-"), getattr(options, field.name)
+        if value is None or value is False:
+            continue
+        if field.name == "policy":
+            word, number = policy_words(value)
+            arguments += ["--policy", word]
+            arguments += [] if number is None else ["--policy-number", repr(number)]
+        elif value is True:
+            arguments += [f"--{name}"]
+        elif isinstance(value, Network):
+            arguments += [f"--{name}", network_text(value)]
+        elif field.name == "doubles":
+            arguments += ["--doubles", *map(str, value)]
+        elif isinstance(value, tuple):
+            host, port = value
+            to = "to" if isinstance(options, RelayOptions) and name == "controller" else name
+            arguments += [f"--{to}", f"{host}:{port}"]
+        else:
+            # In one word: a negative number would be taken for another option.
+            arguments += [f"--{name}={value if isinstance(value, (str, Path)) else repr(value)}"]
+    return arguments

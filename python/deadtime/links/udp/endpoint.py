@@ -1,0 +1,222 @@
+"""One UDP socket that speaks with one other, and reads what comes in batches."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import math
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, TypeAlias, cast
+
+from deadtime._errors import LinkError, PacketError
+from deadtime.links.udp.packets import LoopPacket
+from deadtime.links.udp.statistics import LinkStatistics
+from deadtime.links.udp.wires import Wire
+
+__all__ = ["Address", "Endpoint", "Socket", "open_socket"]
+
+Address: TypeAlias = tuple[str, int]
+
+#: Packets of a batch that is still waiting for the last one; a flood must not keep it waiting.
+LARGEST_BATCH = 64
+
+
+class Socket(asyncio.DatagramProtocol):
+    """A UDP socket of the running loop that hands on what comes."""
+
+    def __init__(self, receive: Callable[[bytes, Address], None]) -> None:
+        self._receive = receive
+        self._transport: asyncio.DatagramTransport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Called by asyncio."""
+        self._transport = cast("asyncio.DatagramTransport", transport)
+
+    def datagram_received(self, data: bytes, addr: tuple[Any, ...]) -> None:
+        """Called by asyncio."""
+        self._receive(data, (addr[0], addr[1]))
+
+    def error_received(self, exc: Exception) -> None:
+        """Called by asyncio: nobody listens there (yet), which the watchdogs see to."""
+
+    @property
+    def address(self) -> Address:
+        """Where this socket listens."""
+        assert self._transport is not None
+        host, port = self._transport.get_extra_info("sockname")[:2]
+        return host, port
+
+    def send(self, data: bytes, address: Address) -> None:
+        """Send a datagram."""
+        if self._transport is not None and not self._transport.is_closing():
+            self._transport.sendto(data, address)
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._transport is not None:
+            self._transport.close()
+
+
+async def open_socket(receive: Callable[[bytes, Address], None], address: Address) -> Socket:
+    """A socket that listens on this address; port 0 takes a free one."""
+    loop = asyncio.get_running_loop()
+    try:
+        _, socket = await loop.create_datagram_endpoint(lambda: Socket(receive), local_addr=address)
+    except OSError as error:
+        raise LinkError(
+            f"no UDP socket on {address[0]}:{address[1]}: {error.strerror or error}; give a port "
+            "that is free, or 0 for any"
+        ) from None
+    if not is_loopback(address[0]):
+        print(
+            f"listening on {address[0]}: whoever reaches this port from outside can speak to it",
+            file=sys.stderr,
+        )
+    return socket
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this computer, as an address or by its name."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+async def resolved(address: Address) -> Address:
+    """The numeric IPv4 address that datagrams from this host come from."""
+    host, port = address
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        loop = asyncio.get_running_loop()
+        try:
+            found = await loop.getaddrinfo(host, port)
+        except OSError as error:
+            raise LinkError(f"the host {host!r} is not known: {error.strerror}") from None
+        numeric = [entry[4][0] for entry in found if ":" not in str(entry[4][0])]
+        if not numeric:
+            raise LinkError(f"the host {host!r} has no IPv4 address") from None
+        return str(numeric[0]), port
+    return address
+
+
+class Endpoint:
+    """The socket of one end of the loop: checked peer, decoded packets, in batches.
+
+    Parameters
+    ----------
+    wire : Wire
+        How packets are on the wire.
+    take : callable
+        Called with the packets of a batch and the times at which they were read. A batch is what
+        came in until a pass of the event loop brought nothing more.
+    peer : (str, int), optional
+        The other end. Without, it is whoever sends the first packet that is one.
+    """
+
+    def __init__(
+        self,
+        wire: Wire,
+        take: Callable[[list[tuple[LoopPacket, float]]], None],
+        peer: Address | None = None,
+    ) -> None:
+        self.statistics = LinkStatistics()
+        self._wire, self._take = wire, take
+        self._fixed_peer = peer
+        self.peer = peer
+        self._batch: list[tuple[LoopPacket, float]] = []
+        self._socket: Socket | None = None
+        self._failure: Exception | None = None
+
+    async def open(self, address: Address) -> None:
+        """Open the socket on this address; port 0 takes a free one."""
+        self._loop = asyncio.get_running_loop()
+        self._closed = asyncio.Event()
+        if self._fixed_peer is not None:
+            self._fixed_peer = self.peer = await resolved(self._fixed_peer)
+        self._socket = await open_socket(self._receive, address)
+
+    @property
+    def address(self) -> Address:
+        """Where this end listens."""
+        if self._socket is None:
+            raise LinkError("the endpoint is not open: call open() first")
+        return self._socket.address
+
+    def forget_peer(self) -> None:
+        """Be ready for another peer, or for the same one started anew."""
+        self.peer = self._fixed_peer
+        self.statistics.restart()
+
+    def send(self, packet: LoopPacket) -> None:
+        """Send a packet to the peer, if there is one."""
+        if self._socket is not None and self.peer is not None:
+            self._socket.send(self._wire.encode(packet), self.peer)
+
+    def close(self) -> None:
+        """Close the socket; what has come and was not taken yet is left."""
+        if self._socket is not None:
+            self._socket.close()
+            self._closed.set()
+        self._batch.clear()
+
+    def fail(self, error: Exception) -> None:
+        """Close the socket because of an error, which `running` raises."""
+        self._failure = self._failure or error
+        self.close()
+
+    async def running(self, time: float) -> None:
+        """Wait for so long, s, or until the endpoint fails; raises the error then."""
+        with suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._closed.wait(), None if math.isinf(time) else time)
+        self.check()
+
+    def check(self) -> None:
+        """Raise the error that the endpoint failed by, if it did."""
+        if self._failure is not None:
+            raise self._failure
+
+    def _receive(self, data: bytes, address: Address) -> None:
+        if self._closed.is_set():
+            return
+        now = self._loop.time()
+        if self.peer is not None and address != self.peer:
+            self.statistics.strangers += 1
+            return
+        try:
+            packet = self._wire.decode(data)
+        except PacketError:
+            self.statistics.invalid += 1
+            return
+        self.peer = address
+        if not self.statistics.arrived(packet, now):
+            return
+        self._batch.append((packet, now))
+        if len(self._batch) == 1:
+            self._loop.call_soon(self._look_again, 0)
+        elif len(self._batch) >= LARGEST_BATCH:
+            self._hand_over()
+
+    def _look_again(self, before: int) -> None:
+        """Hand the batch over once a whole pass of the event loop added nothing to it.
+
+        A selector loop reads one datagram of a socket in each pass, after the callbacks that were
+        due: only the second look has seen what was there to be read.
+        """
+        if not self._batch:
+            return
+        if len(self._batch) > before:
+            self._loop.call_soon(self._look_again, len(self._batch))
+        else:
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        batch, self._batch = self._batch, []
+        try:
+            self._take(batch)
+        except Exception as error:
+            # In a callback of the event loop it would be printed and forgotten.
+            self.fail(error)

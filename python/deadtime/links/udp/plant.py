@@ -1,0 +1,291 @@
+"""The end with the plant: it samples, sends what it measures and does what comes back.
+
+Safety: a command is finite and within the limit or it is not applied; it is newer than the one in
+force and answers a measurement no older than the watchdog's time; when none comes for that time,
+the declared safe command is applied until one does. The watchdog runs here, where the plant is, so
+that nothing at the other end or between needs to work for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+from deadtime._recording import MINIMUM_SAMPLES, Recording
+from deadtime.links.journal import Journal
+from deadtime.links.udp.endpoint import Endpoint
+from deadtime.links.udp.integrator import HeldIntegrator
+from deadtime.links.udp.packets import LoopPacket
+from deadtime.links.udp.plant_options import PlantOptions, PlantReport
+from deadtime.links.udp.statistics import KEPT, REMEMBERED, Percentiles
+from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
+
+__all__ = ["run_plant"]
+
+#: Columns of the plant's recording.
+COLUMNS = ("time_s", "reference", "output", "command", "age_s")
+
+
+async def run_plant(options: PlantOptions) -> PlantReport:
+    """Run the plant's end of the loop in the running event loop, real or virtual.
+
+    Raises
+    ------
+    LinkError
+        When there is no such address, or no socket to be had.
+    OSError
+        When the recording cannot be written; the safe command is in force by then.
+    """
+    plant = _Plant(options)
+    await plant.open()
+    with plant.at_work():
+        await plant.running()
+    return plant.report()
+
+
+class _Plant:
+    def __init__(self, options: PlantOptions) -> None:
+        self.options = options
+        self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
+        self._endpoint = Endpoint(self._wire, self._take, options.controller)
+        self._model = HeldIntegrator(options.gain, options.lag)
+        self._command, self._stamp = options.safe, math.nan
+        self._newest = 0
+        self._sequence = 0
+        self._sent: dict[int, float] = {}
+        self._echo: tuple[LoopPacket, float] | None = None
+        self._watchdog: asyncio.TimerHandle | None = None
+        self._hold: asyncio.TimerHandle | None = None
+        self._tick: asyncio.Handle | None = None
+        self._waiting: set[asyncio.TimerHandle] = set()
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=KEPT)
+        self._periods: deque[float] = deque(maxlen=KEPT)
+        self._ages: deque[float] = deque(maxlen=KEPT)
+        self._arrivals: deque[tuple[int, float]] = deque(maxlen=KEPT)
+        self._age_area = self._age_time = self._oldest = 0.0
+        self._overruns = self._applied = self._trips = 0
+        self._safe_since: float | None = None
+        self._safe_time = 0.0
+        self._largest_command = self._largest_output = 0.0
+
+    async def open(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        await self._endpoint.open(self.options.listen)
+
+    async def running(self) -> None:
+        await self._endpoint.running(self.options.duration)
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """Sample and obey until the end of the context, then leave the safe command in force."""
+        with ExitStack() as stack:
+            stack.callback(self._endpoint.close)
+            self._journal = None
+            if self.options.recording is not None:
+                self._journal = stack.enter_context(Journal(self.options.recording, COLUMNS))
+            self._started = self._clock = self._loop.time()
+            self._due = 0
+            stack.callback(self._stop)
+            self._tick = self._loop.call_soon(self._sample)
+            yield
+
+    def _stop(self) -> None:
+        for timer in (self._tick, self._watchdog, self._hold, *self._waiting):
+            if timer is not None:
+                timer.cancel()
+        self._pass_time(self._loop.time())
+        if self._safe_since is not None:
+            self._safe_time += self._clock - self._safe_since
+        self._command = self.options.safe
+
+    def _pass_time(self, now: float) -> None:
+        """Bring the plant, and the account of the command's age, up to now."""
+        before, self._clock = self._clock, max(now, self._clock)
+        self._model.advance(self._clock - before, self._command)
+        self._largest_output = max(self._largest_output, abs(self._model.output))
+        if math.isfinite(self._stamp):
+            old, new = before - self._stamp, self._clock - self._stamp
+            self._age_area += 0.5 * (new * new - old * old)
+            self._age_time += self._clock - before
+            self._oldest = max(self._oldest, new)
+
+    def _sample(self) -> None:
+        """Measure, send and record, and see to the next time."""
+        try:
+            self._measure()
+        except Exception as error:  # such as a full disk: without samples there is no loop
+            self._endpoint.fail(error)
+            self._make_safe(self.options.safe)
+            return
+        due = self._due + 1
+        latest = math.floor((self._loop.time() - self._started) / self.options.sample_time + 1e-6)
+        self._overruns += max(0, latest - due)
+        self._due = max(due, latest)
+        self._tick = self._loop.call_at(
+            self._started + self._due * self.options.sample_time, self._sample
+        )
+
+    def _measure(self) -> None:
+        now = self._loop.time()
+        self._pass_time(now)
+        elapsed = now - self._started
+        # What was meant for the time of the step comes there but for rounding.
+        stepped = elapsed >= self.options.rest - 1e-9
+        reference = self.options.amplitude if stepped else 0.0
+        output = self._model.output
+        echo, read = self._echo or (None, now)
+        self._sequence += 1
+        self._sent[self._sequence] = now
+        self._sent.pop(self._sequence - REMEMBERED, None)
+        self._endpoint.send(
+            LoopPacket(
+                sequence=self._sequence,
+                sent=now,
+                echo_sequence=0 if echo is None else echo.sequence,
+                echo_sent=0.0 if echo is None else echo.sent,
+                held=now - read,
+                value=output,
+                reference=reference,
+            )
+        )
+        if self._rows:
+            self._periods.append(elapsed - self._rows[-1][0])
+        if not self._rows or elapsed > self._rows[-1][0]:
+            row = (elapsed, reference, output, self._command)
+            self._rows.append(row)
+            if self._journal is not None:
+                age = now - self._stamp
+                self._journal.write((*row, age if math.isfinite(age) else None))
+
+    def _take(self, batch: list[tuple[LoopPacket, float]]) -> None:
+        for packet, read in batch:
+            self._judge(packet, read)
+
+    def _judge(self, packet: LoopPacket, read: float) -> None:
+        """Apply a command, now or later, or leave it."""
+        statistics = self._endpoint.statistics
+        if not math.isfinite(packet.value):
+            statistics.invalid += 1
+            return
+        # The plant's own numbers order what comes: a controller that was started anew has new ones.
+        number = packet.echo_sequence if self._wire.has_times else packet.sequence
+        if packet.flags & SAFE:
+            if self._newest <= number <= self._sequence:
+                self._newest = number
+                self._make_safe(_clipped(packet.value, self.options.limit))
+                self._arm_watchdog()
+            return
+        age = 0.0
+        if self._wire.has_times:
+            age = read - packet.echo_sent
+            # Only what answers a measurement of this plant, and could have done so, is an answer.
+            own = self._sent.get(number) == packet.echo_sent
+            if not (own and packet.held <= age):
+                statistics.invalid += 1
+                return
+            self._echo = (packet, read)
+            statistics.exchanged(packet, read)
+            self._arrivals.append((number, age))
+            if age > self.options.watchdog:
+                statistics.came_late(age - self.options.watchdog)
+                return
+        if number <= self._newest:
+            statistics.came_late(self._behind(age))
+            return
+        wait = self.options.policy.wait(age)
+        if wait is None:
+            statistics.came_late(age - self.options.policy.oldest)
+            return
+        if wait == 0.0:
+            self._apply(packet, number)
+        else:
+            self._apply_after(wait, packet, number)
+
+    def _behind(self, age: float) -> float:
+        """How much older than the command in force one of this age is."""
+        return max(0.0, age - (self._loop.time() - self._stamp)) if self._ages else 0.0
+
+    def _apply_after(self, wait: float, packet: LoopPacket, number: int) -> None:
+        def apply() -> None:
+            self._waiting.discard(timer)
+            if number > self._newest:
+                self._apply(packet, number)
+
+        timer = self._loop.call_later(wait, apply)
+        self._waiting.add(timer)
+
+    def _apply(self, packet: LoopPacket, number: int) -> None:
+        now = self._loop.time()
+        self._pass_time(now)
+        self._newest = number
+        self._command = _clipped(packet.value, self.options.limit)
+        self._largest_command = max(self._largest_command, abs(self._command))
+        self._applied += 1
+        if self._wire.has_times:
+            self._stamp = packet.echo_sent
+            self._ages.append(now - packet.echo_sent)
+        if self._safe_since is not None:
+            self._safe_time += now - self._safe_since
+            self._safe_since = None
+        self._arm_watchdog()
+        if self._hold is not None:
+            self._hold.cancel()
+        if self.options.policy.holds is not None:
+            held = self.options.policy.holds * self.options.sample_time
+            self._hold = self._loop.call_later(held, self._let_go)
+
+    def _arm_watchdog(self) -> None:
+        if self._watchdog is not None:
+            self._watchdog.cancel()
+        self._watchdog = self._loop.call_later(self.options.watchdog, self._bite)
+
+    def _let_go(self) -> None:
+        """The last command has held long enough."""
+        self._pass_time(self._loop.time())
+        self._command, self._stamp = 0.0, math.nan
+
+    def _bite(self) -> None:
+        """No command came in time: be safe, and ready for a controller that was started anew."""
+        self._endpoint.forget_peer()
+        self._make_safe(self.options.safe)
+
+    def _make_safe(self, command: float) -> None:
+        now = self._loop.time()
+        self._pass_time(now)
+        for timer in (self._hold, *self._waiting):
+            if timer is not None:
+                timer.cancel()
+        self._waiting.clear()
+        self._command, self._stamp = command, math.nan
+        if self._safe_since is None:
+            self._safe_since = now
+            self._trips += 1
+
+    def report(self) -> PlantReport:
+        recording = None
+        if len(self._rows) >= MINIMUM_SAMPLES:
+            time, reference, output, command = zip(*self._rows, strict=True)
+            recording = Recording(time, reference, output, command, source="the plant")
+        return PlantReport(
+            link=self._endpoint.statistics.report(),
+            period=Percentiles.of(self._periods),
+            overruns=self._overruns,
+            applied=self._applied,
+            age=self._age_area / self._age_time if self._age_time else math.nan,
+            oldest=self._oldest,
+            age_when_applied=Percentiles.of(self._ages),
+            trips=self._trips,
+            safe_time=self._safe_time,
+            largest_command=self._largest_command,
+            largest_output=self._largest_output,
+            arrivals=tuple(self._arrivals),
+            recording=recording,
+        )
+
+
+def _clipped(command: float, limit: float) -> float:
+    """A command within the limit; `command` is finite."""
+    return max(-limit, min(limit, command))

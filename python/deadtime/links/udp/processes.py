@@ -1,0 +1,118 @@
+"""One run of the loop with plant, relay and controller in a process each."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from deadtime._errors import LinkError
+from deadtime.links.udp.described import arguments_of
+from deadtime.links.udp.endpoint import Address
+from deadtime.links.udp.trial import ENDS, Trial
+
+__all__ = ["part", "run_processes"]
+
+#: A process is ready, or has ended, after so many seconds, or something is wrong with it.
+PATIENCE = 30.0
+
+
+class Part:
+    """A process of the loop."""
+
+    def __init__(self, name: str, arguments: Sequence[str]) -> None:
+        self.name = name
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "deadtime.links.udp", name, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def address(self) -> Address:
+        """Where it listens, once it is ready."""
+        assert self.process.stdout is not None
+        # A process that says nothing is ended, which ends the line, too.
+        giving_up = threading.Timer(PATIENCE, self.process.kill)
+        giving_up.start()
+        try:
+            line = self.process.stdout.readline()
+        finally:
+            giving_up.cancel()
+        if not line:
+            raise LinkError(f"the {self.name} did not start: {self._last_words()}")
+        ready = json.loads(line)
+        return ready["host"], ready["port"]
+
+    def report(self, within: float) -> dict[str, Any]:
+        """What it says at its end, which comes within so many seconds."""
+        try:
+            out, _ = self.process.communicate(timeout=within)
+        except subprocess.TimeoutExpired:
+            raise LinkError(f"the {self.name} did not end within {within:g} s") from None
+        lines = out.splitlines()
+        if self.process.returncode != 0 or not lines:
+            raise LinkError(
+                f"the {self.name} ended before its time (exit code {self.process.returncode})"
+            )
+        found: dict[str, Any] = json.loads(lines[-1])["report"]
+        return found
+
+    def _last_words(self) -> str:
+        _, said = self.process.communicate()
+        return said.strip().splitlines()[-1] if said.strip() else "it said nothing"
+
+
+@contextmanager
+def part(name: str, arguments: Sequence[str]) -> Iterator[Part]:
+    """Start a process of the loop; it has ended when the context has, in every case."""
+    started = Part(name, arguments)
+    try:
+        yield started
+    finally:
+        started.process.kill()
+        started.process.communicate()
+
+
+def run_processes(trial: Trial, folder: Path, *, stem: str = "") -> dict[str, dict[str, Any]]:
+    """Run plant, relay and controller as processes on this computer, over its loopback.
+
+    Parameters
+    ----------
+    trial : Trial
+        What to run.
+    folder : Path
+        Where both ends write what they record, as ``<stem>plant.csv`` and ``<stem>controller.csv``.
+    stem : str
+        Beginning of the names of the files.
+
+    Returns
+    -------
+    dict of str to dict
+        What happened at the ``plant`` and the ``controller``, as of `PlantReport.to_dict` and
+        `ControllerReport.to_dict`, with None in place of NaN.
+
+    Raises
+    ------
+    LinkError
+        When a process does not start, or ends before its time.
+    """
+    files = {end: folder / f"{stem}{end}.csv" for end in ENDS}
+    # If this process is killed, the others end by themselves.
+    until = ["--duration", repr(trial.duration + 3.0 * PATIENCE)]
+    with ExitStack() as stack:
+        options = trial.controller_options(files["controller"])
+        controller = stack.enter_context(part("controller", [*arguments_of(options), *until]))
+        between = arguments_of(trial.relay_options(controller.address()))
+        relay = stack.enter_context(part("relay", [*between, *until]))
+        wanted = trial.plant_options(relay.address(), files["plant"])
+        plant = stack.enter_context(part("plant", arguments_of(wanted)))
+        reports = {"plant": plant.report(trial.duration + PATIENCE)}
+        controller.process.terminate()
+        reports["controller"] = controller.report(PATIENCE)
+    return reports

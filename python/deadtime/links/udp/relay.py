@@ -1,0 +1,121 @@
+"""A relay that stands for the network between plant and controller.
+
+It listens for the plant and speaks to the controller from a port of its own; what passes is
+delayed, lost, repeated and reordered by a `Path` in each direction. Nothing that passes is read.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import heapq
+import itertools
+from dataclasses import dataclass, field
+
+from deadtime.links.udp.endpoint import Address, Socket, open_socket, resolved
+from deadtime.links.udp.network import Network, Path
+
+__all__ = ["Relay", "RelayOptions"]
+
+#: Packets under way at most; what comes beyond is dropped.
+MOST_UNDER_WAY = 10_000
+
+#: After so much silence the relay takes the next plant that comes, s.
+IDLE = 2.0
+
+
+@dataclass(frozen=True)
+class RelayOptions:
+    """A relay, as a description.
+
+    Parameters
+    ----------
+    controller : (str, int)
+        Where the controller listens.
+    there, back : Network
+        From the plant to the controller, and back.
+    seed : int
+        What all delays and losses follow from.
+    listen : (str, int)
+        Where to listen for the plant; port 0 takes a free one.
+    """
+
+    controller: Address
+    there: Network = field(default_factory=Network)
+    back: Network = field(default_factory=Network)
+    seed: int = 0
+    listen: Address = ("127.0.0.1", 0)
+
+
+class Relay:
+    """A relay at work: ``async with Relay(options) as relay``, then send to ``relay.address``."""
+
+    def __init__(self, options: RelayOptions) -> None:
+        self.options = options
+        self.there: Path = options.there.path(f"{options.seed} there")
+        self.back: Path = options.back.path(f"{options.seed} back")
+        self.overflowed = 0
+        self._under_way: list[tuple[float, int, bytes, bool]] = []
+        self._number = itertools.count()
+        self._timer: asyncio.TimerHandle | None = None
+        self._plant: Address | None = None
+        self._heard = 0.0
+
+    async def __aenter__(self) -> Relay:
+        self._loop = asyncio.get_running_loop()
+        self._started = self._loop.time()
+        self._controller = await resolved(self.options.controller)
+        self._front: Socket = await open_socket(self._from_plant, self.options.listen)
+        own = "127.0.0.1" if self._controller[0].startswith("127.") else "0.0.0.0"
+        self._rear: Socket = await open_socket(self._from_controller, (own, 0))
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._front.close()
+        self._rear.close()
+
+    @property
+    def address(self) -> Address:
+        """Where the relay listens for the plant."""
+        return self._front.address
+
+    def _from_plant(self, data: bytes, address: Address) -> None:
+        now = self._loop.time()
+        if address != self._plant:
+            if self._plant is not None and now - self._heard < IDLE:
+                return
+            self._plant = address
+        self._heard = now
+        self._pass_on(self.there, now, data, True)
+
+    def _from_controller(self, data: bytes, address: Address) -> None:
+        if address == self._controller:
+            self._pass_on(self.back, self._loop.time(), data, False)
+
+    def _pass_on(self, path: Path, now: float, data: bytes, there: bool) -> None:
+        for arrival, packet in path.send(now - self._started, data):
+            if len(self._under_way) >= MOST_UNDER_WAY:
+                self.overflowed += 1
+                continue
+            entry = (self._started + arrival, next(self._number), packet, there)
+            heapq.heappush(self._under_way, entry)
+        self._wait()
+
+    def _wait(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._under_way:
+            self._timer = self._loop.call_at(self._under_way[0][0], self._deliver)
+
+    def _deliver(self) -> None:
+        due = max(self._loop.time(), self._under_way[0][0])  # a timer may fire a rounding early
+        while self._under_way and self._under_way[0][0] <= due:
+            _, _, packet, there = heapq.heappop(self._under_way)
+            if there:
+                self._rear.send(packet, self._controller)
+            elif self._plant is not None:
+                self._front.send(packet, self._plant)
+        self._timer = None
+        self._wait()

@@ -1,0 +1,298 @@
+"""What a stream of packets tells about the network: measured, not estimated.
+
+Every packet echoes the number and the time stamp of the one it answers, and says how long that was
+held before the answer left. With the four times of such an exchange (sent t0, received there t1,
+answered there t2, received here t3; t0 and t3 by this clock, t1 and t2 by the other)
+
+    round trip = (t3 - t0) - (t2 - t1),
+
+whatever the clocks show. How it divides into the two ways cannot be measured; but no way is
+shorter than nothing, and that bounds the offset between the clocks, and with it each way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from deadtime.links.udp.packets import LoopPacket
+
+__all__ = [
+    "KEPT",
+    "REMEMBERED",
+    "ClockOffset",
+    "LinkReport",
+    "LinkStatistics",
+    "Percentiles",
+    "histogram",
+]
+
+#: Packets whose times are kept, the newest: an end may run for days.
+KEPT = 100_000
+
+#: Sequence numbers that are remembered: which came, to tell a duplicate from a packet that was
+#: overtaken, and when which was sent.
+REMEMBERED = 4096
+
+#: Width of a bin at least, s: no clock tells less.
+NARROWEST = 1e-6
+
+#: Part by which each packet moves the running jitter (RFC 3550, section 6.4.1).
+JITTER_PART = 1.0 / 16.0
+
+
+@dataclass(frozen=True)
+class Percentiles:
+    """A sample of times in six numbers, s; NaN where there are none.
+
+    Attributes
+    ----------
+    count : int
+        How many.
+    mean, p50, p95, p99, largest : float
+        Mean, median, percentiles and maximum, s.
+    """
+
+    count: int
+    mean: float
+    p50: float
+    p95: float
+    p99: float
+    largest: float
+
+    @staticmethod
+    def of(values: Sequence[float]) -> Percentiles:
+        """Those of a sample."""
+        if not len(values):
+            return Percentiles(0, *[math.nan] * 5)
+        p50, p95, p99, largest = np.percentile(values, [50.0, 95.0, 99.0, 100.0]).tolist()
+        return Percentiles(len(values), float(np.mean(values)), p50, p95, p99, largest)
+
+
+def histogram(values: Sequence[float], bins: int = 20) -> tuple[list[float], list[int]]:
+    """Edges (s) and counts of a sample, from its smallest to its largest value."""
+    if not len(values):
+        return [], []
+    low, high = min(values), max(values)
+    counts, edges = np.histogram(values, bins, (low, max(high, low + bins * NARROWEST)))
+    return edges.tolist(), counts.tolist()
+
+
+@dataclass
+class ClockOffset:
+    """Offset of another clock against this one, from the four times of many exchanges.
+
+    As in MAVLink's TIMESYNC, but with its bound: ``there = here + offset``. Each exchange says that
+    the offset is at most ``t1 - t0`` and at least ``t2 - t3``; what all of them leave is kept. A
+    clock that drifts makes the bounds meet: count over minutes, not over days.
+
+    Examples
+    --------
+    The other clock is 100 s ahead; 3 ms go there and 1 ms comes back:
+
+    >>> from deadtime.links.udp import ClockOffset
+    >>> clock = ClockOffset()
+    >>> clock.add(5.0, 105.003, 105.004, 5.005)
+    >>> round(clock.offset, 4), round(clock.uncertainty, 4)
+    (100.001, 0.002)
+    """
+
+    most: float = math.inf
+    least: float = -math.inf
+
+    def add(self, t0: float, t1: float, t2: float, t3: float) -> None:
+        """Take in an exchange: sent, received there, answered there, received here."""
+        self.most = min(self.most, t1 - t0)
+        self.least = max(self.least, t2 - t3)
+
+    @property
+    def offset(self) -> float:
+        """The middle of what is possible, s; NaN before the first exchange."""
+        return 0.5 * (self.most + self.least) if math.isfinite(self.most) else math.nan
+
+    @property
+    def uncertainty(self) -> float:
+        """Largest error of `offset` by any division of the round trip, s."""
+        return max(0.0, 0.5 * (self.most - self.least))
+
+
+@dataclass(frozen=True)
+class LinkReport:
+    """What one end saw of the stream that came to it.
+
+    Attributes
+    ----------
+    received : int
+        Packets that were read, duplicates included.
+    lost : int
+        Sequence numbers below the highest that never came.
+    duplicates, reordered : int
+        Packets that came again; packets that came after one sent later.
+    late : int
+        Packets that came too late to be used: overtaken, or refused by the policy.
+    strangers, invalid : int
+        Datagrams from another address; datagrams that are no packets, or say what cannot be.
+    round_trip : Percentiles
+        Round trips, without the time an answer was held, s.
+    held : Percentiles
+        Time between the arrival of a packet there and the answer, s.
+    lateness : Percentiles
+        How much older than the newest one in use late packets were, or than the policy bears, s.
+    jitter : float
+        Running mean of the change of the way here from packet to packet (RFC 3550), s.
+    there, back : (float, float)
+        Bounds of the mean one-way delay to the other end and from it, s.
+    offset, offset_uncertainty : float
+        Of the other end's clock against this one, s.
+    round_trip_histogram, lateness_histogram : (list of float, list of int)
+        Edges in s, and counts.
+    """
+
+    received: int
+    lost: int
+    duplicates: int
+    reordered: int
+    late: int
+    strangers: int
+    invalid: int
+    round_trip: Percentiles
+    held: Percentiles
+    lateness: Percentiles
+    jitter: float
+    there: tuple[float, float]
+    back: tuple[float, float]
+    offset: float
+    offset_uncertainty: float
+    round_trip_histogram: tuple[list[float], list[int]]
+    lateness_histogram: tuple[list[float], list[int]]
+
+    @property
+    def loss(self) -> float:
+        """Part of the packets sent that never came."""
+        came = self.received - self.duplicates
+        return self.lost / (self.lost + came) if self.lost + came else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {**asdict(self), "loss": self.loss}
+
+
+def _newest() -> deque[float]:
+    return deque(maxlen=KEPT)
+
+
+@dataclass
+class LinkStatistics:
+    """Counts of one stream, and the times of its last 100 000 packets."""
+
+    received: int = 0
+    duplicates: int = 0
+    reordered: int = 0
+    strangers: int = 0
+    invalid: int = 0
+    round_trips: deque[float] = field(default_factory=_newest)
+    held: deque[float] = field(default_factory=_newest)
+    lateness: deque[float] = field(default_factory=_newest)
+    late: int = 0
+    clock: ClockOffset = field(default_factory=ClockOffset)
+    _there: deque[float] = field(default_factory=_newest)
+    _back: deque[float] = field(default_factory=_newest)
+    _jitter: float = 0.0
+    _first: int | None = None
+    _highest: int = -1
+    _missed: int = 0
+    _unique: int = 0
+    _may_begin_anew: bool = False
+
+    def __post_init__(self) -> None:
+        self._order: deque[int] = deque()
+        self._seen: set[int] = set()
+
+    def restart(self) -> None:
+        """Be ready for sequence numbers that begin anew: the other end may have done so, too."""
+        self._may_begin_anew = True
+
+    def _begin_anew(self) -> None:
+        self._missed = self._lost()
+        self._first, self._highest, self._unique = None, -1, 0
+        self._order.clear()
+        self._seen.clear()
+
+    def _lost(self) -> int:
+        expected = 0 if self._first is None else self._highest - self._first + 1
+        return self._missed + max(0, expected - self._unique)
+
+    def arrived(self, packet: LoopPacket, now: float) -> bool:
+        """Take in a packet; False if it is a duplicate."""
+        self.received += 1
+        if self._may_begin_anew and packet.sequence <= self._highest:
+            self._begin_anew()
+        self._may_begin_anew = False
+        if packet.sequence in self._seen:
+            self.duplicates += 1
+            return False
+        self._remember(packet.sequence)
+        if self._first is None:
+            self._first = packet.sequence
+        self._first = min(self._first, packet.sequence)
+        self._unique += 1
+        if packet.sequence < self._highest:
+            self.reordered += 1
+        self._highest = max(self._highest, packet.sequence)
+        return True
+
+    def _remember(self, sequence: int) -> None:
+        self._order.append(sequence)
+        self._seen.add(sequence)
+        if len(self._order) > REMEMBERED:
+            self._seen.discard(self._order.popleft())
+
+    def exchanged(self, packet: LoopPacket, now: float) -> None:
+        """Take in the times of a packet that echoes one of this end."""
+        received_there = packet.sent - packet.held
+        there, back = received_there - packet.echo_sent, now - packet.sent
+        if self._back:
+            change = abs(back - self._back[-1])
+            self._jitter += JITTER_PART * (change - self._jitter)
+        self._there.append(there)
+        self._back.append(back)
+        self.held.append(packet.held)
+        self.round_trips.append(there + back)
+        self.clock.add(packet.echo_sent, received_there, packet.sent, now)
+
+    def came_late(self, by: float) -> None:
+        """Take in that a packet could not be used, being late by so much."""
+        self.late += 1
+        self.lateness.append(by)
+
+    def report(self) -> LinkReport:
+        """All of it."""
+        nothing = (math.nan, math.nan)
+        most, least = self.clock.most, self.clock.least
+        there = float(np.mean(self._there)) if self._there else math.nan
+        back = float(np.mean(self._back)) if self._back else math.nan
+        return LinkReport(
+            received=self.received,
+            lost=self._lost(),
+            duplicates=self.duplicates,
+            reordered=self.reordered,
+            late=self.late,
+            strangers=self.strangers,
+            invalid=self.invalid,
+            round_trip=Percentiles.of(self.round_trips),
+            held=Percentiles.of(self.held),
+            lateness=Percentiles.of(self.lateness),
+            jitter=self._jitter,
+            # The way there is what the clocks show less the offset, which is between two bounds.
+            there=(there - most, there - least) if self._there else nothing,
+            back=(back + least, back + most) if self._back else nothing,
+            offset=self.clock.offset,
+            offset_uncertainty=self.clock.uncertainty if self._there else math.nan,
+            round_trip_histogram=histogram(self.round_trips),
+            lateness_histogram=histogram(self.lateness),
+        )

@@ -1,0 +1,172 @@
+"""One run of the whole loop in one event loop: plant, relay and controller beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from deadtime._validation import positive
+from deadtime.links.udp.controller import Controller, ControllerOptions, ControllerReport
+from deadtime.links.udp.network import Network
+from deadtime.links.udp.plant import run_plant
+from deadtime.links.udp.plant_options import PlantOptions, PlantReport
+from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
+from deadtime.links.udp.relay import Relay, RelayOptions
+
+__all__ = ["Trial", "TrialReport", "run_trial"]
+
+NOWHERE = ("127.0.0.1", 0)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run of the loop, as a description.
+
+    Parameters
+    ----------
+    gain : float
+        Of the controller, 1/s.
+    there, back : Network
+        From the plant to the controller, and back.
+    seed : int
+        What all delays and losses follow from.
+    sample_time : float
+        Time between two measurements, s.
+    duration : float
+        How long the loop runs, s; the reference steps after `rest`.
+    rest : float
+        Time before the step, s.
+    plant_gain, lag : float
+        Of the integrator; the lag in s.
+    limit : float
+        Largest size of the command, on both sides.
+    policy : Policy
+        What the plant does with late commands.
+    watchdog : float
+        Longest silence either side bears, s.
+    safe : float
+        The command that is applied then.
+    """
+
+    gain: float
+    there: Network = field(default_factory=Network)
+    back: Network = field(default_factory=Network)
+    seed: int = 0
+    sample_time: float = 0.01
+    duration: float = 6.0
+    rest: float = 1.0
+    plant_gain: float = 1.0
+    lag: float = 0.0
+    limit: float = 20.0
+    policy: Policy = field(default_factory=NewestWins)
+    watchdog: float = 0.5
+    safe: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("gain", self.gain)
+        # What is wrong with the rest is said now, not when the loop runs.
+        self.plant_options(NOWHERE)
+        self.controller_options()
+
+    def controller_options(self, recording: Path | None = None) -> ControllerOptions:
+        """The controller's part, on a free port of this computer."""
+        return ControllerOptions(
+            gain=self.gain,
+            limit=self.limit,
+            watchdog=self.watchdog,
+            safe=self.safe,
+            every=isinstance(self.policy, JitterBuffer),
+            recording=recording,
+        )
+
+    def relay_options(self, controller: tuple[str, int]) -> RelayOptions:
+        """The network's part, on a free port of this computer."""
+        return RelayOptions(controller, self.there, self.back, self.seed)
+
+    def plant_options(
+        self, controller: tuple[str, int], recording: Path | None = None
+    ) -> PlantOptions:
+        """The plant's part, on a free port of this computer."""
+        return PlantOptions(
+            controller=controller,
+            gain=self.plant_gain,
+            lag=self.lag,
+            sample_time=self.sample_time,
+            duration=self.duration,
+            rest=self.rest,
+            limit=self.limit,
+            policy=self.policy,
+            watchdog=self.watchdog,
+            safe=self.safe,
+            recording=recording,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class TrialReport:
+    """What happened at both ends.
+
+    Attributes
+    ----------
+    plant : PlantReport
+        At the plant.
+    controller : ControllerReport
+        At the controller.
+    """
+
+    plant: PlantReport
+    controller: ControllerReport
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON; without the recordings."""
+        return {"plant": self.plant.to_dict(), "controller": self.controller.to_dict()}
+
+
+async def run_trial(
+    trial: Trial,
+    folder: Path | None = None,
+    *,
+    stem: str = "",
+    meanwhile: Callable[[Relay, Controller], None] | None = None,
+) -> TrialReport:
+    """Run plant, relay and controller in the running event loop.
+
+    Parameters
+    ----------
+    trial : Trial
+        What to run.
+    folder : Path, optional
+        Where both ends write what they record, as ``<stem>plant.csv`` and ``<stem>controller.csv``.
+    stem : str
+        Beginning of the names of the files.
+    meanwhile : callable, optional
+        Called when all is ready to run, to do something to the loop while it runs.
+
+    Returns
+    -------
+    TrialReport
+
+    Examples
+    --------
+    Two ways of 50 ms, in virtual time:
+
+    >>> from deadtime.links import virtual_time
+    >>> from deadtime.links.udp import Network, Trial, run_trial
+    >>> way = Network(delay=0.05)
+    >>> report = virtual_time.run(run_trial(Trial(gain=8.0, there=way, back=way)))
+    >>> round(report.plant.link.round_trip.p50, 6), round(report.plant.age, 6)
+    (0.1, 0.105)
+    """
+    files = [None if folder is None else folder / f"{stem}{end}.csv" for end in ENDS]
+    async with Controller(trial.controller_options(files[1])) as controller:
+        async with Relay(trial.relay_options(controller.address)) as relay:
+            if meanwhile is not None:
+                meanwhile(relay, controller)
+            plant = await run_plant(trial.plant_options(relay.address, files[0]))
+        return TrialReport(plant, controller.report())
+
+
+#: The two ends, by the names of their recordings.
+ENDS = ("plant", "controller")
