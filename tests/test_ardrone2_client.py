@@ -8,8 +8,8 @@ import pytest
 from deadtime import FlightAbortedError, LinkError
 from deadtime.links import Limits, run
 from deadtime.links.ardrone2 import Navdata, build_navdata
-from deadtime.links.ardrone2.client import _Door
 from deadtime.links.ardrone2.commands import Ref, decode
+from deadtime.links.ardrone2.connection import _Door
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.emulator.settings import Settings
 from emulated import LIMITS, client_of, connected, emulator
@@ -39,7 +39,7 @@ async def fall(drone):
 def watch_datagrams(drone):
     """Everything that the client sends from now on, with the time."""
     sent = []
-    socket = drone._sockets[1]
+    socket = drone._link._commands
 
     def sendto(data, plain=socket.sendto):
         sent.append((now(), decode(data)))
@@ -202,10 +202,10 @@ def test_a_program_that_ends_without_closing_leaves_a_drone_that_lands():
             await drone.connect()
             await drone.take_off()
             drone.command(0.3)
-            drone._cycle.cancel()  # what the end of the event loop does to its tasks
+            drone._link._cycle.cancel()  # what the end of the event loop does to its tasks
             await asyncio.sleep(0.1)
             assert emulated.truth().phase is Phase.LANDING
-            drone._shut()
+            drone._link.shut()
 
     run(fly())
 
@@ -216,7 +216,9 @@ def test_silence_in_flight_is_told_and_landing_ends_in_bounded_time():
             drone = client_of(emulated)
             await drone.connect()
             await drone.take_off()
-            drone._take = lambda packet: None  # navdata no longer arrive, commands do
+            drone._link.reader.accept = lambda packet, now: (
+                None
+            )  # navdata no longer arrive, commands do
             lost = now()
             with pytest.raises(LinkError, match="nothing heard"):
                 await look(drone)
@@ -278,7 +280,7 @@ def test_forged_navdata_from_another_port_are_ignored():
             state = await drone.state()
             forged = build_navdata(Navdata(1 << 31, state.sequence + 50))
             loop = asyncio.get_running_loop()
-            door = drone._sockets[0].get_extra_info("sockname")
+            door = drone._link._navdata.get_extra_info("sockname")
             stranger, _ = await loop.create_datagram_endpoint(
                 asyncio.DatagramProtocol, local_addr=("127.0.0.1", 0)
             )
@@ -297,7 +299,7 @@ def test_what_a_socket_hands_on_from_elsewhere_is_counted_and_dropped():
     # A system that filters less than it should: the protocol checks address and port itself.
     async def fly():
         async with connected() as (_, drone):
-            door = _Door(drone, navdata=True)
+            door = _Door(drone._link.take, drone._link.reader.refuse)
             door._peer = ("127.0.0.1", 5554)
             before = (await drone.state()).sequence
             forged = build_navdata(Navdata(1 << 31, before + 1))
