@@ -195,6 +195,37 @@ def test_cancelling_lands_it_also_when_cancelled_again(impatient):
     run(fly())
 
 
+@pytest.mark.parametrize("packet", [1, 2, 5, 100, 600, 900])
+def test_cancelling_is_not_lost_when_it_comes_with_a_packet(packet):
+    # While connecting, at the 1st to 5th; while rising; in the air.
+    async def fly():
+        async with emulator() as emulated:
+            drone = client_of(emulated)
+            take, count = drone._link.take, itertools.count(1)
+
+            async def hover():
+                async with drone:
+                    await drone.take_off()
+                    await look(drone)
+
+            def cancelling(data):
+                take(data)
+                if next(count) == packet:
+                    task.cancel()
+                    cancelled.append(now())
+
+            cancelled = []
+            drone._link.take = cancelling
+            task = asyncio.create_task(hover())
+            done, _ = await asyncio.wait([task], timeout=15.0)
+            assert done, "it flies on"
+            assert task.cancelled()
+            assert now() - cancelled[0] < 6.0
+            assert emulated.truth().phase is Phase.LANDED
+
+    run(fly())
+
+
 def test_a_program_that_ends_without_closing_leaves_a_drone_that_lands():
     async def fly():
         async with emulator() as emulated:
@@ -340,6 +371,32 @@ def test_a_setting_that_is_never_acknowledged_ends_the_handshake(monkeypatch):
             with pytest.raises(LinkError, match="does not acknowledge general:navdata_demo"):
                 await client_of(emulated).connect()
             assert now() - begun < 5.0
+
+    run(fly())
+
+
+@pytest.mark.parametrize(
+    ("piece", "said"),
+    [(b"x" * 100_000, "no end within 65536 bytes"), (b"x", "nothing came for 2 s")],
+)
+def test_settings_that_never_end_are_not_waited_for(piece, said):
+    async def trickle(reader, writer):
+        for _ in range(6):
+            writer.write(piece)
+            await asyncio.sleep(0.5)
+        writer.close()
+
+    async def fly():
+        async with emulator() as emulated:
+            server = await asyncio.start_server(trickle, "127.0.0.1", 0)
+            drone = client_of(emulated)
+            drone.control_port = server.sockets[0].getsockname()[1]
+            begun = now()
+            with pytest.raises(LinkError, match=said):
+                await drone.connect()
+            assert now() - begun < 10.0
+            await asyncio.sleep(3.5)
+            server.close()
 
     run(fly())
 

@@ -167,7 +167,9 @@ class Connection:
                 return False
             self._arrived.clear()
             try:
-                await asyncio.wait_for(self._arrived.wait(), left)
+                # Not `wait_for`: before Python 3.12 it loses a cancellation that comes with a packet.
+                async with asyncio.timeout(left):
+                    await self._arrived.wait()
             except TimeoutError:
                 return False
 

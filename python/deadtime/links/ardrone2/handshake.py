@@ -87,8 +87,11 @@ class Handshake:
         problem = ""
         for _ in range(DUMP_TRIES):
             try:
-                return parse_configuration(await asyncio.wait_for(self._dump(host, port), DUMP))
-            except (OSError, EOFError, ValueError, TimeoutError) as error:
+                async with asyncio.timeout(DUMP):
+                    return parse_configuration(await self._dump(host, port))
+            except asyncio.LimitOverrunError:
+                problem = f"no end within {LONGEST_DUMP} bytes"
+            except (OSError, EOFError, ValueError) as error:  # among them TimeoutError
                 problem = str(error) or f"nothing came for {DUMP:g} s"
         raise LinkError(
             f"{self._name} does not send its configuration on TCP port {port} ({problem}): without "
