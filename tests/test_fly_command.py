@@ -1,6 +1,7 @@
 """``deadtime fly`` as it is run: on an emulator of its own, and what signals do to it."""
 
 import asyncio
+import contextlib
 import csv
 import json
 import os
@@ -11,6 +12,7 @@ import sys
 import time
 
 import pytest
+from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._experiment.step_test import ROW
 from deadtime.links.ardrone2.emulator import Phase
 from emulated import emulator
@@ -95,7 +97,53 @@ def read_rows(path):
     return rows
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+
+
+@pytest.fixture
+def handlers():
+    """Puts back what signals did before."""
+    before = {number: signal.getsignal(number) for number in ENDING}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_each_signal_cancels_and_is_heeded_again_afterwards(number, handlers):
+    async def fly():
+        for _ in range(3):  # something on the way has taken the first ones for its own
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.sleep(5.0)
+                raise AssertionError("nothing came")
+            os.kill(os.getpid(), number)
+        await asyncio.sleep(5.0)
+
+    async def begin():
+        os.kill(os.getpid(), number)
+        await fly()
+
+    with terminated_like_interrupted():
+        with pytest.raises(KeyboardInterrupt):
+            run_landing(begin())
+        # Between two flights, while gains are designed.
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+
+
+def test_what_nohup_has_had_ignored_stays_so(handlers):
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    async def fly():
+        os.kill(os.getpid(), signal.SIGHUP)
+        await asyncio.sleep(0.01)
+        return "landed"
+
+    with terminated_like_interrupted():
+        assert run_landing(fly()) == "landed"
+
+
+@pytest.mark.parametrize("number", ENDING)
 def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
     async def fly():
         async with emulator(host="127.0.0.1") as emulated:

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM while something flies: both land it, and neither can interrupt the landing."""
+"""Ctrl-C, SIGTERM and a closed terminal while something flies: they land it, and it stays so."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 import signal
 import sys
 from collections.abc import Coroutine, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -14,38 +14,42 @@ __all__ = ["run_landing", "terminated_like_interrupted"]
 
 T = TypeVar("T")
 
+#: What ends a flight: Ctrl-C, a polite kill, and a terminal that was closed or lost.
+ENDING = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+
 
 def run_landing(main: Coroutine[Any, Any, T]) -> T:
     """Run a coroutine that lands what it flies when it is cancelled.
 
-    The first signal cancels it; later ones are answered by patience: landing takes a bounded time.
+    Each signal cancels it. Landing is not interrupted by more of them; it takes a bounded time.
 
     Raises
     ------
     KeyboardInterrupt
         If a signal came.
     """
-    stopped: list[int] = []
 
     async def guarded() -> T:
         loop = asyncio.get_running_loop()
         task = asyncio.current_task()
         assert task is not None
 
-        def stop(number: int) -> None:
-            if not stopped:
-                task.cancel()
-            print("deadtime: landing first", file=sys.stderr, flush=True)
-            stopped.append(number)
+        def stop() -> None:
+            task.cancel()
+            with suppress(OSError):  # whoever read it may be gone
+                print("deadtime: landing first", file=sys.stderr, flush=True)
 
-        signals = (signal.SIGINT, signal.SIGTERM)
-        for one in signals:
-            loop.add_signal_handler(one, stop, one)
+        before = {one: signal.getsignal(one) or signal.SIG_DFL for one in _heeded()}
+        for one in before:
+            loop.add_signal_handler(one, stop)
         try:
             return await main
         finally:
-            for one in signals:
+            for one, handler in before.items():
                 loop.remove_signal_handler(one)
+                signal.signal(one, handler)
 
     try:
         return asyncio.run(guarded())
@@ -58,13 +62,21 @@ def run_landing(main: Coroutine[Any, Any, T]) -> T:
 
 @contextmanager
 def terminated_like_interrupted() -> Iterator[None]:
-    """SIGTERM raises what Ctrl-C does, so that what was started is ended on the way out."""
+    """The other signals raise what Ctrl-C does, so that what was started is ended."""
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    before = {one: signal.signal(one, interrupt) for one in _heeded() if one != signal.SIGINT}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
+def _heeded() -> list[signal.Signals]:
+    """The signals that end; a closed terminal does not where `nohup` has had that ignored."""
+    return [
+        one for one in ENDING if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN
+    ]

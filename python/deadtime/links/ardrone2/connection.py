@@ -167,7 +167,7 @@ class Connection:
                 return False
             self._arrived.clear()
             try:
-                # Not `wait_for`: before Python 3.12 it loses a cancellation that comes with a packet.
+                # Before Python 3.12 `wait_for` loses a cancellation that comes with a packet.
                 async with asyncio.timeout(left):
                     await self._arrived.wait()
             except TimeoutError:
