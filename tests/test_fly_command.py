@@ -12,6 +12,7 @@ import sys
 import time
 
 import pytest
+from deadtime._cli.fly import _free_folder
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._experiment.step_test import ROW
 from deadtime.links.ardrone2.emulator import Phase
@@ -37,10 +38,13 @@ def test_the_whole_experiment_in_virtual_time(tmp_path):
     done = flown("--virtual-time", "--folder", folder, "--seed", 3, "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert told["vehicle"] == "an emulated AR.Drone 2.0 (kit)"
+    assert told["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
     assert 0.33 < told["overshoot_method"][1] < 0.38
     assert told["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
     assert told["transport"]["delay"] == pytest.approx(0.26, abs=0.01)
+    assert told["vehicle_lateness"] == pytest.approx(0.142, abs=0.015)
+    low, high = told["vehicle"]["interval_95"]["time_constant"]
+    assert low < told["vehicle_lateness"] < high
     last = told["flights"][-1]
     assert last["overshoot"] < 5.0
     assert last["settling_time"] < min(one["settling_time"] for one in told["flights"][:-1])
@@ -86,6 +90,17 @@ def test_what_is_not_safe_or_makes_no_sense_is_refused(options, said, tmp_path):
     assert done.returncode == 1
     assert said in " ".join(done.stderr.split())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_without_a_flight_in_it_is_taken(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert str(_free_folder()) == "flight"
+    (tmp_path / "flight").mkdir()
+    assert str(_free_folder()) == "flight"
+    (tmp_path / "flight" / "flight-1-P.csv").touch()
+    assert str(_free_folder()) == "flight-2"
+    (tmp_path / "flight-2").touch()
+    assert str(_free_folder()) == "flight-3"
 
 
 def read_rows(path):

@@ -120,10 +120,11 @@ def fly_drone(
             ERRORS.print(f"deadtime: {note}", highlight=False, markup=False, soft_wrap=True)
         _tell_what_is_kept(where)
         raise
-    page = write_flight_page(study, where / "report.html", flown.name)
-    told = {**study.to_dict(), "vehicle": flown.name, "report": page, "folder": where}
+    page = where / "report.html"
+    told = {"flown_on": flown.name, **study.to_dict(), "report": page, "folder": where}
     text = json.dumps(plain(told), indent=2, ensure_ascii=False, allow_nan=False)
     (where / "result.json").write_text(text + "\n", encoding="utf-8")
+    write_flight_page(study, page, flown.name)
     if as_json:
         print_json(told)
     else:
@@ -139,7 +140,7 @@ def _numbers(gains: str) -> tuple[float, ...]:
 
 def _free_folder() -> Path:
     number, folder = 1, Path(FOLDER)
-    while folder.exists():
+    while folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         number += 1
         folder = Path(f"{FOLDER}-{number}")
     return folder

@@ -165,6 +165,7 @@ class FlightStudy:
             ],
             "transport": None if split is None else split.transport.to_dict(),
             "vehicle": None if split is None else split.vehicle.to_dict(),
+            "vehicle_lateness": None if split is None else split.vehicle_lateness,
             "no_split_because": learned.unsplit,
             "designed": learned.designed.gains,
             "designed_p": learned.proportional.gains,
