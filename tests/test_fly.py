@@ -14,6 +14,7 @@ from deadtime._experiment.learn import learn
 from deadtime._experiment.split import split_delay
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain
 from deadtime.links import Limits, run
+from deadtime.links.journal import Journal
 from emulated import connecting
 from simulated_vehicle import KIT, SimulatedVehicle
 
@@ -150,6 +151,32 @@ def test_a_gain_beyond_the_bound_is_refused_before_anything_is_connected(tmp_pat
     with pytest.raises(ValueError, match=r"Kp = 2\.6 is above 2\.47"):
         fly_experiment(lambda: vehicle, FlightPlan(gains=(1.2, 2.6)), tmp_path, run=run)
     assert vehicle.log == []
+
+
+def test_a_folder_that_takes_no_file_is_refused_before_anything_is_connected(tmp_path):
+    taken = tmp_path / "taken"
+    taken.touch()
+    for folder in (taken, taken / "below"):
+        vehicle = SimulatedVehicle()
+        with pytest.raises(OSError, match=str(folder)):
+            fly_experiment(lambda vehicle=vehicle: vehicle, FlightPlan(), folder, run=run)
+        assert vehicle.log == []
+
+
+def test_a_disk_that_fills_up_in_flight_lands_the_vehicle(tmp_path, monkeypatch):
+    put = Journal._put
+
+    def full(self, cells):
+        if self.rows == 30 and "messages" not in self.path.name:
+            raise OSError(28, "No space left on device")
+        put(self, cells)
+
+    monkeypatch.setattr(Journal, "_put", full)
+    vehicle = SimulatedVehicle()
+    with pytest.raises(OSError, match="No space left"):
+        fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert vehicle.log[-2:] == ["landed", "closed"]
+    assert columns_of(tmp_path / "flight-1-P.csv").size == 30
 
 
 # What is learnt

@@ -2,7 +2,10 @@
 
 import copy
 import math
+import os
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import deadtime as dtm
@@ -170,3 +173,25 @@ def test_twelve_digits_are_kept(value):
         with Journal(Path(folder) / "one.csv", ["x"]) as journal:
             journal.write([value])
         assert float(journal.path.read_text().split()[1]) == pytest.approx(value, rel=1e-11)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the size of files is limited in a process")
+def test_a_row_for_which_there_is_no_room_is_told_and_leaves_whole_rows(tmp_path):
+    # A disk with room for some bytes of the next row: the system writes these and says how many.
+    path = tmp_path / "flight.csv"
+    program = (
+        "import resource, sys\n"
+        "from deadtime.links.journal import Journal\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
+        "with Journal(sys.argv[1], ['time_s', 'height_m']) as journal:\n"
+        "    for row in range(100):\n"
+        "        journal.write([0.5 * row, 1.25])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=False
+    )
+    assert "no room for another row" in done.stderr
+    head, *rows = path.read_text().splitlines()
+    assert head == "time_s,height_m"
+    assert rows == [f"{0.5 * k},1.25" for k in range(len(rows))]
+    assert len(rows) == 9

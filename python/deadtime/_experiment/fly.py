@@ -12,6 +12,7 @@ from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import AbstractAsyncContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 from deadtime._controllers import PV, P
@@ -167,6 +168,8 @@ def fly_experiment(
     ------
     ValueError
         If the plan is not safe, or no gains meet its margin.
+    OSError
+        If nothing can be written into the folder.
     FlightAbortedError
         If a safety rule ends a flight. The vehicle is landed, the recordings so far are kept.
     LinkError
@@ -175,6 +178,7 @@ def fly_experiment(
         If the flights do not tell the delay.
     """
     plan.check()
+    _check_folder(folder)
     tried = [P(Kp) for Kp in plan.gains]
     flown = run(fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
     progress("estimating the delay")
@@ -185,6 +189,17 @@ def fly_experiment(
     hold = plan.checked_hold
     checked = run(fly_all(connect, designed, plan, hold, folder, len(flown) + 1, progress))
     return FlightStudy(plan.step, plan.limits.max_climb, learned, tuple(checked))
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder that no file can be made in, before anything is in the air."""
+    if not folder.exists():
+        folder.mkdir(parents=True)
+    try:
+        with TemporaryFile(dir=folder) as file:
+            file.write(b"room for a row")
+    except OSError as error:
+        raise type(error)(error.errno, error.strerror, str(folder)) from None
 
 
 async def fly_all(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 from collections.abc import Iterable, Sequence
@@ -67,6 +68,8 @@ class Journal:
         ValueError
             If the row has another length than the columns, a value is not finite, or the journal
             is closed.
+        OSError
+            If the row does not go into the file, which then ends with the one before.
         """
         values = list(row)
         if len(values) != len(self.columns):
@@ -84,7 +87,12 @@ class Journal:
     def _put(self, cells: Iterable[str]) -> None:
         if self._file.closed:
             raise ValueError(f"the journal {self.path} is closed: open another one")
-        self._file.write((",".join(cells) + "\n").encode())
+        row = (",".join(cells) + "\n").encode()
+        written = self._file.write(row) or 0
+        if written < len(row):  # the last bytes of a disk; without this row the file is whole
+            self._file.seek(-written, os.SEEK_CUR)
+            self._file.truncate()
+            raise OSError(errno.ENOSPC, "no room for another row", str(self.path))
 
     def sync(self) -> None:
         """Have the system put all rows on the disk."""
@@ -93,8 +101,10 @@ class Journal:
     def close(self) -> None:
         """Put all rows on the disk and close the file; may be called twice."""
         if not self._file.closed:
-            self.sync()
-            self._file.close()
+            try:
+                self.sync()
+            finally:
+                self._file.close()
 
     def __enter__(self) -> Self:
         return self
