@@ -7,7 +7,7 @@ import math
 import pytest
 from deadtime import FlightAbortedError, LinkError
 from deadtime.links import Limits, run
-from deadtime.links.ardrone2 import Navdata, build_navdata
+from deadtime.links.ardrone2 import ARDrone2, Navdata, build_navdata
 from deadtime.links.ardrone2.commands import Ref, decode
 from deadtime.links.ardrone2.connection import _Door
 from deadtime.links.ardrone2.emulator import Phase
@@ -152,6 +152,43 @@ def test_take_off_is_held_until_the_transition_is_over():
             names = [type(c).__name__ for _, commands in sent for _, c in commands]
             assert names.count("FlatTrim") == 1
             assert names.index("FlatTrim") < up.index(True) * 2  # on the ground, before
+
+    run(fly())
+
+
+@pytest.mark.parametrize("begun", [0.5, 2.0, 4.0])
+def test_silence_while_taking_off_lands_it(begun):
+    async def fly():
+        async with emulator() as emulated:
+            drone = client_of(emulated)
+            await drone.connect()
+            taking_off = asyncio.create_task(drone.take_off())
+            await asyncio.sleep(begun)
+            drone._link.reader.accept = lambda packet, now: None  # commands still arrive
+            lost = now()
+            with pytest.raises(LinkError, match="nothing heard"):
+                await taking_off
+            assert now() - lost < 1.2
+            with pytest.raises(LinkError, match="while landing"):
+                await drone.close()
+            await asyncio.sleep(6.0)
+            assert emulated.truth().phase is Phase.LANDED
+
+    run(fly())
+
+
+def test_an_emergency_while_taking_off_ends_it():
+    async def fly():
+        async with emulator() as emulated:
+            drone = client_of(emulated)
+            await drone.connect()
+            taking_off = asyncio.create_task(drone.take_off())
+            await asyncio.sleep(2.0)
+            drone._sender.cut = True
+            with pytest.raises(FlightAbortedError, match="emergency while taking off"):
+                await taking_off
+            assert not drone._sender.in_air
+            await drone.close()
 
     run(fly())
 
@@ -302,6 +339,33 @@ def test_a_landing_that_nobody_confirms_is_noted_on_what_ended_the_flight():
             assert "while landing" in ended.value.__notes__[0]
 
     run(fly())
+
+
+def test_it_is_noted_also_when_the_landing_itself_was_cancelled():
+    async def fly():
+        async with emulator() as emulated:
+
+            async def hop():
+                async with client_of(emulated) as drone:
+                    await drone.take_off()
+                    await emulated.close()
+
+            task = asyncio.create_task(hop())
+            await asyncio.sleep(8.0)
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError) as ended:
+                await task
+            assert "while landing" in ended.value.__notes__[0]
+
+    run(fly())
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"navdata_port": 99999}, {"command_port": -1}, {"control_port": 0}]
+)
+def test_a_port_that_is_none_is_refused(wrong):
+    with pytest.raises(ValueError, match="is no port"):
+        ARDrone2("127.0.0.1", **wrong)
 
 
 def test_forged_navdata_from_another_port_are_ignored():

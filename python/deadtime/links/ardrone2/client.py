@@ -34,6 +34,9 @@ LOST = 1.0
 #: How long taking off may take until the drone holds its height, and landing, s.
 TAKING_OFF, LANDING = 15.0, 20.0
 
+#: How often the link is looked at while nothing else is waited for, s.
+LOOKING = 0.1
+
 #: How long the drone is given to measure what level is, s.
 TRIMMING = 0.3
 
@@ -66,6 +69,11 @@ class ARDrone2:
     navdata_port, command_port, control_port : int
         5554, 5556 and 5559 on a drone.
 
+    Raises
+    ------
+    ValueError
+        If a port is none.
+
     Examples
     --------
     >>> drone = ARDrone2("192.168.1.1")
@@ -84,6 +92,14 @@ class ARDrone2:
         command_port: int = 5556,
         control_port: int = 5559,
     ) -> None:
+        ports = {
+            "navdata_port": navdata_port,
+            "command_port": command_port,
+            "control_port": control_port,
+        }
+        for name, port in ports.items():
+            if not 1 <= port <= 65535:
+                raise ValueError(f"{name}={port} is no port: give 1 to 65535")
         self.host = host
         self.limits = Limits() if limits is None else limits
         self.full = full
@@ -159,8 +175,8 @@ class ARDrone2:
         Raises
         ------
         LinkError
-            If it is not connected, not on the ground, in an emergency, low on battery, or does not
-            come up in 15 s; it is then told to land.
+            If it is not connected, not on the ground, in an emergency, low on battery, falls silent
+            or does not come up in 15 s; it is then told to land.
         """
         speed = self.vz_max
         state = await self.state()
@@ -182,17 +198,21 @@ class ARDrone2:
         await asyncio.sleep(TRIMMING)
         self._sender.fly()
         try:
-            up = await self._link.until(_is_up, TAKING_OFF)
+            await self._rise()
         except BaseException:
             self._sender.land()
             raise
-        newest = self._reader.newest
-        if not up or newest is None or newest.emergency:
-            self._sender.land()
-            if newest is not None and newest.emergency:
-                raise FlightAbortedError(f"{self.host} went into emergency while taking off")
-            raise LinkError(f"{self.host} is not up {TAKING_OFF:g} s after the take-off")
         self._sender.guard(self._link.now)
+
+    async def _rise(self) -> None:
+        deadline = self._link.now + TAKING_OFF
+        while not await self._link.until(_is_up, LOOKING):
+            self._check_link()
+            if self._link.now > deadline:
+                raise LinkError(f"{self.host} is not up {TAKING_OFF:g} s after the take-off")
+        navdata = self._link.reader.navdata
+        if navdata is None or navdata.emergency:
+            raise FlightAbortedError(f"{self.host} went into emergency while taking off")
 
     async def state(self) -> VehicleState:
         """The newest state; waits for the first.
@@ -286,7 +306,7 @@ class ARDrone2:
             return
         self._link.send()
         deadline = self._link.now + LANDING
-        while not await self._link.until(_has_landed, 0.1):
+        while not await self._link.until(_has_landed, LOOKING):
             silent = self._link.silent
             if silent > SILENT_LANDING:
                 raise LinkError(
@@ -390,6 +410,11 @@ async def _uninterrupted(landing: Any) -> None:
             interrupted = True
         except LinkError:
             break
-    if interrupted:
-        raise asyncio.CancelledError
-    task.result()
+    if not interrupted:
+        task.result()
+        return
+    cancelled = asyncio.CancelledError()
+    problem = task.exception()
+    if problem is not None:
+        cancelled.add_note(str(problem))
+    raise cancelled

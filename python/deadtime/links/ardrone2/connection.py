@@ -96,6 +96,9 @@ class Connection:
         except OSError as error:
             self.shut()
             raise LinkError(f"{self.host} cannot be reached: {error}") from None
+        except BaseException:
+            self.shut()
+            raise
         self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
 
     async def _socket(self, port: int, take: Callable[[bytes], None]) -> asyncio.DatagramTransport:
