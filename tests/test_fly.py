@@ -64,6 +64,8 @@ def test_a_programme_says_what_to_hold_when():
     assert told == [1.0] * 5 + [1.25] * 2 + [1.0] * 2
     with pytest.raises(ValueError, match=r"may come to 1\.5 m, outside"):
         programme.check(Limits(max_height=1.4))
+    with pytest.raises(ValueError, match="command more often"):
+        StepProgramme((1.0, 1.2), (3.0, 3.0), 0.25).check(Limits())
     with pytest.raises(ValueError, match="one hold for each"):
         StepProgramme((1.0, 1.2), (3.0,))
 
@@ -136,6 +138,15 @@ def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
     rows = columns_of(tmp_path / "flight-1-P.csv")
     assert 2.8 < rows["time_s"][-1] < 4.5
     assert rows.dtype.names == ROW
+
+
+def test_a_height_that_freezes_does_not_make_the_vehicle_climb_for_long(tmp_path):
+    # At the base; the first step is at 5 s, and would be held until 11.5 s.
+    vehicle = troubled(lambda state: replace(state, height=1.0))
+    with pytest.raises(FlightAbortedError, match=r"has read 1\.000 m"):
+        fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert columns_of(tmp_path / "flight-1-P.csv")["time_s"][-1] < 6.1
+    assert vehicle.log[-2:] == ["landed", "closed"]
 
 
 def test_an_error_that_grows_ends_the_flight(tmp_path):

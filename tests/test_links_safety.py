@@ -118,6 +118,47 @@ def test_messages_that_arrive_in_a_burst_are_judged_by_the_clock_of_the_vehicle(
     watch.check(replace(STATE, sequence=9, vehicle_time=3.2, height=1.5), now=10.0)
 
 
+def later_by(passed, **changes):
+    """The state a while later, as it arrives when nothing holds it up."""
+    number = 7 + round(passed / 0.05)
+    times = {"time": 10.0 + passed, "vehicle_time": 3.0 + passed, "sequence": number}
+    return replace(STATE, **(times | changes))
+
+
+def test_messages_that_arrive_late_by_the_clock_of_the_vehicle_are_old():
+    # They queue on the way, and each looks new when it comes.
+    watch = Watch(Limits())
+    watch.check(STATE, now=10.0)
+    watch.check(later_by(0.5, vehicle_time=3.25), now=10.5)
+    with pytest.raises(FlightAbortedError, match=r"newest message is 0\.35 s old"):
+        watch.check(later_by(1.0, vehicle_time=3.65), now=11.0)
+
+
+@pytest.mark.parametrize(
+    ("reference", "wiggle", "ends"), [(1.2, 0.0, True), (1.2, 0.001, False), (1.04, 0.0, False)]
+)
+def test_a_height_that_stands_still_away_from_the_reference_is_not_believed(
+    reference, wiggle, ends
+):
+    watch = Watch(Limits())
+    for k in range(60):
+        passed = 0.05 * k
+        state = later_by(passed, height=1.0 + wiggle * (k % 2))
+        if ends and passed > 1.04:
+            with pytest.raises(FlightAbortedError, match=r"has read 1\.000 m for 1\.1 s"):
+                watch.check(state, now=state.time, reference=reference)
+            break
+        watch.check(state, now=state.time, reference=reference)
+
+
+def test_a_height_may_stand_still_until_the_reference_moves():
+    watch = Watch(Limits())
+    for k in range(60):
+        passed = 0.05 * k
+        reference = 1.0 if passed < 2.0 else 1.25
+        watch.check(later_by(passed), now=10.0 + passed, reference=reference)
+
+
 def test_the_limits_can_be_shown():
     lines = " ".join(Limits().lines())
     for number in ("0.5 m/s", "3 m", "15 degrees", "20 %", "0.25 s", "1 s"):

@@ -41,6 +41,10 @@ MESSAGE = (
 )
 
 
+#: Smallest step, m: several times the noise of a height.
+LEAST_STEP = 0.02
+
+
 @runtime_checkable
 class TellsAll(Protocol):
     """A vehicle that hands on each of its messages, not only the newest."""
@@ -118,11 +122,16 @@ class FlightPlan:
         Raises
         ------
         ValueError
-            For no or too large a gain, or a height that may leave the limits.
+            For no or too large a gain, a step that is too small to be seen, or a programme that
+            the limits would end.
         """
         if not self.gains:
             raise ValueError("no gains to fly: give at least one")
-        positive("step", self.step)
+        if positive("step", self.step) < LEAST_STEP:
+            raise ValueError(
+                f"step={self.step:g} m is lost in the noise of a height: fly {LEAST_STEP:g} m or "
+                "more"
+            )
         for Kp in self.gains:
             check_gain(Kp, self.prior_delay, self.prior_gain)
         self.programme(self.hold).check(self.limits)

@@ -97,13 +97,25 @@ class StepProgramme:
         return self.heights[-1]
 
     def check(self, limits: Limits) -> None:
-        """Refuse heights outside the limits.
+        """Refuse what the limits would end.
 
         Raises
         ------
         ValueError
-            If one is, or so close to one that an overshoot of the whole step would be.
+            If a height is outside, or so close to a limit that an overshoot of the whole step would
+            be; if a step alone is an error that ends a flight; or if a command would be too old
+            before the next.
         """
+        if self.largest_step + ROOM > limits.max_error:
+            raise ValueError(
+                f"a step of {self.largest_step:g} m is an error that ends a flight, at "
+                f"{limits.max_error:g} m: fly steps of {limits.max_error - ROOM:g} m or less"
+            )
+        if self.sample_time >= limits.command_age:
+            raise ValueError(
+                f"sample_time={self.sample_time:g} s is no less than the {limits.command_age:g} s "
+                "that a command is good for: command more often"
+            )
         for height in self.heights:
             for end in (height - self.largest_step, height + self.largest_step):
                 if not limits.min_height <= end <= limits.max_height:

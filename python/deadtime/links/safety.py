@@ -2,8 +2,8 @@
 
 A command is a number in [-1, 1] by its type: nothing else can be written to the wire. A flight
 ends (hover, then land) when the vehicle strays from what it was asked, when it tilts, when its
-battery runs low, when a sensor is lost, when its messages are old or missing, and when it says that
-there is an emergency.
+battery runs low, when a sensor is lost or stands still, when its messages are old or missing, and
+when it says that there is an emergency.
 """
 
 from __future__ import annotations
@@ -73,7 +73,10 @@ class Limits:
     max_jump : float
         Fastest change of the measured height that is believed, m/s.
     max_state_age : float
-        Age of the newest message of the vehicle beyond which a flight is aborted, s.
+        Age of the newest message of the vehicle beyond which a flight is aborted, s: the time since
+        it arrived, and by how much later than others it did so by the vehicle's clock.
+    max_still : float
+        How long the height may read the same to the last digit, away from the reference, s.
     max_missing : int
         Messages in a row that may be lost before a flight is aborted.
     command_age : float
@@ -90,6 +93,7 @@ class Limits:
     max_error: float = 1.0
     max_jump: float = 5.0
     max_state_age: float = 0.3
+    max_still: float = 1.0
     max_missing: int = 20
     command_age: float = 0.25
     landing_after: float = 1.0
@@ -141,6 +145,10 @@ def largest_gain(delay: float, gain: float = 1.0) -> float:
     return math.pi / (4.0 * positive("delay", delay) * positive("gain", gain))
 
 
+#: Distance from the reference at which a height that does not change at all is no rest, m.
+AWAY = 0.05
+
+
 class Watch:
     """Watches the states of one flight and ends it when a rule is broken.
 
@@ -160,6 +168,8 @@ class Watch:
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
         self._last: VehicleState | None = None
+        self._moved = -math.inf
+        self._least_ahead = math.inf
 
     def check(self, state: VehicleState, now: float, reference: float | None = None) -> None:
         """Hold the newest state against the limits.
@@ -178,10 +188,25 @@ class Watch:
         FlightAbortedError
             If a rule is broken.
         """
+        if self._last is None or state.height != self._last.height or not self._away(reference):
+            self._moved = now
         broken = self._broken(state, now, reference)
         self._last = state
         if broken is not None:
             raise FlightAbortedError(broken)
+
+    def _away(self, reference: float | None) -> bool:
+        """Whether the height was away from the reference."""
+        last = self._last
+        return last is not None and reference is not None and abs(last.height - reference) > AWAY
+
+    def _lateness(self, state: VehicleState) -> float:
+        """By how much later a message arrived than the promptest, as the vehicle's clock tells."""
+        if state.vehicle_time is None:
+            return 0.0
+        ahead = state.time - state.vehicle_time
+        self._least_ahead = min(self._least_ahead, ahead)
+        return ahead - self._least_ahead
 
     def _broken(self, state: VehicleState, now: float, reference: float | None) -> str | None:
         limits = self.limits
@@ -189,11 +214,9 @@ class Watch:
             return "the vehicle reports an emergency"
         if state.sensor_fault is not None:
             return f"the vehicle reports that {state.sensor_fault}"
-        if not now - state.time <= limits.max_state_age:
-            return (
-                f"the newest message is {now - state.time:.2f} s old, more than "
-                f"{limits.max_state_age:g} s"
-            )
+        age = now - state.time + self._lateness(state)
+        if not age <= limits.max_state_age:
+            return f"the newest message is {age:.2f} s old, more than {limits.max_state_age:g} s"
         if state.missing > limits.max_missing:
             return f"{state.missing} messages in a row were lost, more than {limits.max_missing}"
         for angle in (abs(state.roll), abs(state.pitch)):  # one by one: `max` may skip a NaN
@@ -213,6 +236,11 @@ class Watch:
             return (
                 f"the height is {state.height:.2f} m and the reference {reference:.2f} m, more "
                 f"than {limits.max_error:g} m apart"
+            )
+        if now - self._moved > limits.max_still:
+            return (
+                f"the height has read {state.height:.3f} m for {now - self._moved:.1f} s although "
+                "it is not where it should be"
             )
         return self._broken_since(state)
 
