@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from deadtime import FlightAbortedError
 from deadtime._experiment.flights import telemetry_of
 from deadtime._experiment.split import split_delay
+from deadtime.links import Limits, Watch
 from deadtime.links.ardrone2 import Navdata, build_navdata
 from deadtime.links.ardrone2.navdata import State
 from deadtime.links.ardrone2.navdata_options import Demo
@@ -93,6 +95,25 @@ def test_a_state_is_flying_only_under_control():
         assert (state.flying, state.landed) == (flying, landed)
 
 
+@pytest.mark.parametrize(
+    ("bit", "says"),
+    [
+        (State.ULTRASOUND_DEAF, "deaf"),
+        (State.MOTORS_PROBLEM, "motor"),
+        (State.CUTOUT, "stopped"),
+        (State.ANGLES_OUT_OF_RANGE, "tilted"),
+        (State.SOFTWARE_FAULT, "program"),
+        (State.TOO_MUCH_WIND, "wind"),
+        (State.BATTERY_LOW, "battery"),
+    ],
+)
+def test_what_the_drone_says_is_wrong_with_it_ends_a_flight(bit, says):
+    sound, troubled = fed(packet(1), packet(2, state=State.FLYING | bit))[1]
+    assert sound.fault is None
+    with pytest.raises(FlightAbortedError, match=rf"reports that .*{says}"):
+        Watch(Limits()).check(troubled, troubled.time)
+
+
 def real_packets():
     data = flight_path("ardrone2_full_navdata_expD_every12.lp32").read_bytes()
     place = 0
@@ -125,6 +146,7 @@ def test_a_real_flight_passes_the_reader():
     assert told.implausible == told.reordered == told.restarts == 0
     assert all(0 < state.battery <= 100 for state in states)
     assert {state.flying for state in states} == {True, False}
+    assert all(state.fault is None for state in states)
     flown = [state for state in states if state.flying]
     assert min(state.height for state in flown) > 0.6
     assert max(state.height for state in flown) < 1.4

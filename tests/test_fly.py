@@ -98,7 +98,7 @@ ABORTS = {
     "pitch is no number": lambda state: replace(state, pitch=math.nan),
     "battery is at 19 %": lambda state: replace(state, battery=19.0),
     "reports that its ultrasound is deaf": lambda state: replace(
-        state, sensor_fault="its ultrasound is deaf"
+        state, fault="its ultrasound is deaf"
     ),
     "s old, more than 0.3 s": lambda state: None,
     "messages in a row were lost": lambda state: replace(state, missing=21),

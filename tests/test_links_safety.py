@@ -73,7 +73,7 @@ def test_the_largest_gain_leaves_a_factor_of_two_to_instability():
 
 BROKEN = {
     "emergency": ({"emergency": True}, {}),
-    "deaf": ({"sensor_fault": "its ultrasound is deaf"}, {}),
+    "deaf": ({"fault": "its ultrasound is deaf"}, {}),
     "0.31 s old": ({}, {"now": 10.31}),
     "nan s old": ({}, {"now": math.nan}),
     "21 messages": ({"missing": 21}, {}),

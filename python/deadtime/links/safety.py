@@ -212,8 +212,6 @@ class Watch:
         limits = self.limits
         if state.emergency:
             return "the vehicle reports an emergency"
-        if state.sensor_fault is not None:
-            return f"the vehicle reports that {state.sensor_fault}"
         age = now - state.time + self._lateness(state)
         if not age <= limits.max_state_age:
             return f"the newest message is {age:.2f} s old, more than {limits.max_state_age:g} s"
@@ -227,6 +225,8 @@ class Watch:
                 )
         if state.battery is not None and not state.battery >= limits.min_battery:
             return f"the battery is at {state.battery:g} %, below {limits.min_battery:g} %"
+        if state.fault is not None:
+            return f"the vehicle reports that {state.fault}"
         if not limits.min_height <= state.height <= limits.max_height:
             return (
                 f"the height is {state.height:.2f} m, outside {limits.min_height:g} to "

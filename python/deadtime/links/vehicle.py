@@ -38,9 +38,8 @@ class VehicleState:
         Charge left, percent.
     emergency : bool
         The vehicle has cut its motors.
-    sensor_fault : str, optional
-        What the vehicle says of a sensor that it has lost, to follow "that": "its ultrasound is
-        deaf".
+    fault : str, optional
+        What the vehicle says is wrong with it, to follow "that": "its ultrasound is deaf".
     missing : int
         Messages lost in a row, the most in the second before this one.
     """
@@ -57,7 +56,7 @@ class VehicleState:
     pitch: float = 0.0
     battery: float | None = None
     emergency: bool = False
-    sensor_fault: str | None = None
+    fault: str | None = None
     missing: int = 0
 
 

@@ -14,7 +14,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from deadtime._errors import PacketError
-from deadtime.links.ardrone2.navdata import Navdata, parse_navdata
+from deadtime.links.ardrone2.navdata import Navdata, State, parse_navdata
 from deadtime.links.vehicle import VehicleState
 
 __all__ = ["FLYING", "HOVERING", "LinkStatistics", "NavdataReader", "on_ground", "phase_of"]
@@ -37,6 +37,18 @@ BUMP = 0.1
 #: Control states, the upper half of the word that navdata has for them.
 FLYING, HOVERING = 3, 4
 TAKING_OFF, CLIMBING, LANDING = 6, 7, 8
+
+
+#: Bits of the drone's state with which it is not to be flown on, as of `VehicleState.fault`.
+FAULTS = {
+    State.ULTRASOUND_DEAF: "its ultrasound is deaf",
+    State.MOTORS_PROBLEM: "a motor does not turn as it should",
+    State.CUTOUT: "its motors have been stopped",
+    State.ANGLES_OUT_OF_RANGE: "it is tilted too far",
+    State.SOFTWARE_FAULT: "its program has failed",
+    State.TOO_MUCH_WIND: "there is more wind than it can hold against",
+    State.BATTERY_LOW: "its battery lasts for no more than landing",
+}
 
 
 @dataclass(frozen=True)
@@ -248,6 +260,6 @@ def _state_of(navdata: Navdata, clock: float | None, now: float, missing: int) -
         pitch=math.nan if navdata.pitch is None else navdata.pitch,
         battery=navdata.battery,
         emergency=navdata.emergency,
-        sensor_fault="its ultrasound is deaf" if navdata.ultrasound_deaf else None,
+        fault=next((says for bit, says in FAULTS.items() if navdata.state & bit), None),
         missing=missing,
     )
