@@ -29,6 +29,7 @@ tr.truth td { font-weight: 600; background: #f5f5f0; }
 figure { margin: 1rem 0; }
 figcaption { color: #555; font-size: .9rem; }
 svg { max-width: 100%; height: auto; }
+pre { white-space: pre-wrap; }
 """
 
 
