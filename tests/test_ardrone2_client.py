@@ -300,6 +300,24 @@ def test_silence_in_flight_is_told_and_landing_ends_in_bounded_time():
     run(fly())
 
 
+def test_a_landing_is_confirmed_also_by_a_drone_that_forgot_its_client():
+    # A program that was stopped for a while: the drone's watchdog has landed it.
+    async def fly():
+        async with connected() as (emulated, drone):
+            await drone.take_off()
+            socket = drone._link._commands
+            plain, socket.sendto = socket.sendto, lambda data: None
+            await asyncio.sleep(6.0)
+            socket.sendto = plain
+            begun = now()
+            await drone.land()
+            assert now() - begun < 3.0
+            assert emulated.truth().phase is Phase.LANDED
+            assert (drone._reader.navdata.bootstrap, drone._reader.navdata.demo) == (True, None)
+
+    run(fly())
+
+
 def test_a_dead_drone_ends_the_context_in_bounded_time():
     async def fly():
         async with emulator() as emulated:

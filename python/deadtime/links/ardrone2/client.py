@@ -306,7 +306,7 @@ class ARDrone2:
             return
         self._link.send()
         deadline = self._link.now + LANDING
-        while not await self._link.until(_has_landed, LOOKING):
+        while not await self._link.until(on_ground, LOOKING):
             silent = self._link.silent
             if silent > SILENT_LANDING:
                 raise LinkError(
@@ -387,10 +387,6 @@ class ARDrone2:
 
 def _is_up(navdata: Navdata) -> bool:
     return navdata.emergency or (navdata.flying and phase_of(navdata) in (FLYING, HOVERING))
-
-
-def _has_landed(navdata: Navdata) -> bool:
-    return navdata.demo is not None and on_ground(navdata)
 
 
 def _tells_state(navdata: Navdata) -> bool:

@@ -240,7 +240,10 @@ def phase_of(navdata: Navdata) -> int | None:
 
 
 def on_ground(navdata: Navdata) -> bool:
-    """Whether a drone is down, and not on its way up."""
+    """Whether a drone is down, and not on its way up.
+
+    One that has forgotten its client says no more than whether it flies.
+    """
     in_air = (FLYING, HOVERING, TAKING_OFF, CLIMBING, LANDING)
     return not navdata.flying and phase_of(navdata) not in in_air
 
