@@ -2,11 +2,19 @@
 
 from contextlib import asynccontextmanager
 
+import pytest
 from deadtime.links import Limits
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
 
 LIMITS = Limits(max_climb=1.0)
+
+
+def skip_if_too_busy(said):
+    """Skip where a flight in real time was ended because this machine did not keep up."""
+    said = str(said)
+    if any(word in said for word in ("messages in a row", "s old, more than", "no command for")):
+        pytest.skip(f"this machine was too busy for real time: {said}")
 
 
 def emulator(**options):
