@@ -157,6 +157,14 @@ def test_an_error_that_grows_ends_the_flight(tmp_path):
     assert vehicle.log[-2:] == ["landed", "closed"]
 
 
+def test_a_base_too_far_from_where_it_hovers_is_said_before_it_is_commanded(tmp_path):
+    vehicle = SimulatedVehicle()
+    plan = FlightPlan(base=2.0)
+    with pytest.raises(FlightAbortedError, match=r"hovers at 0\.75 m: .* 2 m, .* begin closer"):
+        fly_experiment(lambda: vehicle, plan, tmp_path, run=run)
+    assert vehicle.log == ["connected", "took off", "landed", "closed"]
+
+
 def test_a_gain_beyond_the_bound_is_refused_before_anything_is_connected(tmp_path):
     vehicle = SimulatedVehicle()
     with pytest.raises(ValueError, match=r"Kp = 2\.6 is above 2\.47"):

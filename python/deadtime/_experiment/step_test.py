@@ -184,7 +184,14 @@ async def fly_steps(
     clock = asyncio.get_running_loop().time
     begin = clock() if begin is None else begin
     first = await vehicle.state()
-    largest = max(programme.largest_step, abs(first.height - programme.heights[0]))
+    base = programme.heights[0]
+    way = abs(first.height - base)
+    if way + ROOM > limits.max_error:
+        raise FlightAbortedError(
+            f"the vehicle hovers at {first.height:.2f} m: the way to the first reference, "
+            f"{base:g} m, is an error that ends a flight, at {limits.max_error:g} m: begin closer"
+        )
+    largest = max(programme.largest_step, way)
     watch = Watch(replace(limits, max_error=min(limits.max_error, GROWTH * largest + ROOM)))
     sample = 0
     try:
