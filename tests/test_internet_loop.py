@@ -2,6 +2,8 @@
 
 import json
 import math
+import signal
+import socket
 import subprocess
 import sys
 import time
@@ -9,6 +11,7 @@ import time
 import numpy as np
 import pytest
 from deadtime import estimate_delay, read_recording
+from deadtime._errors import LinkError
 from deadtime._internet_loop import GAINS, run_internet_loop
 from deadtime._internet_replay import answer_times
 from deadtime._internet_result import Spread
@@ -225,6 +228,62 @@ def test_the_parts_say_what_is_wrong_in_one_line():
     assert "needs a time" in said("plant", "--controller", "127.0.0.1:9", "--policy", "drop-late")
     assert "--gain" in said("controller")
     assert "probability" in said("relay", "--to", "127.0.0.1:9", "--loss", "2")
+    assert "more than zero" in said("relay", "--to", "127.0.0.1:9", "--duration", "nan")
+    assert "port 0" in said("plant", "--controller", "127.0.0.1:0", "--duration", "1")
+
+
+def test_each_part_says_where_it_listens_and_at_ctrl_c_what_happened():
+    for name, arguments in (
+        ("controller", ["--gain", "8"]),
+        ("relay", ["--to", "127.0.0.1:9"]),
+        ("plant", ["--controller", "127.0.0.1:9", "--duration", "60"]),
+    ):
+        with part(name, arguments) as running:
+            assert running.address()[0] == "127.0.0.1"
+            running.process.send_signal(signal.SIGINT)
+            assert running.report(within=20.0)
+
+
+def test_a_part_ends_with_the_process_that_started_it():
+    script = (
+        "import time\n"
+        "from deadtime.links.udp.processes import part\n"
+        "with part('controller', ['--gain', '8']) as started:\n"
+        "    print(started.address()[1], flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE) as parent:
+        port = int(parent.stdout.readline())
+        parent.kill()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        for _ in range(1000):  # until the port is given back
+            try:
+                free.bind(("127.0.0.1", port))
+                break
+            except OSError:
+                time.sleep(0.02)
+        assert free.getsockname()[1] == port
+
+
+def test_why_a_part_ended_is_said():
+    options = ["--controller", "127.0.0.1:9", "--recording", "/dev/null"]
+    said = pytest.raises(LinkError, match=r"exit code 1\).*/dev/null")
+    with part("plant", options) as running, said:
+        running.report(within=20.0)
+
+
+def test_all_parts_speak_ipv6():
+    with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("::1", 0))
+        except OSError:
+            pytest.skip("this computer has no IPv6 loopback")
+    with part("controller", ["--gain", "8", "--listen", "[::1]:0"]) as controller:
+        host, port = controller.address()
+        with part("relay", ["--to", f"[{host}]:{port}", "--listen", "[::1]:0"]) as relay:
+            host, port = relay.address()
+            with part("plant", ["--controller", f"[{host}]:{port}", "--duration", "2"]) as plant:
+                assert plant.report(within=30.0)["applied"] > 50
 
 
 def test_options_go_through_the_command_line():

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from deadtime.links.udp import (
     Network,
     NewestWins,
     Normal,
+    Plant,
     PlantOptions,
     Relay,
     RelayOptions,
@@ -143,6 +145,26 @@ def test_a_recording_that_cannot_be_written_ends_the_run(tmp_path):
 
     with pytest.MonkeyPatch.context() as monkeypatch:
         assert in_virtual_time(disk_fills_up(monkeypatch)) == pytest.approx(1.01, abs=0.01)
+
+
+def test_an_end_that_cannot_record_leaves_its_port(tmp_path):
+    there = tmp_path / "there.csv"
+    there.touch()
+    here = ("127.0.0.1", 40_000)
+
+    async def twice(end, **more):
+        with pytest.raises(FileExistsError):
+            async with end(**more, listen=here, recording=there):
+                pass
+        async with end(**more, listen=here) as second:
+            return second.address
+
+    for end, options, more in (
+        (Controller, ControllerOptions, {"gain": 1.0}),
+        (Plant, PlantOptions, {"controller": ("127.0.0.1", 9)}),
+    ):
+        made = partial(lambda end, options, **given: end(options(**given)), end, options)
+        assert in_virtual_time(twice(made, **more)) == here
 
 
 def test_losses_are_counted_as_they_happened():
