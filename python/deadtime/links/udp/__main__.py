@@ -1,8 +1,8 @@
 """``python -m deadtime.links.udp controller|relay|plant``: each part as a process of its own.
 
 Each says where it listens in one line of JSON when it is ready, and what happened in another when
-it ends: after its time, by Ctrl-C or SIGTERM, or with whoever started it. Nothing but the base of the package is needed, so
-that either end can run on a small computer.
+it ends: after its time, by Ctrl-C or SIGTERM, or with whoever started it. Nothing but the base of
+the package is needed, so that either end can run on a small computer.
 """
 
 from __future__ import annotations
