@@ -3,6 +3,8 @@
 import copy
 import math
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import deadtime as dtm
@@ -139,7 +141,7 @@ def test_every_row_is_in_the_file_before_the_next_is_written(tmp_path):
 def test_a_recording_is_never_written_over(tmp_path):
     path = tmp_path / "flight.csv"
     Journal(path, COLUMNS).close()
-    with pytest.raises(FileExistsError):
+    with pytest.raises(FileExistsError, match="give another name"):
         Journal(path, COLUMNS)
 
 
@@ -152,6 +154,30 @@ def test_a_row_that_cannot_be_read_back_is_refused_and_leaves_the_file_whole(tmp
     assert journal.path.read_text() == "time_s,reference_m,height_m\n0.0,1.0,\n"
     with pytest.raises(ValueError, match="closed"):
         journal.write((0.0, 1.0, 2.0))
+
+
+FULL_DISK = """
+import resource, signal, sys
+from deadtime.links import Journal
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # an error instead, as of a full disk
+resource.setrlimit(resource.RLIMIT_FSIZE, (16, 16))
+with Journal(sys.argv[1], ["x_m"]) as journal:
+    journal.write([1.25])
+    journal.write([2.25])
+    journal.write([3.25])
+"""
+
+
+def test_a_full_disk_leaves_whole_rows_and_says_where(tmp_path):
+    pytest.importorskip("resource", reason="this system has no limit on the size of files")
+    path = tmp_path / "flight.csv"
+    result = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(path)], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1
+    assert str(path) in result.stderr.splitlines()[-1]
+    assert path.read_text() == "x_m\n1.25\n2.25\n"  # the third would end at byte 19
 
 
 @pytest.mark.parametrize("columns", [(), ("a", "a"), ("a,b",), ('a"',), ("a\n",), ("",)])

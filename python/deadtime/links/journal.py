@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Sequence
+from errno import EEXIST
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -29,6 +30,8 @@ class Journal:
     ------
     FileExistsError
         If the file is there: a recording is never written over.
+    OSError
+        Also of `write`: if the disk is full, or the file cannot be made.
     ValueError
         If names repeat or hold a comma, a quote or the end of a line.
 
@@ -56,8 +59,18 @@ class Journal:
                 raise ValueError(f"the column name {name!r} cannot stand in the first line of CSV")
         self.path.parent.mkdir(parents=True, exist_ok=True)
         # Unbuffered: one row is one call of the system, whole or not at all.
-        self._file = open(self.path, "xb", buffering=0)  # noqa: SIM115
-        self._put(self.columns)
+        try:
+            self._file = open(self.path, "xb", buffering=0)  # noqa: SIM115
+        except FileExistsError:
+            raise FileExistsError(
+                EEXIST, "there already; give another name", str(self.path)
+            ) from None
+        self._size = 0
+        try:
+            self._put(self.columns)
+        except OSError:
+            self._file.close()
+            raise
 
     def write(self, row: Iterable[float | None]) -> None:
         """Append one row; `None` leaves a cell empty.
@@ -84,7 +97,15 @@ class Journal:
     def _put(self, cells: Iterable[str]) -> None:
         if self._file.closed:
             raise ValueError(f"the journal {self.path} is closed: open another one")
-        self._file.write((",".join(cells) + "\n").encode())
+        line = (",".join(cells) + "\n").encode()
+        written = 0
+        try:
+            while written < len(line):  # a disk that is all but full takes a part
+                written += self._file.write(line[written:])
+        except OSError as error:
+            self._file.truncate(self._size)
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+        self._size += len(line)
 
     def sync(self) -> None:
         """Have the system put all rows on the disk."""
