@@ -1,5 +1,6 @@
 """The Internet loop from end to end: its delay measured and estimated, in memory and over UDP."""
 
+import dataclasses
 import json
 import math
 import signal
@@ -13,7 +14,7 @@ import pytest
 from deadtime import estimate_delay, read_recording
 from deadtime._errors import LinkError
 from deadtime._internet_loop import GAINS, run_internet_loop
-from deadtime._internet_replay import answer_times
+from deadtime._internet_replay import _overshoot, answer_times
 from deadtime._internet_result import Spread
 from deadtime.links.udp import (
     Bursts,
@@ -137,6 +138,23 @@ def test_a_spread_of_one_or_none_has_no_interval():
     assert math.isnan(Spread.of([0.1]).low)
     both = Spread.of([0.1, 0.2])
     assert both.low < 0.1 < 0.2 < both.high
+
+
+def test_without_enough_replayed_steps_the_runs_give_the_interval():
+    trial = Trial(gain=8.0, there=WAY, back=Network(Normal(0.05, 0.01)), duration=2.0)
+    whole = run_internet_loop(trial, (7.0, 8.0, 9.0), methods=["exact"])
+    few = dataclasses.replace(whole, _errors=tuple({"exact": np.zeros(3)} for _ in range(3)))
+    assert whole.spread("exact").replayed
+    assert few.spread("exact") == Spread.of([run.delay("exact") for run in few.runs])
+
+
+def test_a_replayed_step_falls_back_on_the_safe_command():
+    silent = np.array([0.01] + [math.inf] * 400)
+    steps = {safe: Trial(gain=1.0, limit=5.0, duration=5.0, safe=safe) for safe in (0.0, 2.0)}
+    peaks = {safe: _overshoot(trial, silent) for safe, trial in steps.items()}
+    # one answer, 1 per second until the watchdog's 0.5 s after it; then the safe command
+    assert peaks[0.0] == pytest.approx(0.5 - 1.0, abs=1e-9)
+    assert peaks[2.0] == pytest.approx(0.5 + 2.0 * (3.99 - 0.51) - 1.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -304,6 +322,8 @@ def test_options_go_through_the_command_line():
     ]
     assert "--safe=-0.5" in words
     assert arguments_of(RelayOptions(("127.0.0.1", 7)))[:2] == ["--to", "127.0.0.1:7"]
+    measured = PlantOptions(controller=("127.0.0.1", 7), duration=np.float64(2.5))
+    assert "--duration=2.5" in arguments_of(measured)
     with pytest.raises(ValueError, match="whole number"):
         policy_of("hold", 1.5)
 

@@ -197,6 +197,15 @@ def test_a_jitter_buffer_makes_a_random_delay_constant():
     assert np.abs(model.outputs - recording.output).max() < 1e-9
 
 
+def test_answers_may_take_as_long_as_the_watchdog_allows():
+    way = Network(delay=2.4)
+    trial = Trial(gain=0.1, there=way, back=way, sample_time=1e-3, watchdog=5.0, duration=6.0)
+    report = run(trial)
+    assert report.plant.link.invalid == 0
+    assert report.plant.applied > 1000
+    assert report.plant.age_when_applied.largest == pytest.approx(4.8, abs=1e-9)
+
+
 def test_late_commands_are_dropped_where_asked_for():
     way = Network(delay=ShiftedGamma(0.03, 0.05, 0.02))
     report = run(Trial(gain=6.0, there=way, back=way, policy=DropLate(0.1)))

@@ -182,6 +182,8 @@ class InternetLoop:
             return found
         errors = [self._errors[index][method] for index in answered]
         low, high = interval_of_mean(found.mean, errors, self._age_error)
+        if math.isnan(low):
+            return found
         return replace(found, low=low, high=high, replayed=True)
 
     @property

@@ -56,6 +56,8 @@ class Plant:
         self._newest = 0
         self._sequence = 0
         self._sent: dict[int, float] = {}
+        # Whatever is answered in time, and longer, to tell what is late from what cannot be.
+        self._remembered = max(REMEMBERED, 2 * math.ceil(options.watchdog / options.sample_time))
         self._echo: tuple[LoopPacket, float] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self._hold: asyncio.TimerHandle | None = None
@@ -138,7 +140,7 @@ class Plant:
         echo, read = self._echo or (None, now)
         self._sequence += 1
         self._sent[self._sequence] = now
-        self._sent.pop(self._sequence - REMEMBERED, None)
+        self._sent.pop(self._sequence - self._remembered, None)
         self._endpoint.send(
             LoopPacket(
                 sequence=self._sequence,
