@@ -3,14 +3,20 @@
 They are kept beside the pages, so that building the pages needs no run of the package.
 """
 
+import tempfile
 from pathlib import Path
 
 import deadtime as dtm
 import matplotlib.pyplot as plt
 import numpy as np
 from deadtime import paper
+from deadtime._cli.fly import emulated_drone
+from deadtime._experiment import FlightPlan, fly_experiment
+from deadtime._experiment.flights import read_telemetry
+from deadtime._flight_plots import plot_checked, plot_learned, plot_told
 from deadtime._internet_loop import run_internet_loop
 from deadtime._internet_plots import plot_internet_loop
+from deadtime._plots import new_figure
 from deadtime.links import udp, virtual_time
 from deadtime.links.ardrone2.emulator import Thruster, ThrustMotion
 from scipy.optimize import least_squares
@@ -189,6 +195,24 @@ def estimating() -> None:
     figure.savefig(IMAGES / "estimate-design.png", dpi=90)
 
 
+def flying() -> None:
+    """The experiment of `deadtime fly`, on the emulator in virtual time."""
+    with tempfile.TemporaryDirectory() as folder:
+        connect = emulated_drone("kit", 0, FlightPlan().limits)
+        found = fly_experiment(connect, FlightPlan(), Path(folder), run=virtual_time.run)
+        figure, axes = new_figure(7.5, 4.6, rows=2)
+        plot_checked(axes, [found.before, *found.checked])
+        figure.savefig(IMAGES / "flying-before-after.png", dpi=90)
+        figure, axes = new_figure(7.5, 4.4, rows=2, even=True)
+        plot_learned(axes, found.learned.flights, found.learned.fit)
+        figure.savefig(IMAGES / "flying-learned.png", dpi=90)
+        told = read_telemetry(found.before.telemetry, found.before.recording)
+        figure, axes = new_figure(7.5, 4.2, rows=2)
+        plot_told(axes, told, found.before)
+        figure.savefig(IMAGES / "flying-told.png", dpi=90)
+    print(found.verdict())
+
+
 def internet_loop() -> None:
     """The Internet loop on a network that jitters and loses, and what policies make of a burst."""
     bad = udp.Network(delay=udp.Normal(0.05, 0.01), loss=udp.Bursts.of(0.05, 4.0))
@@ -313,6 +337,7 @@ def thrust() -> None:
 
 
 if __name__ == "__main__":
+    flying()
     thrust()
     designing()
     estimating()

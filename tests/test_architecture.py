@@ -94,10 +94,11 @@ FLOORS = [
         "_design_plots",
         "_planning_plots",
         "_paper_plots",
+        "_flight_plots",
         "_internet_plots",
     },
     {"_page"},
-    {"_report", "_paper_page"},
+    {"_report", "_paper_page", "_flight_page"},
     {"_cli"},
 ]
 NUMERICS = FLOORS[2]

@@ -247,7 +247,8 @@ BAD_NUMBERS = [
     (["simulate", "--kp", "2", "--delay", "1", "--duration", "nan"], "duration"),
     (["simulate", "--kp", "2"], "delay"),
     (["demo", "--seed", "-1"], "seed"),
-    (["fly"], "fly"),
+    (["fly", "--gains", "nan"], "Kp"),
+    (["hover"], "hover"),
 ]
 
 

@@ -46,13 +46,16 @@ COLOURS = ("#0b6fb8", "#d1481f", "#2f8f4e", "#8a4fbf")
 
 
 def new_figure(
-    width: float = 7.0, height: float = 4.0, rows: int = 1, columns: int = 1
+    width: float = 7.0, height: float = 4.0, rows: int = 1, columns: int = 1, even: bool = False
 ) -> tuple[Figure, Any]:
-    """A figure that belongs to nobody's window, and its axes; rows share their x axis."""
+    """A figure that belongs to nobody's window, and its axes; rows share their x axis.
+
+    The first row is the highest unless they are to be even.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
-    ratios = None if rows == 1 else [3.0, *([1.0] * (rows - 1))]
+    ratios = None if rows == 1 or even else [3.0, *([1.0] * (rows - 1))]
     axes = figure.subplots(rows, columns, sharex=rows > 1, height_ratios=ratios)
     for one in np.ravel(axes):
         one.spines[["top", "right"]].set_visible(False)

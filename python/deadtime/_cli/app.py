@@ -18,6 +18,7 @@ from deadtime._cli import options as opt
 from deadtime._cli.designs import design_gains
 from deadtime._cli.emulate import emulators
 from deadtime._cli.estimates import estimate_delays
+from deadtime._cli.fly import fly_drone
 from deadtime._cli.internet_loop import run_loop
 from deadtime._cli.maps import map_gains
 from deadtime._cli.reproduce import reproduce_paper
@@ -176,6 +177,7 @@ def _roots_table(found: RootSet) -> Table:
 app.command("map")(map_gains)
 app.command("design")(design_gains)
 app.command("reproduce")(reproduce_paper)
+app.command("fly")(fly_drone)
 app.command("internet-loop")(run_loop)
 app.add_typer(emulators, name="emulate")
 

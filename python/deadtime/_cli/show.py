@@ -23,6 +23,7 @@ __all__ = [
     "console",
     "counted",
     "estimates_table",
+    "plain",
     "print_json",
     "print_table",
     "save_figure",
@@ -35,20 +36,21 @@ PICTURES = (".png", ".svg", ".pdf")
 
 def print_json(found: Mapping[str, Any]) -> None:
     """Print plain values as JSON; what is not finite becomes null."""
-    print(json.dumps(_plain(found), indent=2, ensure_ascii=False, allow_nan=False))
+    print(json.dumps(plain(found), indent=2, ensure_ascii=False, allow_nan=False))
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Values that JSON has; what is not finite becomes null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
+        return [plain(one) for one in value]
     if isinstance(value, complex):
-        return {"re": _plain(value.real), "im": _plain(value.imag)}
+        return {"re": plain(value.real), "im": plain(value.imag)}
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Path):

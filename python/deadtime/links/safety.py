@@ -196,12 +196,12 @@ class Watch:
             )
         if state.missing > limits.max_missing:
             return f"{state.missing} messages in a row were lost, more than {limits.max_missing}"
-        angle = max(abs(state.roll), abs(state.pitch))
-        if not angle <= limits.max_angle:
-            return (
-                f"the vehicle is tilted by {math.degrees(angle):.0f} degrees, more than "
-                f"{math.degrees(limits.max_angle):g}"
-            )
+        for angle in (abs(state.roll), abs(state.pitch)):  # one by one: `max` may skip a NaN
+            if not angle <= limits.max_angle:
+                return (
+                    f"the vehicle is tilted by {math.degrees(angle):.0f} degrees, more than "
+                    f"{math.degrees(limits.max_angle):g}"
+                )
         if state.battery is not None and not state.battery >= limits.min_battery:
             return f"the battery is at {state.battery:g} %, below {limits.min_battery:g} %"
         if not limits.min_height <= state.height <= limits.max_height:

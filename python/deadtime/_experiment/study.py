@@ -8,19 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._controllers import PV, Controller, P
-from deadtime._derivative_filter import DerivativeFilter
 from deadtime._design import Design, critical_gain, design
 from deadtime._estimation import DelayEstimate
 from deadtime._estimation.compare import Comparison, compare_methods
+from deadtime._experiment.height_control import PAPER_FILTER
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator, kit_plant
 from deadtime._recording import Recording
 from deadtime._response import Response
 
 __all__ = ["DemoFlight", "Study", "demo_flight", "study"]
-
-#: The derivative of the paper's PV controller: the vehicle reports no vertical speed.
-PAPER_FILTER = DerivativeFilter(omega=38.0, damping=1.0)
 
 #: Share of the stability limit beyond which a gain is called unsafe: the usual gain margin of 2.
 SAFE_SHARE = 0.5

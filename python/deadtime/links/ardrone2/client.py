@@ -1,0 +1,395 @@
+"""The AR.Drone 2.0 as a vehicle whose climb can be commanded."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self
+
+from deadtime._errors import FlightAbortedError, LinkError
+from deadtime._validation import finite
+from deadtime.links.ardrone2.commands import FlatTrim
+from deadtime.links.ardrone2.connection import Connection
+from deadtime.links.ardrone2.handshake import Handshake, check_configuration
+from deadtime.links.ardrone2.navdata import Navdata
+from deadtime.links.ardrone2.reader import (
+    FLYING,
+    HOVERING,
+    LinkStatistics,
+    on_ground,
+    phase_of,
+)
+from deadtime.links.safety import Limits, UnitCommand
+from deadtime.links.vehicle import VehicleState
+
+__all__ = ["ARDrone2"]
+
+#: How long the first navdata, and leaving bootstrap, may take, s.
+FIRST_NEWS = 5.0
+
+#: How long nothing may come until the link counts as lost, s.
+LOST = 1.0
+
+#: How long taking off may take until the drone holds its height, and landing, s.
+TAKING_OFF, LANDING = 15.0, 20.0
+
+#: How long the drone is given to measure what level is, s.
+TRIMMING = 0.3
+
+#: How long nothing may come while landing, s: by then the drone's own watchdog lands it.
+SILENT_LANDING = 3.0
+
+#: Largest vertical speed that a command of 1 stands for, mm/s: what the drone may be told is
+#: 200 to 2000, its own default 700.
+VZ_MAX = 1000
+
+#: Longest heights of the drone's own limit, mm.
+ALTITUDE_MAX = (500, 5000)
+
+
+class ARDrone2:
+    """A link to an AR.Drone 2.0, or to an emulator of one.
+
+    As an asynchronous context manager it connects on entry, and lands and closes on the way out,
+    whatever the reason. Connecting tells the drone to be on the ground and never takes off.
+
+    Parameters
+    ----------
+    host : str
+        Address of the drone.
+    limits : Limits, optional
+        What it is kept within. The largest height is set in the drone, too.
+    full : bool
+        All of navdata, 200 times a second, with vertical speed and the demand that is followed;
+        otherwise the 15 small ones.
+    navdata_port, command_port, control_port : int
+        5554, 5556 and 5559 on a drone.
+
+    Examples
+    --------
+    >>> drone = ARDrone2("192.168.1.1")
+    >>> drone.command(0.3)
+    Traceback (most recent call last):
+    deadtime._errors.LinkError: 192.168.1.1 is not in the air: take off before commanding it
+    """
+
+    def __init__(
+        self,
+        host: str,
+        limits: Limits | None = None,
+        *,
+        full: bool = True,
+        navdata_port: int = 5554,
+        command_port: int = 5556,
+        control_port: int = 5559,
+    ) -> None:
+        self.host = host
+        self.limits = Limits() if limits is None else limits
+        self.full = full
+        self.control_port = control_port
+        self._link = Connection(host, navdata_port, command_port, self.limits)
+        self._sender, self._reader = self._link.sender, self._link.reader
+        self._restarts = 0
+        self._vz_max: float | None = None
+
+    @property
+    def statistics(self) -> LinkStatistics:
+        """What came over the link until now."""
+        return self._reader.statistics
+
+    @property
+    def vz_max(self) -> float:
+        """Vertical speed that a command of 1 stands for, as read back from the drone, m/s.
+
+        Raises
+        ------
+        LinkError
+            If it is not connected.
+        """
+        if self._vz_max is None:
+            raise LinkError(f"{self.host} is not connected: what a command means is not known")
+        return self._vz_max
+
+    # Connecting
+
+    async def connect(self) -> None:
+        """Wake the drone up, set its limits and read them back.
+
+        Raises
+        ------
+        LinkError
+            If it does not answer, or does not hold what it was told.
+        """
+        await self._link.open()
+        try:
+            await self._configure()
+        except BaseException:
+            self._link.shut()
+            raise
+
+    async def _configure(self) -> None:
+        heard = await self._link.until(lambda navdata: True, FIRST_NEWS)
+        if not heard:
+            raise LinkError(
+                f"no navdata from {self.host}, UDP port {self._link.navdata_port}, within "
+                f"{FIRST_NEWS:g} s: is the drone on, and this computer in its network?"
+            )
+        handshake = Handshake(self.host, self._link.send, self._link.until)
+        highest = round(1e3 * self.limits.max_height)
+        wanted = {
+            "general:navdata_demo": "FALSE" if self.full else "TRUE",
+            "control:control_vz_max": str(VZ_MAX),
+            "control:altitude_max": str(min(max(highest, ALTITUDE_MAX[0]), ALTITUDE_MAX[1])),
+        }
+        for key, value in wanted.items():
+            await handshake.set(key, value)
+        held = await handshake.read_back(self.host, self.control_port)
+        check_configuration(self.host, held, wanted)
+        if not await self._link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
+            raise LinkError(f"{self.host} sends navdata without height and battery: restart it")
+        self._vz_max = 1e-3 * float(held["control:control_vz_max"])
+        self._restarts = self._reader.restarts
+
+    # Flying
+
+    async def take_off(self) -> None:
+        """Leave the ground; returns when the drone holds its height.
+
+        Raises
+        ------
+        LinkError
+            If it is not connected, not on the ground, in an emergency, low on battery, or does not
+            come up in 15 s; it is then told to land.
+        """
+        speed = self.vz_max
+        state = await self.state()
+        if state.emergency:
+            raise LinkError(f"{self.host} is in emergency: look at it, then clear_emergency()")
+        if not state.landed:
+            raise LinkError(f"{self.host} is not on the ground: land it first")
+        if state.battery is not None and state.battery < self.limits.min_battery:
+            raise LinkError(
+                f"the battery of {self.host} is at {state.battery:g} %, below "
+                f"{self.limits.min_battery:g} %: charge it"
+            )
+        if self.limits.max_climb > speed:
+            raise LinkError(
+                f"max_climb = {self.limits.max_climb:g} m/s is more than the drone's largest "
+                f"vertical speed of {speed:g} m/s: ask for less"
+            )
+        self._link.send(FlatTrim())
+        await asyncio.sleep(TRIMMING)
+        self._sender.fly()
+        try:
+            up = await self._link.until(_is_up, TAKING_OFF)
+        except BaseException:
+            self._sender.land()
+            raise
+        newest = self._reader.newest
+        if not up or newest is None or newest.emergency:
+            self._sender.land()
+            if newest is not None and newest.emergency:
+                raise FlightAbortedError(f"{self.host} went into emergency while taking off")
+            raise LinkError(f"{self.host} is not up {TAKING_OFF:g} s after the take-off")
+        self._sender.guard(self._link.now)
+
+    async def state(self) -> VehicleState:
+        """The newest state; waits for the first.
+
+        Raises
+        ------
+        LinkError
+            If the drone fell silent, began to count anew, or was landed because no command came.
+        """
+        if not self._link.is_open:
+            raise LinkError(f"{self.host} is not connected")
+        if self._reader.newest is None and not await self._link.until(_tells_state, FIRST_NEWS):
+            raise LinkError(f"no state of {self.host} within {FIRST_NEWS:g} s")
+        self._check_link()
+        state = self._reader.newest
+        assert state is not None
+        return state
+
+    def _check_link(self) -> None:
+        if self._link.failure is not None:
+            raise LinkError(
+                f"what listens to {self.host} has failed: {self._link.failure}"
+            ) from self._link.failure
+        if self._sender.expired is not None:
+            raise FlightAbortedError(self._sender.expired)
+        silent = self._link.silent
+        if silent > LOST:
+            raise LinkError(f"nothing heard of {self.host} for {silent:.1f} s")
+        if self._vz_max is not None and self._reader.restarts > self._restarts:
+            raise LinkError(
+                f"{self.host} began to count anew, so it has forgotten this client: land, and "
+                "connect again"
+            )
+
+    def command(self, climb: float) -> float:
+        """Ask for a vertical speed; it is sent at once and repeated while it is young.
+
+        Parameters
+        ----------
+        climb : float
+            m/s, up positive. Clipped to ``limits.max_climb``.
+
+        Returns
+        -------
+        float
+            What was sent, m/s.
+
+        Raises
+        ------
+        ValueError
+            If `climb` is not finite.
+        LinkError
+            If the drone was not told to take off, or was landed because no command came.
+        """
+        wanted = finite("climb", climb)
+        if self._sender.expired is not None:
+            raise FlightAbortedError(self._sender.expired)
+        if not self._sender.guarded:
+            raise LinkError(f"{self.host} is not in the air: take off before commanding it")
+        most = min(self.limits.max_climb, self.vz_max)
+        share = UnitCommand.saturated(max(-most, min(most, wanted)) / self.vz_max)
+        self._sender.climb(share, self._link.now)
+        self._link.send()
+        return float(share) * self.vz_max
+
+    def hover(self) -> None:
+        """Ask for no motion; like a command it is good for a short while, then the drone lands."""
+        self._sender.hover(self._link.now)
+        self._link.send()
+
+    def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
+        """Call `listener` with every state from now on; None: no longer.
+
+        If it raises, it is not called again, and the next `state` raises `LinkError` from that.
+        """
+        self._link.listener = listener
+
+    # Coming down
+
+    async def land(self) -> None:
+        """Land; returns when the drone is on the ground.
+
+        Raises
+        ------
+        LinkError
+            If it does not say so in 20 s, or says nothing for 3 s: by then its own watchdog lands
+            it. It is told to land as long as the link is open.
+        """
+        self._sender.land()
+        if not self._link.is_open or self._reader.newest is None:
+            return
+        self._link.send()
+        deadline = self._link.now + LANDING
+        while not await self._link.until(_has_landed, 0.1):
+            silent = self._link.silent
+            if silent > SILENT_LANDING:
+                raise LinkError(
+                    f"nothing heard of {self.host} for {silent:.1f} s while landing: its own "
+                    "watchdog lands it 2 s after the last command it heard"
+                )
+            if self._link.now > deadline:
+                raise LinkError(f"{self.host} has not landed in {LANDING:g} s")
+
+    async def close(self) -> None:
+        """Land if in the air, and end the link; may be called twice.
+
+        Raises
+        ------
+        LinkError
+            As `land` does; the link is closed all the same.
+        """
+        try:
+            await _uninterrupted(self.land())
+        finally:
+            self._link.shut()
+            self._vz_max = None
+
+    async def cut_motors(self) -> None:
+        """Stop the motors at once, whatever the height: the drone falls.
+
+        For a drone that is about to hurt somebody. Landing never does this.
+
+        Raises
+        ------
+        LinkError
+            If the drone does not say within 2 s that it did.
+        """
+        self._sender.land()
+        if not await self._toggled(lambda navdata: navdata.emergency):
+            raise LinkError(f"{self.host} does not confirm that its motors are cut")
+
+    async def clear_emergency(self) -> None:
+        """Bring a drone on the ground from emergency back to normal.
+
+        Raises
+        ------
+        LinkError
+            If it stays in emergency.
+        """
+        self._sender.land()
+        if not await self._toggled(lambda navdata: not navdata.emergency):
+            raise LinkError(f"{self.host} stays in emergency: check its motors and its level")
+
+    async def _toggled(self, wanted: Callable[[Navdata], bool]) -> bool:
+        """Toggle between emergency and normal, which takes a rising edge, until it is so."""
+        for _ in range(10):
+            if await self._link.until(wanted, 0.0):
+                return True
+            self._sender.cut = True
+            self._link.send()
+            if await self._link.until(wanted, 0.2):
+                return True
+        return False
+
+    async def __aenter__(self) -> Self:
+        await self.connect()
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            await self.close()
+        except LinkError as problem:
+            if error is None:
+                raise
+            error.add_note(str(problem))
+
+
+def _is_up(navdata: Navdata) -> bool:
+    return navdata.emergency or (navdata.flying and phase_of(navdata) in (FLYING, HOVERING))
+
+
+def _has_landed(navdata: Navdata) -> bool:
+    return navdata.demo is not None and on_ground(navdata)
+
+
+def _tells_state(navdata: Navdata) -> bool:
+    return navdata.demo is not None
+
+
+async def _uninterrupted(landing: Any) -> None:
+    """See a landing to its end, which comes in bounded time, and only then be cancelled."""
+    task = asyncio.ensure_future(landing)
+    interrupted = False
+    while not task.done():
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError:
+            if task.cancelled():
+                raise
+            interrupted = True
+        except LinkError:
+            break
+    if interrupted:
+        raise asyncio.CancelledError
+    task.result()

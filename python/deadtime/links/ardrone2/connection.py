@@ -1,0 +1,192 @@
+"""The two sockets to a drone, and the task that keeps talking to it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from deadtime._errors import LinkError
+from deadtime.links.ardrone2.commands import Command
+from deadtime.links.ardrone2.navdata import Navdata
+from deadtime.links.ardrone2.reader import NavdataReader
+from deadtime.links.ardrone2.sender import CYCLE, CommandSender
+from deadtime.links.safety import Limits
+from deadtime.links.vehicle import VehicleState
+
+__all__ = ["Connection"]
+
+#: What wakes the drone's navdata.
+WAKE_UP = b"\x01\x00\x00\x00"
+
+#: How often the wake-up is sent again while nothing comes, s.
+WAKE_AGAIN = 0.2
+
+#: Last words to a drone when the link closes, in case some are lost.
+LAST_WORDS = 3
+
+
+class Connection:
+    """Packets to one drone and from it; what they mean is for its reader and its sender.
+
+    Parameters
+    ----------
+    host : str
+        Address of the drone.
+    navdata_port, command_port : int
+        Its UDP ports.
+    limits : Limits
+        How old a command may get, and how fast a height may change.
+
+    Attributes
+    ----------
+    reader : NavdataReader
+        What has come in.
+    sender : CommandSender
+        What goes out.
+    listener : callable or None
+        Called with every state.
+    failure : Exception or None
+        What it raised, if it did; it is then no longer called.
+    """
+
+    def __init__(self, host: str, navdata_port: int, command_port: int, limits: Limits) -> None:
+        self.host = host
+        self.navdata_port, self.command_port = navdata_port, command_port
+        self.reader = NavdataReader(limits.max_jump)
+        self.sender = CommandSender(limits)
+        self.listener: Callable[[VehicleState], None] | None = None
+        self.failure: Exception | None = None
+        self._arrived = asyncio.Event()
+        self._navdata: asyncio.DatagramTransport | None = None
+        self._commands: asyncio.DatagramTransport | None = None
+        self._cycle: asyncio.Task[None] | None = None
+        self._woken = 0.0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether datagrams go out."""
+        return self._cycle is not None
+
+    @property
+    def now(self) -> float:
+        """The event loop's clock, s."""
+        return asyncio.get_running_loop().time()
+
+    @property
+    def silent(self) -> float:
+        """How long nothing was heard, s."""
+        heard = self.reader.heard
+        return 0.0 if heard is None else self.now - heard
+
+    async def open(self) -> None:
+        """Open the sockets and begin to talk: to be on the ground, until told otherwise.
+
+        Raises
+        ------
+        LinkError
+            If there is no way to the host, or the connection is open.
+        """
+        if self.is_open:
+            raise LinkError(f"{self.host} is connected already")
+        try:
+            # Connected to the drone: the system hands on what comes from there alone.
+            self._navdata = await self._socket(self.navdata_port, self.take)
+            self._commands = await self._socket(self.command_port, lambda packet: None)
+        except OSError as error:
+            self.shut()
+            raise LinkError(f"{self.host} cannot be reached: {error}") from None
+        self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
+
+    async def _socket(self, port: int, take: Callable[[bytes], None]) -> asyncio.DatagramTransport:
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+            lambda: _Door(take, self.reader.refuse), remote_addr=(self.host, port)
+        )
+        return transport
+
+    def shut(self) -> None:
+        """Tell the drone to land, and close the sockets."""
+        if self._cycle is not None:
+            self._cycle.cancel()
+            # Cancelled before it began, the task would not say its last words.
+            self._say_last_words()
+        for transport in (self._navdata, self._commands):
+            if transport is not None:
+                transport.close()
+        self._cycle = self._navdata = self._commands = None
+
+    async def _keep_sending(self) -> None:
+        """A datagram each cycle, the wake-up while nothing comes."""
+        try:
+            while self._navdata is not None:
+                now = self.now
+                quiet = self.reader.heard is None or self.silent > WAKE_AGAIN
+                if quiet and now - self._woken >= WAKE_AGAIN:
+                    self._woken = now
+                    self._navdata.sendto(WAKE_UP)
+                self.send()
+                await asyncio.sleep(CYCLE)
+        finally:
+            # Reached also when the program ends without having closed the link.
+            self._say_last_words()
+
+    def _say_last_words(self) -> None:
+        self.sender.land()
+        for _ in range(LAST_WORDS):
+            self.send()
+
+    def send(self, *more: Command) -> None:
+        """Send the next datagram now; `more` is said once, in it."""
+        if self._commands is None or self._commands.is_closing():
+            return
+        navdata = self.reader.navdata
+        alive = navdata is None or navdata.com_watchdog or self.silent > WAKE_AGAIN
+        self._commands.sendto(self.sender.datagram(self.now, alive, more))
+
+    def take(self, packet: bytes) -> None:
+        """Take in a packet of the drone."""
+        state = self.reader.accept(packet, self.now)
+        self._arrived.set()
+        if state is None or self.listener is None:
+            return
+        try:
+            self.listener(state)
+        except Exception as error:
+            # Here nobody could catch it; whoever flies is told with the next state.
+            self.listener, self.failure = None, error
+
+    async def until(self, holds: Callable[[Navdata], bool], timeout: float) -> bool:
+        """Wait until navdata are so; False if they are not before the timeout, s."""
+        deadline = self.now + timeout
+        while True:
+            navdata = self.reader.navdata
+            if navdata is not None and holds(navdata):
+                return True
+            left = deadline - self.now
+            if left <= 0.0:
+                return False
+            self._arrived.clear()
+            try:
+                await asyncio.wait_for(self._arrived.wait(), left)
+            except TimeoutError:
+                return False
+
+
+class _Door(asyncio.DatagramProtocol):
+    """Lets in what comes from the address and port that the socket is connected to."""
+
+    def __init__(self, take: Callable[[bytes], None], refuse: Callable[[], None]) -> None:
+        self._take, self._refuse = take, refuse
+        self._peer: Any = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._peer = transport.get_extra_info("peername")
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        if self._peer is not None and tuple(addr[:2]) != tuple(self._peer[:2]):
+            self._refuse()
+        else:
+            self._take(data)
+
+    def error_received(self, exc: Exception) -> None:
+        """A refused datagram is like a lost one: the silence that follows says it."""

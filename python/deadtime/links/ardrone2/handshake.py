@@ -1,0 +1,130 @@
+"""The configuration of the drone: set one key after the other, and read back what it then holds.
+
+The drone acknowledges a CONFIG by setting a bit of its state, COMMAND_MASK, which the client clears
+by CTRL 5 before the next. What came of it is in the dump on TCP, which CTRL 4 asks for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
+
+from deadtime._errors import LinkError
+from deadtime.links.ardrone2.commands import Command, Config, Control
+from deadtime.links.ardrone2.configuration import parse_configuration
+from deadtime.links.ardrone2.navdata import Navdata
+
+__all__ = ["Handshake", "check_configuration"]
+
+#: Modes of CTRL.
+SEND_CONFIGURATION, ACKNOWLEDGE = 4, 5
+
+#: How long an acknowledgement may take, how often a key is sent again, and how often CTRL 5, s.
+ANSWER, TRIES, AGAIN = 0.5, 5, 0.05
+
+#: How long the dump may take, s; how often it is asked for; and how long it may be, bytes.
+DUMP, DUMP_TRIES, LONGEST_DUMP = 2.0, 3, 65536
+
+Send = Callable[[Command], None]
+Until = Callable[[Callable[[Navdata], bool], float], Awaitable[bool]]
+
+
+class Handshake:
+    """Configures one drone.
+
+    Parameters
+    ----------
+    name : str
+        The drone, for messages.
+    send : callable
+        Sends a command, once.
+    until : callable
+        Waits until navdata are so, or for so many seconds; tells whether they are.
+    """
+
+    def __init__(self, name: str, send: Send, until: Until) -> None:
+        self._name, self._send, self._until = name, send, until
+
+    async def set(self, key: str, value: str) -> None:
+        """Set one key and wait for the acknowledgement.
+
+        Raises
+        ------
+        LinkError
+            If none comes, or if it cannot be cleared.
+        """
+        await self._clear()
+        for _ in range(TRIES):
+            self._send(Config(key, value))
+            if await self._until(lambda navdata: navdata.command_acknowledged, ANSWER):
+                await self._clear()
+                return
+        raise LinkError(
+            f"{self._name} does not acknowledge {key} = {value}, sent {TRIES} times: is another "
+            "client connected?"
+        )
+
+    async def _clear(self) -> None:
+        for _ in range(round(TRIES * ANSWER / AGAIN)):
+            if await self._until(lambda navdata: not navdata.command_acknowledged, 0.0):
+                return
+            self._send(Control(ACKNOWLEDGE))
+            if await self._until(lambda navdata: not navdata.command_acknowledged, AGAIN):
+                return
+        raise LinkError(
+            f"{self._name} keeps its acknowledgement bit set although CTRL {ACKNOWLEDGE} was sent "
+            f"for {TRIES * ANSWER:g} s: restart the drone"
+        )
+
+    async def read_back(self, host: str, port: int) -> dict[str, str]:
+        """The configuration as the drone holds it.
+
+        Raises
+        ------
+        LinkError
+            If it does not come.
+        """
+        problem = ""
+        for _ in range(DUMP_TRIES):
+            try:
+                return parse_configuration(await asyncio.wait_for(self._dump(host, port), DUMP))
+            except (OSError, EOFError, ValueError, TimeoutError) as error:
+                problem = str(error) or f"nothing came for {DUMP:g} s"
+        raise LinkError(
+            f"{self._name} does not send its configuration on TCP port {port} ({problem}): without "
+            "reading it back its limits are not known, so it is not flown"
+        )
+
+    async def _dump(self, host: str, port: int) -> bytes:
+        reader, writer = await asyncio.open_connection(host, port, limit=LONGEST_DUMP)
+        try:
+            self._send(Control(SEND_CONFIGURATION))
+            return await reader.readuntil(b"\0")
+        finally:
+            writer.close()
+
+
+def check_configuration(name: str, held: Mapping[str, str], wanted: Mapping[str, str]) -> None:
+    """Refuse a drone that does not hold what it was told.
+
+    Raises
+    ------
+    LinkError
+        With the key, and what it holds instead.
+    """
+    for key, value in wanted.items():
+        found = held.get(key)
+        if found is None or not _same(found, value):
+            shown = "nothing" if found is None else found
+            raise LinkError(
+                f"{name} was told {key} = {value} and reads back {shown}: it is not flown with "
+                "limits that it does not keep"
+            )
+
+
+def _same(found: str, wanted: str) -> bool:
+    """Whether two values are the same number, or the same word."""
+    try:
+        return abs(float(found) - float(wanted)) <= 1e-6 * abs(float(wanted))
+    except ValueError:
+        return found.strip().upper() == wanted.strip().upper()

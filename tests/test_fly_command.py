@@ -1,0 +1,161 @@
+"""``deadtime fly`` as it is run: on an emulator of its own, and what signals do to it."""
+
+import asyncio
+import csv
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from deadtime._experiment.step_test import ROW
+from deadtime.links.ardrone2.emulator import Phase
+from emulated import emulator
+
+FLY = [sys.executable, "-m", "deadtime", "fly"]
+
+
+def flown(*options):
+    return subprocess.run([*FLY, *map(str, options)], capture_output=True, text=True, check=False)
+
+
+def running(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_the_whole_experiment_in_virtual_time(tmp_path):
+    folder = tmp_path / "new" / "flight"
+    done = flown("--virtual-time", "--folder", folder, "--seed", 3, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["vehicle"] == "an emulated AR.Drone 2.0 (kit)"
+    assert 0.33 < told["overshoot_method"][1] < 0.38
+    assert told["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
+    assert told["transport"]["delay"] == pytest.approx(0.26, abs=0.01)
+    last = told["flights"][-1]
+    assert last["overshoot"] < 5.0
+    assert last["settling_time"] < min(one["settling_time"] for one in told["flights"][:-1])
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 3
+    assert told["verdict"].split(".")[0] in page
+    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == told
+    again = flown("--virtual-time", "--folder", folder)
+    assert again.returncode == 1
+    assert "holds recordings already" in again.stderr
+
+
+def test_a_real_host_needs_consent_and_shows_the_limits():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
+        drone.bind(("127.0.0.1", 0))
+        drone.settimeout(0.3)
+        port = drone.getsockname()[1]
+        done = flown("--host", "127.0.0.1", "--navdata-port", port, "--command-port", port)
+        with pytest.raises(TimeoutError):
+            drone.recvfrom(1)
+    assert done.returncode == 1
+    assert "--i-have-a-safe-area" in done.stderr
+    assert "nothing was sent" in done.stderr
+    # A real drone climbs at half a metre a second unless told otherwise.
+    assert "no more than 0.5 m/s" in done.stderr
+    assert "4 flights" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--gains", "1.2,3"), "Kp = 3 is above 2.47"),
+        (("--gains", "fast"), "numbers with commas"),
+        (("--gains", ""), "no gains to fly"),
+        (("--max-height", "1.2"), "outside 0.2 to 1.2 m"),
+        (("--host", "127.0.0.1", "--virtual-time"), "take one"),
+        (("--max-climb", "nan"), "max_climb"),
+        (("--step", "-0.2"), "step"),
+    ],
+)
+def test_what_is_not_safe_or_makes_no_sense_is_refused(options, said, tmp_path):
+    done = flown("--folder", tmp_path, *options)
+    assert done.returncode == 1
+    assert said in " ".join(done.stderr.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def read_rows(path):
+    """The rows of a recording; every one has to be whole."""
+    with path.open(newline="") as stream:
+        head, *rows = csv.reader(stream)
+    assert tuple(head) == ROW
+    assert all(len(row) == len(head) for row in rows)
+    return rows
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
+    async def fly():
+        async with emulator(host="127.0.0.1") as emulated:
+            ports = ("navdata_port", "command_port", "control_port")
+            options = [f"--{name.replace('_', '-')}={getattr(emulated, name)}" for name in ports]
+            process = await asyncio.create_subprocess_exec(
+                *FLY,
+                *("--host", "127.0.0.1", "--i-have-a-safe-area", "--folder", str(tmp_path)),
+                *options,
+                stderr=asyncio.subprocess.PIPE,
+            )
+            recording = tmp_path / "flight-1-P.csv"
+            for _ in range(600):
+                await asyncio.sleep(0.05)
+                if recording.exists() and len(recording.read_text().splitlines()) > 15:
+                    break
+            assert emulated.truth().phase is Phase.FLYING
+            process.send_signal(number)
+            await asyncio.sleep(0.5)
+            assert emulated.truth().phase is Phase.LANDING
+            process.send_signal(number)  # impatience does not end the landing
+            _, error = await asyncio.wait_for(process.communicate(), 20.0)
+            assert emulated.truth().phase is Phase.LANDED
+            assert process.returncode == 130
+            assert "landing first" in error.decode()
+            assert "kept in" in error.decode()
+            assert len(read_rows(recording)) > 14
+
+    asyncio.run(fly())
+
+
+def own_emulators(parent):
+    """Processes that a process has started."""
+    found = []
+    for entry in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            with open(f"/proc/{entry}/stat", encoding="utf-8") as stat:
+                fields = stat.read().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[1]) == parent:
+            found.append(int(entry))
+    return found
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_its_own_emulator_ends_with_it(number, tmp_path):
+    process = subprocess.Popen([*FLY, "--folder", str(tmp_path)], stderr=subprocess.DEVNULL)
+    children = []
+    for _ in range(200):
+        children = own_emulators(process.pid)
+        if children and list(tmp_path.glob("flight-1-P.csv")):
+            break
+        time.sleep(0.1)
+    assert children
+    process.send_signal(number)
+    process.wait(20.0)
+    for _ in range(100):
+        if not any(map(running, children)):
+            break
+        time.sleep(0.1)
+    assert not any(map(running, children))
