@@ -109,7 +109,8 @@ async def _run_relay(given: argparse.Namespace) -> None:
             await asyncio.sleep(given.duration)
         finally:
             paths = {name: getattr(relay, name) for name in WAYS}
-            _say(report={name: path.counts() for name, path in paths.items()})
+            counts = {name: path.counts() for name, path in paths.items()}
+            _say(report={**counts, "overflowed": relay.overflowed})
 
 
 async def _run_plant(given: argparse.Namespace) -> None:

@@ -48,7 +48,15 @@ class RelayOptions:
 
 
 class Relay:
-    """A relay at work: ``async with Relay(options) as relay``, then send to ``relay.address``."""
+    """A relay at work: ``async with Relay(options) as relay``, then send to ``relay.address``.
+
+    Attributes
+    ----------
+    there, back : Path
+        What became of the packets.
+    overflowed : int
+        Packets that were dropped because 10 000 were under way.
+    """
 
     def __init__(self, options: RelayOptions) -> None:
         self.options = options
