@@ -420,6 +420,18 @@ def test_answers_that_cannot_be_are_not_obeyed(change):
     assert report.link.invalid == 1
 
 
+@pytest.mark.parametrize("change", [{"echo_sequence": 9999}, {"echo_sent": 0.1}, {"held": 0.2}])
+def test_who_cannot_have_heard_the_plant_cannot_make_it_safe(change):
+    report = in_virtual_time(attacked(lambda measured: [answer(measured, flags=1, **change)]))
+    assert (report.link.invalid, report.trips) == (1, 0)
+
+
+def test_told_to_be_safe_the_plant_does_what_it_has_declared_itself():
+    report = in_virtual_time(attacked(lambda measured: [answer(measured, flags=1, value=20.0)]))
+    assert report.trips == 1
+    assert (report.recording.command == 0.0).all()
+
+
 @given(st.lists(st.binary(max_size=80), max_size=20))
 @settings(max_examples=25)
 def test_bytes_that_are_no_packets_are_counted_and_left(packets):

@@ -50,7 +50,8 @@ class ControllerOptions:
     watchdog : float
         Longest time without a measurement, s.
     safe : float
-        The command that is sent when the watchdog bites.
+        The command that is sent when the watchdog bites; a plant that reads its flag applies the
+        one that it has declared itself.
     every : bool
         Answer every measurement, as a plant with a jitter buffer needs it; else the newest alone.
     recording : Path or None

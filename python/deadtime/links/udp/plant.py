@@ -119,7 +119,7 @@ class Plant:
             self._measure()
         except Exception as error:  # such as a full disk: without samples there is no loop
             self._endpoint.fail(error)
-            self._make_safe(self.options.safe)
+            self._make_safe()
             return
         due = self._due + 1
         latest = math.floor((self._loop.time() - self._started) / self.options.sample_time + 1e-6)
@@ -173,12 +173,6 @@ class Plant:
             return
         # The plant's own numbers order what comes: a controller that was started anew has new ones.
         number = packet.echo_sequence if self._wire.has_times else packet.sequence
-        if packet.flags & SAFE:
-            if self._newest <= number <= self._sequence:
-                self._newest = number
-                self._make_safe(_clipped(packet.value, self.options.limit))
-                self._arm_watchdog()
-            return
         age = 0.0
         if self._wire.has_times:
             age = read - packet.echo_sent
@@ -187,6 +181,13 @@ class Plant:
             if not (own and packet.held <= age):
                 statistics.invalid += 1
                 return
+        if packet.flags & SAFE:
+            if number >= self._newest:
+                self._newest = number
+                self._make_safe()
+                self._arm_watchdog()
+            return
+        if self._wire.has_times:
             self._echo = (packet, read)
             statistics.exchanged(packet, read)
             self._arrivals.append((number, age))
@@ -251,16 +252,17 @@ class Plant:
     def _bite(self) -> None:
         """No command came in time: be safe, and ready for a controller that was started anew."""
         self._endpoint.forget_peer()
-        self._make_safe(self.options.safe)
+        self._make_safe()
 
-    def _make_safe(self, command: float) -> None:
+    def _make_safe(self) -> None:
+        """Apply the safe command that this end has declared, whatever the other one has."""
         now = self._loop.time()
         self._pass_time(now)
         for timer in (self._hold, *self._waiting):
             if timer is not None:
                 timer.cancel()
         self._waiting.clear()
-        self._command, self._stamp = command, math.nan
+        self._command, self._stamp = self.options.safe, math.nan
         if self._safe_since is None:
             self._safe_since = now
             self._trips += 1
