@@ -84,6 +84,7 @@ def test_a_lag_is_found_apart_from_the_delay():
     for method in ("waveform", "output_error"):
         fit = found.runs[0].estimates[method]
         assert (fit.delay, fit.lag) == pytest.approx((0.1, 0.05), abs=1e-6)
+    assert any("lag of the plant, 50.0 ms" in sentence for sentence in found.explanation())
 
 
 @pytest.mark.parametrize(

@@ -216,6 +216,12 @@ class InternetLoop:
                 "single fit is for those. For the mean delay go by the intervals of the replayed "
                 "steps, or make the delay constant with a jitter buffer."
             )
+        lag = self.runs[0].trial.lag
+        if lag > 0.0:
+            said.append(
+                f"The lag of the plant, {1e3 * lag:.1f} ms, is not in what was measured. The "
+                "overshoot methods take it for delay; replaying takes it out of their intervals."
+            )
         for method, label in TOLD.items():
             found = self.spread(method)
             if found.count == 0:
