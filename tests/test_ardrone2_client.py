@@ -36,6 +36,15 @@ async def fall(drone):
         raise ZeroDivisionError
 
 
+async def take_off_and_hover(emulated):
+    """Fly until somebody ends it."""
+    async with client_of(emulated) as drone:
+        await drone.take_off()
+        while True:
+            drone.hover()
+            await asyncio.sleep(0.05)
+
+
 def watch_datagrams(drone):
     """Everything that the client sends from now on, with the time."""
     sent = []
@@ -210,15 +219,7 @@ def test_an_exception_lands_it():
 def test_cancelling_lands_it_also_when_cancelled_again(impatient):
     async def fly():
         async with emulator() as emulated:
-
-            async def hover():
-                async with client_of(emulated) as drone:
-                    await drone.take_off()
-                    while True:
-                        drone.hover()
-                        await asyncio.sleep(0.05)
-
-            task = asyncio.create_task(hover())
+            task = asyncio.create_task(take_off_and_hover(emulated))
             await asyncio.sleep(7.0)
             assert emulated.truth().phase is Phase.FLYING
             task.cancel()
@@ -340,15 +341,7 @@ def test_a_dead_drone_ends_the_context_in_bounded_time():
 def test_a_landing_that_nobody_confirms_is_noted_on_what_ended_the_flight():
     async def fly():
         async with emulator() as emulated:
-
-            async def hover():
-                async with client_of(emulated) as drone:
-                    await drone.take_off()
-                    while True:
-                        drone.hover()
-                        await asyncio.sleep(0.05)
-
-            task = asyncio.create_task(hover())
+            task = asyncio.create_task(take_off_and_hover(emulated))
             await asyncio.sleep(7.0)
             await emulated.close()
             task.cancel()

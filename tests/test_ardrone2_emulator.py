@@ -156,6 +156,28 @@ def test_navdata_go_to_one_address_until_it_is_silent():
     assert [address for _, address in pilot.drone.packets(pilot.time)] == [other]
 
 
+@pytest.mark.parametrize("waits", [False, True])
+def test_navdata_go_to_the_host_of_the_commands(waits):
+    pilot, elsewhere = Pilot(), ("127.0.0.2", 40001)
+    pilot.wake(source=elsewhere)
+    if waits:
+        pilot.wake()
+    pilot.send(Config("general:navdata_demo", "FALSE"))
+    if not waits:
+        pilot.wake()
+    assert len(pilot.sent) == 1  # the answer to the wake-up from elsewhere
+    told = []
+    for _ in range(50):
+        pilot.drone.commanded(encode([Watchdog()], pilot.number), COMMANDS, pilot.time)
+        pilot.number += 1
+        pilot.time = round(pilot.time + 0.02, 6)
+        pilot.drone.advance(pilot.time)
+        told += pilot.take()
+    assert {address for _, address in told} == {NAVDATA}
+    numbers = [parse_navdata(packet).sequence for packet, _ in told]
+    assert numbers == list(range(1, 201))
+
+
 def test_navdata_stop_two_seconds_after_the_last_sign_of_life():
     pilot = Pilot().connect(demo=False)
     pilot.wait(1.0, Watchdog())
@@ -282,6 +304,22 @@ def test_a_new_client_may_begin_with_take_off():
     pilot.number = 1
     pilot.send(UP)
     assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+def test_what_another_client_wished_for_is_forgotten_with_its_numbers():
+    pilot = Pilot().connect().fly()
+    pilot.wait(20.0)
+    assert pilot.truth.phase is Phase.LANDED
+    pilot.number = 1
+    pilot.send(FlatTrim())  # its first command is no REF
+    assert pilot.wait(6.0, UP).phase is Phase.FLYING
+
+
+def test_numbers_from_0_on_are_those_of_one_client():
+    pilot = Pilot().connect().fly()
+    pilot.number = 0
+    pilot.drone.commanded(b"AT*REF=0,256\rAT*REF=1,256\r", COMMANDS, pilot.time + 3.0)
+    assert pilot.drone.truth(pilot.time + 3.0).emergency
 
 
 def test_a_low_battery_is_told_forbids_to_take_off_and_ends_a_flight():
@@ -685,6 +723,9 @@ def test_thrust_is_the_same_whoever_looks():
         ({"plant": "kite"}, "none of kit, paper, real, thrust"),
         ({"delay": -0.1}, "delay"),
         ({"jitter": float("nan")}, "jitter"),
+        ({"delay": 101.0}, "no more than 100"),
+        ({"downlink": 21.0}, "no more than 20"),
+        ({"noise": 1e9}, "no more than 10"),
         ({"battery": 101.0}, "percentage"),
         ({"seed": -1}, "seed"),
         ({"navdata_port": 70000}, "no port"),
@@ -758,6 +799,23 @@ def test_where_others_can_reach_it_the_clients_have_to_be_named():
     with pytest.raises(ValueError, match="'anybody' is no IP address"):
         EmulatorOptions(host="0.0.0.0", clients=("anybody",))
     assert EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)).answers("192.168.1.2")
+
+
+def test_a_name_that_looks_like_the_loopback_is_not_taken_for_it():
+    for host in ("127.0.0.1.example.org", "127.evil"):
+        with pytest.raises(ValueError, match="reached by others"):
+            EmulatorOptions(host=host)
+    for host in ("localhost", "127.0.0.2", "::1"):
+        assert EmulatorOptions(host=host).only_here
+
+
+@pytest.mark.parametrize("plant", ["kit", "thrust"])
+def test_the_largest_noise_has_a_place_in_navdata(plant):
+    pilot = Pilot(plant=plant, noise=10.0, downlink=20.0).connect(demo=False).fly()
+    pilot.wait(20.0, UP)
+    heights = [parse_navdata(packet).height for packet in pilot.sent]
+    assert len(heights) > 2000
+    assert np.std(heights[1:]) == pytest.approx(10.0, rel=0.1)
 
 
 def test_hosts_that_are_not_named_are_neither_heard_nor_answered():

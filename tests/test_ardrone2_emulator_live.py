@@ -3,6 +3,7 @@
 import asyncio
 import importlib.util
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -340,6 +341,24 @@ def test_the_command_tells_its_ports_works_and_ends_with_its_input(tmp_path):
     lines = truth.read_text().splitlines()
     assert lines[0].startswith("time_s,height_m,climb_m_s,demand_m_s")
     assert len(lines) > 1
+
+
+@pytest.mark.parametrize("end", ["time", "Ctrl-C"])
+def test_it_may_end_before_its_input_does(end, listens_to_ctrl_c):
+    given = ("--json", "--until-input-ends", *(["--duration", "0.1"] if end == "time" else []))
+    with started(*given, stdin=subprocess.PIPE) as process:
+        process.stdout.readline()
+        if end == "Ctrl-C":
+            process.send_signal(signal.SIGINT)
+        assert process.wait(20.0) == (130 if end == "Ctrl-C" else 0)
+        said = process.stderr.read()
+    assert said == ("deadtime: interrupted\n" if end == "Ctrl-C" else "")
+
+
+def test_without_an_input_it_ends_at_once():
+    with started("--json", "--until-input-ends", preexec_fn=lambda: os.close(0)) as process:
+        assert process.wait(20.0) == 0
+        assert process.stderr.read() == ""
 
 
 def test_ctrl_c_ends_the_command(listens_to_ctrl_c):

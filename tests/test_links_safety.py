@@ -2,7 +2,6 @@
 
 import copy
 import math
-import os
 import pickle
 import subprocess
 import sys
@@ -183,7 +182,7 @@ def test_every_row_is_in_the_file_before_the_next_is_written(tmp_path):
 def test_a_recording_is_never_written_over(tmp_path):
     path = tmp_path / "flight.csv"
     Journal(path, COLUMNS).close()
-    with pytest.raises(FileExistsError):
+    with pytest.raises(FileExistsError, match="give another name"):
         Journal(path, COLUMNS)
 
 
@@ -196,6 +195,51 @@ def test_a_row_that_cannot_be_read_back_is_refused_and_leaves_the_file_whole(tmp
     assert journal.path.read_text() == "time_s,reference_m,height_m\n0.0,1.0,\n"
     with pytest.raises(ValueError, match="closed"):
         journal.write((0.0, 1.0, 2.0))
+
+
+FULL_DISK = """
+import resource, signal, sys
+from deadtime.links import Journal
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # an error instead, as of a full disk
+resource.setrlimit(resource.RLIMIT_FSIZE, (16, 16))
+with Journal(sys.argv[1], ["x_m"]) as journal:
+    journal.write([1.25])
+    journal.write([2.25])
+    journal.write([3.25])
+"""
+
+
+def test_a_full_disk_leaves_whole_rows_and_says_where(tmp_path):
+    pytest.importorskip("resource", reason="this system has no limit on the size of files")
+    path = tmp_path / "flight.csv"
+    result = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(path)], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1
+    assert str(path) in result.stderr.splitlines()[-1]
+    assert path.read_text() == "x_m\n1.25\n2.25\n"  # the third would end at byte 19
+
+
+ROOM_AGAIN = """
+import contextlib, resource, sys
+from deadtime.links import Journal
+most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+resource.setrlimit(resource.RLIMIT_FSIZE, (12, most))
+with Journal(sys.argv[1], ["x_m"]) as journal:
+    journal.write([1.25])
+    with contextlib.suppress(OSError):
+        journal.write([2.25])
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+    journal.write([3.25])
+"""
+
+
+def test_a_row_after_one_that_found_no_room_leaves_no_hole(tmp_path):
+    pytest.importorskip("resource", reason="this system has no limit on the size of files")
+    path = tmp_path / "flight.csv"
+    subprocess.run([sys.executable, "-c", ROOM_AGAIN, str(path)], check=True)
+    assert path.read_bytes() == b"x_m\n1.25\n3.25\n"
 
 
 @pytest.mark.parametrize("columns", [(), ("a", "a"), ("a,b",), ('a"',), ("a\n",), ("",)])
@@ -214,25 +258,3 @@ def test_twelve_digits_are_kept(value):
         with Journal(Path(folder) / "one.csv", ["x"]) as journal:
             journal.write([value])
         assert float(journal.path.read_text().split()[1]) == pytest.approx(value, rel=1e-11)
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="the size of files is limited in a process")
-def test_a_row_for_which_there_is_no_room_is_told_and_leaves_whole_rows(tmp_path):
-    # A disk with room for some bytes of the next row: the system writes these and says how many.
-    path = tmp_path / "flight.csv"
-    program = (
-        "import resource, sys\n"
-        "from deadtime.links.journal import Journal\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
-        "with Journal(sys.argv[1], ['time_s', 'height_m']) as journal:\n"
-        "    for row in range(100):\n"
-        "        journal.write([0.5 * row, 1.25])\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=False
-    )
-    assert "no room for another row" in done.stderr
-    head, *rows = path.read_text().splitlines()
-    assert head == "time_s,height_m"
-    assert rows == [f"{0.5 * k},1.25" for k in range(len(rows))]
-    assert len(rows) == 9

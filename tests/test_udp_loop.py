@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from deadtime.links.udp import (
     Network,
     NewestWins,
     Normal,
+    Plant,
     PlantOptions,
     Relay,
     RelayOptions,
@@ -145,6 +147,26 @@ def test_a_recording_that_cannot_be_written_ends_the_run(tmp_path):
         assert in_virtual_time(disk_fills_up(monkeypatch)) == pytest.approx(1.01, abs=0.01)
 
 
+def test_an_end_that_cannot_record_leaves_its_port(tmp_path):
+    there = tmp_path / "there.csv"
+    there.touch()
+    here = ("127.0.0.1", 40_000)
+
+    async def twice(end, **more):
+        with pytest.raises(FileExistsError):
+            async with end(**more, listen=here, recording=there):
+                pass
+        async with end(**more, listen=here) as second:
+            return second.address
+
+    for end, options, more in (
+        (Controller, ControllerOptions, {"gain": 1.0}),
+        (Plant, PlantOptions, {"controller": ("127.0.0.1", 9)}),
+    ):
+        made = partial(lambda end, options, **given: end(options(**given)), end, options)
+        assert in_virtual_time(twice(made, **more)) == here
+
+
 def test_losses_are_counted_as_they_happened():
     relays = []
     way = Network(delay=0.05, loss=0.1, duplication=0.1)
@@ -173,6 +195,15 @@ def test_a_jitter_buffer_makes_a_random_delay_constant():
         recording.time, recording.reference, reference_time=recording.time
     )
     assert np.abs(model.outputs - recording.output).max() < 1e-9
+
+
+def test_answers_may_take_as_long_as_the_watchdog_allows():
+    way = Network(delay=2.4)
+    trial = Trial(gain=0.1, there=way, back=way, sample_time=1e-3, watchdog=5.0, duration=6.0)
+    report = run(trial)
+    assert report.plant.link.invalid == 0
+    assert report.plant.applied > 1000
+    assert report.plant.age_when_applied.largest == pytest.approx(4.8, abs=1e-9)
 
 
 def test_late_commands_are_dropped_where_asked_for():
@@ -387,6 +418,18 @@ def test_answers_that_cannot_be_are_not_obeyed(change):
     report = in_virtual_time(attacked(lambda measured: [answer(measured, **change)]))
     assert report.applied == 0
     assert report.link.invalid == 1
+
+
+@pytest.mark.parametrize("change", [{"echo_sequence": 9999}, {"echo_sent": 0.1}, {"held": 0.2}])
+def test_who_cannot_have_heard_the_plant_cannot_make_it_safe(change):
+    report = in_virtual_time(attacked(lambda measured: [answer(measured, flags=1, **change)]))
+    assert (report.link.invalid, report.trips) == (1, 0)
+
+
+def test_told_to_be_safe_the_plant_does_what_it_has_declared_itself():
+    report = in_virtual_time(attacked(lambda measured: [answer(measured, flags=1, value=20.0)]))
+    assert report.trips == 1
+    assert (report.recording.command == 0.0).all()
 
 
 @given(st.lists(st.binary(max_size=80), max_size=20))

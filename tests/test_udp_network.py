@@ -1,5 +1,6 @@
 """The network between plant and controller: what it does to packets follows from its seed."""
 
+import math
 import random
 import statistics
 
@@ -134,6 +135,8 @@ def test_a_network_goes_through_words(network):
         (lambda: Network(blackouts=((2.0, 1.0),)), "empty"),
         (lambda: Bursts(0.1, 0.0), "never end"),
         (lambda: Bursts.of(0.9, 1.5), "longer"),
+        (lambda: Bursts.of(0.05, math.inf), "finite"),
+        (lambda: network_of("gamma", 0.0, 0.01), "cannot vary"),
         (lambda: ShiftedGamma(0.05, 0.05, 0.01), "not above"),
         (lambda: network_of("pareto"), "none of"),
         (lambda: network_from("{}"), "describe"),

@@ -1,6 +1,7 @@
 """Virtual time: the clock jumps, the network is in memory, and nothing is left to chance."""
 
 import asyncio
+import math
 
 import pytest
 from deadtime import LinkError
@@ -69,6 +70,18 @@ def test_a_wait_without_end_is_an_error_and_not_a_hang():
 
     with pytest.raises(LinkError, match="without an end"):
         run(main())
+
+
+def test_the_end_of_all_times_is_not_jumped_to():
+    with pytest.raises(LinkError, match="without an end"):
+        run(asyncio.sleep(math.inf))
+
+    async def main():
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(asyncio.sleep(math.inf), 5.0)
+        return asyncio.get_running_loop().time()
+
+    assert run(main()) == 5.0
 
 
 def test_datagrams_arrive_at_once_in_order_and_carry_their_sender():

@@ -75,7 +75,9 @@ def run_internet_loop(
     LinkError
         When a process does not start, or ends before its time.
     FileExistsError
-        When the folder holds recordings of that name already.
+        When the folder holds recordings of that name already, or is a file.
+    OSError
+        When the folder cannot be made.
     """
     if not len(gains):
         raise ValueError("gains is empty: give one or more")
@@ -92,6 +94,8 @@ def run_internet_loop(
     for file in [] if folder is None else [folder / f"{a}{b}.csv" for a in stems for b in ENDS]:
         if file.exists():  # said before the first of them runs
             raise FileExistsError(EEXIST, "there already; choose another folder", str(file))
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
     runs = []
     for one, stem in zip(trials, stems, strict=True):
         progress(f"K = {one.gain:g}: running")

@@ -131,7 +131,9 @@ def _overshoot(trial: Trial, times: Array) -> float:
     plant = HeldIntegrator(trial.plant_gain, trial.lag)
     samples = math.floor((trial.duration - trial.rest) / trial.sample_time)
     holds = trial.policy.holds
-    hold = min(trial.watchdog, math.inf if holds is None else holds * trial.sample_time)
+    hold, then = trial.watchdog, trial.safe
+    if holds is not None and holds * trial.sample_time < hold:
+        hold, then = holds * trial.sample_time, 0.0
     under_way: list[tuple[float, int, float]] = []
     command, newest, clock, peak = 0.0, -1, 0.0, 0.0
     let_go = math.inf
@@ -141,7 +143,7 @@ def _overshoot(trial: Trial, times: Array) -> float:
         nonlocal clock, command, let_go
         if let_go < now:
             plant.advance(let_go - clock, command)
-            clock, command, let_go = let_go, 0.0, math.inf
+            clock, command, let_go = let_go, then, math.inf
         plant.advance(now - clock, command)
         clock = now
 

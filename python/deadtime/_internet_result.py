@@ -182,6 +182,8 @@ class InternetLoop:
             return found
         errors = [self._errors[index][method] for index in answered]
         low, high = interval_of_mean(found.mean, errors, self._age_error)
+        if math.isnan(low):
+            return found
         return replace(found, low=low, high=high, replayed=True)
 
     @property
@@ -213,6 +215,12 @@ class InternetLoop:
                 "The delay is not constant: a step meets few of its values, and the interval of a "
                 "single fit is for those. For the mean delay go by the intervals of the replayed "
                 "steps, or make the delay constant with a jitter buffer."
+            )
+        lag = self.runs[0].trial.lag
+        if lag > 0.0:
+            said.append(
+                f"The lag of the plant, {1e3 * lag:.1f} ms, is not in what was measured. The "
+                "overshoot methods take it for delay; replaying takes it out of their intervals."
             )
         for method, label in TOLD.items():
             found = self.spread(method)

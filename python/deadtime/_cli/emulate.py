@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
-import threading
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
@@ -22,6 +21,7 @@ from deadtime.links import Journal
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase, Truth
 from deadtime.links.ardrone2.emulator.motion import PlantName
 from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
+from deadtime.links.lifeline import input_ends
 
 __all__ = ["emulators", "tell"]
 
@@ -120,9 +120,7 @@ async def _emulate(
             live = None
             if not as_json and console.is_terminal:
                 live = stack.enter_context(Live(console=console, auto_refresh=False))
-            ended = asyncio.Event()
-            if until_input_ends:
-                _watch_input(ended)
+            ended = input_ends() if until_input_ends else asyncio.Event()
             tasks: list[asyncio.Task[object]] = [asyncio.create_task(ended.wait())]
             if journal is not None:
                 tasks.append(asyncio.create_task(_keep(emulator, journal)))
@@ -199,16 +197,3 @@ async def _keep(emulator: Emulator, journal: Journal) -> None:
         row = (truth.time, truth.height, truth.climb, truth.demand, truth.battery, landed)
         journal.write(row)
         await asyncio.sleep(RECORDED_EVERY)
-
-
-def _watch_input(ended: asyncio.Event) -> None:
-    """Set an event at the end of standard input, which ends with the process that holds it."""
-    loop = asyncio.get_running_loop()
-
-    def read() -> None:
-        while sys.stdin.buffer.read(4096):
-            pass
-        loop.call_soon_threadsafe(ended.set)
-
-    # A daemon: nobody waits for input that may never end.
-    threading.Thread(target=read, daemon=True).start()

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "check_picture",
     "console",
     "counted",
     "estimates_table",
@@ -64,10 +65,17 @@ def print_table(table: Table) -> None:
     Console(width=max(console.width, needed)).print(table, soft_wrap=True)
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure to a file whose suffix says the format."""
+def check_picture(path: Path) -> None:
+    """Refuse a file that no figure can be written to, before long work for the figure begins."""
     if path.suffix.lower() not in PICTURES:
         raise ValueError(f"{path} is no picture: end it in {', '.join(PICTURES)}")
+    if not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}; make it, or give another one")
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure to a file whose suffix says the format."""
+    check_picture(path)
     figure.savefig(path, dpi=150)
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import errno
 import math
 import os
 from collections.abc import Iterable, Sequence
+from errno import EEXIST
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -30,6 +30,8 @@ class Journal:
     ------
     FileExistsError
         If the file is there: a recording is never written over.
+    OSError
+        Also of `write`: if the disk is full, or the file cannot be made.
     ValueError
         If names repeat or hold a comma, a quote or the end of a line.
 
@@ -57,8 +59,18 @@ class Journal:
                 raise ValueError(f"the column name {name!r} cannot stand in the first line of CSV")
         self.path.parent.mkdir(parents=True, exist_ok=True)
         # Unbuffered: one row is one call of the system, whole or not at all.
-        self._file = open(self.path, "xb", buffering=0)  # noqa: SIM115
-        self._put(self.columns)
+        try:
+            self._file = open(self.path, "xb", buffering=0)  # noqa: SIM115
+        except FileExistsError:
+            raise FileExistsError(
+                EEXIST, "there already; give another name", str(self.path)
+            ) from None
+        self._size = 0
+        try:
+            self._put(self.columns)
+        except OSError:
+            self._file.close()
+            raise
 
     def write(self, row: Iterable[float | None]) -> None:
         """Append one row; `None` leaves a cell empty.
@@ -68,8 +80,6 @@ class Journal:
         ValueError
             If the row has another length than the columns, a value is not finite, or the journal
             is closed.
-        OSError
-            If the row does not go into the file, which then ends with the one before.
         """
         values = list(row)
         if len(values) != len(self.columns):
@@ -87,12 +97,16 @@ class Journal:
     def _put(self, cells: Iterable[str]) -> None:
         if self._file.closed:
             raise ValueError(f"the journal {self.path} is closed: open another one")
-        row = (",".join(cells) + "\n").encode()
-        written = self._file.write(row) or 0
-        if written < len(row):  # the last bytes of a disk; without this row the file is whole
-            self._file.seek(-written, os.SEEK_CUR)
+        line = (",".join(cells) + "\n").encode()
+        written = 0
+        try:
+            while written < len(line):  # a disk that is all but full takes a part
+                written += self._file.write(line[written:])
+        except OSError as error:
+            self._file.seek(self._size)
             self._file.truncate()
-            raise OSError(errno.ENOSPC, "no room for another row", str(self.path))
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+        self._size += len(line)
 
     def sync(self) -> None:
         """Have the system put all rows on the disk."""
@@ -101,10 +115,8 @@ class Journal:
     def close(self) -> None:
         """Put all rows on the disk and close the file; may be called twice."""
         if not self._file.closed:
-            try:
-                self.sync()
-            finally:
-                self._file.close()
+            self.sync()
+            self._file.close()
 
     def __enter__(self) -> Self:
         return self

@@ -12,7 +12,7 @@ from deadtime.links.udp.described import DELAYS, POLICIES, network_of, policy_of
 from deadtime.links.udp.integrator import HeldIntegrator
 from deadtime.links.udp.network import Bursts, Network, Path
 from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_doubles
-from deadtime.links.udp.plant import run_plant
+from deadtime.links.udp.plant import Plant, run_plant
 from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.policies import DropLate, HoldThenZero, JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.processes import run_processes
@@ -46,6 +46,7 @@ __all__ = [
     "Normal",
     "Path",
     "Percentiles",
+    "Plant",
     "PlantOptions",
     "PlantReport",
     "Policy",

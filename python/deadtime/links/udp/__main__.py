@@ -1,8 +1,8 @@
 """``python -m deadtime.links.udp controller|relay|plant``: each part as a process of its own.
 
 Each says where it listens in one line of JSON when it is ready, and what happened in another when
-it ends: after its time, or by Ctrl-C or SIGTERM. Nothing but the base of the package is needed, so
-that either end can run on a small computer.
+it ends: after its time, by Ctrl-C or SIGTERM, or with whoever started it. Nothing but the base of
+the package is needed, so that either end can run on a small computer.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from deadtime._errors import DeadtimeError
+from deadtime.links.lifeline import input_ends
 from deadtime.links.udp.controller import Controller, ControllerOptions
 from deadtime.links.udp.described import (
     DELAYS,
@@ -28,8 +29,8 @@ from deadtime.links.udp.described import (
     plain,
     policy_of,
 )
-from deadtime.links.udp.endpoint import Address, is_loopback
-from deadtime.links.udp.plant import run_plant
+from deadtime.links.udp.endpoint import Address, resolved, speaking_to
+from deadtime.links.udp.plant import Plant
 from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.relay import Relay, RelayOptions
 
@@ -40,17 +41,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one part of the loop; the exit code is 0 on success only."""
     given = _parser().parse_args(arguments)
     try:
-        asyncio.run(_until_told(given.run(given)))
+        asyncio.run(_until_told(given.run(given), given.until_input_ends))
     except (DeadtimeError, OSError, ValueError) as error:
         print(f"deadtime.links.udp: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
     return 0
 
 
-async def _until_told(work: Coroutine[Any, Any, None]) -> None:
+async def _until_told(work: Coroutine[Any, Any, None], until_input_ends: bool) -> None:
     """Run, and end in an orderly way when told to."""
     task = asyncio.ensure_future(work)
     loop = asyncio.get_running_loop()
+    if until_input_ends:
+        lifeline = asyncio.ensure_future(input_ends().wait())
+        lifeline.add_done_callback(lambda _: task.cancel())
     for number in (signal.SIGINT, signal.SIGTERM):
         with suppress(NotImplementedError, RuntimeError):  # Windows has no such handlers
             loop.add_signal_handler(number, task.cancel)
@@ -105,16 +109,15 @@ async def _run_relay(given: argparse.Namespace) -> None:
             await asyncio.sleep(given.duration)
         finally:
             paths = {name: getattr(relay, name) for name in WAYS}
-            _say(report={name: path.counts() for name, path in paths.items()})
+            counts = {name: path.counts() for name, path in paths.items()}
+            _say(report={**counts, "overflowed": relay.overflowed})
 
 
 async def _run_plant(given: argparse.Namespace) -> None:
-    listen = given.listen
-    if not is_loopback(given.controller[0]) and listen == LOOPBACK:
-        listen = ("0.0.0.0", 0)  # a socket on the loopback cannot send elsewhere
+    controller = await resolved(given.controller)
     options = PlantOptions(
-        controller=given.controller,
-        listen=listen,
+        controller=controller,
+        listen=given.listen or speaking_to(controller),
         gain=given.gain,
         lag=given.lag,
         sample_time=given.sample_time,
@@ -128,8 +131,12 @@ async def _run_plant(given: argparse.Namespace) -> None:
         recording=given.recording,
         doubles=given.doubles,
     )
-    report = await run_plant(options)
-    _say(report=report.to_dict())
+    async with Plant(options) as plant:
+        _ready("plant", plant.address)
+        try:
+            await plant.running()
+        finally:
+            _say(report=plant.report().to_dict())
 
 
 #: From the plant to the controller, and back.
@@ -140,9 +147,16 @@ LOOPBACK = ("127.0.0.1", 0)
 
 def _address(text: str) -> Address:
     host, colon, port = text.rpartition(":")
-    if not colon or not port.isdigit() or int(port) > 65535:
+    if not colon or not port.isdecimal() or int(port) > 65535:
         raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT, such as 127.0.0.1:5600")
-    return host or "127.0.0.1", int(port)
+    return host.removeprefix("[").removesuffix("]") or "127.0.0.1", int(port)
+
+
+def _time(text: str) -> float:
+    time = float(text)
+    if not time > 0.0:
+        raise argparse.ArgumentTypeError(f"{text} s is no time to run for: give more than zero")
+    return time
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -152,6 +166,7 @@ def _parser() -> argparse.ArgumentParser:
     controller = parts.add_parser("controller", help="answers measurements with commands")
     controller.set_defaults(run=_run_controller)
     controller.add_argument("--gain", type=float, required=True, help="K, 1/s")
+    controller.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
     controller.add_argument("--plant", type=_address, help="answer this address alone")
     controller.add_argument(
         "--every", action="store_true", help="answer every measurement, for a jitter buffer"
@@ -159,6 +174,7 @@ def _parser() -> argparse.ArgumentParser:
 
     relay = parts.add_parser("relay", help="stands for the network between")
     relay.set_defaults(run=_run_relay)
+    relay.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
     relay.add_argument("--to", type=_address, required=True, help="the controller")
     relay.add_argument("--delay", type=float, default=0.05, help="mean one-way delay, s")
     relay.add_argument("--jitter", type=float, default=0.0, help="its standard deviation, s")
@@ -178,6 +194,9 @@ def _parser() -> argparse.ArgumentParser:
     plant.add_argument(
         "--controller", type=_address, required=True, help="the controller, or a relay"
     )
+    plant.add_argument(
+        "--listen", type=_address, help="HOST:PORT. Without: where the controller can answer"
+    )
     plant.add_argument("--gain", type=float, default=1.0, help="of the integrator")
     plant.add_argument("--lag", type=float, default=0.0, help="of the integrator, s")
     plant.add_argument("--sample-time", type=float, default=0.01, help="between measurements, s")
@@ -187,8 +206,12 @@ def _parser() -> argparse.ArgumentParser:
     plant.add_argument("--policy-number", type=float, help="time in s, or number of samples")
 
     for part, duration in ((controller, math.inf), (relay, math.inf), (plant, 6.0)):
-        part.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
-        part.add_argument("--duration", type=float, default=duration, help="how long to run, s")
+        part.add_argument("--duration", type=_time, default=duration, help="how long to run, s")
+        part.add_argument(
+            "--until-input-ends",
+            action="store_true",
+            help="end when standard input does, as whoever started this does",
+        )
     for part in (controller, plant):
         part.add_argument("--limit", type=float, default=20.0, help="largest size of the command")
         part.add_argument("--watchdog", type=float, default=0.5, help="longest silence, s")

@@ -50,7 +50,8 @@ class ControllerOptions:
     watchdog : float
         Longest time without a measurement, s.
     safe : float
-        The command that is sent when the watchdog bites.
+        The command that is sent when the watchdog bites; a plant that reads its flag applies the
+        one that it has declared itself.
     every : bool
         Answer every measurement, as a plant with a jitter buffer needs it; else the newest alone.
     recording : Path or None
@@ -124,7 +125,6 @@ class Controller:
         self.options = options
         self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
         self._endpoint = Endpoint(self._wire, self._take, options.plant)
-        self._stack = ExitStack()
         self._journal: Journal | None = None
         self._newest = 0
         self._sequence = 0
@@ -138,9 +138,11 @@ class Controller:
     async def __aenter__(self) -> Controller:
         self._loop = asyncio.get_running_loop()
         await self._endpoint.open(self.options.listen)
-        self._stack.callback(self._endpoint.close)
-        if self.options.recording is not None:
-            self._journal = self._stack.enter_context(Journal(self.options.recording, COLUMNS))
+        with ExitStack() as stack:
+            stack.callback(self._endpoint.close)
+            if self.options.recording is not None:
+                self._journal = stack.enter_context(Journal(self.options.recording, COLUMNS))
+            self._stack = stack.pop_all()
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:

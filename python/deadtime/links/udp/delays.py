@@ -66,7 +66,22 @@ class Normal:
 
 
 @dataclass(frozen=True)
-class ShiftedGamma:
+class _Queued:
+    """A shortest delay with a wait on top of it: its numbers, checked."""
+
+    least: float
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        non_negative("least", self.least)
+        positive("deviation", self.deviation)
+        if not self.mean > self.least:
+            raise ValueError(f"mean={self.mean} is not above least={self.least}: give a longer one")
+
+
+@dataclass(frozen=True)
+class ShiftedGamma(_Queued):
     """A shortest delay, and a gamma-distributed wait on top of it, as queues make it.
 
     Parameters
@@ -79,16 +94,6 @@ class ShiftedGamma:
         Standard deviation, s.
     """
 
-    least: float
-    mean: float
-    deviation: float
-
-    def __post_init__(self) -> None:
-        non_negative("least", self.least)
-        positive("deviation", self.deviation)
-        if not self.mean > self.least:
-            raise ValueError(f"mean={self.mean} is not above least={self.least}: give a longer one")
-
     def draw(self, numbers: random.Random) -> float:
         """One delay, s."""
         wait = self.mean - self.least
@@ -97,7 +102,7 @@ class ShiftedGamma:
 
 
 @dataclass(frozen=True)
-class LogNormal:
+class LogNormal(_Queued):
     """A shortest delay, and a log-normally distributed wait on top of it, with its long tail.
 
     Parameters
@@ -109,16 +114,6 @@ class LogNormal:
     deviation : float
         Standard deviation, s.
     """
-
-    least: float
-    mean: float
-    deviation: float
-
-    def __post_init__(self) -> None:
-        non_negative("least", self.least)
-        positive("deviation", self.deviation)
-        if not self.mean > self.least:
-            raise ValueError(f"mean={self.mean} is not above least={self.least}: give a longer one")
 
     def draw(self, numbers: random.Random) -> float:
         """One delay, s."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, fields
-from pathlib import Path
 from typing import Any
 
 from deadtime.links.udp.controller import ControllerOptions
@@ -41,6 +40,10 @@ def delays_of(kind: str, mean: float, deviation: float) -> Delays:
         raise ValueError(f"the delays {kind!r} are none of {', '.join(DELAYS)}")
     if deviation == 0.0:
         return Constant(mean)
+    if mean == 0.0 and kind != "normal":
+        raise ValueError(
+            f"{kind} delays of {mean} s on average cannot vary by {deviation} s: give a longer mean"
+        )
     if kind == "normal":
         return Normal(mean, deviation)
     return (ShiftedGamma if kind == "gamma" else LogNormal)(LEAST * mean, mean, deviation)
@@ -173,7 +176,7 @@ def arguments_of(options: ControllerOptions | RelayOptions | PlantOptions) -> li
         if field.name == "policy":
             word, number = policy_words(value)
             arguments += ["--policy", word]
-            arguments += [] if number is None else ["--policy-number", repr(number)]
+            arguments += [] if number is None else ["--policy-number", str(number)]
         elif value is True:
             arguments += [f"--{name}"]
         elif isinstance(value, Network):
@@ -186,5 +189,5 @@ def arguments_of(options: ControllerOptions | RelayOptions | PlantOptions) -> li
             arguments += [f"--{to}", f"{host}:{port}"]
         else:
             # In one word: a negative number would be taken for another option.
-            arguments += [f"--{name}={value if isinstance(value, (str, Path)) else repr(value)}"]
+            arguments += [f"--{name}={value}"]
     return arguments

@@ -15,7 +15,7 @@ from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.statistics import LinkStatistics
 from deadtime.links.udp.wires import Wire
 
-__all__ = ["Address", "Endpoint", "Socket", "open_socket"]
+__all__ = ["Address", "Endpoint", "Socket", "open_socket", "resolved", "speaking_to"]
 
 Address: TypeAlias = tuple[str, int]
 
@@ -85,9 +85,25 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
+def speaking_to(address: Address) -> Address:
+    """Where a socket listens that speaks to a numeric address: no wider than it has to."""
+    there = ipaddress.ip_address(address[0])
+    if there.is_loopback:  # a socket on the loopback cannot send elsewhere
+        return ("127.0.0.1" if there.version == 4 else "::1"), 0
+    return ("0.0.0.0" if there.version == 4 else "::"), 0
+
+
 async def resolved(address: Address) -> Address:
-    """The numeric IPv4 address that datagrams from this host come from."""
+    """The numeric address that datagrams from this host come from; of a name, the IPv4 one.
+
+    Raises
+    ------
+    LinkError
+        When the host has no such address, or the port is 0.
+    """
     host, port = address
+    if port == 0:
+        raise LinkError(f"nobody can be reached at port 0 of {host}: give the port it listens on")
     try:
         ipaddress.ip_address(host)
     except ValueError:
@@ -95,7 +111,9 @@ async def resolved(address: Address) -> Address:
         try:
             found = await loop.getaddrinfo(host, port)
         except OSError as error:
-            raise LinkError(f"the host {host!r} is not known: {error.strerror}") from None
+            raise LinkError(
+                f"the host {host!r} is not known: {error.strerror}; give its address"
+            ) from None
         numeric = [entry[4][0] for entry in found if ":" not in str(entry[4][0])]
         if not numeric:
             raise LinkError(f"the host {host!r} has no IPv4 address") from None

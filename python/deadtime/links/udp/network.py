@@ -61,7 +61,7 @@ class Bursts:
         _probability("loss", loss)
         if loss >= 1.0:
             raise ValueError(f"loss={loss}: give less than 1, all is lost else")
-        if not length >= 1.0:
+        if not finite("length", length) >= 1.0:
             raise ValueError(f"length={length}: a burst is one packet at least")
         end = 1.0 / length
         begin = end * loss / (1.0 - loss)

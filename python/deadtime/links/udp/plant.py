@@ -11,19 +11,18 @@ from __future__ import annotations
 import asyncio
 import math
 from collections import deque
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 
 from deadtime._recording import MINIMUM_SAMPLES, Recording
 from deadtime.links.journal import Journal
-from deadtime.links.udp.endpoint import Endpoint
+from deadtime.links.udp.endpoint import Address, Endpoint
 from deadtime.links.udp.integrator import HeldIntegrator
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.statistics import KEPT, REMEMBERED, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
 
-__all__ = ["run_plant"]
+__all__ = ["Plant", "run_plant"]
 
 #: Columns of the plant's recording.
 COLUMNS = ("time_s", "reference", "output", "command", "age_s")
@@ -39,23 +38,26 @@ async def run_plant(options: PlantOptions) -> PlantReport:
     OSError
         When the recording cannot be written; the safe command is in force by then.
     """
-    plant = _Plant(options)
-    await plant.open()
-    with plant.at_work():
+    async with Plant(options) as plant:
         await plant.running()
-    return plant.report()
+        return plant.report()
 
 
-class _Plant:
+class Plant:
+    """A plant at work: ``async with Plant(options) as plant``."""
+
     def __init__(self, options: PlantOptions) -> None:
         self.options = options
         self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
         self._endpoint = Endpoint(self._wire, self._take, options.controller)
+        self._journal: Journal | None = None
         self._model = HeldIntegrator(options.gain, options.lag)
         self._command, self._stamp = options.safe, math.nan
         self._newest = 0
         self._sequence = 0
         self._sent: dict[int, float] = {}
+        # Whatever is answered in time, and longer, to tell what is late from what cannot be.
+        self._remembered = max(REMEMBERED, 2 * math.ceil(options.watchdog / options.sample_time))
         self._echo: tuple[LoopPacket, float] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self._hold: asyncio.TimerHandle | None = None
@@ -71,35 +73,34 @@ class _Plant:
         self._safe_time = 0.0
         self._largest_command = self._largest_output = 0.0
 
-    async def open(self) -> None:
+    async def __aenter__(self) -> Plant:
         self._loop = asyncio.get_running_loop()
         await self._endpoint.open(self.options.listen)
-
-    async def running(self) -> None:
-        await self._endpoint.running(self.options.duration)
-
-    @contextmanager
-    def at_work(self) -> Iterator[None]:
-        """Sample and obey until the end of the context, then leave the safe command in force."""
         with ExitStack() as stack:
             stack.callback(self._endpoint.close)
-            self._journal = None
             if self.options.recording is not None:
                 self._journal = stack.enter_context(Journal(self.options.recording, COLUMNS))
-            self._started = self._clock = self._loop.time()
-            self._due = 0
-            stack.callback(self._stop)
-            self._tick = self._loop.call_soon(self._sample)
-            yield
+            self._stack = stack.pop_all()
+        self._started = self._clock = self._loop.time()
+        self._due = 0
+        self._tick = self._loop.call_soon(self._sample)
+        return self
 
-    def _stop(self) -> None:
+    async def __aexit__(self, *_: object) -> None:
         for timer in (self._tick, self._watchdog, self._hold, *self._waiting):
             if timer is not None:
                 timer.cancel()
-        self._pass_time(self._loop.time())
-        if self._safe_since is not None:
-            self._safe_time += self._clock - self._safe_since
         self._command = self.options.safe
+        self._stack.close()
+
+    async def running(self) -> None:
+        """Work for as long as the options say; raises what it cannot work on with."""
+        await self._endpoint.running(self.options.duration)
+
+    @property
+    def address(self) -> Address:
+        """Where the plant receives."""
+        return self._endpoint.address
 
     def _pass_time(self, now: float) -> None:
         """Bring the plant, and the account of the command's age, up to now."""
@@ -118,7 +119,7 @@ class _Plant:
             self._measure()
         except Exception as error:  # such as a full disk: without samples there is no loop
             self._endpoint.fail(error)
-            self._make_safe(self.options.safe)
+            self._make_safe()
             return
         due = self._due + 1
         latest = math.floor((self._loop.time() - self._started) / self.options.sample_time + 1e-6)
@@ -139,7 +140,7 @@ class _Plant:
         echo, read = self._echo or (None, now)
         self._sequence += 1
         self._sent[self._sequence] = now
-        self._sent.pop(self._sequence - REMEMBERED, None)
+        self._sent.pop(self._sequence - self._remembered, None)
         self._endpoint.send(
             LoopPacket(
                 sequence=self._sequence,
@@ -172,12 +173,6 @@ class _Plant:
             return
         # The plant's own numbers order what comes: a controller that was started anew has new ones.
         number = packet.echo_sequence if self._wire.has_times else packet.sequence
-        if packet.flags & SAFE:
-            if self._newest <= number <= self._sequence:
-                self._newest = number
-                self._make_safe(_clipped(packet.value, self.options.limit))
-                self._arm_watchdog()
-            return
         age = 0.0
         if self._wire.has_times:
             age = read - packet.echo_sent
@@ -186,6 +181,13 @@ class _Plant:
             if not (own and packet.held <= age):
                 statistics.invalid += 1
                 return
+        if packet.flags & SAFE:
+            if number >= self._newest:
+                self._newest = number
+                self._make_safe()
+                self._arm_watchdog()
+            return
+        if self._wire.has_times:
             self._echo = (packet, read)
             statistics.exchanged(packet, read)
             self._arrivals.append((number, age))
@@ -250,21 +252,25 @@ class _Plant:
     def _bite(self) -> None:
         """No command came in time: be safe, and ready for a controller that was started anew."""
         self._endpoint.forget_peer()
-        self._make_safe(self.options.safe)
+        self._make_safe()
 
-    def _make_safe(self, command: float) -> None:
+    def _make_safe(self) -> None:
+        """Apply the safe command that this end has declared, whatever the other one has."""
         now = self._loop.time()
         self._pass_time(now)
         for timer in (self._hold, *self._waiting):
             if timer is not None:
                 timer.cancel()
         self._waiting.clear()
-        self._command, self._stamp = command, math.nan
+        self._command, self._stamp = self.options.safe, math.nan
         if self._safe_since is None:
             self._safe_since = now
             self._trips += 1
 
     def report(self) -> PlantReport:
+        """What happened until now."""
+        self._pass_time(self._loop.time())
+        since = self._clock if self._safe_since is None else self._safe_since
         recording = None
         if len(self._rows) >= MINIMUM_SAMPLES:
             time, reference, output, command = zip(*self._rows, strict=True)
@@ -278,7 +284,7 @@ class _Plant:
             oldest=self._oldest,
             age_when_applied=Percentiles.of(self._ages),
             trips=self._trips,
-            safe_time=self._safe_time,
+            safe_time=self._safe_time + (self._clock - since),
             largest_command=self._largest_command,
             largest_output=self._largest_output,
             arrivals=tuple(self._arrivals),

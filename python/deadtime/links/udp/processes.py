@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -27,12 +28,16 @@ class Part:
 
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
         self.name = name
+        # Not a pipe of Popen's, whose `communicate` closes it at once.
+        its_end, self._lifeline = os.pipe()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "deadtime.links.udp", name, *arguments],
+            [sys.executable, "-m", "deadtime.links.udp", name, "--until-input-ends", *arguments],
+            stdin=its_end,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
+        os.close(its_end)
 
     def address(self) -> Address:
         """Where it listens, once it is ready."""
@@ -45,38 +50,45 @@ class Part:
         finally:
             giving_up.cancel()
         if not line:
-            raise LinkError(f"the {self.name} did not start: {self._last_words()}")
+            _, said = self.process.communicate()
+            raise LinkError(f"the {self.name} did not start: {_last_line(said)}")
         ready = json.loads(line)
         return ready["host"], ready["port"]
 
     def report(self, within: float) -> dict[str, Any]:
         """What it says at its end, which comes within so many seconds."""
         try:
-            out, _ = self.process.communicate(timeout=within)
+            out, said = self.process.communicate(timeout=within)
         except subprocess.TimeoutExpired:
             raise LinkError(f"the {self.name} did not end within {within:g} s") from None
         lines = out.splitlines()
         if self.process.returncode != 0 or not lines:
             raise LinkError(
-                f"the {self.name} ended before its time (exit code {self.process.returncode})"
+                f"the {self.name} ended before its time (exit code {self.process.returncode}): "
+                f"{_last_line(said)}"
             )
         found: dict[str, Any] = json.loads(lines[-1])["report"]
         return found
 
-    def _last_words(self) -> str:
-        _, said = self.process.communicate()
-        return said.strip().splitlines()[-1] if said.strip() else "it said nothing"
+    def end(self) -> None:
+        """End it, if it has not ended yet."""
+        self.process.kill()
+        self.process.communicate()
+        os.close(self._lifeline)
+
+
+def _last_line(said: str) -> str:
+    return said.strip().splitlines()[-1] if said.strip() else "it said nothing"
 
 
 @contextmanager
 def part(name: str, arguments: Sequence[str]) -> Iterator[Part]:
-    """Start a process of the loop; it has ended when the context has, in every case."""
+    """Start a process of the loop; it has ended when the context has, or when this process has."""
     started = Part(name, arguments)
     try:
         yield started
     finally:
-        started.process.kill()
-        started.process.communicate()
+        started.end()
 
 
 def run_processes(trial: Trial, folder: Path, *, stem: str = "") -> dict[str, dict[str, Any]]:
@@ -103,13 +115,11 @@ def run_processes(trial: Trial, folder: Path, *, stem: str = "") -> dict[str, di
         When a process does not start, or ends before its time.
     """
     files = {end: folder / f"{stem}{end}.csv" for end in ENDS}
-    # If this process is killed, the others end by themselves.
-    until = ["--duration", repr(trial.duration + 3.0 * PATIENCE)]
     with ExitStack() as stack:
         options = trial.controller_options(files["controller"])
-        controller = stack.enter_context(part("controller", [*arguments_of(options), *until]))
+        controller = stack.enter_context(part("controller", arguments_of(options)))
         between = arguments_of(trial.relay_options(controller.address()))
-        relay = stack.enter_context(part("relay", [*between, *until]))
+        relay = stack.enter_context(part("relay", between))
         wanted = trial.plant_options(relay.address(), files["plant"])
         plant = stack.enter_context(part("plant", arguments_of(wanted)))
         reports = {"plant": plant.report(trial.duration + PATIENCE)}

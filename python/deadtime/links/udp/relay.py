@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 import heapq
 import itertools
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 
-from deadtime.links.udp.endpoint import Address, Socket, open_socket, resolved
+from deadtime.links.udp.endpoint import Address, Socket, open_socket, resolved, speaking_to
 from deadtime.links.udp.network import Network, Path
 
 __all__ = ["Relay", "RelayOptions"]
@@ -47,7 +48,15 @@ class RelayOptions:
 
 
 class Relay:
-    """A relay at work: ``async with Relay(options) as relay``, then send to ``relay.address``."""
+    """A relay at work: ``async with Relay(options) as relay``, then send to ``relay.address``.
+
+    Attributes
+    ----------
+    there, back : Path
+        What became of the packets.
+    overflowed : int
+        Packets that were dropped because 10 000 were under way.
+    """
 
     def __init__(self, options: RelayOptions) -> None:
         self.options = options
@@ -65,8 +74,11 @@ class Relay:
         self._started = self._loop.time()
         self._controller = await resolved(self.options.controller)
         self._front: Socket = await open_socket(self._from_plant, self.options.listen)
-        own = "127.0.0.1" if self._controller[0].startswith("127.") else "0.0.0.0"
-        self._rear: Socket = await open_socket(self._from_controller, (own, 0))
+        with ExitStack() as stack:
+            stack.callback(self._front.close)
+            own = speaking_to(self._controller)
+            self._rear: Socket = await open_socket(self._from_controller, own)
+            stack.pop_all()
         return self
 
     async def __aexit__(self, *_: object) -> None:

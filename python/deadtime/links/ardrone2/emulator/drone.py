@@ -139,9 +139,13 @@ class Drone:
         """Take a datagram of the command port."""
         time = self._go_on(now)
         for number, command in decode(datagram):
+            begins = self._order.begins(number)
             if not self._order.accept(number, time):
                 continue
-            self._listener.commanded(source, time)
+            if begins:  # what another client wished for is no wish of this one
+                self._ref = Ref()
+            if self._listener.commanded(source, time):
+                self._sequence = 0
             self._carry_out(number, command, source, time)
 
     def woken(self, datagram: bytes, source: Address, now: float) -> None:
@@ -218,8 +222,7 @@ class Drone:
         A drone that has landed by itself must not take off again because somebody goes on
         repeating the wish of before: the wish counts from when it is expressed anew.
         """
-        before = Ref() if self._order.begins(number) else self._ref
-        self._ref, self._ref_number = ref, number
+        before, self._ref, self._ref_number = self._ref, ref, number
         flight = self._flight
         if ref.emergency and not before.emergency:
             flight.toggle_emergency(time)

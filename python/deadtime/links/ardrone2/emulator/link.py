@@ -59,8 +59,8 @@ class Order:
         return True
 
     def begins(self, number: int) -> bool:
-        """Whether this number is a client's first."""
-        return number <= 1
+        """Whether this number, if it comes next, is a client's first."""
+        return number == 0 or (number == 1 and self._last != 0)
 
     @property
     def loses_at(self) -> Micros | None:
@@ -115,17 +115,23 @@ class Listener:
         self._answered = time
         return True
 
-    def commanded(self, source: Address, time: Micros) -> None:
+    def commanded(self, source: Address, time: Micros) -> bool:
         """A command was executed: a sign of life of the listener if it comes from its socket.
 
         Commands and wake-ups come from two sockets of one host; which belong together is told by
-        who was first.
+        who was first. A listener on another host leaves: True, if so.
         """
         if self._commander is None:
             self._commander = source
+            if self.address is not None and self.address[0] != source[0]:
+                waits = self._waiting is not None and self._waiting[0] == source[0]
+                self.address, self._waiting = self._waiting if waits else None, None
+                self._heard = time
+                return True
         here = self.address is not None and self.address[0] == source[0]
         if here and source == self._commander:
             self._heard = time
+        return False
 
     @property
     def leaves_at(self) -> Micros | None:

@@ -15,6 +15,9 @@ LOOPBACK = "127.0.0.1"
 
 #: The ports of the vehicle count from here: navdata, commands and control.
 PORT_BASE = 5550
+#: Longer delays would need more commands and navdata under way than are kept, and navdata have no
+#: place for much more noise.
+LARGEST = {"delay": 100.0, "jitter": 100.0, "downlink": 20.0, "noise": 10.0}
 PORTS_FROM_BASE = {"navdata_port": 4, "command_port": 6, "control_port": 9}
 
 
@@ -79,10 +82,13 @@ class EmulatorOptions:
     def __post_init__(self) -> None:
         if self.plant not in DELAYS:
             raise ValueError(f"plant={self.plant!r} is none of {', '.join(get_args(PlantName))}")
-        for name in ("jitter", "downlink", "noise"):
-            object.__setattr__(self, name, non_negative(name, getattr(self, name)))
-        if self.delay is not None:
-            object.__setattr__(self, "delay", non_negative("delay", self.delay))
+        for name, largest in LARGEST.items():
+            if getattr(self, name) is None:
+                continue
+            value = non_negative(name, getattr(self, name))
+            if value > largest:
+                raise ValueError(f"{name}={value}: give no more than {largest:g}")
+            object.__setattr__(self, name, value)
         if not 0.0 <= self.battery <= 100.0:
             raise ValueError(f"battery={self.battery} is no percentage: give 0 to 100")
         if self.seed < 0:
@@ -110,7 +116,10 @@ class EmulatorOptions:
     @property
     def only_here(self) -> bool:
         """Whether only this machine can reach it."""
-        return self.host in ("localhost", "::1") or self.host.startswith("127.")
+        try:
+            return ip_address(self.host).is_loopback
+        except ValueError:
+            return self.host == "localhost"
 
     def answers(self, host: str) -> bool:
         """Whether a host is listened to."""
