@@ -188,8 +188,9 @@ class Endpoint:
 
     async def running(self, time: float) -> None:
         """Wait for so long, s, or until the endpoint fails; raises the error then."""
-        with suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._closed.wait(), None if math.isinf(time) else time)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(None if math.isinf(time) else time):
+                await self._closed.wait()
         self.check()
 
     def check(self) -> None:
