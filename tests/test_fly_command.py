@@ -114,6 +114,15 @@ def read_rows(path):
     return rows
 
 
+# These tests may run under `nohup`, which the command would respect; this takes its place first.
+HEEDING_SIGHUP = [
+    sys.executable,
+    "-c",
+    "import os, signal, sys\n"
+    "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"
+    "os.execv(sys.argv[1], sys.argv[1:])",
+]
+
 ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
 
@@ -170,29 +179,35 @@ def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
             ports = ("navdata_port", "command_port", "control_port")
             options = [f"--{name.replace('_', '-')}={getattr(emulated, name)}" for name in ports]
             process = await asyncio.create_subprocess_exec(
+                *HEEDING_SIGHUP,
                 *FLY,
                 *("--host", "127.0.0.1", "--i-have-a-safe-area", "--folder", str(tmp_path)),
                 *options,
                 stderr=asyncio.subprocess.PIPE,
             )
             recording = tmp_path / "flight-1-P.csv"
-            for _ in range(600):
-                await asyncio.sleep(0.05)
-                if recording.exists() and len(recording.read_text().splitlines()) > 15:
-                    break
-            if process.returncode is not None:
-                skip_if_too_busy((await process.communicate())[1].decode())
-            assert emulated.truth().phase is Phase.FLYING
-            process.send_signal(number)
-            await asyncio.sleep(0.5)
-            assert emulated.truth().phase is Phase.LANDING
-            process.send_signal(number)  # impatience does not end the landing
-            _, error = await asyncio.wait_for(process.communicate(), 20.0)
-            assert emulated.truth().phase is Phase.LANDED
-            assert process.returncode == 130
-            assert "landing first" in error.decode()
-            assert "kept in" in error.decode()
-            assert len(read_rows(recording)) > 14
+            try:
+                for _ in range(600):
+                    await asyncio.sleep(0.05)
+                    if recording.exists() and len(recording.read_text().splitlines()) > 15:
+                        break
+                if process.returncode is not None:
+                    skip_if_too_busy((await process.communicate())[1].decode())
+                assert emulated.truth().phase is Phase.FLYING
+                process.send_signal(number)
+                await asyncio.sleep(0.5)
+                assert emulated.truth().phase is Phase.LANDING
+                process.send_signal(number)  # impatience does not end the landing
+                _, error = await asyncio.wait_for(process.communicate(), 20.0)
+                assert emulated.truth().phase is Phase.LANDED
+                assert process.returncode == 130
+                assert "landing first" in error.decode()
+                assert "kept in" in error.decode()
+                assert len(read_rows(recording)) > 14
+            finally:
+                if process.returncode is None:
+                    process.kill()
+                    await process.communicate()
 
     asyncio.run(fly())
 
