@@ -164,10 +164,6 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         await asyncio.sleep(0)
         return near, near_protocol
 
-    async def create_unix_connection(self, *given: Any, **others: Any) -> Any:
-        """Refused: there is no such thing in the memory of this loop."""
-        raise NotImplementedError("in virtual time there are only datagrams and TCP streams")
-
 
 class _Datagrams(asyncio.DatagramTransport):
     """One end of a network that loses nothing and takes no time."""
