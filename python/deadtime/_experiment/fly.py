@@ -22,6 +22,7 @@ from deadtime._experiment.learn import FlightStudy, learn
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain, fly_steps
 from deadtime._readers import read_recording
 from deadtime._validation import positive
+from deadtime.links.clock import now
 from deadtime.links.journal import Journal
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import Vehicle, VehicleState
@@ -237,7 +238,7 @@ async def _fly_one(
     control = HeightControl(controller, plan.sample_time, smoothing)
     path = folder / f"flight-{number}-{type(controller).__name__}.csv"
     await vehicle.take_off()
-    begin = asyncio.get_running_loop().time()
+    begin = now()
     messages = path.with_suffix(".messages.csv")
     with Journal(path, ROW) as journal, _messages(vehicle, messages, begin) as told:
         await fly_steps(vehicle, control, plan.programme(hold), plan.limits, journal, begin)

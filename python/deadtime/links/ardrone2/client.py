@@ -195,7 +195,14 @@ class ARDrone2:
                 f"vertical speed of {speed:g} m/s: ask for less"
             )
         self._link.send(FlatTrim())
+        asked = self._link.now
         await asyncio.sleep(TRIMMING)
+        late = self._link.now - asked - TRIMMING
+        if late > self.limits.command_age:
+            raise LinkError(
+                f"this program stood still for {late:.2f} s just before {self.host} would have "
+                "taken off: what was seen of it is old; take off again"
+            )
         self._sender.fly()
         try:
             await self._rise()
@@ -220,7 +227,8 @@ class ARDrone2:
         Raises
         ------
         LinkError
-            If the drone fell silent, began to count anew, or was landed because no command came.
+            If the drone fell silent or began to count anew, another client commands it, or the
+            flight has ended without `land`, as of `command`.
         """
         if not self._link.is_open:
             raise LinkError(f"{self.host} is not connected")
@@ -236,16 +244,24 @@ class ARDrone2:
             raise LinkError(
                 f"what listens to {self.host} has failed: {self._link.failure}"
             ) from self._link.failure
-        if self._sender.expired is not None:
-            raise FlightAbortedError(self._sender.expired)
+        self._check_wish()
+        if self._sender.rival is not None:
+            raise LinkError(self._sender.rival)
         silent = self._link.silent
         if silent > LOST:
-            raise LinkError(f"nothing heard of {self.host} for {silent:.1f} s")
-        if self._vz_max is not None and self._reader.restarts > self._restarts:
             raise LinkError(
-                f"{self.host} began to count anew, so it has forgotten this client: land, and "
-                "connect again"
+                f"nothing heard of {self.host} for {silent:.1f} s: it is off or out of reach, or "
+                "sends its navdata to another client"
             )
+        if self._vz_max is not None and self._reader.restarts > self._restarts:
+            raise LinkError(self._link.forgotten)
+
+    def _check_wish(self) -> None:
+        """Refuse to go on with a flight that has ended by itself."""
+        self._sender.age(self._link.now)
+        if self._sender.expired is not None:
+            self._link.send()  # it says to land
+            raise FlightAbortedError(self._sender.expired)
 
     def command(self, climb: float) -> float:
         """Ask for a vertical speed; it is sent at once and repeated while it is young.
@@ -258,28 +274,36 @@ class ARDrone2:
         Returns
         -------
         float
-            What was sent, m/s.
+            What was sent, m/s: 0 while nothing tells yet whether the drone still flies after a
+            pause of this program.
 
         Raises
         ------
         ValueError
             If `climb` is not finite.
         LinkError
-            If the drone was not told to take off, or was landed because no command came.
+            If the drone was not told to take off, or if the flight has ended without `land`: no
+            command came, this program stood still, the drone landed or obeyed another client.
         """
         wanted = finite("climb", climb)
-        if self._sender.expired is not None:
-            raise FlightAbortedError(self._sender.expired)
-        if not self._sender.guarded:
+        if self._sender.expired is None and not self._sender.guarded:
             raise LinkError(f"{self.host} is not in the air: take off before commanding it")
+        self._check_wish()
         most = min(self.limits.max_climb, self.vz_max)
         share = UnitCommand.saturated(max(-most, min(most, wanted)) / self.vz_max)
-        self._sender.climb(share, self._link.now)
+        sent = self._sender.climb(share, self._link.now)
         self._link.send()
-        return float(share) * self.vz_max
+        return float(sent) * self.vz_max
 
     def hover(self) -> None:
-        """Ask for no motion; like a command it is good for a short while, then the drone lands."""
+        """Ask for no motion; like a command it is good for a short while, then the drone lands.
+
+        Raises
+        ------
+        LinkError
+            If the flight has ended without `land`, as of `command`.
+        """
+        self._check_wish()
         self._sender.hover(self._link.now)
         self._link.send()
 

@@ -11,6 +11,7 @@ from deadtime.links.ardrone2.commands import Command
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import NavdataReader
 from deadtime.links.ardrone2.sender import CYCLE, CommandSender
+from deadtime.links.clock import now
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import VehicleState
 
@@ -70,8 +71,16 @@ class Connection:
 
     @property
     def now(self) -> float:
-        """The event loop's clock, s."""
-        return asyncio.get_running_loop().time()
+        """The clock of all ages, s."""
+        return now()
+
+    @property
+    def forgotten(self) -> str:
+        """What is said when the drone has begun to count anew."""
+        return (
+            f"{self.host} began to count anew, so it has forgotten this client: land, and connect "
+            "again"
+        )
 
     @property
     def silent(self) -> float:
@@ -122,10 +131,9 @@ class Connection:
         """A datagram each cycle, the wake-up while nothing comes."""
         try:
             while self._navdata is not None:
-                now = self.now
                 quiet = self.reader.heard is None or self.silent > WAKE_AGAIN
-                if quiet and now - self._woken >= WAKE_AGAIN:
-                    self._woken = now
+                if quiet and self.now - self._woken >= WAKE_AGAIN:
+                    self._woken = self.now
                     self._navdata.sendto(WAKE_UP)
                 self.send()
                 await asyncio.sleep(CYCLE)
@@ -148,7 +156,13 @@ class Connection:
 
     def take(self, packet: bytes) -> None:
         """Take in a packet of the drone."""
-        state = self.reader.accept(packet, self.now)
+        reader = self.reader
+        before, restarts = reader.navdata, reader.restarts
+        state = reader.accept(packet, self.now)
+        if reader.restarts > restarts:
+            self.sender.give_up(self.forgotten)
+        if reader.navdata is not None and reader.navdata is not before:
+            self.sender.told(reader.navdata, reader.sent)
         self._arrived.set()
         if state is None or self.listener is None:
             return
