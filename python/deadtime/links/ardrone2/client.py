@@ -43,6 +43,11 @@ TRIMMING = 0.3
 #: How long nothing may come while landing, s: by then the drone's own watchdog lands it.
 SILENT_LANDING = 3.0
 
+#: By how much news are younger than a toggle of the emergency that is then sent again, s; how long
+#: the drone is given to confirm one in all, s; and how often its datagram is sent: copies have the
+#: same number, and the drone carries out one.
+TOGGLED, TOGGLING, COPIES = 1.0, 5.0, 3
+
 #: Largest vertical speed that a command of 1 stands for, mm/s: what the drone may be told is
 #: 200 to 2000, its own default 700.
 VZ_MAX = 1000
@@ -357,12 +362,13 @@ class ARDrone2:
     async def cut_motors(self) -> None:
         """Stop the motors at once, whatever the height: the drone falls.
 
-        For a drone that is about to hurt somebody. Landing never does this.
+        For a drone that is about to hurt somebody. Landing never does this. The drone is told once,
+        and again only if what it says 1 s later still shows its motors on.
 
         Raises
         ------
         LinkError
-            If the drone does not say within 2 s that it did.
+            If the drone does not say within 5 s that it did.
         """
         self._sender.land()
         if not await self._toggled(lambda navdata: navdata.emergency):
@@ -381,15 +387,26 @@ class ARDrone2:
             raise LinkError(f"{self.host} stays in emergency: check its motors and its level")
 
     async def _toggled(self, wanted: Callable[[Navdata], bool]) -> bool:
-        """Toggle between emergency and normal, which takes a rising edge, until it is so."""
-        for _ in range(10):
-            if await self._link.until(wanted, 0.0):
-                return True
+        """Toggle between emergency and normal until the drone says that it is as wanted.
+
+        The drone has one signal for both directions, so a second one too early would undo the
+        first. It is sent again only after news that must have been written long after the first,
+        and still show the old state.
+        """
+        link = self._link
+        deadline = link.now + TOGGLING
+        while not await link.until(wanted, 0.0):
             self._sender.cut = True
-            self._link.send()
-            if await self._link.until(wanted, 0.2):
-                return True
-        return False
+            link.send(copies=COPIES)
+            toggled = link.now
+            while not await link.until(wanted, LOOKING):
+                if link.now > deadline:
+                    return False
+                # What waited in the socket during a pause of this program is no news, either.
+                since = max(toggled, self._sender.resumed)
+                if link.told is not None and link.told >= since + TOGGLED:
+                    break
+        return True
 
     async def __aenter__(self) -> Self:
         await self.connect()

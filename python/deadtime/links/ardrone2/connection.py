@@ -83,6 +83,11 @@ class Connection:
         )
 
     @property
+    def told(self) -> float | None:
+        """When the newest news were sent, s; when they arrived, where the drone tells no clock."""
+        return self.reader.heard if self.reader.sent is None else self.reader.sent
+
+    @property
     def silent(self) -> float:
         """How long nothing was heard, s."""
         heard = self.reader.heard
@@ -146,13 +151,15 @@ class Connection:
         for _ in range(LAST_WORDS):
             self.send()
 
-    def send(self, *more: Command) -> None:
-        """Send the next datagram now; `more` is said once, in it."""
+    def send(self, *more: Command, copies: int = 1) -> None:
+        """Send the next datagram now, so many times; `more` is said once, in it."""
         if self._commands is None or self._commands.is_closing():
             return
         navdata = self.reader.navdata
         alive = navdata is None or navdata.com_watchdog or self.silent > WAKE_AGAIN
-        self._commands.sendto(self.sender.datagram(self.now, alive, more))
+        datagram = self.sender.datagram(self.now, alive, more)
+        for _ in range(copies):
+            self._commands.sendto(datagram)
 
     def take(self, packet: bytes) -> None:
         """Take in a packet of the drone."""
