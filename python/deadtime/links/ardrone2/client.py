@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import math
+import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -48,12 +51,11 @@ SILENT_LANDING = 3.0
 #: same number, and the drone carries out one.
 TOGGLED, TOGGLING, COPIES = 1.0, 5.0, 3
 
-#: Largest vertical speed that a command of 1 stands for, mm/s: what the drone may be told is
-#: 200 to 2000, its own default 700.
-VZ_MAX = 1000
+#: What the drone takes as its largest vertical speed, mm/s, and as its largest height, mm.
+VZ_MAX, ALTITUDE_MAX = (200, 2000), (500, 5000)
 
-#: Longest heights of the drone's own limit, mm.
-ALTITUDE_MAX = (500, 5000)
+#: How long putting its settings back may take, s.
+PUTTING_BACK = 3.0
 
 
 class ARDrone2:
@@ -67,7 +69,8 @@ class ARDrone2:
     host : str
         Address of the drone.
     limits : Limits, optional
-        What it is kept within. The largest height is set in the drone, too.
+        What it is kept within. Largest climb and height are set in the drone, too, as far as it
+        takes them, and put back to what they were when the link is closed.
     full : bool
         All of navdata, 200 times a second, with vertical speed and the demand that is followed;
         otherwise the 15 small ones.
@@ -109,14 +112,21 @@ class ARDrone2:
         self.limits = Limits() if limits is None else limits
         self.full = full
         self.control_port = control_port
-        self._link = Connection(host, navdata_port, command_port, self.limits)
-        self._sender, self._reader = self._link.sender, self._link.reader
+        self._ports = navdata_port, command_port
         self._restarts = 0
         self._vz_max: float | None = None
+        self._before: dict[str, str] = {}
+        self._link = self._new_link()
+
+    def _new_link(self) -> Connection:
+        """Both directions from their beginning: what an earlier link has heard is no news."""
+        link = Connection(self.host, *self._ports, self.limits)
+        self._sender, self._reader = link.sender, link.reader
+        return link
 
     @property
     def statistics(self) -> LinkStatistics:
-        """What came over the link until now."""
+        """What has come since it was connected last."""
         return self._reader.statistics
 
     @property
@@ -142,35 +152,63 @@ class ARDrone2:
         LinkError
             If it does not answer, or does not hold what it was told.
         """
+        if self._link.is_open:
+            raise LinkError(f"{self.host} is connected already")
+        listener, self._link = self._link.listener, self._new_link()
+        self._link.listener = listener
         await self._link.open()
         try:
             await self._configure()
-        except BaseException:
+        except BaseException as error:
+            _note(error, await self._put_back())
             self._link.shut()
             raise
 
     async def _configure(self) -> None:
-        heard = await self._link.until(lambda navdata: True, FIRST_NEWS)
+        link, host = self._link, self.host
+        heard = await link.until(lambda navdata: True, FIRST_NEWS)
         if not heard:
             raise LinkError(
-                f"no navdata from {self.host}, UDP port {self._link.navdata_port}, within "
-                f"{FIRST_NEWS:g} s: is the drone on, and this computer in its network?"
+                f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NEWS:g} s: "
+                "is the drone on, this computer in its network, and no other client connected?"
             )
-        handshake = Handshake(self.host, self._link.send, self._link.until)
-        highest = round(1e3 * self.limits.max_height)
+        handshake = Handshake(host, link.send, link.until)
+        demo = {"general:navdata_demo": "FALSE" if self.full else "TRUE"}
+        await handshake.set(*demo.popitem())
+        before = await handshake.read_back(host, self.control_port)
+        climb = math.ceil(1e3 * self.limits.max_climb - 1e-6)
         wanted = {
-            "general:navdata_demo": "FALSE" if self.full else "TRUE",
-            "control:control_vz_max": str(VZ_MAX),
-            "control:altitude_max": str(min(max(highest, ALTITUDE_MAX[0]), ALTITUDE_MAX[1])),
+            "control:control_vz_max": str(min(max(climb, VZ_MAX[0]), VZ_MAX[1])),
+            "control:altitude_max": str(
+                min(max(round(1e3 * self.limits.max_height), ALTITUDE_MAX[0]), ALTITUDE_MAX[1])
+            ),
         }
         for key, value in wanted.items():
+            if before.get(key, value) != value:
+                self._before[key] = before[key]
             await handshake.set(key, value)
-        held = await handshake.read_back(self.host, self.control_port)
-        check_configuration(self.host, held, wanted)
-        if not await self._link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
-            raise LinkError(f"{self.host} sends navdata without height and battery: restart it")
+        held = await handshake.read_back(host, self.control_port)
+        check_configuration(host, held, wanted)
+        if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
+            raise LinkError(f"{host} sends navdata without height and battery: restart it")
         self._vz_max = 1e-3 * float(held["control:control_vz_max"])
         self._restarts = self._reader.restarts
+
+    async def _put_back(self) -> str | None:
+        """Set what was changed to what it was, if the drone is down and answers; what was not."""
+        before, self._before = self._before, {}
+        link, navdata = self._link, self._reader.navdata
+        handshake = Handshake(self.host, link.send, link.until)
+        with suppress(LinkError, TimeoutError):
+            async with asyncio.timeout(PUTTING_BACK):
+                while before and link.silent < LOST and navdata is not None and on_ground(navdata):
+                    key = next(iter(before))
+                    await handshake.set(key, before[key])
+                    del before[key]
+        if not before:
+            return None
+        kept = ", ".join(f"{key} = {value}" for key, value in before.items())
+        return f"could not be put back in {self.host} to what it was before: {kept}"
 
     # Flying
 
@@ -346,18 +384,33 @@ class ARDrone2:
                 raise LinkError(f"{self.host} has not landed in {LANDING:g} s")
 
     async def close(self) -> None:
-        """Land if in the air, and end the link; may be called twice.
+        """Land if in the air, put the drone's settings back, and end the link; may be called twice.
 
         Raises
         ------
         LinkError
             As `land` does; the link is closed all the same.
+
+        Warns
+        -----
+        RuntimeWarning
+            If it has landed and does not take its settings back.
         """
         try:
-            await _uninterrupted(self.land())
+            await _uninterrupted(self._end())
         finally:
             self._link.shut()
             self._vz_max = None
+
+    async def _end(self) -> None:
+        try:
+            await self.land()
+        except LinkError as error:
+            _note(error, await self._put_back())
+            raise
+        kept = await self._put_back()
+        if kept is not None:
+            warnings.warn(kept, RuntimeWarning, stacklevel=2)
 
     async def cut_motors(self) -> None:
         """Stop the motors at once, whatever the height: the drone falls.
@@ -423,7 +476,13 @@ class ARDrone2:
         except LinkError as problem:
             if error is None:
                 raise
-            error.add_note(str(problem))
+            _note(error, str(problem), *getattr(problem, "__notes__", ()))
+
+
+def _note(error: BaseException, *said: str | None) -> None:
+    for one in said:
+        if one is not None:
+            error.add_note(one)
 
 
 def _is_up(navdata: Navdata) -> bool:
@@ -453,5 +512,5 @@ async def _uninterrupted(landing: Any) -> None:
     cancelled = asyncio.CancelledError()
     problem = task.exception()
     if problem is not None:
-        cancelled.add_note(str(problem))
+        _note(cancelled, str(problem), *getattr(problem, "__notes__", ()))
     raise cancelled
