@@ -1,6 +1,9 @@
 """The experiment: steps on a vehicle, what ends them, and what is learnt; all in virtual time."""
 
 import math
+import os
+import threading
+import time
 from dataclasses import replace
 
 import deadtime as dtm
@@ -9,12 +12,14 @@ import pytest
 from deadtime import FlightAbortedError, NotIdentifiableError
 from deadtime._experiment import FlightPlan, fly_experiment
 from deadtime._experiment.flights import FlownSteps, telemetry_of
+from deadtime._experiment.fly import fly_all
 from deadtime._experiment.height_control import PAPER_FILTER, HeightControl, Velocity
 from deadtime._experiment.learn import learn
 from deadtime._experiment.split import split_delay
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain
 from deadtime.links import Limits, run
-from deadtime.links.journal import Journal
+from deadtime.links import journal as journal_module
+from deadtime.links.journal import _Writer
 from emulated import connecting
 from simulated_vehicle import KIT, SimulatedVehicle
 
@@ -183,19 +188,61 @@ def test_a_folder_that_takes_no_file_is_refused_before_anything_is_connected(tmp
 
 
 def test_a_disk_that_fills_up_in_flight_lands_the_vehicle(tmp_path, monkeypatch):
-    put = Journal._put
+    write, synced = _Writer._write, []
 
-    def full(self, cells):
-        if self.rows == 30 and "messages" not in self.path.name:
+    def full(self, waiting):
+        if "messages" not in self._path and self._file.tell() > 2000:
+            synced.append(self)
             raise OSError(28, "No space left on device")
-        put(self, cells)
+        time.sleep(0.001)  # virtual time runs ahead of the disk
+        return write(self, waiting)
 
-    monkeypatch.setattr(Journal, "_put", full)
+    monkeypatch.setattr(_Writer, "_write", full)
     vehicle = SimulatedVehicle()
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match="No space left") as ended:
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert synced
+    assert ended.value.filename.endswith("flight-1-P.csv")
     assert vehicle.log[-2:] == ["landed", "closed"]
-    assert columns_of(tmp_path / "flight-1-P.csv").size == 30
+    assert columns_of(tmp_path / "flight-1-P.csv").size > 5
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
+    # Journals were put on the disk before the landing: one that took 3 s left it to the watchdog.
+    ashore, waited = threading.Event(), []
+
+    def slow(call):
+        def waits(*given):
+            waited.append(ashore.wait(20.0))
+            return call(*given)
+
+        return waits
+
+    monkeypatch.setattr(_Writer, "_write", slow(_Writer._write))
+    monkeypatch.setattr(journal_module.os, "fsync", slow(os.fsync))
+
+    def trouble(state, since):
+        return replace(state, roll=1.0) if fails and since > 3.0 else state
+
+    class Closing(SimulatedVehicle):
+        async def close(self):
+            await super().close()
+            ashore.set()
+
+    vehicle = Closing(trouble=trouble)
+    flight = fly_all(lambda: vehicle, [dtm.P(1.2)], FlightPlan(), 6.5, tmp_path, 1)
+    if fails:
+        with pytest.raises(FlightAbortedError, match="tilted"):
+            run(flight)
+    else:
+        run(flight)
+    assert waited
+    assert all(waited)  # nothing was written before the vehicle was down and its link closed
+    assert vehicle.log[-2:] == ["landed", "closed"]
+    rows = columns_of(tmp_path / "flight-1-P.csv")
+    assert np.diff(rows["time_s"]) == pytest.approx(TS, abs=1e-6)
+    assert rows["time_s"][-1] > (2.8 if fails else 17.8)
 
 
 # What is learnt

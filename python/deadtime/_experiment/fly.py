@@ -8,8 +8,8 @@ air for it.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator, Sequence
-from contextlib import AbstractAsyncContextManager, contextmanager
+from collections.abc import Callable, Coroutine, Sequence
+from contextlib import AbstractAsyncContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -223,54 +223,73 @@ async def fly_all(
 ) -> list[FlownSteps]:
     """One flight under each controller, over one link; `number` is that of the first."""
     flown = []
-    async with connect() as vehicle:
-        for place, controller in enumerate(controllers, number):
-            progress(f"flight {place} of {plan.flights}: {named(controller)}")
-            flown.append(await _fly_one(vehicle, controller, plan, hold, folder, place))
-    return flown
+    # The journals are closed last: however slow the disk is, the vehicle is down by then.
+    with ExitStack() as journals:
+        async with connect() as vehicle:
+            for place, controller in enumerate(controllers, number):
+                progress(f"flight {place} of {plan.flights}: {named(controller)}")
+                path = folder / f"flight-{place}-{type(controller).__name__}.csv"
+                told = await _fly_one(vehicle, controller, plan, hold, path, journals)
+                flown.append((controller, path, told))
+    return [
+        FlownSteps(
+            controller,
+            read_recording(
+                path,
+                time="time_s",
+                reference="reference_m",
+                output="height_m",
+                command="command_m_s",
+            ),
+            path,
+            told,
+            plan.sample_time,
+            plan.settle,
+        )
+        for controller, path, told in flown
+    ]
 
 
 async def _fly_one(
-    vehicle: Vehicle, controller: P | PV, plan: FlightPlan, hold: float, folder: Path, number: int
-) -> FlownSteps:
-    """One flight, from taking off to landing."""
+    vehicle: Vehicle,
+    controller: P | PV,
+    plan: FlightPlan,
+    hold: float,
+    path: Path,
+    journals: ExitStack,
+) -> Path | None:
+    """One flight, from taking off to landing; the file of its messages, if there is one."""
     smoothing = getattr(controller, "filter", None) or PAPER_FILTER
     control = HeightControl(controller, plan.sample_time, smoothing)
-    path = folder / f"flight-{number}-{type(controller).__name__}.csv"
     await vehicle.take_off()
     begin = now()
-    messages = path.with_suffix(".messages.csv")
-    with Journal(path, ROW) as journal, _messages(vehicle, messages, begin) as told:
+    journal = journals.enter_context(Journal(path, ROW))
+    told = None
+    if isinstance(vehicle, TellsAll):
+        told = path.with_suffix(".messages.csv")
+        _keep_messages(vehicle, journals.enter_context(Journal(told, MESSAGE)), begin)
+    try:
         await fly_steps(vehicle, control, plan.programme(hold), plan.limits, journal, begin)
-    await vehicle.land()
-    recording = read_recording(
-        path, time="time_s", reference="reference_m", output="height_m", command="command_m_s"
-    )
-    return FlownSteps(controller, recording, path, told, plan.sample_time, plan.settle)
-
-
-@contextmanager
-def _messages(vehicle: Vehicle, path: Path, begin: float) -> Iterator[Path | None]:
-    """Save every message that comes while the context is open, if the vehicle hands them on."""
-    if not isinstance(vehicle, TellsAll):
-        yield None
-        return
-    with Journal(path, MESSAGE) as journal:
-
-        def save(state: VehicleState) -> None:
-            journal.write(
-                (
-                    state.time - begin,
-                    state.vehicle_time,
-                    state.sequence,
-                    state.height,
-                    state.climb,
-                    state.climb_demand,
-                )
-            )
-
-        vehicle.listen(save)
-        try:
-            yield path
-        finally:
+    finally:
+        if isinstance(vehicle, TellsAll):
             vehicle.listen(None)
+    await vehicle.land()
+    return told
+
+
+def _keep_messages(vehicle: TellsAll, journal: Journal, begin: float) -> None:
+    """Save every message that comes from now on."""
+
+    def save(state: VehicleState) -> None:
+        journal.write(
+            (
+                state.time - begin,
+                state.vehicle_time,
+                state.sequence,
+                state.height,
+                state.climb,
+                state.climb_demand,
+            )
+        )
+
+    vehicle.listen(save)
