@@ -104,3 +104,20 @@ def test_a_drone_that_says_nothing_is_not_toggled_again_and_that_is_said():
             del drone._deliver
 
     run(fly())
+
+
+@pytest.mark.parametrize("late", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("after", [0.35, 0.5])
+def test_news_from_before_a_take_off_confirm_no_landing(late, after):
+    # Cancelled as it began to rise, it was said to be down because it had not been seen to rise.
+    async def fly():
+        async with level(late=late, uplink=0.2) as (drone, client):
+            taking_off = asyncio.create_task(client.take_off())
+            await asyncio.sleep(after)
+            taking_off.cancel()
+            await asyncio.wait([taking_off])
+            await client.land()
+            assert drone.came_down > 0.0
+            assert drone.phase == "landed"
+
+    run(fly())

@@ -46,10 +46,12 @@ TRIMMING = 0.3
 #: How long nothing may come while landing, s: by then the drone's own watchdog lands it.
 SILENT_LANDING = 3.0
 
-#: By how much news are younger than a toggle of the emergency that is then sent again, s; how long
-#: the drone is given to confirm one in all, s; and how often its datagram is sent: copies have the
-#: same number, and the drone carries out one.
-TOGGLED, TOGGLING, COPIES = 1.0, 5.0, 3
+#: News that are by so much younger than what was sent show what came of it, s.
+ANSWERED = 1.0
+
+#: How long the drone is given to confirm a toggle of the emergency, s, and how often the datagram
+#: is sent: copies have the same number, and the drone carries out one.
+TOGGLING, COPIES = 5.0, 3
 
 #: What the drone takes as its largest vertical speed, mm/s, and as its largest height, mm.
 VZ_MAX, ALTITUDE_MAX = (200, 2000), (500, 5000)
@@ -116,6 +118,7 @@ class ARDrone2:
         self._restarts = 0
         self._vz_max: float | None = None
         self._before: dict[str, str] = {}
+        self._asked_up = -math.inf
         self._link = self._new_link()
 
     def _new_link(self) -> Connection:
@@ -154,8 +157,9 @@ class ARDrone2:
         """
         if self._link.is_open:
             raise LinkError(f"{self.host} is connected already")
-        listener, self._link = self._link.listener, self._new_link()
-        self._link.listener = listener
+        if self._reader.heard is not None:
+            listener, self._link = self._link.listener, self._new_link()
+            self._link.listener = listener
         await self._link.open()
         try:
             await self._configure()
@@ -246,6 +250,7 @@ class ARDrone2:
                 f"this program stood still for {late:.2f} s just before {self.host} would have "
                 "taken off: what was seen of it is old; take off again"
             )
+        self._asked_up = self._link.now
         self._sender.fly()
         try:
             await self._rise()
@@ -373,7 +378,7 @@ class ARDrone2:
             return
         self._link.send()
         deadline = self._link.now + LANDING
-        while not await self._link.until(on_ground, LOOKING):
+        while not await self._link.until(self._is_down, LOOKING):
             silent = self._link.silent
             if silent > SILENT_LANDING:
                 raise LinkError(
@@ -382,6 +387,11 @@ class ARDrone2:
                 )
             if self._link.now > deadline:
                 raise LinkError(f"{self.host} has not landed in {LANDING:g} s")
+
+    def _is_down(self, navdata: Navdata) -> bool:
+        """Whether a drone is down, by news that would show that it has begun to take off."""
+        told = self._link.told
+        return on_ground(navdata) and told is not None and told >= self._asked_up + ANSWERED
 
     async def close(self) -> None:
         """Land if in the air, put the drone's settings back, and end the link; may be called twice.
@@ -457,7 +467,7 @@ class ARDrone2:
                     return False
                 # What waited in the socket during a pause of this program is no news, either.
                 since = max(toggled, self._sender.resumed)
-                if link.told is not None and link.told >= since + TOGGLED:
+                if link.told is not None and link.told >= since + ANSWERED:
                     break
         return True
 
