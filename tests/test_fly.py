@@ -5,12 +5,15 @@ import os
 import threading
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import FlightAbortedError, NotIdentifiableError
+from deadtime._cli.fly import _print_study
 from deadtime._experiment import FlightPlan, fly_experiment
+from deadtime._experiment import learn as learn_module
 from deadtime._experiment.flights import FlownSteps, telemetry_of
 from deadtime._experiment.fly import fly_all
 from deadtime._experiment.height_control import PAPER_FILTER, HeightControl, Velocity
@@ -293,6 +296,36 @@ def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
     assert found.after.overshoot < 5.0
     assert found.after.settling_time < found.before.settling_time
     assert found.learned.fit.delay_plus_lag == pytest.approx(0.40, abs=0.01)
+
+
+def test_a_fit_that_is_not_adequate_is_said_before_its_gains_are_flown(
+    tmp_path, capsys, monkeypatch
+):
+    # `fly` designed for such intervals and flew the gains, and said nothing of it.
+    def undesigned(loop, *, controller, **how):  # what is flown does not matter here
+        return SimpleNamespace(loop=loop.replace(controller=controller))
+
+    monkeypatch.setattr(learn_module, "design", undesigned)
+
+    def gusts(state, since):
+        return replace(state, height=state.height + 0.004 * math.sin(2.5 * max(since, 0.0)))
+
+    def warn(doubt):
+        said.append(doubt)
+        flights.append(len(list(tmp_path.glob("flight-?-*P.csv"))))
+
+    said, flights = [], []
+    random = np.random.default_rng(2)
+    vehicle = SimulatedVehicle(noise=0.001, random=random, trouble=gusts)
+    plan = FlightPlan(gains=(2.4,), settle=2.5, hold=3.5, checked_hold=2.0)
+    found = fly_experiment(lambda: vehicle, plan, tmp_path, run=run, warn=warn)
+    assert found.learned.fit.adequate is False
+    assert flights == [1]
+    assert "margin is not assured" in said[0]
+    _print_study(found, tmp_path / "report.html")
+    assert "not adequate (adequate=False)" in " ".join(capsys.readouterr().out.split())
+    fine = replace(found.learned, fit=replace(found.learned.fit, adequate=True))
+    assert "adequate" not in replace(found, learned=fine).verdict()
 
 
 def test_flights_without_a_vehicle_in_them_are_refused(tmp_path):

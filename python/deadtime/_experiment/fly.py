@@ -153,6 +153,7 @@ def fly_experiment(
     folder: Path,
     progress: Callable[[str], None] = lambda stage: None,
     run: Callable[[Coroutine[Any, Any, list[FlownSteps]]], list[FlownSteps]] = asyncio.run,
+    warn: Callable[[str], None] = lambda doubt: None,
 ) -> FlightStudy:
     """Fly the plan.
 
@@ -169,6 +170,9 @@ def fly_experiment(
     run : callable
         Runs a coroutine to its end: `asyncio.run`, or `deadtime.links.run` in virtual time. It is
         called once to learn and once to check.
+    warn : callable
+        Called with what is to be said of the gains before they are flown, if the fit that they were
+        designed from is not adequate.
 
     Returns
     -------
@@ -193,6 +197,8 @@ def fly_experiment(
     flown = run(fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
     progress("estimating the delay")
     learned = learn(flown, plan.limits.max_climb, plan.step, plan.gain_margin, progress)
+    for doubt in learned.doubts():
+        warn(doubt)
     # The best P first: if it does not fly as it should, PV had better not be tried.
     made = [design.loop.controller for design in (learned.proportional, learned.designed)]
     designed = [one for one in made if isinstance(one, (P, PV))]
