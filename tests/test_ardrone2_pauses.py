@@ -155,6 +155,33 @@ def test_no_pause_anywhere_has_a_drone_that_came_down_asked_to_fly(pauses, own, 
     run(fly())
 
 
+@pytest.mark.parametrize("out", [1.5, 2.5, 6.0])
+def test_a_drone_that_landed_while_the_radio_was_out_is_not_asked_to_take_off(out):
+    # The wish to fly was repeated by a program that only hovers, and heard when the radio was back.
+    async def fly():
+        async with level() as (drone, client):
+            await client.take_off()
+            socket, begun = client._link._commands, now()
+            plain, deliver = socket.sendto, drone._deliver
+            socket.sendto, drone._deliver = (lambda data: None), (lambda packet: None)
+            ended = None
+            while now() < begun + out + 1.0:
+                if now() > begun + out and socket.sendto is not plain:
+                    socket.sendto, drone._deliver = plain, deliver
+                try:
+                    client.hover()
+                except FlightAbortedError as error:
+                    ended = error
+                await asyncio.sleep(0.05)
+            assert "nothing heard of 127.0.0.1 for 1.0 s" in str(ended)
+            assert drone.phase == "landed"
+            later = [up for sent, up in refs(drone.told) if sent > begun + 0.05]
+            assert len(later) > 10
+            assert True not in later
+
+    run(fly())
+
+
 def test_ages_run_on_while_the_machine_sleeps(monkeypatch):
     # A laptop that was closed in flight: the clock of the event loop stood still meanwhile.
     if not hasattr(time, "CLOCK_BOOTTIME"):

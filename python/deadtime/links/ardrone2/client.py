@@ -13,7 +13,7 @@ from typing import Any, Self
 from deadtime._errors import FlightAbortedError, LinkError
 from deadtime._validation import finite
 from deadtime.links.ardrone2.commands import FlatTrim
-from deadtime.links.ardrone2.connection import Connection
+from deadtime.links.ardrone2.connection import LOST, Connection
 from deadtime.links.ardrone2.handshake import Handshake, check_configuration
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import (
@@ -30,9 +30,6 @@ __all__ = ["ARDrone2"]
 
 #: How long the first navdata, and leaving bootstrap, may take, s.
 FIRST_NEWS = 5.0
-
-#: How long nothing may come until the link counts as lost, s.
-LOST = 1.0
 
 #: How long taking off may take until the drone holds its height, and landing, s.
 TAKING_OFF, LANDING = 15.0, 20.0
@@ -295,12 +292,8 @@ class ARDrone2:
         self._check_wish()
         if self._sender.rival is not None:
             raise LinkError(self._sender.rival)
-        silent = self._link.silent
-        if silent > LOST:
-            raise LinkError(
-                f"nothing heard of {self.host} for {silent:.1f} s: it is off or out of reach, or "
-                "sends its navdata to another client"
-            )
+        if self._link.silent > LOST:
+            raise LinkError(self._link.unheard)
         if self._vz_max is not None and self._reader.restarts > self._restarts:
             raise LinkError(self._link.forgotten)
 

@@ -15,7 +15,10 @@ from deadtime.links.clock import now
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["Connection"]
+__all__ = ["LOST", "Connection"]
+
+#: How long nothing may come until the link counts as lost, s.
+LOST = 1.0
 
 #: What wakes the drone's navdata.
 WAKE_UP = b"\x01\x00\x00\x00"
@@ -80,6 +83,14 @@ class Connection:
         return (
             f"{self.host} began to count anew, so it has forgotten this client: land, and connect "
             "again"
+        )
+
+    @property
+    def unheard(self) -> str:
+        """What is said when nothing has been heard for too long."""
+        return (
+            f"nothing heard of {self.host} for {self.silent:.1f} s: it is off or out of reach, or "
+            "sends its navdata to another client"
         )
 
     @property
@@ -155,6 +166,8 @@ class Connection:
         """Send the next datagram now, so many times; `more` is said once, in it."""
         if self._commands is None or self._commands.is_closing():
             return
+        if self.silent > LOST:  # it may have landed: commands may not reach it, either
+            self.sender.give_up(self.unheard)
         navdata = self.reader.navdata
         alive = navdata is None or navdata.com_watchdog or self.silent > WAKE_AGAIN
         datagram = self.sender.datagram(self.now, alive, more)

@@ -81,8 +81,8 @@ class CommandSender:
         self._in_doubt = self._left_ground = False
 
     def guard(self, now: float) -> None:
-        """From now on commands grow old."""
-        self.guarded, self._given = True, now
+        """From now on commands grow old, if the wish to fly still stands."""
+        self.guarded, self._given = self.in_air, now
 
     def land(self) -> None:
         """Ask for landing."""
