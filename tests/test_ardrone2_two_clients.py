@@ -1,13 +1,15 @@
 """A second client at the same drone, and a drone that lands by itself: noticed and named."""
 
 import asyncio
+import contextlib
 
 import pytest
 from deadtime import FlightAbortedError, LinkError
 from deadtime.links import run
 from deadtime.links.ardrone2.commands import Move, Ref, encode
+from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.navdata import State
-from emulated import client_of, connected
+from emulated import client_of, emulator
 from level_drone import level
 
 
@@ -23,21 +25,30 @@ async def connect_beside(emulated):
     """A second client of this package, from the same machine."""
     await asyncio.sleep(0.3)
     second = client_of(emulated)
-    with pytest.raises(LinkError):
+    with contextlib.suppress(LinkError):
         await second.connect()
+    with contextlib.suppress(LinkError):
+        await second.close()
 
 
 def test_a_second_client_of_the_emulator_is_named_to_the_first():
-    # Its first datagram landed the flight of the first client, which went on asking to fly.
+    # Its first datagram landed the flight of the first client, which went on asking to fly. If the
+    # drone sends navdata to the newer one, the first is left with their absence.
     async def fly():
-        async with connected() as (emulated, drone):
+        async with emulator() as emulated:
+            drone = client_of(emulated)
+            await drone.connect()
             await drone.take_off()
             beside = asyncio.create_task(connect_beside(emulated))
             with pytest.raises(FlightAbortedError, match="another client commands this drone"):
                 await hovering(drone)
             assert not drone._sender.in_air
             with pytest.raises(LinkError, match="another client"):
-                await drone.state()
+                drone.hover()
+            await asyncio.sleep(4.0)
+            assert emulated.truth().phase is Phase.LANDED
+            with contextlib.suppress(LinkError):
+                await drone.close()
             await beside
 
     run(fly())

@@ -289,10 +289,13 @@ class ARDrone2:
             raise LinkError(
                 f"what listens to {self.host} has failed: {self._link.failure}"
             ) from self._link.failure
+        silent = self._link.silent > LOST
+        if silent:
+            self._sender.give_up(self._link.unheard)
         self._check_wish()
         if self._sender.rival is not None:
             raise LinkError(self._sender.rival)
-        if self._link.silent > LOST:
+        if silent:
             raise LinkError(self._link.unheard)
         if self._vz_max is not None and self._reader.restarts > self._restarts:
             raise LinkError(self._link.forgotten)

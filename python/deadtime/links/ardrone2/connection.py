@@ -90,7 +90,7 @@ class Connection:
         """What is said when nothing has been heard for too long."""
         return (
             f"nothing heard of {self.host} for {self.silent:.1f} s: it is off or out of reach, or "
-            "sends its navdata to another client"
+            "another client commands this drone and is sent its navdata"
         )
 
     @property
