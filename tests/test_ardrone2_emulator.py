@@ -571,6 +571,8 @@ def test_where_others_can_reach_it_the_clients_have_to_be_named():
     with pytest.raises(ValueError, match="'anybody' is no IP address"):
         EmulatorOptions(host="0.0.0.0", clients=("anybody",))
     assert EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)).answers("192.168.1.2")
+    assert EmulatorOptions(host="::", clients=("fd00:0::2",)).answers("fd00::2")
+    assert EmulatorOptions(host="::", clients=("192.168.1.2",)).answers("::ffff:192.168.1.2")
 
 
 def test_a_name_that_looks_like_the_loopback_is_not_taken_for_it():

@@ -30,7 +30,7 @@ from deadtime.links.ardrone2.emulator.flight import HOVER, TICK, Demand, Flight,
 from deadtime.links.ardrone2.emulator.link import Address, Listener, Order
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.sensors import Reading, Sensors
-from deadtime.links.ardrone2.emulator.settings import Settings
+from deadtime.links.ardrone2.emulator.settings import IDS, Settings
 
 __all__ = ["Drone", "Truth"]
 
@@ -274,9 +274,8 @@ class Drone:
         if mode == ACKNOWLEDGE:
             self._to_acknowledge = False
         elif mode in (SEND_CONFIGURATION, SEND_IDS):
-            only = "" if mode == SEND_CONFIGURATION else "custom:"
             values = self.settings.values
-            told = {key: value for key, value in values.items() if key.startswith(only)}
+            told = values if mode == SEND_CONFIGURATION else {key: values[key] for key in IDS}
             # One answer to a host at a time: more questions are no reason for more answers.
             if all(host != source[0] for host, _ in self._dumps):
                 self._dumps.append((source[0], write_configuration(told)))

@@ -13,7 +13,7 @@ import re
 
 from deadtime.links.ardrone2.emulator.configuration_keys import ENTRIES, LONGEST, NO_ID, Entry
 
-__all__ = ["Settings"]
+__all__ = ["IDS", "Settings"]
 
 IDS = ("custom:session_id", "custom:profile_id", "custom:application_id")
 
