@@ -283,3 +283,21 @@ def test_idle_connections_are_few_end_and_are_in_nobodys_way(port_name, host_spe
     assert open_ones == 4
     assert "control:altitude_max" in settings
     assert left == ((3 if port_name == "control_port" else 4) if host_speaks else 0)
+
+
+def test_a_connection_that_a_client_keeps_is_not_the_one_that_has_to_go():
+    async def crowd():
+        async with AsyncExitStack() as stack:
+            emulator = await stack.enter_async_context(Emulator(EmulatorOptions(**FREE)))
+            client = Client(emulator)
+            kept = await stack.enter_async_context(connection(emulator.control_port))
+            found = []
+            for _ in range(3):
+                await client.at("CTRL", 4, 0)
+                found.append(parse_configuration(await kept.readuntil(b"\0")))
+                for _ in range(10):
+                    await stack.enter_async_context(connection(emulator.control_port))
+            return found
+
+    first, *others = links.run(crowd())
+    assert others == [first, first]

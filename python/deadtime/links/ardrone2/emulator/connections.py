@@ -1,13 +1,13 @@
 """TCP connections to an emulated drone: few at a time, and none in the way of the next.
 
-Who connects is taken in, in place of the connection that was used longest ago if all places are
-taken. A connection whose host neither says nor reads anything is closed after a while.
+Who connects is taken in, in place of the youngest connection if all places are taken: those that
+a client keeps from its start on stay, and a crowd of idle ones leaves a place for the next. A
+connection whose host gives no sign of life is closed after a while.
 """
 
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Callable
 
 __all__ = ["Connection", "Door"]
@@ -27,8 +27,8 @@ class Connection(asyncio.Protocol):
         self._door = door
         self._transport: asyncio.Transport | None = None
         self.host = ""
-        #: When something was written to it last, and when its host gave its last sign of life.
-        self.used, self.heard = -math.inf, -math.inf
+        #: When its host gave its last sign of life.
+        self.heard = 0.0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Called by asyncio."""
@@ -47,9 +47,8 @@ class Connection(asyncio.Protocol):
             return
         if self._transport.get_write_buffer_size() > MOST_UNREAD:
             self.abort()
-            return
-        self._transport.write(data)
-        self.used = self.heard = asyncio.get_running_loop().time()
+        else:
+            self._transport.write(data)
 
     def end(self) -> None:
         """Close it when all that was written is sent."""
@@ -94,9 +93,9 @@ class Door:
             connection.abort()
             return
         if len(self._inside) >= MOST_CONNECTIONS:
-            oldest = min(self._inside, key=lambda one: one.used)
-            self.leave(oldest)
-            oldest.abort()
+            youngest = next(reversed(self._inside))
+            self.leave(youngest)
+            youngest.abort()
         loop = asyncio.get_running_loop()
         connection.heard = loop.time()
         self._inside[connection] = loop.call_later(IDLE, self._look, connection)
@@ -116,7 +115,7 @@ class Door:
             self.leave(connection)
             connection.abort()
         else:
-            self._inside[connection] = loop.call_at(end, self._look, connection)
+            self._inside[connection] = loop.call_at(end, self._look, connection)  # in its old place
 
     def hear(self, host: str) -> None:
         """A host has given a sign of life."""
