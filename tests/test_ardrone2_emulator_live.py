@@ -293,6 +293,34 @@ def test_a_port_that_is_taken_is_named():
         assert isinstance(found.value, DeadtimeError)
 
 
+def test_it_listens_on_an_address_of_ipv6_and_knows_a_client_by_any_spelling():
+    called = "::1"
+
+    async def read():
+        loop = asyncio.get_running_loop()
+        options = EmulatorOptions(host=called, clients=("0:0::1",), **FREE)
+        async with Emulator(options) as emulator:
+            there = (called, emulator.navdata_port), (called, emulator.command_port)
+            line, heard = await loop.create_datagram_endpoint(Ends, remote_addr=there[0])
+            commands, _ = await loop.create_datagram_endpoint(Ends, remote_addr=there[1])
+            line.sendto(b"\x01")
+            await until(lambda: heard.received)
+            reader, writer = await asyncio.open_connection(called, emulator.control_port)
+            commands.sendto(encode([Control(4)], 1))
+            dump = await asyncio.wait_for(reader.readuntil(b"\0"), 30.0)
+            for end in (line, commands, writer):
+                end.close()
+            await writer.wait_closed()
+            return heard.received[0][1], dump
+
+    try:
+        packet, dump = asyncio.run(read())
+    except LinkError as error:
+        pytest.skip(f"this machine has no IPv6: {error}")
+    assert parse_navdata(packet).bootstrap
+    assert "general:navdata_demo" in parse_configuration(dump)
+
+
 @settings(max_examples=5)
 @given(st.lists(st.tuples(st.integers(0, 2), st.binary(max_size=1400)), max_size=40))
 def test_arbitrary_bytes_on_all_ports_leave_it_working(datagrams):

@@ -226,14 +226,15 @@ def test_on_real_sockets_too():
     assert plant.applied > 0
 
 
-def test_a_controller_on_both_families_answers_a_plant_of_ipv4():
+def test_a_controller_on_a_socket_of_ipv6_answers_a_plant_of_ipv4():
     with_ipv6()
 
     async def run():
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]
-        options = ControllerOptions(gain=4.0, listen=("::", 0), plant=("127.0.0.1", port))
+        listen = ("::ffff:127.0.0.1", 0)  # a socket of IPv6, and still of this machine alone
+        options = ControllerOptions(gain=4.0, listen=listen, plant=("127.0.0.1", port))
         async with Controller(options) as controller:
             there = ("127.0.0.1", controller.address[1])
             async with Relay(RelayOptions(("::ffff:127.0.0.1", there[1]))) as relay:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+from deadtime.links.addresses import canonical
+
 __all__ = ["Connection", "Door"]
 
 #: Connections to a port at a time, and what one may leave unread, bytes.
@@ -34,7 +36,7 @@ class Connection(asyncio.Protocol):
         """Called by asyncio."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        self.host = transport.get_extra_info("peername")[0]
+        self.host = canonical(transport.get_extra_info("peername")[0])
         self._door.enter(self)
 
     def connection_lost(self, exc: Exception | None) -> None:

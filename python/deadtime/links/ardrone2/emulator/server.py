@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Self
 
 from deadtime._errors import LinkError
+from deadtime.links.addresses import canonical, for_socket
 from deadtime.links.ardrone2.emulator.connections import Connection, Door
 from deadtime.links.ardrone2.emulator.drone import Drone, Truth
 from deadtime.links.ardrone2.emulator.link import Address
@@ -44,7 +45,7 @@ class _Port(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: Address) -> None:
         if self._answers(addr[0]):
-            self._received(data, (addr[0], addr[1]))
+            self._received(data, (canonical(addr[0]), addr[1]))
 
 
 class Emulator:
@@ -184,10 +185,10 @@ class Emulator:
         loop = asyncio.get_running_loop()
         if self._navdata is None or self._navdata.is_closing():
             return
-        now = loop.time()
+        now, own = loop.time(), self._navdata.get_extra_info("sockname")[0]
         self.drone.advance(now)
         for packet, address in self.drone.packets(now, oldest=STALE):
-            self._navdata.sendto(packet, address)
+            self._navdata.sendto(packet, for_socket(address, own))
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
