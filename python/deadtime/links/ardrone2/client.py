@@ -289,20 +289,17 @@ class ARDrone2:
             raise LinkError(
                 f"what listens to {self.host} has failed: {self._link.failure}"
             ) from self._link.failure
-        silent = self._link.silent > LOST
-        if silent:
-            self._sender.give_up(self._link.unheard)
         self._check_wish()
         if self._sender.rival is not None:
             raise LinkError(self._sender.rival)
-        if silent:
+        if self._link.silent > LOST:
             raise LinkError(self._link.unheard)
         if self._vz_max is not None and self._reader.restarts > self._restarts:
             raise LinkError(self._link.forgotten)
 
     def _check_wish(self) -> None:
         """Refuse to go on with a flight that has ended by itself."""
-        self._sender.age(self._link.now)
+        self._link.age()
         if self._sender.expired is not None:
             self._link.send()  # it says to land
             raise FlightAbortedError(self._sender.expired)

@@ -166,13 +166,18 @@ class Connection:
         """Send the next datagram now, so many times; `more` is said once, in it."""
         if self._commands is None or self._commands.is_closing():
             return
-        if self.silent > LOST:  # it may have landed: commands may not reach it, either
-            self.sender.give_up(self.unheard)
+        self.age()
         navdata = self.reader.navdata
         alive = navdata is None or navdata.com_watchdog or self.silent > WAKE_AGAIN
         datagram = self.sender.datagram(self.now, alive, more)
         for _ in range(copies):
             self._commands.sendto(datagram)
+
+    def age(self) -> None:
+        """Let what is too old by now lapse."""
+        self.sender.age(self.now)
+        if self.silent > LOST:  # it may have landed: commands may not reach it, either
+            self.sender.give_up(self.unheard)
 
     def take(self, packet: bytes) -> None:
         """Take in a packet of the drone."""
