@@ -6,7 +6,6 @@ import asyncio
 import math
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -14,7 +13,7 @@ from deadtime._errors import FlightAbortedError, LinkError
 from deadtime._validation import finite
 from deadtime.links.ardrone2.commands import FlatTrim
 from deadtime.links.ardrone2.connection import LOST, Connection
-from deadtime.links.ardrone2.handshake import Handshake, check_configuration
+from deadtime.links.ardrone2.limit_settings import LimitSettings
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import (
     FLYING,
@@ -49,12 +48,6 @@ ANSWERED = 1.0
 #: How long the drone is given to confirm a toggle of the emergency, s, and how often the datagram
 #: is sent: copies have the same number, and the drone carries out one.
 TOGGLING, COPIES = 5.0, 3
-
-#: What the drone takes as its largest vertical speed, mm/s, and as its largest height, mm.
-VZ_MAX, ALTITUDE_MAX = (200, 2000), (500, 5000)
-
-#: How long putting its settings back may take, s.
-PUTTING_BACK = 3.0
 
 
 class ARDrone2:
@@ -114,7 +107,7 @@ class ARDrone2:
         self._ports = navdata_port, command_port
         self._restarts = 0
         self._vz_max: float | None = None
-        self._before: dict[str, str] = {}
+        self._settings = LimitSettings(host)
         self._asked_up = -math.inf
         self._link = self._new_link()
 
@@ -161,7 +154,7 @@ class ARDrone2:
         try:
             await self._configure()
         except BaseException as error:
-            _note(error, await self._put_back())
+            _note(error, await self._settings.put_back(self._link))
             self._link.shut()
             raise
 
@@ -173,43 +166,11 @@ class ARDrone2:
                 f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NEWS:g} s: "
                 "is the drone on, this computer in its network, and no other client connected?"
             )
-        handshake = Handshake(host, link.send, link.until)
-        demo = {"general:navdata_demo": "FALSE" if self.full else "TRUE"}
-        await handshake.set(*demo.popitem())
-        before = await handshake.read_back(host, self.control_port)
-        climb = math.ceil(1e3 * self.limits.max_climb - 1e-6)
-        wanted = {
-            "control:control_vz_max": str(min(max(climb, VZ_MAX[0]), VZ_MAX[1])),
-            "control:altitude_max": str(
-                min(max(round(1e3 * self.limits.max_height), ALTITUDE_MAX[0]), ALTITUDE_MAX[1])
-            ),
-        }
-        for key, value in wanted.items():
-            if before.get(key, value) != value:
-                self._before[key] = before[key]
-            await handshake.set(key, value)
-        held = await handshake.read_back(host, self.control_port)
-        check_configuration(host, held, wanted)
+        await self._settings.set(link, self.control_port, self.limits, self.full)
         if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
             raise LinkError(f"{host} sends navdata without height and battery: restart it")
-        self._vz_max = 1e-3 * float(held["control:control_vz_max"])
+        self._vz_max = self._settings.vz_max
         self._restarts = self._reader.restarts
-
-    async def _put_back(self) -> str | None:
-        """Set what was changed to what it was, if the drone is down and answers; what was not."""
-        before, self._before = self._before, {}
-        link, navdata = self._link, self._reader.navdata
-        handshake = Handshake(self.host, link.send, link.until)
-        with suppress(LinkError, TimeoutError):
-            async with asyncio.timeout(PUTTING_BACK):
-                while before and link.silent < LOST and navdata is not None and on_ground(navdata):
-                    key = next(iter(before))
-                    await handshake.set(key, before[key])
-                    del before[key]
-        if not before:
-            return None
-        kept = ", ".join(f"{key} = {value}" for key, value in before.items())
-        return f"could not be put back in {self.host} to what it was before: {kept}"
 
     # Flying
 
@@ -409,9 +370,9 @@ class ARDrone2:
         try:
             await self.land()
         except LinkError as error:
-            _note(error, await self._put_back())
+            _note(error, await self._settings.put_back(self._link))
             raise
-        kept = await self._put_back()
+        kept = await self._settings.put_back(self._link)
         if kept is not None:
             warnings.warn(kept, RuntimeWarning, stacklevel=2)
 
