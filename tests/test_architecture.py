@@ -75,6 +75,7 @@ FLOORS = [
         "_determinant",
         "_matrix_roots",
         "_frequency",
+        "_phase",
         "_interchange",
         "_margins",
         "_sampled_gain",
