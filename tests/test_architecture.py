@@ -27,7 +27,13 @@ CORE_ARROWS = {
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
 FLOORS = [
     {"_errors", "_frozen", "_validation", "_processes", "_deadtime", "_enclosures"},
-    {"_certificate_parts", "_certificate_function", "_certificate_check", "_certificate"},
+    {
+        "_certificate_parts",
+        "_certificate_function",
+        "_certificate_form",
+        "_certificate_check",
+        "_certificate",
+    },
     {
         "_ufunc",
         "_special",
@@ -69,6 +75,7 @@ FLOORS = [
         "_determinant",
         "_matrix_roots",
         "_frequency",
+        "_phase",
         "_interchange",
         "_margins",
         "_sampled_gain",
