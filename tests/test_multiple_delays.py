@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 def test_two_multiples_in_closed_form():
     # z + z^2 = -j omega on the circle: cos a + cos 2a = 0, omega = sin a + sin 2a, z = e^(-j a).
-    found = dtm.crossings(s + delay(T) + delay(2 * T), {"T": (0, 4)})
+    found = dtm.crossings(s + delay(T) + delay(2 * T), {"T": (0, 5)})
     first = math.pi / (3.0 * math.sqrt(3.0))
     period = 2.0 * math.pi / math.sqrt(3.0)
     np.testing.assert_allclose(found.values, [first, first + period], rtol=1e-13)

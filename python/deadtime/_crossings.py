@@ -140,8 +140,9 @@ def crossings(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial or ControlLoop
-        The equation, or a continuous loop, whose limit plays no part.
+    family : ParametricQuasiPolynomial, ControlLoop or DelaySystem
+        The equation; a continuous loop, whose limit plays no part; or a system, of which
+        ``delay`` varies: the least delay of its states, to which the others keep their ratio.
     ranges : mapping of str to (low, high)
         The one number that varies, and between which ends.
     at : mapping of str to float, optional
@@ -156,9 +157,10 @@ def crossings(
     ValueError
         If a name is unknown or another parameter has no value, the range is empty or leads to
         negative delays, the loop is sampled, or the parameter enters in a way that is not covered:
-        neither as a factor of some terms alone, nor as one multiple of a delay alone. And where the
-        leading term vanishes within the range, chains of roots of a neutral equation may reach the
-        axis, a root stays on the axis for all values, or double precision does not suffice.
+        neither as a factor of some terms alone, nor as a delay alone of which all multiples are
+        whole ones of the least, up to five of it. And where chains of roots of a neutral equation
+        may reach the axis in the whole range (for a gain: in a part of it, see `Crossings`), a root
+        stays on the axis for all values, or double precision does not suffice.
     TypeError
         If `family` is something else, or an end is not a number.
 
@@ -166,7 +168,9 @@ def crossings(
     -----
     The list is complete. For a gain that is proved, rounding included [1]_; for a delay every
     frequency with abs(A) = abs(B) is found by bounds on derivatives and rounding, and each gives
-    its delays in closed form [2]_, [3]_.
+    its delays in closed form [2]_, [3]_. Where several multiples of a delay enter, the frequencies
+    are those at which the polynomial in ``exp(-s T)`` shares a root with its reciprocal, found by
+    the same bounds, and each is refined by Newton's iteration.
 
     References
     ----------
@@ -210,18 +214,18 @@ def delay_margin(
 
     Parameters
     ----------
-    loop : ControlLoop, TransferFunction or ParametricQuasiPolynomial
-        A loop; a loop gain, around which unit feedback is closed; or an equation in which one
-        parameter is a delay.
+    loop : ControlLoop, TransferFunction, ParametricQuasiPolynomial or DelaySystem
+        A loop; a loop gain, around which unit feedback is closed; an equation in which one
+        parameter is a delay; or a system, of whose states the delays grow in proportion.
     at : mapping of str to float, optional
         For an equation: the values of all its parameters, the present delay among them.
 
     Returns
     -------
     float
-        In s: in an equation, the growth of the parameter. ``inf`` where no delay makes it
-        unstable, 0 where any does, as in a neutral loop whose leading coefficients outweigh the
-        first.
+        In s: in an equation, the growth of the parameter; in a system, that of the least delay.
+        ``inf`` where no delay makes it unstable, 0 where any does, as in a neutral loop whose
+        leading coefficients outweigh the first.
 
     Raises
     ------
@@ -233,8 +237,7 @@ def delay_margin(
     Notes
     -----
     Continuous: the first of all crossings, none of which is missed. Sampled: the end of
-    ``ControlLoop.stable_range("delay")``, a search in growing steps, which can pass over a loss of
-    stability that is regained within a step.
+    ``ControlLoop.stable_range("delay")``, whatever the number of samples.
 
     Examples
     --------
