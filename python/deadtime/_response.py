@@ -222,17 +222,12 @@ class Response(ReadOnlyArrays):
 
         Raises
         ------
-        ImportError
+        MissingExtraError
             If matplotlib is not installed.
         """
-        if ax is None:
-            try:
-                import matplotlib.pyplot as plt
-            except ImportError as error:
-                raise ImportError(
-                    "plotting needs matplotlib: install it with pip install 'deadtime[plot]'"
-                ) from error
-            _, ax = plt.subplots()
+        from deadtime._plots import shown_axes
+
+        ax = shown_axes(ax)
         ax.plot(self.time, self.outputs, **({"label": "output"} | style))
         ax.step(self.time, self.reference, "k", where="post", linewidth=0.8, label="reference")
         if command:
