@@ -11,9 +11,10 @@ mod past;
 use deadtime::dde::breaks::BreakingPoint;
 use deadtime::dde::history::History;
 use deadtime::dde::spectral::{Equation, Event, Jump, Outcome, Problem, Solution, solve};
+use deadtime::memory::{collected, filled};
 use deadtime::{Error, Task};
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -21,6 +22,7 @@ use pyo3::types::PyTuple;
 use callback::{Callbacks, PythonEquation};
 use compiled::{CompiledEquation, WithEvents};
 
+use crate::arrays::{column, converted};
 use crate::errors::to_python;
 use crate::runtime::{run_attached, run_here};
 
@@ -83,7 +85,8 @@ impl DelayPieces {
         nu: u8,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (first, last) = self.span();
-        let mut values = Array2::zeros((self.dim, times.as_array().len()));
+        let shape = (self.dim, times.as_array().len());
+        let mut values = array(0.0, shape)?;
         let mut value = vec![0.0; self.dim];
         for (mut column, &time) in values.columns_mut().into_iter().zip(times.as_array()) {
             if !(time >= first && time <= last) {
@@ -145,7 +148,14 @@ pub(crate) fn solve_delay_equation<'py>(
         rtol,
         atol: atol.as_array().to_vec(),
         longest,
-        times: times.map(|times| times.as_array().to_vec()),
+        times: times
+            .map(|times| {
+                converted(collected(
+                    "the copy of t_eval",
+                    times.as_array().iter().copied(),
+                ))
+            })
+            .transpose()?,
         keep,
         events: kinds(&events),
         jumps: jumps
@@ -216,12 +226,26 @@ fn kinds(events: &[(Bound<'_, PyAny>, i8, u32)]) -> Vec<Event> {
     events.iter().map(kind).collect()
 }
 
+/// An array of one value.
+fn array(value: f64, shape: (usize, usize)) -> PyResult<Array2<f64>> {
+    let values = filled(
+        "the array of values of the solution",
+        value,
+        shape.0.saturating_mul(shape.1),
+    );
+    Array2::from_shape_vec(shape, converted(values)?)
+        .map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
 fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
     let rows = |values: Vec<f64>| {
         Array2::from_shape_vec((values.len() / dim.max(1), dim), values)
             .map_err(|error| PyValueError::new_err(error.to_string()))
     };
-    let values = rows(found.values)?.reversed_axes();
+    let by_time = rows(found.values)?;
+    let mut values = array(0.0, (dim, by_time.nrows()))?;
+    values.assign(&by_time.t());
+    drop(by_time);
     let (outcome, place) = match found.outcome {
         Outcome::Finished => (0, found.end),
         Outcome::Event => (1, found.end),
@@ -229,11 +253,7 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
         Outcome::NotFinite(place) => (3, place),
     };
     let event_values = found.event_values.into_iter().map(rows);
-    let breaks: Vec<f64> = found
-        .breaks
-        .iter()
-        .map(|point: &BreakingPoint| point.time)
-        .collect();
+    let breaks = column(&found.breaks, |point: &BreakingPoint| point.time)?;
     let pieces = DelayPieces {
         history: found.history,
         dim,
@@ -241,15 +261,11 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
     };
     Ok(DelayRun {
         times: found.times.into_pyarray(py).unbind(),
-        values: values
-            .as_standard_layout()
-            .into_owned()
-            .into_pyarray(py)
-            .unbind(),
+        values: values.into_pyarray(py).unbind(),
         event_times: found
             .event_times
-            .iter()
-            .map(|times| times.to_pyarray(py).unbind())
+            .into_iter()
+            .map(|times| times.into_pyarray(py).unbind())
             .collect(),
         event_values: event_values
             .map(|values| values.map(|values| values.into_pyarray(py).unbind()))
