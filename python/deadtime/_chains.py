@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from deadtime._quasipolynomial import QuasiPolynomial
+from deadtime._validation import real_array, unmasked
 
 __all__ = ["Chain", "chains_of"]
 
@@ -87,7 +88,7 @@ class Chain:
         -------
         ndarray of float, shape of `im`
         """
-        y = np.asarray(im, dtype=np.float64)
+        y = real_array("im", im)
         x = np.full(y.shape, self.offset)
         if self.bend == 0.0:
             return x
@@ -125,7 +126,7 @@ class Chain:
         >>> bool(abs(z - root) < 1e-2)
         True
         """
-        index = np.asarray(n)
+        index = np.asarray(unmasked("n", n))
         if index.dtype.kind not in "iu":
             raise TypeError(f"n of dtype {index.dtype}: give whole numbers")
         if index.size and index.min() < 0:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._frozen import ReadOnlyArrays, read_only
-from deadtime._validation import finite, positive
+from deadtime._validation import finite, positive, real_array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,7 +75,7 @@ class Response(ReadOnlyArrays):
 
     def __post_init__(self) -> None:
         for name in ("time", "outputs", "inputs", "breaks", "reference"):
-            array = np.array(getattr(self, name), dtype=np.float64)
+            array = np.array(real_array(name, getattr(self, name)))
             object.__setattr__(self, name, read_only(array))
         read_only(self.sensitivities)
         read_only(self.input_sensitivities)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._validation import unmasked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,6 +136,7 @@ def ends(name: str, given: Range | None) -> tuple[float, float]:
     """Ends of a range, infinite where open."""
     if given is None:
         return (-math.inf, math.inf)
+    given = unmasked(name, given)
     try:
         low, high = given
         pair = (

@@ -27,7 +27,7 @@ from deadtime._rootset import Range, RootSet
 from deadtime._system_response import SystemResponse
 from deadtime._system_run import respond, step_response
 from deadtime._transfer import TransferFunction
-from deadtime._validation import non_negative, real_array
+from deadtime._validation import non_negative, real_array, unmasked
 
 __all__ = ["DelaySystem"]
 
@@ -250,7 +250,7 @@ class DelaySystem:
         [[ 0. +1.j -1. +0.j]
          [ 4. +0.j  0.4+1.j]]
         """
-        points = np.asarray(s, dtype=np.complex128)
+        points = np.asarray(unmasked("s", s), dtype=np.complex128)
         shape = (*points.shape, self.n_states, self.n_states)
         late = _sum_at(self._N, points, shape) + self._E
         return points[..., None, None] * late - _sum_at(self._A, points, shape)
