@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from deadtime._quasipolynomial import QuasiPolynomial
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._validation import real_array, unmasked
 
 __all__ = ["Chain", "chains_of"]
@@ -42,7 +43,7 @@ _MAX_DEGREE = 128
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class Chain(ReadOnlyArrays):
     r"""A sequence of characteristic roots going to infinity, and its law.
 
     Made by `QuasiPolynomial.chains`. In the upper half plane; the mirror image is another one.

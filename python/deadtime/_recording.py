@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._errors import RecordingError
-from deadtime._frozen import ReadOnlyArrays
+from deadtime._frozen import FrozenDict, ReadOnlyArrays
 from deadtime._validation import unmasked
 
 __all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
@@ -115,7 +115,7 @@ class Recording(ReadOnlyArrays):
         object.__setattr__(self, "reference", arrays["reference"])
         object.__setattr__(self, "output", arrays["output"])
         object.__setattr__(self, "command", arrays.get("command"))
-        object.__setattr__(self, "units", dict(units or {}))
+        object.__setattr__(self, "units", FrozenDict(units or {}))
         object.__setattr__(self, "source", source)
 
     def __len__(self) -> int:

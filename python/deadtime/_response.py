@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import FrozenDict, ReadOnlyArrays
 from deadtime._validation import finite, positive, real_array
 
 if TYPE_CHECKING:
@@ -23,6 +23,10 @@ Vector = NDArray[np.float64]
 # place is then known to 1e-8 of the output step, the height of a peak to rounding.
 _POINTS = 101
 _MAGNIFICATIONS = 4
+
+
+#: Sensitivities that nobody asked for.
+NONE = FrozenDict()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,9 +80,8 @@ class Response(ReadOnlyArrays):
     def __post_init__(self) -> None:
         for name in ("time", "outputs", "inputs", "breaks", "reference"):
             array = np.array(real_array(name, getattr(self, name)))
-            object.__setattr__(self, name, read_only(array))
-        read_only(self.sensitivities)
-        read_only(self.input_sensitivities)
+            object.__setattr__(self, name, array)
+        self._freeze()
 
     @classmethod
     def _of_fresh(
@@ -97,7 +100,7 @@ class Response(ReadOnlyArrays):
             # Read-only, in a fifth of the time that `flags` takes.
             array.setflags(False)  # type: ignore[call-arg]
         fields["steady_state"] = steady_state
-        fields["sensitivities"], fields["input_sensitivities"] = {}, {}
+        fields["sensitivities"] = fields["input_sensitivities"] = NONE
         fields["_dense"] = dense
         return response
 

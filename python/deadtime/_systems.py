@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._determinant import NotExpandedError, expanded
+from deadtime._frozen import equal
 from deadtime._matrix_roots import MatrixDeterminant
 from deadtime._quasipolynomial import QuasiPolynomial
 from deadtime._realisation import Realisation, of_delay_system
@@ -220,6 +221,17 @@ class DelaySystem:
         """Every delay above zero, in s, ascending."""
         groups = (self._A, self._B, self._C, self._D, self._N)
         return np.array(sorted({tau for group in groups for tau in group} - {0.0}))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DelaySystem):
+            return NotImplemented
+        return equal(self._matrices(), other._matrices())
+
+    def __hash__(self) -> int:
+        return hash((self.n_states, self.n_inputs, self.n_outputs, tuple(self.delays.tolist())))
+
+    def _matrices(self) -> list[Any]:
+        return [getattr(self, name) for name in ("_A", "_B", "_C", "_D", "_E", "_N")]
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{tau:g}" for tau in self.delays)

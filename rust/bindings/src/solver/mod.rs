@@ -9,15 +9,15 @@ mod compiled;
 mod past;
 
 use deadtime::dde::breaks::BreakingPoint;
-use deadtime::dde::history::History;
+use deadtime::dde::history::{History, Piece};
 use deadtime::dde::spectral::{Equation, Event, Jump, Outcome, Problem, Solution, solve};
-use deadtime::memory::{collected, filled};
+use deadtime::memory::{collected, copied, filled, reserved};
 use deadtime::{Error, Task};
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyTuple, PyType};
 
 use callback::{Callbacks, PythonEquation};
 use compiled::{CompiledEquation, WithEvents};
@@ -57,8 +57,81 @@ pub(crate) struct DelayPieces {
     end: f64,
 }
 
+/// Dimension, end of the solution; starts, ends and numbers of coefficients of the pieces; all
+/// coefficients one after the other.
+type Parts<'py> = (
+    usize,
+    f64,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
 #[pymethods]
 impl DelayPieces {
+    /// The pieces from what [`Self::__reduce__`] takes them apart into.
+    #[new]
+    fn new(
+        dim: usize,
+        end: f64,
+        starts: Vector<'_>,
+        ends: Vector<'_>,
+        terms: PyReadonlyArray1<'_, u64>,
+        coefficients: Vector<'_>,
+    ) -> PyResult<Self> {
+        let refused = || PyValueError::new_err("these are no pieces of a solution");
+        let spans = starts.as_array().into_iter().zip(ends.as_array());
+        let (lengths, coefficients) = (terms.as_array(), coefficients.as_slice()?);
+        let whole = starts.len() == ends.len() && starts.len() == terms.len();
+        let mut rest = coefficients;
+        let mut pieces = converted(reserved(
+            "the list of pieces of the solution",
+            lengths.len(),
+        ))?;
+        for ((start, end), terms) in spans.zip(lengths) {
+            let terms = usize::try_from(*terms).map_err(|_| refused())?;
+            let count = terms.checked_mul(dim).filter(|count| *count > 0);
+            let (own, others) = count
+                .and_then(|count| rest.split_at_checked(count))
+                .ok_or_else(refused)?;
+            rest = others;
+            let own = converted(copied("the list of pieces of the solution", own))?;
+            pieces.push(Piece::new(*start, *end, terms, own));
+        }
+        if !whole || !rest.is_empty() {
+            return Err(refused());
+        }
+        Ok(Self {
+            history: History::new(pieces),
+            dim,
+            end,
+        })
+    }
+
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Parts<'py>)> {
+        let pieces = || self.history.pieces();
+        let what = "the list of pieces of the solution";
+        let total = pieces().map(|piece| piece.coefficients.len()).sum();
+        let mut coefficients = converted(reserved(what, total))?;
+        for piece in pieces() {
+            coefficients.extend_from_slice(&piece.coefficients);
+        }
+        let starts = converted(collected(what, pieces().map(|piece| piece.start)))?;
+        let ends = converted(collected(what, pieces().map(|piece| piece.end)))?;
+        let terms = converted(collected(what, pieces().map(|piece| piece.terms as u64)))?;
+        let parts = (
+            self.dim,
+            self.end,
+            starts.into_pyarray(py),
+            ends.into_pyarray(py),
+            terms.into_pyarray(py),
+            coefficients.into_pyarray(py),
+        );
+        Ok((py.get_type::<Self>(), parts))
+    }
+
     /// First and last time at which there are values.
     #[getter]
     fn span(&self) -> (f64, f64) {
