@@ -13,8 +13,9 @@ WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 PACKAGE = ROOT / "python" / "deadtime"
 
-# What each room of the core may use besides itself; error, status and task are for everyone.
-FOUNDATION = {"error", "lanes", "status", "task"}
+# What each room of the core may use besides itself; error, memory, status and task are for
+# everyone.
+FOUNDATION = {"error", "memory", "lanes", "status", "task"}
 CORE_ARROWS = {
     "lambertw": set(),
     "elementary": set(),

@@ -291,7 +291,7 @@ def test_without_its_extras_it_says_how_to_get_them():
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
     )
     assert result.returncode == 1
-    assert "pip install 'deadtime[all]'" in result.stderr
+    assert "pip install 'deadtime[cli]'" in result.stderr
     assert "Traceback" not in result.stderr
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from deadtime._batch import matrix, number, vector
 from deadtime._transfer import TransferFunction
-from deadtime._validation import finite, non_negative, non_zero
+from deadtime._validation import finite, non_negative, non_zero, unmasked
 
 __all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
 
@@ -327,6 +327,7 @@ def _trimmed(coefficients: Sequence[float]) -> NDArray[np.float64]:
 
 
 def _coefficients(name: str, given: Sequence[SupportsFloat]) -> tuple[float, ...]:
+    given = unmasked(name, given)
     try:
         listed = list(given)
     except TypeError as error:

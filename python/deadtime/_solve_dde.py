@@ -226,7 +226,7 @@ def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
         return _vector("y0", y0)
     if not callable(past):
         return np.asarray(past)
-    value = np.atleast_1d(np.asarray(past(start), dtype=np.float64))
+    value = np.atleast_1d(real_array("history", past(start)))
     if value.ndim != 1:
         raise ValueError(
             f"history returned shape {value.shape} at t={start}: give a number or (dim,)"

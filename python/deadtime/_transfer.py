@@ -28,7 +28,7 @@ from deadtime._realisation import Realisation, of_transfer_function
 from deadtime._rootset import Range, RootSet
 from deadtime._system_response import SystemResponse
 from deadtime._system_run import respond, step_response
-from deadtime._validation import non_negative, real_array
+from deadtime._validation import non_negative, real_array, unmasked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -204,7 +204,7 @@ class TransferFunction:
         Finite also where numerator and denominator leave the range of doubles and their ratio
         does not. Infinite where only the denominator is zero, NaN where both are.
         """
-        points = np.asarray(s)
+        points = np.asarray(unmasked("s", s))
         if points.dtype.kind not in "biufc":
             raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
         flat = points.astype(np.complex128).ravel()

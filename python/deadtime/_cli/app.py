@@ -6,6 +6,7 @@ import csv
 import os
 import shlex
 import sys
+import traceback
 from pathlib import Path
 from typing import Annotated
 
@@ -35,6 +36,7 @@ from deadtime._errors import DeadtimeError
 from deadtime._experiment import demo_flight, study
 from deadtime._loop import ControlLoop
 from deadtime._plots import (
+    check_matplotlib,
     new_figure,
     plot_certificate,
     plot_responses,
@@ -59,24 +61,20 @@ app = typer.Typer(
 Ends = tuple[float, float]
 
 #: What ends a command with one line; anything else is a defect and shows where it is.
-FAILURES = (
-    DeadtimeError,
-    ArithmeticError,
-    ImportError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
+FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 
+#: Exit code after a defect: that of an error within a program, as `sysexits.h` has it.
+DEFECT = 70
 
 #: Exit code after Ctrl-C.
 INTERRUPTED = 130
 
 
 def run() -> None:
-    """Run the command; a failure is one line on standard error and a non-zero exit."""
+    """Run the command; a failure is one line on standard error and a non-zero exit.
+
+    What the command does not expect is a defect of its own: it shows where it happened.
+    """
     try:
         app()
     except SystemExit as ended:
@@ -93,9 +91,17 @@ def run() -> None:
         elif isinstance(error, ArithmeticError):
             told = f"a number leaves the range of double precision ({told}): choose other units"
         elif isinstance(error, MemoryError):
-            told = "out of memory: ask for less at once"
+            told = f"out of memory: {told or 'ask for less at once'}"
         print(f"deadtime: {' '.join(told.split())}", file=sys.stderr)
         raise SystemExit(1) from None
+    except Exception as error:
+        traceback.print_exc()
+        print(
+            f"deadtime: the command has failed internally ({type(error).__name__}); this is a "
+            "defect, please report it with the lines above and the command",
+            file=sys.stderr,
+        )
+        raise SystemExit(DEFECT) from None
 
 
 app.command("estimate")(estimate_delays)
@@ -280,6 +286,7 @@ def report(
     as_json: opt.As_json = False,
 ) -> None:
     """Write one page about a recording: delay, map of gains, a controller to try."""
+    check_matplotlib()
     recording = read_recording(file, time=time, reference=reference, output=output, command=command)
     loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit)
     with stages(5, quiet=as_json) as begin:
@@ -299,6 +306,7 @@ def demo(
     as_json: opt.As_json = False,
 ) -> None:
     """Fly a simulated loop with known truth and find its delay and its gains; no hardware."""
+    check_matplotlib()
     with stages(6, quiet=as_json) as begin:
         begin("flying the simulated loop")
         flight = demo_flight(seed)

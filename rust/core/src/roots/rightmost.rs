@@ -90,7 +90,7 @@ pub fn unstable_and_rightmost(
             };
             (Ok(count), search(&prepared, 1, Some(line), task))
         }
-        Err(Error::Interrupted) => (Err(Error::Interrupted), Err(Error::Interrupted)),
+        Err(error) if error.ends_all() => (Err(error.clone()), Err(error)),
         Err(error) => (Err(error), search(&prepared, 1, None, task)),
     }
 }

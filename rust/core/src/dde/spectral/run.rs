@@ -120,7 +120,7 @@ impl<'a> Run<'a> {
             wait: (0, 1),
             output: Output::new(problem.times.as_deref()),
         };
-        run.output.start(problem.start, &run.state);
+        run.output.start(problem.start, &run.state)?;
         Ok(run)
     }
 
@@ -295,8 +295,8 @@ impl<'a> Run<'a> {
         let stop = self.watch.scan(equation, &piece, y, t)?;
         let until = stop.unwrap_or(end);
         let last = stop.is_some() || end >= self.problem.end;
-        self.output.give(&piece, (y, t), until, last);
-        self.solution.history.push(piece);
+        self.output.give(&piece, (y, t), until, last)?;
+        self.solution.history.push(piece)?;
         self.solution.elements += 1;
         self.solution.end = until;
         for (state, row) in self.state.iter_mut().zip(self.element.y.chunks_exact(n)) {
@@ -366,7 +366,7 @@ impl<'a> Run<'a> {
         }
         if changed {
             self.watch.restart(equation, time, &self.state)?;
-            self.output.start(time, &self.state);
+            self.output.start(time, &self.state)?;
         }
         Ok(())
     }
