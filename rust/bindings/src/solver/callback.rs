@@ -1,5 +1,7 @@
 //! Right-hand sides, events and changes that are Python functions.
 
+use std::ops::Range;
+
 use deadtime::dde::spectral::{Columns, Equation};
 use deadtime::{Error, Task};
 use numpy::ndarray::{ArrayView2, ArrayView3};
@@ -42,13 +44,22 @@ impl<'py> Callbacks<'py> {
         })
     }
 
-    pub(super) fn events(&mut self, t: f64, y: &[f64], out: &mut [f64]) -> Result<(), Error> {
-        let result = self.read_events(t, y, out);
+    pub(super) fn events(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        which: Range<usize>,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        let result = self.read_events(t, y, which, out);
         self.keep(result)
     }
 
-    fn read_events(&self, t: f64, y: &[f64], out: &mut [f64]) -> PyResult<()> {
-        for (index, (event, out)) in self.events.iter().zip(out).enumerate() {
+    fn read_events(&self, t: f64, y: &[f64], which: Range<usize>, out: &mut [f64]) -> PyResult<()> {
+        for (index, out) in which.zip(out) {
+            let Some(event) = self.events.get(index) else {
+                continue;
+            };
             let py = event.py();
             let head = [PyFloat::new(py, t).into_any(), y.to_pyarray(py).into_any()];
             let value = call(event, head, &self.args)?;
@@ -243,8 +254,14 @@ impl Equation for PythonEquation<'_> {
         true
     }
 
-    fn events(&mut self, t: f64, y: &[f64], out: &mut [f64]) -> Result<(), Error> {
-        self.callbacks.events(t, y, out)
+    fn events(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        which: Range<usize>,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        self.callbacks.events(t, y, which, out)
     }
 
     fn change(&mut self, jump: usize, t: f64, y: &mut [f64]) -> Result<(), Error> {

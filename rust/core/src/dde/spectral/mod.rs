@@ -17,6 +17,7 @@ mod dense;
 mod element;
 mod events;
 mod fit;
+mod isolate;
 mod jacobian;
 mod newton;
 mod nodes;
@@ -30,6 +31,8 @@ mod tests;
 pub use fit::{Approximation, approximate};
 pub use run::solve;
 pub use sparsity::Sparsity;
+
+use std::ops::Range;
 
 use super::breaks::BreakingPoint;
 use super::history::{History, Piece};
@@ -58,8 +61,14 @@ pub trait Equation {
         false
     }
 
-    /// The event functions at a time.
-    fn events(&mut self, _t: f64, _y: &[f64], _out: &mut [f64]) -> Result<(), Error> {
+    /// Some of the event functions at a time.
+    fn events(
+        &mut self,
+        _t: f64,
+        _y: &[f64],
+        _which: Range<usize>,
+        _out: &mut [f64],
+    ) -> Result<(), Error> {
         Ok(())
     }
 

@@ -329,7 +329,7 @@ impl<'a> Run<'a> {
         }
         self.follow(&piece);
         let (y, t) = (&self.element.y, &self.element.t);
-        let stop = self.watch.scan(equation, &piece, y, t)?;
+        let stop = self.watch.scan(equation, &piece, nodes, y)?;
         let until = stop.unwrap_or(end);
         let last = stop.is_some() || end >= self.problem.end;
         self.output.give(&piece, (y, t), until, last);
@@ -343,7 +343,10 @@ impl<'a> Run<'a> {
             return Ok(Some(Outcome::Event));
         }
         self.reach(end);
-        self.jump_at(end, equation)?;
+        if self.jump_at(end, equation)? {
+            self.output.end(end, &self.state);
+            return Ok(Some(Outcome::Event));
+        }
         if !self.problem.keep {
             self.solution.history.forget(end - self.problem.memory());
         }
@@ -388,8 +391,12 @@ impl<'a> Run<'a> {
         self.breaks.follow(point);
     }
 
-    /// What a jump does at `time`.
-    fn jump_at<E: Equation + ?Sized>(&mut self, time: f64, equation: &mut E) -> Result<(), Error> {
+    /// What a jump does at `time`, and whether that is a terminal event.
+    fn jump_at<E: Equation + ?Sized>(
+        &mut self,
+        time: f64,
+        equation: &mut E,
+    ) -> Result<bool, Error> {
         let mut changed = false;
         while let Some(jump) = self.problem.jumps.get(self.jump) {
             if jump.time > time {
@@ -402,10 +409,10 @@ impl<'a> Run<'a> {
             self.jump += 1;
         }
         if changed {
-            self.watch.restart(equation, time, &self.state)?;
             self.output.start(time, &self.state);
+            return self.watch.change(equation, time, &self.state);
         }
-        Ok(())
+        Ok(false)
     }
 
     /// Length and order of the next element.
