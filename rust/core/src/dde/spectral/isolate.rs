@@ -16,7 +16,13 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Append, in ascending order, places on [−1, 1] with no more than one zero between neighbours.
 pub(super) fn separators(coefficients: &[f64], out: &mut Vec<f64>) {
+    let Some((first, others)) = coefficients.split_first() else {
+        return;
+    };
     let largest = total(coefficients);
+    if first.abs() > total(others) + ROUNDING * largest {
+        return;
+    }
     let table = nodes(24);
     let mut values = vec![0.0; table.order + 1];
     let mut local = values.clone();

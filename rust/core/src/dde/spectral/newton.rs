@@ -3,12 +3,12 @@
 //! The residual R of Y = y_0 + (h/2) B F(Y) is answered by δ with (I − (h/2) B ⊗ J) δ = R, where
 //! J = ∂f/∂y at one node, together with ∂f/∂z for delays shorter than the element. With J = 0 this
 //! is a sweep of Picard's. Where the diagonal of J carries nearly all of it, or its factors would
-//! be too large, a real system a component is left; otherwise the eigenvalues of B part the system
-//! into complex ones of the size of J. Factors serve all sweeps, and all elements of the same
-//! length and order.
+//! be too large, a real system a component is left. A small system is solved whole; of a large one
+//! the eigenvalues of B make complex ones of the size of J. Factors serve all sweeps, and all
+//! elements of the same length and order.
 
 use super::delayed::Delayed;
-use super::dense::{Factors, dot};
+use super::dense::{Factors, add_multiple, dot};
 use super::jacobian::{Differences, Jacobian, Point};
 use super::nodes::Nodes;
 use super::shifted::Shifted;
@@ -19,6 +19,8 @@ use crate::{Error, Task};
 /// Off-diagonal part of J, relative to its diagonal, that is left to the sweeps.
 const OFF_DIAGONAL: f64 = 1e-3;
 
+/// Unknowns of a system that is solved whole.
+const WHOLE: usize = 100;
 /// Components with one system from which on its inverse pays.
 const SHARED: usize = 14;
 /// Columns up to which a Jacobian costs no more than a sweep or two.
@@ -35,6 +37,7 @@ pub(super) struct Newton {
     diagonal: Option<Vec<f64>>,
     /// (h/2, order) of the factors.
     key: Option<(f64, usize)>,
+    whole: Option<Factors>,
     shifted: Option<Shifted>,
     /// One system for each different entry of the diagonal.
     single: Vec<Single>,
@@ -153,6 +156,10 @@ impl Newton {
         if self.key != Some((half, order)) && !self.factorise(nodes, half) {
             return false;
         }
+        if let Some(whole) = &self.whole {
+            whole.solve(residual);
+            return true;
+        }
         let diagonal = match (&self.diagonal, &self.shifted, &self.jacobian) {
             (Some(diagonal), _, _) => diagonal,
             (None, Some(shifted), Some(jacobian)) => {
@@ -180,6 +187,7 @@ impl Newton {
     fn factorise(&mut self, nodes: &Nodes, half: f64) -> bool {
         let order = nodes.order;
         self.key = None;
+        self.whole = None;
         self.shifted = None;
         self.single.clear();
         let entry = |i: usize, j: usize, slope: f64| {
@@ -206,6 +214,25 @@ impl Newton {
                     factors,
                     inverse,
                 });
+            }
+        } else if let Some(jacobian) = &self.jacobian
+            && jacobian.dim() * order <= WHOLE
+        {
+            let size = jacobian.dim() * order;
+            let mut matrix = vec![0.0; size * size];
+            matrix
+                .iter_mut()
+                .step_by(size + 1)
+                .for_each(|one| *one = 1.0);
+            for (row, column, value) in jacobian.entries() {
+                for (i, weights) in nodes.integrate.chunks_exact(order).enumerate() {
+                    let at = (row * order + i) * size + column * order;
+                    add_multiple(&mut matrix[at..at + order], -half * value, weights);
+                }
+            }
+            self.whole = Factors::new(size, matrix);
+            if self.whole.is_none() {
+                return false;
             }
         } else if let Some(jacobian) = &self.jacobian {
             self.shifted = Shifted::new(jacobian, nodes, half);
