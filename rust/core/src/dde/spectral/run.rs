@@ -7,6 +7,7 @@ use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
 use super::nodes::{Nodes, nodes};
 use super::output::Output;
+use super::unread::{Reading, Unread};
 use super::{Equation, Outcome, Problem, Solution};
 use crate::dde::chebyshev;
 use crate::{Error, Task};
@@ -60,6 +61,7 @@ struct Run<'a> {
     jump: usize,
     watch: Watch,
     element: Element,
+    reading: Reading,
     state: Vec<f64>,
     /// The point at which the next element starts, if it is a breaking point not yet followed.
     fresh: Option<BreakingPoint>,
@@ -111,6 +113,7 @@ impl<'a> Run<'a> {
             jump: first.unwrap_or(problem.jumps.len()),
             watch: Watch::new(&problem.events, equation, problem.start, &problem.initial)?,
             element: Element::default(),
+            reading: Reading::default(),
             state: problem.initial.clone(),
             fresh: None,
             length: (problem.end - problem.start).min(problem.longest),
@@ -151,11 +154,14 @@ impl<'a> Run<'a> {
                 Sweeps::Converged(count) => {
                     nodes.coefficients(&self.element.y, &mut self.element.coefficients);
                     let verdict = control::judge(&self.element, nodes);
-                    if verdict.error <= 1.0 {
+                    if verdict.error > 1.0 {
+                        self.refuse(verdict);
+                    } else if let Some(unread) = self.unread(nodes) {
+                        self.read(unread, verdict);
+                    } else {
                         self.renew_jacobian(count, equation, task)?;
                         return self.accept(verdict, nodes, equation);
                     }
-                    self.refuse(verdict);
                 }
                 Sweeps::Stalled => {
                     // With a Jacobian of this place once more, then shorter.
@@ -258,6 +264,24 @@ impl<'a> Run<'a> {
         } else {
             self.length = length * control::factor(verdict.error, self.order).min(0.8);
         }
+    }
+
+    fn unread(&mut self, nodes: &Nodes) -> Option<Unread> {
+        let history = &self.solution.history;
+        self.reading
+            .unread(self.problem, &self.element, nodes, history)
+    }
+
+    /// Have the next try read what this one did not.
+    fn read(&mut self, unread: Unread, verdict: Verdict) {
+        let Some(time) = unread.end else {
+            let error = unread.error;
+            return self.refuse(Verdict { error, ..verdict });
+        };
+        self.solution.refused += 1;
+        // It ends this element only: its descendants are left to the same comparison.
+        let order = self.breaks.smooth() - 1;
+        self.breaks.add(BreakingPoint { time, order });
     }
 
     /// Have a Jacobian where sweeps were many, a new one where it is stale.
