@@ -51,8 +51,9 @@ pub(super) struct Element {
     pub(super) t: Vec<f64>,
     /// Values, component by component, at the N + 1 points.
     pub(super) y: Vec<f64>,
-    z: Vec<f64>,
-    dz: Vec<f64>,
+    /// Delayed values and slopes at the nodes, as in [`Columns`].
+    pub(super) z: Vec<f64>,
+    pub(super) dz: Vec<f64>,
     /// The right-hand side there, as last evaluated.
     pub(super) f: Vec<f64>,
     pub(super) coefficients: Vec<f64>,

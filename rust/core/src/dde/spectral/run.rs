@@ -8,6 +8,7 @@ use super::events::Watch;
 use super::newton::Newton;
 use super::nodes::{Nodes, nodes};
 use super::output::Output;
+use super::unread::{Reading, Unread};
 use super::{Equation, Outcome, Problem, Solution};
 use crate::dde::chebyshev;
 use crate::{Error, Task};
@@ -65,6 +66,7 @@ struct Run<'a> {
     jump: usize,
     watch: Watch,
     element: Element,
+    reading: Reading,
     state: Vec<f64>,
     /// The point at which the next element starts, if it is a breaking point not yet followed.
     fresh: Option<BreakingPoint>,
@@ -118,6 +120,7 @@ impl<'a> Run<'a> {
             jump: first.unwrap_or(problem.jumps.len()),
             watch: Watch::new(&problem.events, equation, problem.start, &problem.initial)?,
             element: Element::new(Newton::new(problem.sparsity.as_ref())),
+            reading: Reading::default(),
             state: problem.initial.clone(),
             fresh: None,
             length: (problem.end - problem.start).min(problem.longest),
@@ -163,7 +166,11 @@ impl<'a> Run<'a> {
                 Sweeps::Converged(count) => {
                     nodes.coefficients(&self.element.y, &mut self.element.coefficients);
                     let verdict = control::judge(&self.element, nodes);
-                    if verdict.error <= 1.0 {
+                    if verdict.error > 1.0 {
+                        self.refuse(verdict);
+                    } else if let Some(unread) = self.unread(nodes) {
+                        self.read(unread, verdict);
+                    } else {
                         let stiff = self.renew_jacobian(count, verdict, equation, task)?;
                         let held = (!self.element.newton.is_on() && count > SLOW_SWEEPS)
                             .then_some(end - start);
@@ -171,7 +178,6 @@ impl<'a> Run<'a> {
                         self.length = self.length.min(held.unwrap_or(f64::INFINITY)).max(stiff);
                         return Ok(outcome);
                     }
-                    self.refuse(verdict);
                 }
                 Sweeps::Stalled => {
                     // With a Jacobian of this place once more, then shorter.
@@ -282,6 +288,24 @@ impl<'a> Run<'a> {
         } else {
             self.length = length * control::factor(verdict.error, self.order).min(0.8);
         }
+    }
+
+    fn unread(&mut self, nodes: &Nodes) -> Option<Unread> {
+        let history = &self.solution.history;
+        self.reading
+            .unread(self.problem, &self.element, nodes, history)
+    }
+
+    /// Have the next try read what this one did not.
+    fn read(&mut self, unread: Unread, verdict: Verdict) {
+        let Some(time) = unread.end else {
+            let error = unread.error;
+            return self.refuse(Verdict { error, ..verdict });
+        };
+        self.solution.refused += 1;
+        // It ends this element only: its descendants are left to the same comparison.
+        let order = self.breaks.smooth() - 1;
+        self.breaks.add(BreakingPoint { time, order });
     }
 
     /// Have a Jacobian where sweeps were many, a new one where it is stale; the length that the
