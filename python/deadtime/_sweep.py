@@ -22,7 +22,7 @@ from deadtime._loop_model import LoopModel, refuse_discretised, rest_of
 from deadtime._loop_run import LEAST, SHORTEST
 from deadtime._validation import finite, increasing, positive, real_array, thread_number
 
-__all__ = ["Sweep", "SweepStatus", "sweep"]
+__all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
 
 Vector = NDArray[np.float64]
 
@@ -201,6 +201,8 @@ def sweep(
     ValueError
         If the loop has no such number, a number is out of its range, the arrays do not broadcast,
         or no delay is known.
+    TypeError
+        If `loop` is no `ControlLoop` or `values` no mapping.
 
     Notes
     -----
@@ -229,6 +231,7 @@ def sweep(
     >>> found.best()
     {'Kp': 2.0, 'delay': 0.2}
     """
+    require_loop(loop)
     arrays, shape = _sets(values)
     common = _checked(loop, arrays)
     if time is None and not responses:
@@ -281,6 +284,15 @@ def sweep(
         metrics={name: column.reshape(shape).copy() for name, column in columns.items()},
         outputs=found.reshape(*shape, width) if responses else None,
     )
+
+
+def require_loop(loop: object) -> None:
+    """Raise where something else was given in the place of a loop."""
+    if not isinstance(loop, ControlLoop):
+        raise TypeError(
+            f"a {type(loop).__name__} is no ControlLoop: write the plant as Integrator, FirstOrder "
+            "or RationalPlant, and give ControlLoop(plant, P(1.0), delay=...)"
+        )
 
 
 def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int, ...]]:
