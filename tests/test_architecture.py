@@ -63,6 +63,7 @@ FLOORS = [
         "_loop_sensitivities",
         "_loop_stability",
         "_batch",
+        "_settled",
         "_sweep",
         "_map_axes",
         "_boundaries",
