@@ -23,6 +23,7 @@ from deadtime._experiment.flights import FlownSteps
 from deadtime._experiment.fly import Connect
 from deadtime._experiment.learn import COLUMNS
 from deadtime._flight_page import PARTS, write_flight_page
+from deadtime._plots import check_matplotlib
 from deadtime.links import Limits, Vehicle
 from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
@@ -101,6 +102,7 @@ def fly_drone(
         limits=Limits(max_climb=max_climb, max_height=max_height),
     )
     plan.check()
+    check_matplotlib()  # for the report, and before anything flies
     if host is not None:
         _ask_for_consent(host, plan, consent, virtual_time)
     elif not as_json:
