@@ -31,7 +31,7 @@ from deadtime._response import Response
 from deadtime._sampled_gain import SampledLoopGain
 from deadtime._sampled_margins import sampled_margins
 from deadtime._sampled_ranges import SampledNumber, further_delay
-from deadtime._validation import finite, non_negative, positive
+from deadtime._validation import finite, non_negative, positive, real_array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -495,7 +495,7 @@ class ControlLoop:
                 low = min(low, 0.01 * high)
             omega = np.geomspace(low, high, 1001)
         drawn = shown_rows(axes, 2)
-        plot_bode(drawn, self, np.asarray(omega, dtype=np.float64), found)
+        plot_bode(drawn, self, real_array("omega", omega), found)
         return drawn
 
     def transition_matrix(self) -> NDArray[np.float64]:

@@ -38,7 +38,7 @@ from deadtime._frequency import (
     without_powers,
     zeros_between,
 )
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._quasipolynomial import QuasiPolynomial
 
 __all__ = ["Margins", "end_of_gain", "first_loss", "gain_crossovers", "margins"]
@@ -117,10 +117,6 @@ class Margins(ReadOnlyArrays):
     phase_crossovers: Vector
     gain_margins: Vector
     searched: tuple[float, float]
-
-    def __post_init__(self) -> None:
-        for value in vars(self).values():
-            read_only(value)
 
     def __repr__(self) -> str:
         if not self.stable:

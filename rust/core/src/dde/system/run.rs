@@ -44,7 +44,7 @@ pub(super) fn run(
         .map(|group| terms::longest(group))
         .into_iter()
         .fold(0.0, f64::max);
-    let mut outputs = Outputs::new(equations, times, longest);
+    let mut outputs = Outputs::new(equations, times, longest)?;
     let last = outputs.last();
     let shortest = feeds[..2]
         .iter()
@@ -69,7 +69,7 @@ pub(super) fn run(
     let input_breaks = passed_breaks(inputs, unit);
     for passed in &input_breaks {
         if passed.is_reported(equations.inputs) {
-            outputs.input_break(passed.time);
+            outputs.input_break(passed.time)?;
         }
     }
     let before = passed_breaks(&history, unit);
@@ -83,7 +83,7 @@ pub(super) fn run(
         longest,
     );
     for passed in before {
-        outputs.state_break(passed.time);
+        outputs.state_break(passed.time)?;
         jumps.push(passed)?;
     }
     let (mut states, mut slopes) = (history.track, slopes);
@@ -91,7 +91,7 @@ pub(super) fn run(
     slopes.close(0.0);
     let first = first_break(&jumps, &feeds, [&states, &slopes, &inputs.track], &x);
     if first.is_reported(n) {
-        outputs.state_break(0.0);
+        outputs.state_break(0.0)?;
     }
     jumps.push(first)?;
 
@@ -106,7 +106,7 @@ pub(super) fn run(
                 *x += leap;
             }
             if passed.is_reported(n) {
-                outputs.state_break(t);
+                outputs.state_break(t)?;
             }
             jumps.push(passed)?;
         }
@@ -127,14 +127,17 @@ pub(super) fn run(
             length: suggested.min(reach),
         };
         let stop = jumps.next(t + reach + tolerance, &scale).min(last);
-        let whole = reach.min(stop - t);
+        let mut whole = reach.min(stop - t);
         let tracks = [&states, &slopes, &inputs.track];
         let h = loop {
             // Equal parts: their delayed counterparts then lie on whole elements, and their
             // factors serve again.
             let parts = (whole / suggested - 1e-9).ceil().max(1.0);
             let h = if parts > 1.0 { whole / parts } else { whole };
-            element.solve(&x, t, h, tolerance, tracks);
+            if let Some(read) = element.solve(&x, t, h, tolerance, tracks) {
+                (whole, suggested) = (read, read.min(suggested));
+                continue;
+            }
             if element.is_resolved() || h <= 64.0 * tolerance {
                 break h;
             }
@@ -143,7 +146,7 @@ pub(super) fn run(
         if element.has_room() {
             suggested = suggested.max(2.0 * h);
         }
-        let next = if h < whole {
+        let next = if h < reach.min(stop - t) {
             t + h
         } else if stop - t <= reach {
             stop
