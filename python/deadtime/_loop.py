@@ -629,7 +629,8 @@ class ControlLoop:
         Notes
         -----
         Of a sampled loop the frequencies at which the loop gain is looked at are dense, but chosen
-        by its poles, zeros and peaks and not by a proof.
+        by its poles, zeros and peaks and not by a proof. Of a neutral loop the last hundredth of
+        the way to where it loses strong stability is halved, not searched for all crossings.
 
         Examples
         --------
