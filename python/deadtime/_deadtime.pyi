@@ -461,6 +461,8 @@ def solve_delay_equation(
     longest: float,
     times: NDArray[np.float64] | None,
     keep: bool,
+    sparsity: tuple[list[int], list[int]] | None,
+    most: int | None,
     events: list[tuple[Any, int, int]],
     jumps: list[tuple[float, Any]],
 ) -> DelayRun: ...

@@ -106,6 +106,11 @@ class Plant(ABC):
         return realise(*self._polynomials(self.parameters))
 
 
+# Why numbers cannot be zero.
+NO_GAIN = "a plant without gain does not answer its command, so the loop is open"
+NO_TIME = "the plant is then a gain alone, RationalPlant([gain], [1.0])"
+
+
 @dataclass(frozen=True)
 class Integrator(Plant):
     """gain / (s (lag s + 1)).
@@ -136,7 +141,7 @@ class Integrator(Plant):
     lag: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", non_zero("gain", self.gain))
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
         object.__setattr__(self, "lag", non_negative("lag", self.lag))
 
     @property
@@ -176,8 +181,10 @@ class FirstOrder(Plant):
     time_constant: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", non_zero("gain", self.gain))
-        object.__setattr__(self, "time_constant", non_zero("time_constant", self.time_constant))
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
+        object.__setattr__(
+            self, "time_constant", non_zero("time_constant", self.time_constant, NO_TIME)
+        )
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -225,7 +232,7 @@ class RationalPlant(Plant):
             )
         object.__setattr__(self, "num", num)
         object.__setattr__(self, "den", den)
-        object.__setattr__(self, "gain", non_zero("gain", self.gain))
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
 
     @property
     def parameters(self) -> dict[str, float]:

@@ -20,17 +20,26 @@ from deadtime._frozen import ReadOnlyArrays
 from deadtime._loop import ControlLoop
 from deadtime._loop_model import LoopModel, refuse_discretised, rest_of
 from deadtime._loop_run import LEAST, SHORTEST
+from deadtime._settled import TIME_CONSTANTS, abscissae, slowest_times
 from deadtime._validation import finite, increasing, positive, real_array, thread_number
 
-__all__ = ["Sweep", "SweepStatus", "sweep"]
+__all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
 
 Vector = NDArray[np.float64]
 
 #: Sets built and simulated together.
 _BLOCK = 1 << 15
 
-# How often the time is doubled for the sets that have not settled.
-_DOUBLINGS = 4
+# Sets that have not settled are measured over twice the time or more, up to so many doublings. From
+# the one of that number on their poles are asked for, and it lasts so many of their slowest time
+# constants: an answer of the size of the step has then come down to the band and stayed inside.
+_DOUBLINGS = 10
+_ASKED = 3
+_TO_SETTLE = 8.0
+
+# What the native part gives where the response was inside its band at the end, and did not show
+# that it stays there.
+_DOUBTFUL = 4
 
 #: Figures in the order in which the native part gives them.
 _FIGURES = (
@@ -44,6 +53,7 @@ _FIGURES = (
     "peak",
     "steady_state",
 )
+_SETTLING = _FIGURES.index("settling_time")
 
 
 class SweepStatus(IntEnum):
@@ -52,8 +62,9 @@ class SweepStatus(IntEnum):
     OK = 0
     """Simulated to the end; where metrics were asked for, settled."""
     UNSETTLED = 1
-    """Outside its settling band at the end: the settling time is NaN, and the rise time where the
-    step was not climbed either. An unstable loop held by its limit ends here."""
+    """Outside its settling band at the end, or inside it for less than three of the slowest time
+    constants of the closed loop: the settling time is NaN, and the rise time where the step was
+    not climbed either. An unstable loop held by its limit ends here."""
     DIVERGED = 2
     """Grown beyond 1e150 before the end: all NaN."""
     REFUSED = 3
@@ -172,9 +183,10 @@ def sweep(
         have their common shape.
     time : float or array_like, shape (n,)
         For metrics, the time in s up to which responses are measured, from zero; of an array, the
-        first and the last time. By default ten times the longest delay or time constant, and up to
-        16 times longer for the sets that have not settled by then. For responses, the output
-        times, increasing, the first one being that of the step.
+        first and the last time. By default ten times the longest delay or time constant, and for
+        the sets that have not settled by then as long as their closed-loop poles ask for, up to a
+        thousand times that. For responses, the output times, increasing, the first one being that
+        of the step.
     responses : bool
         Return outputs instead of metrics.
     amplitude : float
@@ -197,13 +209,19 @@ def sweep(
     ValueError
         If the loop has no such number, a number is out of its range, the arrays do not broadcast,
         or no delay is known.
+    TypeError
+        If `loop` is no `ControlLoop` or `values` no mapping.
 
     Notes
     -----
     Metrics are those of `Response.info`, but measured on the response itself instead of a grid of
     times: no peak is missed and the settling range begins where the rise ends, not at the first
     output after it. A set that diverges has NaN for all metrics, and `Sweep.status` says so; NaN
-    elsewhere is what `Response.info` gives: a settling or rise time that was not reached.
+    elsewhere is what `Response.info` gives: a settling or rise time that was not reached. A
+    settling time is given only where the output was in the band for three of the slowest time
+    constants 1/abs(abscissa) of the closed loop before the end, or had died down to a twentieth of
+    the band with no slow pole or zero of plant or controller in play. That is evidence and no
+    proof: `design` proves what follows.
 
     Sampled loops with a plain integrator run in vector registers, one set a lane; the others one
     by one on all threads. The result for a set does not depend on which other sets there are, on
@@ -225,58 +243,153 @@ def sweep(
     >>> found.best()
     {'Kp': 2.0, 'delay': 0.2}
     """
+    require_loop(loop)
     arrays, shape = _sets(values)
     common = _checked(loop, arrays)
-    if time is None and not responses:
-        options = {"amplitude": amplitude, "settling": settling, "rise": rise, "threads": threads}
-        return _until_settled(common, arrays, options, progress)
-    times = _times(time, responses)
     height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
-    band = positive("settling", settling)
-    sampled = 1.0 if "sample_time" in values else common.sample_time
-    refuse_discretised(common.controller, sampled, "a sweep")
     parts = (finite("rise", rise[0]), finite("rise", rise[1]))
     if not 0.0 <= parts[0] < parts[1]:
         raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
-    number = thread_number(threads)
+    band = positive("settling", settling)
+    sampled = 1.0 if "sample_time" in values else common.sample_time
+    refuse_discretised(common.controller, sampled, "a sweep")
+    sets = _Sets(common, arrays, shape, height, band, parts, thread_number(threads))
+    if time is None and not responses:
+        return sets.until_settled(progress)
+    times = _times(time, responses)
+    if responses:
+        return sets.outputs(times, progress)
+    return sets.measured(times, progress)
 
-    count = math.prod(shape)
-    width = len(times) if responses else len(_FIGURES)
-    found = np.full((count, width), np.nan)
-    status = np.empty(count, dtype=np.uint8)
-    flat = {name: np.broadcast_to(array, shape).ravel() for name, array in arrays.items()}
-    done = 0
-    for place, part in _blocks(loop, flat, count):
-        numbers: dict[str, Any] = common.parameters | part
-        model = LoopModel.build(common.plant, common.controller, numbers)
-        row = model.row(*(numbers.get(name) for name in ("delay", "sample_time", "limit")))
-        rows = np.ascontiguousarray(np.broadcast_to(row, (len(place), row.shape[-1])))
-        states = model.B.shape[-1]
-        ahead = common.delay_path == "measurement"
-        report = None if progress is None else lambda n, done=done: progress(done + n)
-        if responses:
+
+@dataclass(frozen=True, eq=False)
+class _Sets:
+    """What `sweep` was asked for, checked."""
+
+    loop: ControlLoop
+    arrays: Mapping[str, Vector]
+    shape: tuple[int, ...]
+    height: float
+    band: float
+    rise: tuple[float, float]
+    threads: int | None
+
+    def only(self, chosen: NDArray[np.bool_]) -> _Sets:
+        """Some of the sets, in one row."""
+        count = int(np.count_nonzero(chosen))
+        arrays = {
+            name: np.broadcast_to(array, self.shape)[chosen] for name, array in self.arrays.items()
+        }
+        return replace(self, arrays=arrays, shape=(count,))
+
+    def blocks(
+        self, progress: Callable[[int], object] | None
+    ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any], tuple[int, Vector, float, bool], Any]]:
+        """Places, numbers, rows for the native part, and its progress, block by block."""
+        flat = {name: np.broadcast_to(a, self.shape).ravel() for name, a in self.arrays.items()}
+        loop, done = self.loop, 0
+        for place, part in _blocks(loop, flat, math.prod(self.shape)):
+            numbers: dict[str, Any] = loop.parameters | part
+            model = LoopModel.build(loop.plant, loop.controller, numbers)
+            row = model.row(*(numbers.get(name) for name in ("delay", "sample_time", "limit")))
+            rows = np.ascontiguousarray(np.broadcast_to(row, (len(place), row.shape[-1])))
+            ahead = loop.delay_path == "measurement"
+            report = None if progress is None else lambda n, done=done: progress(done + n)
+            yield place, numbers, (model.B.shape[-1], rows, self.height, ahead), report
+            done += len(place)
+
+    def outputs(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+        """Outputs at given times."""
+        count = math.prod(self.shape)
+        found, status = np.full((count, len(times)), np.nan), np.empty(count, dtype=np.uint8)
+        for place, _, rows, report in self.blocks(progress):
             found[place], status[place] = sweep_responses(
-                states, rows, height, ahead, times - times[0], number, report
+                *rows, times - times[0], self.threads, report
             )
-        else:
-            steady = np.broadcast_to(_steady(common, numbers, height), (len(place),))
-            span = float(times[-1] - times[0])
-            found[place], status[place] = sweep_figures(
-                states, rows, height, ahead, steady, span, band, parts, number, report
-            )
-        done += len(place)
+        outputs = found.reshape(*self.shape, len(times))
+        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
-    columns = {} if responses else dict(zip(_FIGURES, found.T, strict=True))
-    return Sweep(
-        values=arrays,
-        shape=shape,
-        time=times,
-        status=status.reshape(shape),
-        metrics={name: column.reshape(shape).copy() for name, column in columns.items()},
-        outputs=found.reshape(*shape, width) if responses else None,
-    )
+    def measured(
+        self,
+        times: Vector,
+        progress: Callable[[int], object] | None = None,
+        by_poles: bool = True,
+    ) -> Sweep:
+        """Metrics; `by_poles`, doubtful sets are decided, else their status tells of them."""
+        count, span = math.prod(self.shape), float(times[-1] - times[0])
+        found, status = np.full((count, len(_FIGURES)), np.nan), np.empty(count, dtype=np.uint8)
+        for place, numbers, rows, report in self.blocks(progress):
+            steady = np.broadcast_to(_steady(self.loop, numbers, self.height), (len(place),))
+            figures, ended = sweep_figures(
+                *rows, steady, span, self.band, self.rise, self.threads, report
+            )
+            inside = span - figures[:, _SETTLING]
+            slow = TIME_CONSTANTS * slowest_times(self.loop, numbers, len(place)) > inside
+            ended[slow & (ended == SweepStatus.OK)] = _DOUBTFUL
+            if by_poles:
+                _refuse_passing(self.loop, numbers, figures, ended, inside, self.threads)
+            found[place], status[place] = figures, ended
+        metrics = {
+            name: column.reshape(self.shape).copy()
+            for name, column in zip(_FIGURES, found.T, strict=True)
+        }
+        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), metrics)
+
+    def until_settled(self, progress: Callable[[int], object] | None) -> Sweep:
+        """Metrics of all sets, longer and longer where a set has not settled."""
+        loop = self.loop
+        numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
+        waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
+        slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
+        span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
+        found = self.measured(np.array([0.0, span]), progress, by_poles=False)
+        metrics = {name: figures.copy() for name, figures in found.metrics.items()}
+        status = found.status.copy()
+        due = np.isin(status, (SweepStatus.UNSETTLED, _DOUBTFUL))
+        doublings, longest = np.ones(self.shape), 0
+        for power in range(1, _DOUBLINGS + 1):
+            now = due & (doublings <= power)
+            if not now.any():
+                continue
+            by_poles = power >= _ASKED
+            times = np.array([0.0, 2.0**power * span])
+            longer = self.only(now).measured(times, by_poles=by_poles)
+            longest = power
+            simulated = longer.status != SweepStatus.REFUSED
+            places = np.flatnonzero(now)[simulated]
+            for name, figures in longer.metrics.items():
+                metrics[name].reshape(-1)[places] = figures[simulated]
+            status.reshape(-1)[places] = longer.status[simulated]
+            late = np.isin(longer.status, (SweepStatus.UNSETTLED, _DOUBTFUL))
+            due.reshape(-1)[np.flatnonzero(now)] = late
+            if power == _ASKED - 1 and due.any():
+                # Poles cost as much as these simulations: only now are they asked for.
+                doublings[due] = self.only(due).doublings(span)
+                due &= doublings <= _DOUBLINGS
+        unsure = status == _DOUBTFUL
+        status[unsure] = SweepStatus.UNSETTLED
+        metrics["settling_time"][unsure] = np.nan
+        time = np.array([0.0, 2.0**longest * span])
+        return replace(found, time=time, metrics=metrics, status=status)
+
+    def doublings(self, span: float) -> Vector:
+        """How often `span` is doubled until each set has settled; infinite for unstable ones."""
+        rates = -abscissae(self.loop, self.loop.parameters | dict(self.arrays), self.threads)
+        wanted = np.full(rates.shape, np.inf)
+        stable = rates > 0.0
+        wanted[stable] = np.ceil(np.log2(_TO_SETTLE / (rates[stable] * span)))
+        return np.where(stable, np.clip(wanted, _ASKED, _DOUBLINGS), np.inf)
+
+
+def require_loop(loop: object) -> None:
+    """Raise where something else was given in the place of a loop."""
+    if not isinstance(loop, ControlLoop):
+        raise TypeError(
+            f"a {type(loop).__name__} is no ControlLoop: write the plant as Integrator, FirstOrder "
+            "or RationalPlant, and give ControlLoop(plant, P(1.0), delay=...)"
+        )
 
 
 def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int, ...]]:
@@ -315,31 +428,25 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
     return loop
 
 
-def _until_settled(
+def _refuse_passing(
     loop: ControlLoop,
-    arrays: Mapping[str, Vector],
-    options: dict[str, Any],
-    progress: Callable[[int], object] | None,
-) -> Sweep:
-    """Measure all sets, and those that have not settled over twice the time, again and again."""
-    numbers: dict[str, Any] = loop.parameters | dict(arrays)
-    waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
-    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
-    span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
-    found = sweep(loop, arrays, span, progress=progress, **options)
-    flat = {name: np.broadcast_to(array, found.shape) for name, array in arrays.items()}
-    metrics = {name: figures.copy() for name, figures in found.metrics.items()}
-    status = found.status.copy()
-    for _ in range(_DOUBLINGS):
-        late = status == SweepStatus.UNSETTLED
-        if not late.any():
-            break
-        span *= 2.0
-        longer = sweep(loop, {name: array[late] for name, array in flat.items()}, span, **options)
-        for name, figures in longer.metrics.items():
-            metrics[name][late] = figures
-        status[late] = longer.status
-    return replace(found, time=np.array([0.0, span]), metrics=metrics, status=status)
+    numbers: Mapping[str, Any],
+    figures: Vector,
+    ended: NDArray[np.uint8],
+    inside: Vector,
+    threads: int | None,
+) -> None:
+    """Decide doubtful sets, in place, by how long they have been in the band."""
+    doubtful = np.flatnonzero(ended == _DOUBTFUL)
+    if not doubtful.size:
+        return
+    chosen = {
+        name: value if np.ndim(value) == 0 else value[doubtful] for name, value in numbers.items()
+    }
+    rates = np.broadcast_to(-abscissae(loop, chosen, threads), doubtful.shape)
+    stays = inside[doubtful] * rates >= TIME_CONSTANTS
+    ended[doubtful] = np.where(stays, SweepStatus.OK, SweepStatus.UNSETTLED)
+    figures[doubtful[~stays], _SETTLING] = np.nan
 
 
 def _times(time: ArrayLike | None, responses: bool) -> Vector:

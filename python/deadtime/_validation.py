@@ -57,11 +57,11 @@ def positive(name: str, value: SupportsFloat) -> float:
     return number
 
 
-def non_zero(name: str, value: SupportsFloat) -> float:
-    """Return `value` as a float other than zero, or raise."""
+def non_zero(name: str, value: SupportsFloat, reason: str) -> float:
+    """Return `value` as a float other than zero, or raise with the `reason` why it cannot be."""
     number = finite(name, value)
     if number == 0.0:
-        raise ValueError(f"{name}=0: the loop is open without it, give a number other than zero")
+        raise ValueError(f"{name}=0: {reason}; give a number other than zero")
     return number
 
 

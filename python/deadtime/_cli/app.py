@@ -31,6 +31,7 @@ from deadtime._cli.show import (
     save_figure,
     stages,
 )
+from deadtime._cli.verdicts import listed, verdict
 from deadtime._errors import DeadtimeError
 from deadtime._experiment import demo_flight, study
 from deadtime._loop import ControlLoop
@@ -117,7 +118,9 @@ def roots(
     filter: opt.Filter = None,  # noqa: A002
     re: Annotated[Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
     im: Annotated[Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
-    rightmost: Annotated[int, typer.Option(min=1, help="How many, without a region.")] = 3,
+    rightmost: Annotated[
+        int, typer.Option(min=1, help="At most how many of those with Im s >= 0, without a region.")
+    ] = 3,
     plot: opt.Plot = None,
     certificate: Annotated[
         Path | None,
@@ -156,6 +159,7 @@ def roots(
                 "multiplicities": found.multiplicities,
                 "radii": found.radii,
                 "counted": found.counted,
+                "region": {"re": found.region[0], "im": found.region[1]},
                 "chain_abscissa": chain,
                 "spectral_abscissa": loop.spectral_abscissa(),
                 "stable": loop.is_stable(),
@@ -163,10 +167,10 @@ def roots(
         )
         return
     print_table(_roots_table(found))
+    console.print(listed(found, rightmost if re is None else None, chain), highlight=False)
     if np.isfinite(chain):
         console.print(f"neutral: a chain of roots approaches Re s = {chain:.6g}", highlight=False)
-    state = "stable" if loop.is_stable() else "unstable"
-    console.print(f"spectral abscissa {loop.spectral_abscissa():.6g} 1/s: {state}", highlight=False)
+    console.print(verdict(loop), highlight=False)
 
 
 def _roots_table(found: RootSet) -> Table:
@@ -186,6 +190,10 @@ app.command("reproduce")(reproduce_paper)
 app.command("fly")(fly_drone)
 app.command("internet-loop")(run_loop)
 app.add_typer(emulators, name="emulate")
+
+
+#: What a step response has also where it comes to no steady state.
+PEAK = ("peak", "peak_time")
 
 
 @app.command()
@@ -238,19 +246,28 @@ def simulate(
         figure, axes = new_figure(7.0, 3.8)
         plot_responses(axes, {"response": response})
         save_figure(figure, plot)
+    stable = loop.is_stable()
+    figures = response.info()
+    if not stable:
+        # Measured against a steady state, to which this loop does not come.
+        figures = {name: figures[name] if name in PEAK else np.nan for name in figures}
     if as_json:
         print_json(
             {
                 "time": response.time,
                 "output": response.outputs,
                 "command": response.inputs,
-                "info": response.info(),
+                "stable": stable,
+                "info": figures,
             }
         )
         return
-    for name, value in response.info().items():
-        shown = f"{value:.6g}" if np.isfinite(value) else "never, or not defined"
-        console.print(f"{name.replace('_', ' '):<20}{shown}", highlight=False)
+    limited = " (without the limit on its command)" if limit is not None else ""
+    console.print(f"the loop{limited} is {verdict(loop)}", highlight=False)
+    for name, value in figures.items():
+        if stable or name in PEAK:
+            shown = f"{value:.6g}" if np.isfinite(value) else "not within the time simulated"
+            console.print(f"{name.replace('_', ' '):<20}{shown}", highlight=False)
 
 
 @app.command()

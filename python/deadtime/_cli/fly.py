@@ -116,10 +116,10 @@ def fly_drone(
             _flown_on(host, plant, seed, virtual_time, plan, ports) as flown,
             stages(plan.flights + 2, quiet=as_json) as begin,
         ):
-            study = fly_experiment(flown.connect, plan, where, begin, flown.run)
+            study = fly_experiment(flown.connect, plan, where, begin, flown.run, _say)
     except BaseException as error:
         for note in getattr(error, "__notes__", ()):
-            ERRORS.print(f"deadtime: {note}", highlight=False, markup=False, soft_wrap=True)
+            _say(note)
         _tell_what_is_kept(where)
         raise
     page = where / "report.html"
@@ -131,6 +131,10 @@ def fly_drone(
         print_json(told)
     else:
         _print_study(study, page)
+
+
+def _say(sentence: str) -> None:
+    ERRORS.print(f"deadtime: {sentence}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _numbers(gains: str) -> tuple[float, ...]:

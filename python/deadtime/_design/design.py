@@ -64,8 +64,9 @@ def design(
         The filter of the derivative, in place of that of `controller`; ``"auto"`` chooses its
         corner as `design_filter` does.
     ranges : mapping of str to (float, float), optional
-        Where to look for each free gain; from the stability limit under proportional control if
-        not given.
+        Where to look for each free gain. If not given, from the stability limit under proportional
+        control, negative for a plant that needs negative gains; where no proportional gain is
+        stable, around what the plant's response at one over the delay asks for.
     shape : tuple of int, optional
         Points of the map that the search starts from, along each free gain.
     amplitude : float
@@ -81,7 +82,9 @@ def design(
     ------
     ValueError
         When the delay is not known, no gains in the ranges are stable, or none of them meet the
-        margins; the message says what can be had.
+        margins; the message says what was searched, or what can be had.
+    TypeError
+        When `loop` is no `ControlLoop`, or `fixed` or `ranges` no mapping.
 
     Examples
     --------

@@ -6,14 +6,16 @@ import inspect
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._controllers import PD, PID, PV, Controller, P
+from deadtime._controllers import PD, PID, PV, Controller
 from deadtime._derivative_filter import DerivativeFilter
+from deadtime._design.stabilising import Range, candidate_ranges
 from deadtime._loop import ControlLoop
+from deadtime._sweep import require_loop
 from deadtime._validation import finite, non_negative
 
 __all__ = [
@@ -21,7 +23,6 @@ __all__ = [
     "Scenario",
     "Vector",
     "controller_template",
-    "critical_gain",
     "pose",
     "with_filter",
 ]
@@ -30,8 +31,6 @@ Vector: TypeAlias = NDArray[np.float64]
 
 #: Values of the numbers of the loop that are not known.
 Scenario: TypeAlias = dict[str, float]
-
-Range: TypeAlias = tuple[float, float]
 
 #: More free gains than a controller here has would need a search that knows no map.
 _MOST_FREE = 3
@@ -47,8 +46,8 @@ class Problem:
         With the numbers in `intervals` at their middles.
     free : tuple of str
         Gains to be found.
-    spans : dict of str to (float, float)
-        Where they are looked for.
+    spans : tuple of dict of str to (float, float)
+        Where they are looked for, one after the other until some gains are stable.
     intervals : dict of str to (float, float)
         ``delay`` and, where it is not known either, ``gain`` of the plant.
     amplitude : float
@@ -58,7 +57,7 @@ class Problem:
 
     loop: ControlLoop
     free: tuple[str, ...]
-    spans: dict[str, Range]
+    spans: tuple[dict[str, Range], ...]
     intervals: dict[str, Range]
     amplitude: float
     threads: int | None
@@ -110,8 +109,9 @@ def pose(
     threads: int | None,
 ) -> Problem:
     """Check what a design was asked for."""
+    require_loop(loop)
     template = controller_template(controller)
-    held = {name: finite(name, value) for name, value in (fixed or {}).items()}
+    held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
     unknown = [name for name in held if name not in template.gains]
     if unknown:
         raise ValueError(
@@ -136,10 +136,13 @@ def pose(
     whole = loop.replace(controller=template, **middle)
     if held:
         whole = whole.replace(**held)
-    spans = dict(ranges) if ranges is not None else _default_ranges(whole, free)
-    if set(spans) != set(free):
-        raise ValueError(f"ranges are for {sorted(spans)}, the free gains are {sorted(free)}")
-    spans = {name: _range(name, spans[name]) for name in free}
+    if ranges is None:
+        spans = candidate_ranges(whole, free)
+    else:
+        given = _mapping("ranges", ranges)
+        if set(given) != set(free):
+            raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
+        spans = ({name: _range(name, given[name]) for name in free},)
     height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
@@ -168,8 +171,22 @@ def with_filter(controller: Controller, filter: DerivativeFilter | None) -> Cont
     return type(controller)(**controller.gains, filter=filter)
 
 
+def _mapping(name: str, given: Any) -> dict[str, Any]:
+    """What was given by name, as a dict of its own."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        value = "(0.0, 5.0)" if name == "ranges" else "2.0"
+        raise TypeError(f"{name}={given!r}: give a dict such as {{'Kp': {value}}}")
+    return dict(given)
+
+
 def _range(name: str, given: Range) -> Range:
-    low, high = (finite(name, end) for end in given)
+    try:
+        low, high = given
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"the range of {name} is {given!r}: give (low, high)") from error
+    low, high = finite(name, low), finite(name, high)
     if not low < high:
         raise ValueError(f"the range of {name} is {given}: give (low, high) with low < high")
     return low, high
@@ -194,41 +211,3 @@ def _gain_interval(gain: float | Range) -> Range:
     if not low <= high or low * high <= 0.0:
         raise ValueError(f"gain={gain!r} is not an interval (low, high) on one side of zero")
     return low, high
-
-
-def _default_ranges(loop: ControlLoop, free: Sequence[str]) -> dict[str, Range]:
-    """Ranges around what proportional control bears: the other gains through time constants."""
-    critical = critical_gain(loop)
-    if not np.isfinite(critical):
-        raise ValueError("no proportional gain makes this loop unstable: give ranges=")
-    late = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0) + 0.5 * (loop.sample_time or 0.0)
-    ranges = {}
-    for name in free:
-        if name == "Ki":
-            ranges[name] = (0.0, 0.5 * critical / max(late, 1e-9))
-        elif name == "Kp":
-            ranges[name] = (0.02 * critical, 1.25 * critical)
-        else:
-            ranges[name] = (-0.1 * critical * late, critical * late)
-    return ranges
-
-
-def critical_gain(loop: ControlLoop) -> float:
-    """Proportional gain at which a loop loses stability, infinite where none is found.
-
-    From a gain that is stable, found by halving, one walk upwards covers three decades; a few
-    walks cover all that has a meaning.
-    """
-    gain = 1.0
-    for _ in range(60):
-        if loop.replace(controller=P(gain)).is_stable():
-            break
-        gain *= 0.5
-    else:
-        raise ValueError("no proportional gain stabilises this loop: give ranges= and a controller")
-    for _ in range(4):
-        edge = loop.replace(controller=P(gain)).stable_range("Kp")[1]
-        if np.isfinite(edge):
-            return float(edge)
-        gain *= 500.0
-    return float("inf")

@@ -83,17 +83,22 @@ def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
         raise ValueError(
             f"shape={counts}: give {len(free)} numbers of points, 2 or more, for {', '.join(free)}"
         )
-    axes = tuple(
-        np.linspace(*problem.spans[name], count) for name, count in zip(free, counts, strict=True)
-    )
-    survey = Survey(axes, worst_abscissa(problem, axes, problem.corners))
-    if not survey.stable.any():
-        tried = ", ".join(f"{name} in {problem.spans[name]}" for name in free)
-        late = " or ".join(f"{delay:g}" for delay in problem.delays)
-        raise ValueError(
-            f"no gains in {tried} are stable for a delay of {late} s: widen or move the ranges"
+    for spans in problem.spans:
+        axes = tuple(
+            np.linspace(*spans[name], count) for name, count in zip(free, counts, strict=True)
         )
-    return survey
+        survey = Survey(axes, worst_abscissa(problem, axes, problem.corners))
+        if survey.stable.any():
+            return survey
+    tried = ", nor in ".join(
+        " and ".join(f"{name} from {low:.4g} to {high:.4g}" for name, (low, high) in spans.items())
+        for spans in problem.spans
+    )
+    late = " or ".join(f"{delay:g}" for delay in problem.delays)
+    raise ValueError(
+        f"no gains of {'x'.join(map(str, counts))} tried in {tried} are stable for a delay of "
+        f"{late} s, which proves nothing about the others: give other ranges="
+    )
 
 
 def worst_abscissa(

@@ -10,7 +10,7 @@ mod past;
 
 use deadtime::dde::breaks::BreakingPoint;
 use deadtime::dde::history::{History, Piece};
-use deadtime::dde::spectral::{Equation, Event, Jump, Outcome, Problem, Solution, solve};
+use deadtime::dde::spectral::{Equation, Event, Jump, Outcome, Problem, Solution, Sparsity, solve};
 use deadtime::memory::{collected, copied, filled, reserved};
 use deadtime::{Error, Task};
 use numpy::ndarray::Array2;
@@ -42,9 +42,9 @@ pub(crate) struct DelayRun {
     nodes: u64,
     elements: u64,
     refused: u64,
-    /// 0 finished, 1 terminal event, 2 elements too short, 3 not finite.
+    /// 0 finished, 1 terminal event, 2 elements too short, 3 not finite, 4 too many elements.
     outcome: u8,
-    /// Where the last two of them happened.
+    /// Where the last three of them happened.
     place: f64,
     pieces: Py<DelayPieces>,
 }
@@ -207,6 +207,8 @@ pub(crate) fn solve_delay_equation<'py>(
     longest: f64,
     times: Option<Vector<'py>>,
     keep: bool,
+    sparsity: Option<(Vec<usize>, Vec<usize>)>,
+    most: Option<u64>,
     events: Vec<(Bound<'py, PyAny>, i8, u32)>,
     jumps: Vec<(f64, Option<Bound<'py, PyAny>>)>,
 ) -> PyResult<DelayRun> {
@@ -230,6 +232,11 @@ pub(crate) fn solve_delay_equation<'py>(
             })
             .transpose()?,
         keep,
+        sparsity: sparsity
+            .map(|(rows, columns)| Sparsity::new(initial.as_array().len(), &rows, &columns))
+            .transpose()
+            .map_err(|error| to_python(py, error))?,
+        most,
         events: kinds(&events),
         jumps: jumps
             .iter()
@@ -324,6 +331,7 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
         Outcome::Event => (1, found.end),
         Outcome::Shrunk(place) => (2, place),
         Outcome::NotFinite(place) => (3, place),
+        Outcome::TooMany(place) => (4, place),
     };
     let event_values = found.event_values.into_iter().map(rows);
     let breaks = column(&found.breaks, |point: &BreakingPoint| point.time)?;

@@ -53,6 +53,15 @@ impl Figures {
     }
 }
 
+/// What is left of the band after three time constants: an output that keeps to so narrow a band
+/// has died down.
+const CALM: f64 = 0.05;
+
+/// An output has been in the narrow band for this part of the time it took to get there from the
+/// other; a slow oscillation that passes through both lasts a tenth. And for so many delays.
+const CALM_FOR: f64 = 0.2;
+const CALM_WAITS: f64 = 3.0;
+
 /// What counts as risen and as settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criteria {
@@ -74,6 +83,8 @@ pub(crate) struct Levels {
     pub(crate) rise: (f64, f64),
     /// Half width of the band.
     pub(crate) band: f64,
+    /// Half width of the band of what has died down.
+    pub(crate) calm: f64,
 }
 
 impl Levels {
@@ -87,6 +98,7 @@ impl Levels {
             sign,
             rise: (at(criteria.rise.0), at(criteria.rise.1)),
             band: criteria.settling * span.abs(),
+            calm: CALM * criteria.settling * span.abs(),
         }
     }
 }
@@ -104,9 +116,18 @@ pub(crate) struct Record {
     pub(crate) after: (f64, f64),
     /// Since when the output is in the band; NaN where it is outside at the end.
     pub(crate) inside_since: f64,
+    /// Until when the output has left the narrow band now and then.
+    pub(crate) restless_until: f64,
 }
 
 impl Record {
+    /// Does the response itself show at `end` that it stays in the band? `wait` is the time after
+    /// which the loop answers to itself.
+    pub(crate) fn is_calm(&self, end: f64, wait: f64) -> bool {
+        let quiet = end - self.restless_until;
+        quiet >= CALM_FOR * (self.restless_until - self.inside_since) && quiet >= CALM_WAITS * wait
+    }
+
     pub(crate) fn figures(&self, levels: &Levels) -> Figures {
         let (top, bottom) = (self.top, self.bottom);
         let upper =

@@ -39,6 +39,7 @@ impl Gauge {
                 risen: unknown,
                 after: unknown,
                 inside_since: f64::NAN,
+                restless_until: 0.0,
             },
             zeros: Vec::new(),
         }
@@ -47,6 +48,11 @@ impl Gauge {
     pub(crate) fn figures(&self) -> Figures {
         self.levels
             .map_or(Figures::UNKNOWN, |levels| self.record.figures(&levels))
+    }
+
+    /// Does the response show that it has settled for good?
+    pub(crate) fn is_calm(&self, wait: f64) -> bool {
+        self.record.is_calm(self.end - self.start, wait)
     }
 
     /// The response is `y` of (t − `start`)/`length`, from 0 to `end`.
@@ -116,6 +122,9 @@ impl Gauge {
             if let Some(entry) = entry.copied().reduce(f64::max) {
                 self.record.inside_since = time(entry).min(ends_at);
             }
+        }
+        if (high - levels.steady).max(levels.steady - low) > levels.calm {
+            self.record.restless_until = ends_at;
         }
         self.zeros = zeros;
     }

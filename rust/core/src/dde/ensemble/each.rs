@@ -29,10 +29,12 @@ pub(super) fn figures(
             Err(outcome) => return Ok((Figures::UNKNOWN, outcome)),
         }
     }
+    let row = sets.row(set)?;
+    let wait = row.delay + row.sample_time;
     let mut gauge = Gauge::new(ahead, ahead + span, steady, *criteria);
     let wanted = Wanted::new(&end, &[], 0.0)?.measured_by(&mut gauge);
     Ok(match run(sets, &plant, wanted, task)? {
-        Ok(_) => judged(gauge.figures()),
+        Ok(_) => judged(gauge.figures(), gauge.is_calm(wait)),
         Err(outcome) => (Figures::UNKNOWN, outcome),
     })
 }
@@ -57,11 +59,13 @@ pub(super) fn response(
 }
 
 /// Figures with the outcome that they show.
-pub(super) fn judged(figures: Figures) -> (Figures, Outcome) {
+pub(super) fn judged(figures: Figures, is_calm: bool) -> (Figures, Outcome) {
     let outcome = if figures.settling_time.is_nan() {
         Outcome::Unsettled
-    } else {
+    } else if is_calm {
         Outcome::Ok
+    } else {
+        Outcome::Doubtful
     };
     (figures, outcome)
 }

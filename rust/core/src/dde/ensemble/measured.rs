@@ -49,21 +49,22 @@ pub(super) fn figures(
             least,
             most,
             since,
+            restless,
         ] = &found.parts;
-        judged(
-            Record {
-                top: at([top, top_time]),
-                bottom: at([bottom, bottom_time]),
-                risen: (begun[lane] - ahead, risen[lane] - ahead),
-                after: (least[lane], most[lane]),
-                inside_since: if since[lane] > ahead {
-                    since[lane] - ahead
-                } else {
-                    0.0 * since[lane]
-                },
-            }
-            .figures(levels),
-        )
+        let record = Record {
+            top: at([top, top_time]),
+            bottom: at([bottom, bottom_time]),
+            risen: (begun[lane] - ahead, risen[lane] - ahead),
+            after: (least[lane], most[lane]),
+            inside_since: if since[lane] > ahead {
+                since[lane] - ahead
+            } else {
+                0.0 * since[lane]
+            },
+            restless_until: restless[lane] - ahead,
+        };
+        let wait = block.sample_time[lane] * (block.samples + 2) as f64;
+        judged(record.figures(levels), record.is_calm(span, wait))
     })
     .collect()
 }
@@ -114,9 +115,10 @@ struct Measured {
     begun: Column,
     risen: Column,
     band: Column,
+    calm: Column,
     /// Top, bottom, each with its time; begin and end of the rise; extremes after it; since when
-    /// inside.
-    parts: [Column; 9],
+    /// inside; until when restless.
+    parts: [Column; 10],
     lost: Column,
 }
 
@@ -128,7 +130,8 @@ impl Measured {
             begun: levels.map(|level| level.rise.0),
             risen: levels.map(|level| level.rise.1),
             band: levels.map(|level| level.band),
-            parts: [[0.0; SETS]; 9],
+            calm: levels.map(|level| level.calm),
+            parts: [[0.0; SETS]; 10],
             lost: [0.0; SETS],
         }
     }
@@ -140,6 +143,7 @@ struct Growing<S: Simd> {
     sign: Real<S>,
     steady: Real<S>,
     band: Real<S>,
+    calm: Real<S>,
     level: [Real<S>; 2],
     top: [Real<S>; 2],
     bottom: [Real<S>; 2],
@@ -149,6 +153,7 @@ struct Growing<S: Simd> {
     after: [Real<S>; 2],
     since: Real<S>,
     outside: Mask<S>,
+    restless: Real<S>,
 }
 
 impl<S: Simd> Sink<S> for Growing<S> {
@@ -201,7 +206,8 @@ impl<S: Simd> Sink<S> for Growing<S> {
             most.select(last, self.after[1]),
         ];
 
-        let inside = (up.last - self.steady).abs().le(self.band);
+        let away = (up.last - self.steady).abs();
+        let inside = away.le(self.band);
         let enters = running & inside & self.outside;
         if enters.any() {
             let from_above = up.first.gt(self.steady);
@@ -209,6 +215,8 @@ impl<S: Simd> Sink<S> for Growing<S> {
             self.since = enters.select(up.time_of(edge), self.since);
         }
         self.outside = (running & !inside) | (!running & self.outside);
+        let restless = running & away.gt(self.calm);
+        self.restless = restless.select(end, self.restless);
     }
 }
 
@@ -229,6 +237,7 @@ impl Visitor for Measured {
             sign: load(simd, &self.sign, pair),
             steady,
             band,
+            calm: load(simd, &self.calm, pair),
             level: [load(simd, &self.begun, pair), load(simd, &self.risen, pair)],
             top: [zero; 2],
             bottom: [zero; 2],
@@ -237,6 +246,7 @@ impl Visitor for Measured {
             after: [unknown; 2],
             since: zero,
             outside: !steady.abs().le(band),
+            restless: zero,
         }
     }
 
@@ -253,6 +263,7 @@ impl Visitor for Measured {
             sink.after[0],
             sink.after[1],
             sink.outside.select(unknown, sink.since),
+            sink.restless,
         ];
         for (column, value) in self.parts.iter_mut().zip(values) {
             store(column, pair, value);

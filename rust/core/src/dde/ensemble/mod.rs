@@ -46,6 +46,9 @@ pub enum Outcome {
     Diverged = 2,
     /// Not simulated: numbers outside what a loop can have, or more work than is sensible.
     Refused = 3,
+    /// Inside its settling band at the end, but not so long or so close that the response itself
+    /// shows that it stays there.
+    Doubtful = 4,
 }
 
 /// Loops of one structure, each at rest at zero when its reference steps to `amplitude`.

@@ -38,6 +38,16 @@ impl<'a> Output<'a> {
         Ok(())
     }
 
+    /// The state after a change at which the run ends.
+    pub(super) fn end(&mut self, time: f64, state: &[f64]) {
+        let wanted = self.wanted.unwrap_or_default();
+        while wanted.get(self.next).is_some_and(|wanted| *wanted <= time) {
+            self.next += 1;
+            self.times.push(time);
+            self.values.extend_from_slice(state);
+        }
+    }
+
     /// An element up to `until`, with its nodes: values (component, node) and times. A wanted time
     /// at its end belongs to the next element, unless this is the last one.
     pub(super) fn give(

@@ -12,7 +12,7 @@
 use super::legendre::{DEGREE, TERMS};
 use super::solver::Solver;
 use super::terms::Feed;
-use super::track::{KINDS, Sizes, Track};
+use super::track::{KINDS, NEGLIGIBLE, Sizes, Track};
 
 /// Coefficients of x′ below this part of F are rounding: ten units, since each sums 25 values.
 const RESOLVED: f64 = 10.0 * f64::EPSILON;
@@ -86,21 +86,34 @@ impl Element {
         &self.slope_size
     }
 
-    /// Solve over [t, t + h] from `start`; `tracks` as the feeds.
-    pub(super) fn solve(&mut self, start: &[f64], t: f64, h: f64, slack: f64, tracks: [&Track; 3]) {
+    /// Solve over [t, t + h] from `start`; `tracks` as the feeds. Where the series of what is
+    /// delayed stand only for a part of h, nothing is solved, and that part is returned.
+    pub(super) fn solve(
+        &mut self,
+        start: &[f64],
+        t: f64,
+        h: f64,
+        slack: f64,
+        tracks: [&Track; 3],
+    ) -> Option<f64> {
         self.g.fill(0.0);
         self.forcing_size.fill([0.0; KINDS]);
-        let mut degree = 0;
+        let (mut degree, mut until) = (0, h);
         for (feeds, track) in self.feeds.iter_mut().zip(tracks) {
             for feed in feeds {
-                let added =
+                let (added, read) =
                     feed.add_series(track, t, h, slack, &mut self.g, &mut self.forcing_size);
                 degree = degree.max(added);
+                until = until.min(read);
             }
+        }
+        if until < h {
+            return Some(until);
         }
         self.solver
             .solve(h, slack, start, (&self.g, degree), &mut self.x, &mut self.f);
         self.judge(h);
+        None
     }
 
     fn judge(&mut self, h: f64) {
@@ -121,7 +134,10 @@ impl Element {
         }
         (self.needed, self.kept) = (0, 0);
         for (f, size) in self.f.chunks_exact(TERMS).zip(&self.slope_size) {
-            let beyond = |part: f64| f.iter().rposition(|c| c.abs() > part * size).unwrap_or(0);
+            let beyond = |part: f64| {
+                let least = (part * size).max(NEGLIGIBLE);
+                f.iter().rposition(|c| c.abs() > least).unwrap_or(0)
+            };
             self.kept = self.kept.max(beyond(NOTHING));
             if self.kept > self.needed {
                 self.needed = self.needed.max(beyond(RESOLVED));

@@ -153,8 +153,10 @@ impl Signal {
             Ok(Piece::new(pair[0], pair[1], degree, series))
         };
         let pieces: Result<Vec<Piece>, Error> = edges.windows(2).enumerate().map(piece).collect();
+        let mut pieces = pieces?;
+        track::share_rounding(&mut pieces);
         Ok(Self {
-            track: Track::new(width, pieces?),
+            track: Track::new(width, pieces),
             breaks,
         })
     }

@@ -127,14 +127,17 @@ pub(super) fn run(
             length: suggested.min(reach),
         };
         let stop = jumps.next(t + reach + tolerance, &scale).min(last);
-        let whole = reach.min(stop - t);
+        let mut whole = reach.min(stop - t);
         let tracks = [&states, &slopes, &inputs.track];
         let h = loop {
             // Equal parts: their delayed counterparts then lie on whole elements, and their
             // factors serve again.
             let parts = (whole / suggested - 1e-9).ceil().max(1.0);
             let h = if parts > 1.0 { whole / parts } else { whole };
-            element.solve(&x, t, h, tolerance, tracks);
+            if let Some(read) = element.solve(&x, t, h, tolerance, tracks) {
+                (whole, suggested) = (read, read.min(suggested));
+                continue;
+            }
             if element.is_resolved() || h <= 64.0 * tolerance {
                 break h;
             }
@@ -143,7 +146,7 @@ pub(super) fn run(
         if element.has_room() {
             suggested = suggested.max(2.0 * h);
         }
-        let next = if h < whole {
+        let next = if h < reach.min(stop - t) {
             t + h
         } else if stop - t <= reach {
             stop

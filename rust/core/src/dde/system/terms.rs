@@ -72,7 +72,8 @@ impl Feed {
     }
 
     /// Add the matrix times the delayed track over [t, t + h] to the series `g`, and to `size` what
-    /// rounding of that is relative to; the degree of what was added.
+    /// rounding of that is relative to; the degree of what was added, and how much of h it stands
+    /// for.
     pub(super) fn add_series(
         &mut self,
         track: &Track,
@@ -81,13 +82,14 @@ impl Feed {
         slack: f64,
         g: &mut [f64],
         size: &mut [Sizes],
-    ) -> usize {
+    ) -> (usize, f64) {
         let s = t - self.delay;
         track.seek(&mut self.place, s, slack);
-        let mut highest = 0;
+        let (mut highest, mut until) = (0, h);
         for (column, entries) in &self.columns {
-            let (series, degree) = track.read(self.place, s, h, slack, *column);
+            let (series, degree, read) = track.read(self.place, s, h, slack, *column);
             highest = highest.max(degree);
+            until = until.min(read);
             let scale = track.size(self.place, *column);
             for (row, factor) in entries {
                 for (size, scale) in size[*row].iter_mut().zip(&scale) {
@@ -99,7 +101,7 @@ impl Feed {
                 }
             }
         }
-        highest
+        (highest, until)
     }
 
     /// Add the matrix times the delayed track at time `t` to `y`.

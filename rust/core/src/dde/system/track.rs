@@ -18,6 +18,16 @@ pub(super) struct Piece {
     first: Vec<f64>,
 }
 
+/// What series through several pieces may be off, as a part of what their rounding is relative to:
+/// ends of pieces err by ten units, and interpolation adds up as many.
+const UNREAD: f64 = 256.0 * f64::EPSILON;
+
+/// Values so close to the smallest number that they are not resolved relative to their size.
+pub(super) const NEGLIGIBLE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
+/// Stretches of a piece shorter than this many times the rounding of times are not looked at.
+const THIN: f64 = 16.0;
+
 /// Kinds of sizes.
 pub(super) const KINDS: usize = 4;
 
@@ -92,6 +102,24 @@ impl Piece {
             }
         }
         bounds
+    }
+}
+
+/// Curves stand for a function to rounding of its largest values: next to a pulse its tail must not
+/// be resolved like a signal.
+pub(super) fn share_rounding(pieces: &mut [Piece]) {
+    let curved = |piece: &&mut Piece| piece.degree > 1;
+    let mut largest: Vec<f64> = Vec::new();
+    for piece in pieces.iter_mut().filter(curved) {
+        largest.resize(piece.size.len(), 0.0);
+        for (largest, size) in largest.iter_mut().zip(&piece.size) {
+            *largest = largest.max(size[0]);
+        }
+    }
+    for piece in pieces.iter_mut().filter(curved) {
+        for (size, largest) in piece.size.iter_mut().zip(&largest) {
+            size[1..].fill(*largest);
+        }
     }
 }
 
@@ -202,7 +230,8 @@ impl Track {
             .map_or([0.0; TERMS], |piece| piece.taylor_bounds(s, column, h))
     }
 
-    /// Series of a column over [s, s + h], `place` being that of s; and its degree.
+    /// Series of a column over [s, s + h], `place` being that of s; its degree; and up to where it
+    /// is the column: for less than h where it is not, see [`stretch_is_read`].
     pub(super) fn read(
         &self,
         place: usize,
@@ -210,19 +239,18 @@ impl Track {
         h: f64,
         slack: f64,
         column: usize,
-    ) -> (Series, usize) {
+    ) -> (Series, usize, f64) {
         let Some(piece) = self.get(place) else {
-            return ([0.0; TERMS], 0);
+            return ([0.0; TERMS], 0, h);
         };
-        let last = self.dropped + self.pieces.len() <= place + 1;
-        if last || s + h <= piece.end + slack {
-            return (part(piece, s, h, slack, column), piece.degree);
+        if self.is_last(place) || s + h <= piece.end + slack {
+            return (part(piece, s, h, slack, column), piece.degree, h);
         }
         let mut values = [0.0; TERMS];
-        let (mut place, mut from) = (place, 0);
-        while let Some(piece) = self.get(place) {
+        let (mut at, mut from) = (place, 0);
+        while let Some(piece) = self.get(at) {
             let nodes = &legendre::nodes()[from..];
-            let last = self.dropped + self.pieces.len() <= place + 1;
+            let last = self.is_last(at);
             let inside = |node: &&f64| last || s + 0.5 * h * (1.0 + **node) < piece.end;
             let until = from + nodes.iter().take_while(inside).count();
             if piece.degree == 0 {
@@ -241,10 +269,76 @@ impl Track {
                 break;
             }
             from = until;
+            at += 1;
+        }
+        let series = legendre::from_values(&values);
+        let size = values.iter().fold(0.0, |m, value| f64::max(m, value.abs()));
+        let until = self.read_until(place, (s, h), slack, column, (&series, size));
+        (series, DEGREE, until)
+    }
+
+    fn is_last(&self, place: usize) -> bool {
+        self.dropped + self.pieces.len() <= place + 1
+    }
+
+    /// How far from s on a series that goes through several pieces stands for all of them: to the
+    /// start of the first one that it is not, or through that one where it is the first.
+    fn read_until(
+        &self,
+        place: usize,
+        (s, h): (f64, f64),
+        slack: f64,
+        column: usize,
+        (series, size): (&Series, f64),
+    ) -> f64 {
+        let end = s + h;
+        let (mut place, mut low) = (place, s);
+        while let Some(piece) = self.get(place) {
+            let last = self.is_last(place) || piece.end + slack >= end;
+            let high = if last { end } else { piece.end };
+            if high - low > THIN * slack
+                && !stretch_is_read(piece, column, (low, high), (s, h), (series, size))
+            {
+                if low - s > THIN * slack {
+                    return low - s;
+                }
+                if end - high > THIN * slack {
+                    return high - s;
+                }
+            }
+            if last {
+                break;
+            }
+            low = high;
             place += 1;
         }
-        (legendre::from_values(&values), DEGREE)
+        h
     }
+}
+
+/// Whether a series over [s, s + h] is the piece on [low, high]: two polynomials that agree at all
+/// Gauss nodes of the stretch, rounding apart, are one. `size` is that of the series.
+fn stretch_is_read(
+    piece: &Piece,
+    column: usize,
+    (low, high): (f64, f64),
+    (s, h): (f64, f64),
+    (series, size): (&Series, f64),
+) -> bool {
+    let length = high - low;
+    let (mut found, mut stored) = ([0.0; TERMS], [0.0; TERMS]);
+    let offset = ((low - s) - (s + h - high)) / h;
+    legendre::at_nodes(series, offset, length / h, 0..TERMS, &mut found);
+    if piece.degree == 0 {
+        stored.fill(piece.column(column)[0]);
+    } else {
+        let (offset, ratio) = window(piece, low, length);
+        legendre::at_nodes(piece.column(column), offset, ratio, 0..TERMS, &mut stored);
+    }
+    let rounding = piece.size[column].iter().fold(size, |m, size| m.max(*size));
+    let pairs = found.iter().zip(&stored);
+    let off = pairs.fold(0.0, |off, (a, b)| f64::max(off, (a - b).abs()));
+    off <= (UNREAD * rounding).max(NEGLIGIBLE)
 }
 
 /// Series of a column of one piece over [s, s + h].
