@@ -47,7 +47,7 @@ pub fn is_stable(h: &QuasiPolynomial, strong: bool, task: &Task) -> Result<bool,
     match at_first {
         Ok(Some(number)) => return Ok(number == 0),
         Err(Error::Contour { .. }) => return Ok(false),
-        Err(Error::Interrupted) => return Err(Error::Interrupted),
+        Err(error) if error.ends_all() => return Err(error),
         Ok(None) | Err(_) => {}
     }
     if has_unstable_root(&h, glance.hints, task)? {
