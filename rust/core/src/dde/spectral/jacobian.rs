@@ -123,9 +123,10 @@ enum Move {
 impl Differences {
     /// Start from a pattern.
     pub(super) fn given(pattern: Option<&Sparsity>) -> Self {
-        let mut differences = Self::default();
-        differences.known = pattern.map(|pattern| with_groups(pattern.clone()));
-        differences
+        Self {
+            known: pattern.map(|pattern| with_groups(pattern.clone())),
+            ..Self::default()
+        }
     }
 
     /// Columns that a Jacobian takes.
@@ -250,7 +251,7 @@ impl Differences {
                 diagonal[column] = (f[column] - base[column]) / step;
                 for (row, ((f, base), least)) in f.iter().zip(base).zip(&least).enumerate() {
                     let change = f - base;
-                    if row == column || !(change.abs() <= *least) {
+                    if row == column || change.is_nan() || change.abs() > *least {
                         pattern.rows.push(row);
                         values.push(change / step);
                     }
@@ -370,10 +371,10 @@ fn agrees(pattern: &Sparsity, values: &[f64], steps: &[f64], base: &[f64], check
     let dim = base.len();
     let mut size = vec![0.0_f64; dim];
     let mut predicted = vec![0.0; checks.len()];
-    for column in 0..dim {
+    for (column, step) in steps.iter().enumerate() {
         for at in pattern.column(column) {
             let row = pattern.rows[at];
-            let change = values[at] * steps[column];
+            let change = values[at] * step;
             size[row] = size[row].max(change.abs());
             for (check, predicted) in predicted.chunks_exact_mut(dim).enumerate() {
                 predicted[row] += sign(check, column) * change;

@@ -103,10 +103,10 @@ impl Sparsity {
     pub(super) fn banded(&self) -> (Vec<usize>, usize) {
         let dim = self.dim();
         let mut near = self.transposed();
-        for column in 0..dim {
-            near[column].extend_from_slice(&self.rows[self.column(column)]);
-            near[column].sort_unstable();
-            near[column].dedup();
+        for (column, near) in near.iter_mut().enumerate() {
+            near.extend_from_slice(&self.rows[self.column(column)]);
+            near.sort_unstable();
+            near.dedup();
         }
         let mut order = Vec::with_capacity(dim);
         let mut seen = vec![false; dim];
