@@ -13,8 +13,9 @@ WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 PACKAGE = ROOT / "python" / "deadtime"
 
-# What each room of the core may use besides itself; error, status and task are for everyone.
-FOUNDATION = {"error", "lanes", "status", "task"}
+# What each room of the core may use besides itself; error, memory, status and task are for
+# everyone.
+FOUNDATION = {"error", "memory", "lanes", "status", "task"}
 CORE_ARROWS = {
     "lambertw": set(),
     "elementary": set(),
@@ -27,7 +28,13 @@ CORE_ARROWS = {
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
 FLOORS = [
     {"_errors", "_frozen", "_validation", "_processes", "_deadtime", "_enclosures"},
-    {"_certificate_parts", "_certificate_function", "_certificate_check", "_certificate"},
+    {
+        "_certificate_parts",
+        "_certificate_function",
+        "_certificate_form",
+        "_certificate_check",
+        "_certificate",
+    },
     {
         "_ufunc",
         "_special",
@@ -59,6 +66,8 @@ FLOORS = [
         "_sweep",
         "_map_axes",
         "_boundaries",
+        "_axis_crossings",
+        "_multiples",
         "_crossings",
         "_stability",
         "_families",
@@ -69,10 +78,14 @@ FLOORS = [
         "_determinant",
         "_matrix_roots",
         "_frequency",
+        "_phase",
         "_interchange",
         "_margins",
         "_sampled_gain",
         "_sampled_margins",
+        "_sampled_march",
+        "_sampled_ranges",
+        "_continuous_ranges",
         "_ratio",
         "_transfer",
         "_systems",

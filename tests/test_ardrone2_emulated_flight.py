@@ -9,6 +9,7 @@ import pytest
 from deadtime.links.ardrone2.commands import (
     Config,
     Move,
+    Ref,
     Watchdog,
 )
 from deadtime.links.ardrone2.emulator import (
@@ -73,6 +74,38 @@ def test_the_ultrasound_is_heard_25_times_a_second():
     raw = [parse_navdata(packet).altitude.altitude_raw for packet in pilot.sent]
     changes = sum(a != b for a, b in pairwise(raw))
     assert 70 <= changes <= 100  # a millimetre is the resolution: some repeat
+
+
+def accelerations(pilot):
+    said = pilot.last.physical_measures
+    return said.acceleration_x, said.acceleration_y, said.acceleration_z
+
+
+def test_at_rest_and_hovering_the_accelerometers_feel_one_g():
+    """They told of no acceleration at all, as of a drone that falls."""
+    pilot = Pilot().connect(demo=False)
+    pilot.wait(0.1, Watchdog())
+    assert accelerations(pilot) == pytest.approx((0.0, 0.0, -1.0), abs=1e-6)
+    raw = pilot.last.raw_measures
+    counts = (raw.acceleration_x, raw.acceleration_y, raw.acceleration_z)
+    assert counts == (2048, 2048, 2560)  # as of the vehicle in recordings, within its offsets
+    pilot.fly()
+    assert accelerations(pilot) == pytest.approx((0.0, 0.0, -1.0), abs=1e-4)
+
+
+@pytest.mark.parametrize("plant", ["kit", "thrust"])
+def test_accelerometers_feel_what_the_climb_changes_by(plant):
+    pilot = Pilot(plant=plant, delay=0.0).connect(demo=False).fly()
+    pilot.sent.clear()
+    pilot.wait(2.0, UP, Move(gaz=0.5))
+    told = [parse_navdata(packet) for packet in pilot.sent]
+    felt = np.array([packet.physical_measures.acceleration_z for packet in told])
+    climb = np.array([packet.kalman_pressure.est_zdot for packet in told])
+    gained = np.cumsum(-felt[1:] - 1.0) * GRAVITY * 0.005
+    assert gained == pytest.approx(climb[1:] - climb[0], abs=0.002)
+    pilot.send(Ref(take_off=True, emergency=True))  # falls
+    pilot.wait(0.1, Ref(take_off=True, emergency=True))
+    assert accelerations(pilot) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
 
 
 def test_the_last_ref_is_told_by_its_number():

@@ -373,7 +373,7 @@ def test_angles_are_enclosed(x, y):
 
 
 def test_numbers_out_of_range():
-    assert exponential(-(2**30), 0, 64) == (0, 1, 2**20)
+    assert exponential(-(2**30), 0, 64) == (0, 1, 2**13)
     with pytest.raises(OverflowError):
         exponential(2**30, 0, 64)
     with pytest.raises(OverflowError):

@@ -1,20 +1,28 @@
 """The experiment: steps on a vehicle, what ends them, and what is learnt; all in virtual time."""
 
 import math
+import os
+import threading
+import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import FlightAbortedError, NotIdentifiableError
+from deadtime._cli.fly import _print_study
 from deadtime._experiment import FlightPlan, fly_experiment
+from deadtime._experiment import learn as learn_module
 from deadtime._experiment.flights import FlownSteps, telemetry_of
+from deadtime._experiment.fly import fly_all
 from deadtime._experiment.height_control import PAPER_FILTER, HeightControl, Velocity
 from deadtime._experiment.learn import learn
 from deadtime._experiment.split import split_delay
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain
 from deadtime.links import Limits, run
-from deadtime.links.journal import Journal
+from deadtime.links import journal as journal_module
+from deadtime.links.journal import _Writer
 from emulated import connecting
 from simulated_vehicle import KIT, SimulatedVehicle
 
@@ -183,19 +191,61 @@ def test_a_folder_that_takes_no_file_is_refused_before_anything_is_connected(tmp
 
 
 def test_a_disk_that_fills_up_in_flight_lands_the_vehicle(tmp_path, monkeypatch):
-    put = Journal._put
+    write, synced = _Writer._write, []
 
-    def full(self, cells):
-        if self.rows == 30 and "messages" not in self.path.name:
+    def full(self, waiting):
+        if "messages" not in self._path and self._file.tell() > 2000:
+            synced.append(self)
             raise OSError(28, "No space left on device")
-        put(self, cells)
+        time.sleep(0.001)  # virtual time runs ahead of the disk
+        return write(self, waiting)
 
-    monkeypatch.setattr(Journal, "_put", full)
+    monkeypatch.setattr(_Writer, "_write", full)
     vehicle = SimulatedVehicle()
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match="No space left") as ended:
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert synced
+    assert ended.value.filename.endswith("flight-1-P.csv")
     assert vehicle.log[-2:] == ["landed", "closed"]
-    assert columns_of(tmp_path / "flight-1-P.csv").size == 30
+    assert columns_of(tmp_path / "flight-1-P.csv").size > 5
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
+    # Journals were put on the disk before the landing: one that took 3 s left it to the watchdog.
+    ashore, waited = threading.Event(), []
+
+    def slow(call):
+        def waits(*given):
+            waited.append(ashore.wait(20.0))
+            return call(*given)
+
+        return waits
+
+    monkeypatch.setattr(_Writer, "_write", slow(_Writer._write))
+    monkeypatch.setattr(journal_module.os, "fsync", slow(os.fsync))
+
+    def trouble(state, since):
+        return replace(state, roll=1.0) if fails and since > 3.0 else state
+
+    class Closing(SimulatedVehicle):
+        async def close(self):
+            await super().close()
+            ashore.set()
+
+    vehicle = Closing(trouble=trouble)
+    flight = fly_all(lambda: vehicle, [dtm.P(1.2)], FlightPlan(), 6.5, tmp_path, 1)
+    if fails:
+        with pytest.raises(FlightAbortedError, match="tilted"):
+            run(flight)
+    else:
+        run(flight)
+    assert waited
+    assert all(waited)  # nothing was written before the vehicle was down and its link closed
+    assert vehicle.log[-2:] == ["landed", "closed"]
+    rows = columns_of(tmp_path / "flight-1-P.csv")
+    assert np.diff(rows["time_s"]) == pytest.approx(TS, abs=1e-6)
+    assert rows["time_s"][-1] > (2.8 if fails else 17.8)
 
 
 # What is learnt
@@ -246,6 +296,36 @@ def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
     assert found.after.overshoot < 5.0
     assert found.after.settling_time < found.before.settling_time
     assert found.learned.fit.delay_plus_lag == pytest.approx(0.40, abs=0.01)
+
+
+def test_a_fit_that_is_not_adequate_is_said_before_its_gains_are_flown(
+    tmp_path, capsys, monkeypatch
+):
+    # `fly` designed for such intervals and flew the gains, and said nothing of it.
+    def undesigned(loop, *, controller, **how):  # what is flown does not matter here
+        return SimpleNamespace(loop=loop.replace(controller=controller))
+
+    monkeypatch.setattr(learn_module, "design", undesigned)
+
+    def gusts(state, since):
+        return replace(state, height=state.height + 0.004 * math.sin(2.5 * max(since, 0.0)))
+
+    def warn(doubt):
+        said.append(doubt)
+        flights.append(len(list(tmp_path.glob("flight-?-*P.csv"))))
+
+    said, flights = [], []
+    random = np.random.default_rng(2)
+    vehicle = SimulatedVehicle(noise=0.001, random=random, trouble=gusts)
+    plan = FlightPlan(gains=(2.4,), settle=2.5, hold=3.5, checked_hold=2.0)
+    found = fly_experiment(lambda: vehicle, plan, tmp_path, run=run, warn=warn)
+    assert found.learned.fit.adequate is False
+    assert flights == [1]
+    assert "margin is not assured" in said[0]
+    _print_study(found, tmp_path / "report.html")
+    assert "not adequate (adequate=False)" in " ".join(capsys.readouterr().out.split())
+    fine = replace(found.learned, fit=replace(found.learned.fit, adequate=True))
+    assert "adequate" not in replace(found, learned=fine).verdict()
 
 
 def test_flights_without_a_vehicle_in_them_are_refused(tmp_path):

@@ -172,6 +172,39 @@ def test_what_nohup_has_had_ignored_stays_so(handlers):
         assert run_landing(fly()) == "landed"
 
 
+class LoopWithoutSignals(asyncio.SelectorEventLoop):
+    """As the event loops of Windows are."""
+
+    def add_signal_handler(self, *given):
+        raise NotImplementedError
+
+    def remove_signal_handler(self, *given):
+        raise NotImplementedError
+
+
+def test_where_the_event_loop_takes_no_signals_the_interpreter_does(handlers, monkeypatch, capsys):
+    # `deadtime fly` could not run on Windows: its first call was one that is not there.
+    monkeypatch.delattr(signal, "SIGHUP")
+    monkeypatch.setattr(asyncio.events, "new_event_loop", LoopWithoutSignals)
+    landed = []
+
+    async def fly():
+        assert isinstance(asyncio.get_running_loop(), LoopWithoutSignals)
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            await asyncio.sleep(10.0)
+        except asyncio.CancelledError:
+            landed.append(True)
+            raise
+
+    before = signal.getsignal(signal.SIGINT)
+    with terminated_like_interrupted(), pytest.raises(KeyboardInterrupt):
+        run_landing(fly())
+    assert landed
+    assert "landing first" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGINT) is before
+
+
 @pytest.mark.parametrize("number", ENDING)
 def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
     async def fly():

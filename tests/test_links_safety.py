@@ -5,6 +5,7 @@ import math
 import pickle
 import subprocess
 import sys
+import time
 from dataclasses import replace
 
 import deadtime as dtm
@@ -167,12 +168,21 @@ def test_the_limits_can_be_shown():
 COLUMNS = ("time_s", "reference_m", "height_m")
 
 
-def test_every_row_is_in_the_file_before_the_next_is_written(tmp_path):
+def lines_once_there(path, count):
+    """What is in a file as soon as it has so many lines; a thread writes it."""
+    for _ in range(2000):
+        if len(path.read_text().splitlines()) >= count:
+            break
+        time.sleep(0.01)
+    return path.read_text().splitlines()
+
+
+def test_every_row_comes_into_the_file_without_being_asked_for(tmp_path):
     path = tmp_path / "folder" / "flight.csv"
     journal = Journal(path, COLUMNS)
     for row in range(10):
         journal.write((0.065 * row, float(row > 4), 0.1 * row))
-        assert len(path.read_text().splitlines()) == row + 2
+        assert len(lines_once_there(path, row + 2)) == row + 2
     journal.close()
     journal.close()
     flight = dtm.read_recording(path, time="time_s", reference="reference_m", output="height_m")
@@ -193,6 +203,7 @@ def test_a_row_that_cannot_be_read_back_is_refused_and_leaves_the_file_whole(tmp
         with pytest.raises(ValueError, match="row"):
             journal.write(row)
     assert journal.path.read_text() == "time_s,reference_m,height_m\n0.0,1.0,\n"
+    assert journal.rows == 1
     with pytest.raises(ValueError, match="closed"):
         journal.write((0.0, 1.0, 2.0))
 
@@ -222,24 +233,69 @@ def test_a_full_disk_leaves_whole_rows_and_says_where(tmp_path):
 
 
 ROOM_AGAIN = """
-import contextlib, resource, sys
+import resource, sys, time
 from deadtime.links import Journal
 most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
 resource.setrlimit(resource.RLIMIT_FSIZE, (12, most))
-with Journal(sys.argv[1], ["x_m"]) as journal:
-    journal.write([1.25])
-    with contextlib.suppress(OSError):
-        journal.write([2.25])
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
-    journal.write([3.25])
+journal, refused = Journal(sys.argv[1], ["x_m"]), 0
+journal.write([1.25])
+journal.write([2.25])
+for _ in range(2000):
+    time.sleep(0.01)
+    try:
+        journal._writer.check()
+    except OSError:
+        break
+resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+for call in (lambda: journal.write([3.25]), journal.close):
+    try:
+        call()
+    except OSError as error:
+        refused += error.filename == sys.argv[1]
+print(refused)
 """
 
 
-def test_a_row_after_one_that_found_no_room_leaves_no_hole(tmp_path):
+def test_after_a_row_that_found_no_room_nothing_follows_and_every_call_says_so(tmp_path):
     pytest.importorskip("resource", reason="this system has no limit on the size of files")
     path = tmp_path / "flight.csv"
-    subprocess.run([sys.executable, "-c", ROOM_AGAIN, str(path)], check=True)
-    assert path.read_bytes() == b"x_m\n1.25\n3.25\n"
+    command = [sys.executable, "-c", ROOM_AGAIN, str(path)]
+    assert subprocess.run(command, check=True, capture_output=True).stdout.split() == [b"2"]
+    assert path.read_bytes() == b"x_m\n1.25\n"
+
+
+LEFT_OPEN = """
+import os, sys, time
+from deadtime.links import Journal, journal
+plain = journal._Writer._write
+def slow(self, waiting):
+    time.sleep(0.2)
+    return plain(self, waiting)
+journal._Writer._write = slow
+kept = Journal(sys.argv[1], ["x_m"])
+for row in range(500):
+    kept.write([row])
+if sys.argv[2] == "raises":
+    raise ZeroDivisionError
+if sys.argv[2] == "dropped":
+    del kept
+"""
+
+
+@pytest.mark.parametrize("ends", ["returns", "raises", "dropped"])
+def test_a_journal_that_nobody_closes_is_whole_when_the_program_ends(ends, tmp_path):
+    path = tmp_path / "flight.csv"
+    command = [sys.executable, "-c", LEFT_OPEN, str(path), ends]
+    subprocess.run(command, check=False, capture_output=True)
+    assert path.read_text().split() == ["x_m", *(f"{row}.0" for row in range(500))]
+
+
+def test_many_rows_at_once_are_all_there_in_their_order(tmp_path):
+    with Journal(tmp_path / "flight.csv", ["x"]) as journal:
+        for row in range(20000):
+            journal.write([row])
+    found = journal.path.read_text().split()
+    assert found == ["x", *(f"{row}.0" for row in range(20000))]
 
 
 @pytest.mark.parametrize("columns", [(), ("a", "a"), ("a,b",), ('a"',), ("a\n",), ("",)])

@@ -155,9 +155,10 @@ def test_bad_numbers_are_named(arguments, message):
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: dtm.Integrator(gain=0.0), "gain=0"),
+        (lambda: dtm.Integrator(gain=0.0), "gain=0: a plant without gain"),
         (lambda: dtm.Integrator(lag=-0.1), "lag=-0.1"),
-        (lambda: dtm.FirstOrder(time_constant=0.0), "time_constant=0"),
+        # It was told that the loop is open without a time constant.
+        (lambda: dtm.FirstOrder(1, 0), "time_constant=0: the plant is then a gain alone"),
         (lambda: dtm.P(0.0), "Kp=0"),
         (lambda: dtm.PID(0.0, 0.0, 0.0), "Kp=0, Ki=0, Kd=0"),
         (lambda: dtm.P(math.inf), "Kp=inf"),

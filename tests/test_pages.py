@@ -7,7 +7,8 @@ from pathlib import Path
 import deadtime as dtm
 import pytest
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
 
 
 PAGES = [
@@ -36,3 +37,18 @@ def test_the_reference_lists_every_public_name_once():
     ours = [part for part in text.split("```{eval-rst}") if "currentmodule:: deadtime\n" in part]
     listed = re.findall(r"^   (\w+)$", "".join(ours), re.MULTILINE)
     assert sorted(listed) == sorted(set(dtm.__all__) - {"gallery"})  # it has a part of its own
+
+
+def test_each_promise_names_a_test_or_survey_that_exists():
+    text = (DOCS / "promises.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    promises = [row for row in rows if not row.startswith("| promise ")]
+    assert len(promises) > 30
+    for row in promises:
+        named = re.findall(r"`([\w/]+\.(?:py|rs))::(\w+)`", row)
+        assert named, f"no test holds the promise {row!r}"
+        for path, name in named:
+            source = (ROOT / path).read_text(encoding="utf-8")
+            assert re.search(rf"\b(?:def|fn) {name}\b", source), f"{path} has no {name}"
+    for path in re.findall(r"`python ([\w/]+\.py)\b", text):
+        assert (ROOT / path).is_file(), f"no survey {path}"

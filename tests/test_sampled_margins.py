@@ -73,8 +73,7 @@ def test_margins_are_where_an_eigenvalue_reaches_the_circle(loop):
 def test_the_delay_margin_is_where_the_loop_loses_stability(loop):
     found = loop.margin()
     lost = loop.delay + found.delay_margin
-    walked = loop.stable_range("delay")[1]  # over 200 samples at most
-    assert lost == pytest.approx(walked, rel=1e-9) or lost > 200 * loop.sample_time
+    assert lost == pytest.approx(loop.stable_range("delay")[1], rel=1e-9)
     for part in np.linspace(0.0, 0.999, 30):
         assert loop.replace(delay=loop.delay + part * found.delay_margin).is_stable()
     assert not loop.replace(delay=lost + 1e-4 * loop.sample_time).is_stable()
@@ -142,9 +141,8 @@ def test_no_gain_below_the_margin_is_unstable(Kp, Kv, delay, period, lag):
         assert radius(loop, np.exp(1j * part * math.radians(found.phase_margin))) < 1.0
 
 
-def test_a_long_delay_margin_is_found_beyond_the_walk_over_samples():
+def test_a_delay_margin_of_more_than_two_hundred_samples():
     loop = sampled(dtm.Integrator(), dtm.P(1.5), 0.36, 0.005)
-    assert loop.stable_range("delay")[1] == math.inf  # beyond 200 samples
     found = loop.margin().delay_margin
     lost = loop.delay + found
     assert loop.replace(delay=lost - 1e-4).is_stable()

@@ -234,5 +234,7 @@ def test_ctrl_c_stops_a_run(listens_to_ctrl_c, compiled):
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        dtm.solve_dde(fun, (0, 1e9), 1.0, 1.0, t_eval=[1e9], vectorized=not compiled)
+        dtm.solve_dde(
+            fun, (0, 1e9), 1.0, 1.0, t_eval=[1e9], vectorized=not compiled, max_steps=None
+        )
     timer.join()

@@ -21,9 +21,11 @@ from deadtime._errors import (
     DeadtimeError,
     FlightAbortedError,
     LinkError,
+    MissingExtraError,
     NotIdentifiableError,
     PacketError,
     RecordingError,
+    WorkerError,
 )
 from deadtime._estimation import (
     CramerRaoBound,
@@ -104,6 +106,7 @@ __all__ = [
     "LinkError",
     "MapStatus",
     "Margins",
+    "MissingExtraError",
     "MonteCarlo",
     "NotIdentifiableError",
     "OffsetW",
@@ -131,6 +134,7 @@ __all__ = [
     "Trade",
     "TransferFunction",
     "Whiteness",
+    "WorkerError",
     "crossings",
     "damping_ratio",
     "dde_roots",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeAlias, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar, get_type_hints
 
 from deadtime._certificate_check import check
+from deadtime._certificate_form import check_form
 from deadtime._certificate_parts import Contour, Monotone, Segment
 
 if TYPE_CHECKING:
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["Certificate"]
 
 Range: TypeAlias = tuple[float, float]
+
+_T = TypeVar("_T")
 
 _FORMAT: Final = "deadtime certificate"
 
@@ -105,7 +109,8 @@ class Certificate:
         Raises
         ------
         CertificateError
-            If a claim is false, with the first one that is.
+            If a claim is false, with the first one that is, or takes more digits to check than
+            any that `QuasiPolynomial.certify` makes.
 
         Notes
         -----
@@ -176,26 +181,32 @@ class Certificate:
         Raises
         ------
         ValueError
-            If it is no certificate.
+            If it is no certificate, or has numbers that none has.
         """
         try:
             data = json.loads(text)
             if data.pop("format") != _FORMAT:
                 raise KeyError("format")
-            return cls(
-                coefficients=tuple(tuple(map(_number, row)) for row in data.pop("coefficients")),
-                delays=tuple(map(_number, data.pop("delays"))),
+            read = cls(
+                coefficients=_each(lambda row: _each(_number, row), data.pop("coefficients")),
+                delays=_each(_number, data.pop("delays")),
                 region=_box(data.pop("region")),
-                count=_whole(data.pop("count")),
-                scale=_whole(data.pop("scale")),
-                zeros=_whole(data.pop("zeros")),
+                count=data.pop("count"),
+                scale=data.pop("scale"),
+                zeros=data.pop("zeros"),
                 beyond=_bound(data.pop("beyond")),
                 closed=_box(data.pop("closed")),
-                contours=tuple(map(_contour, data.pop("contours"))),
-                real=tuple(map(_part, data.pop("real"))),
+                contours=_each(_contour, data.pop("contours")),
+                real=_each(_part, data.pop("real")),
             )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise ValueError(f"this is not the text of a certificate: {error!r}") from error
+            check_form(read)
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise ValueError(f"this is not the text of a certificate: {error}") from error
+        except RecursionError:
+            raise ValueError(
+                "this is not the text of a certificate: brackets are nested deeper than in one"
+            ) from None
+        return read
 
     @classmethod
     def _made(
@@ -241,39 +252,45 @@ def _plain(value: Any) -> Any:
 
 def _number(text: Any) -> float:
     if not isinstance(text, str):
-        raise TypeError(f"{text!r}: a number is written in hexadecimal")
+        raise TypeError(f"{reprlib.repr(text)}: a number is written in hexadecimal")
     return float.fromhex(text)
 
 
-def _whole(value: Any) -> int:
-    if type(value) is not int:
-        raise TypeError(f"{value!r} is not a whole number")
-    return value
+def _each(read: Callable[[Any], _T], values: Any) -> tuple[_T, ...]:
+    if not isinstance(values, list):
+        raise TypeError(f"{reprlib.repr(values)} is not a list")
+    return tuple(map(read, values))
 
 
-def _complex(pair: Any) -> complex:
-    re, im = map(_number, pair)
-    return complex(re, im)
+def _pair(read: Callable[[Any], _T], values: Any) -> tuple[_T, _T]:
+    first, second = _each(read, values)
+    return first, second
 
 
-def _range(pair: Any) -> Range:
-    low, high = map(_number, pair)
-    return low, high
+def _complex(values: Any) -> complex:
+    return complex(*_pair(_number, values))
 
 
-def _box(pair: Any) -> tuple[Range, Range]:
-    re, im = map(_range, pair)
-    return re, im
+def _range(values: Any) -> Range:
+    return _pair(_number, values)
 
 
-def _bound(pair: Any) -> tuple[int, float] | None:
-    if pair is None:
+def _box(values: Any) -> tuple[Range, Range]:
+    return _pair(_range, values)
+
+
+def _bound(values: Any) -> tuple[int, float] | None:
+    if values is None:
         return None
-    row, radius = pair
-    return _whole(row), _number(radius)
+    row, radius = _pair(lambda value: value, values)
+    return row, _number(radius)
 
 
-_READERS: Final[dict[Any, Callable[[Any], Any]]] = {complex: _complex, float: _number, int: _whole}
+_READERS: Final[dict[Any, Callable[[Any], Any]]] = {
+    complex: _complex,
+    float: _number,
+    int: lambda value: value,
+}
 
 
 def _part(data: Any) -> Segment | Monotone:
@@ -284,13 +301,10 @@ def _part(data: Any) -> Segment | Monotone:
 
 
 def _contour(data: Any) -> Contour:
-    segments = tuple(map(_part, data["segments"]))
-    if not all(isinstance(segment, Segment) for segment in segments):
-        raise TypeError("a contour consists of segments")
     return Contour(
         _range(data["re"]),
         _range(data["im"]),
-        bool(data["symmetric"]),
-        _whole(data["count"]),
-        segments,  # type: ignore[arg-type]
+        data["symmetric"],
+        data["count"],
+        _each(_part, data["segments"]),  # type: ignore[arg-type]
     )

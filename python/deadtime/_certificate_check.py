@@ -23,7 +23,15 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from deadtime._certificate_function import ExactFunction, above, exponential_above, fail, pair
+from deadtime._certificate_form import check_form
+from deadtime._certificate_function import (
+    ExactFunction,
+    above,
+    affordable,
+    exponential_above,
+    fail,
+    pair,
+)
 from deadtime._certificate_parts import Contour, Monotone, Segment
 from deadtime._enclosures import angle, pi
 from deadtime._errors import CertificateError
@@ -43,9 +51,12 @@ def check(certificate: Certificate) -> int:
         With the first claim found false.
     """
     try:
+        check_form(certificate)
         return _Checker(certificate).count()
     except (OverflowError, ZeroDivisionError, ValueError, IndexError) as error:
-        raise CertificateError(f"the certificate has a number out of range: {error}") from error
+        raise CertificateError(
+            f"the certificate has a number out of range, or a part of no use: {error}"
+        ) from error
 
 
 class _Checker:
@@ -159,6 +170,7 @@ class _Checker:
                 elif j != index:
                     room -= weight * abs(c)
         r = Fraction(radius)
+        affordable(self.function.rows, r)
         # Beyond 0 itself only a constant has no roots.
         positive = radius > 0 or degree == 0
         if not positive or room * r**degree <= sum(c * r**k for k, c in enumerate(lower)):
@@ -334,6 +346,7 @@ def _dominates_rightward(
         return False
     edge = Fraction(x)
     size = above(edge, Fraction(height))
+    affordable(rows, size)
     degree = len(rows[0]) - 1
     total = Fraction(0)
     for row, tau in zip(rows, delays, strict=True):

@@ -17,7 +17,7 @@ from typing import NoReturn, TypeAlias
 from deadtime._enclosures import cos_sin, dyadic, exponential, shifted
 from deadtime._errors import CertificateError
 
-__all__ = ["Enclosure", "ExactFunction", "above", "exponential_above", "fail", "pair"]
+__all__ = ["Enclosure", "ExactFunction", "above", "affordable", "exponential_above", "fail", "pair"]
 
 # Binary digits kept below the size of a value; doubles have 53.
 _DIGITS = 120
@@ -30,6 +30,11 @@ _ORDER = 8
 
 # More digits than that make nothing true that is not so with them.
 _MOST_DIGITS = 1 << 14
+
+# Binary digits of all powers of a point together, one power for each coefficient; and the same for
+# Taylor polynomials, which are fractions.
+_MOST_WORK = 1 << 24
+_MOST_WORK_WITH_FRACTIONS = 1 << 20
 
 
 _Exact: TypeAlias = tuple[Fraction, Fraction]
@@ -69,6 +74,7 @@ class ExactFunction:
         """Enclose g and g' at s, with digits enough for values of about `size`."""
         (x, qx), (y, qy) = dyadic(s.real), dyadic(s.imag)
         q = max(qx, qy)
+        affordable(self.rows, Fraction(1, 1 << q), above(*map(abs, pair(s))))
         x, y = x << (q - qx), y << (q - qy)
         polynomials = []
         largest = 0
@@ -87,6 +93,8 @@ class ExactFunction:
         gaps = [tau - self.delays[index] for tau in self.delays]
         widest = max(map(abs, gaps)).bit_length() - self.t
         bits = _DIGITS - math.frexp(size)[1] + max(0, largest) + max(0, widest)
+        if bits > _MOST_DIGITS:
+            raise OverflowError(f"a value takes {bits} binary digits to check")
         bits = max(128, -(-bits // 64) * 64)
         found = Enclosure(bits)
         for (pr, pi_, dr, di, shift), gap in zip(polynomials, gaps, strict=True):
@@ -136,6 +144,7 @@ class ExactFunction:
 
     def steepness(self, middle: complex, radius: Fraction, index: int, size: float) -> Fraction:
         """Bound |g'| in a disc by the Taylor polynomial, for values of about `size`."""
+        affordable(self.rows, *map(abs, pair(middle)), limit=_MOST_WORK_WITH_FRACTIONS)
         # |g'| <= sum k |a_k| r^(k - 1) + (n + 1) R r^n, R bounding the coefficient a_(n + 1).
         total = (_ORDER + 1) * self._taylor_rest(middle, radius, index)
         for k, bound in reversed(list(enumerate(self._taylor(middle, radius, index, size)))[1:]):
@@ -254,6 +263,16 @@ def _trimmed(row: Sequence[float], zeros: int) -> list[float]:
 
 def pair(value: complex) -> tuple[Fraction, Fraction]:
     return Fraction(value.real), Fraction(value.imag)
+
+
+def affordable(
+    rows: Sequence[Sequence[object]], *points: Fraction, limit: int = _MOST_WORK
+) -> None:
+    """Refuse points of which the powers in polynomials have too many digits."""
+    digits = sum(point.numerator.bit_length() + point.denominator.bit_length() for point in points)
+    work = digits * max(map(len, rows)) * sum(map(len, rows))
+    if work > limit:
+        raise OverflowError(f"polynomials take {work} binary digits to check")
 
 
 def _binary(x: Fraction) -> tuple[int, int]:

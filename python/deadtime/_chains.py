@@ -27,6 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from deadtime._quasipolynomial import QuasiPolynomial
+from deadtime._frozen import ReadOnlyArrays
+from deadtime._validation import real_array, unmasked
 
 __all__ = ["Chain", "chains_of"]
 
@@ -41,7 +43,7 @@ _MAX_DEGREE = 128
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class Chain(ReadOnlyArrays):
     r"""A sequence of characteristic roots going to infinity, and its law.
 
     Made by `QuasiPolynomial.chains`. In the upper half plane; the mirror image is another one.
@@ -87,7 +89,7 @@ class Chain:
         -------
         ndarray of float, shape of `im`
         """
-        y = np.asarray(im, dtype=np.float64)
+        y = real_array("im", im)
         x = np.full(y.shape, self.offset)
         if self.bend == 0.0:
             return x
@@ -125,7 +127,7 @@ class Chain:
         >>> bool(abs(z - root) < 1e-2)
         True
         """
-        index = np.asarray(n)
+        index = np.asarray(unmasked("n", n))
         if index.dtype.kind not in "iu":
             raise TypeError(f"n of dtype {index.dtype}: give whole numbers")
         if index.size and index.min() < 0:

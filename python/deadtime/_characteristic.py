@@ -159,13 +159,15 @@ class Characteristic:
         -------
         RootSet
             More than `n` if the real parts of the next ones cannot be told apart. Fewer if there
-            are no more, or for a neutral equation no more clearly right of its chains of roots
-            (see `chain_abscissa`). ``region`` is the half plane in which these are all.
+            are no more, or no more right of the last line that could be counted, for a neutral
+            equation mostly next to its chains of roots (see `chain_abscissa`). ``region`` is the
+            half plane in which these are all.
 
         Raises
         ------
         ValueError
-            If `n` is less than 1, or the equation is advanced.
+            If `n` is less than 1, the equation is advanced, or no root was found and what lies
+            next to the chains could not be counted.
         CountMismatchError
             If double precision does not tell the roots apart.
 
@@ -184,9 +186,9 @@ class Characteristic:
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.
 
-        For a neutral equation, roots closer to the chains than the search comes to them are not
-        told from them: ``rightmost().region`` shows how close, usually within 1e-4 of one over
-        the longest delay.
+        For a neutral equation, roots closer to the chains than 1e-3 of one over the longest
+        delay are not told from them; ``rightmost().region`` shows how close the search came.
+        Where it came no closer and found no root, there is an error and no number.
 
         Parameters
         ----------
@@ -197,6 +199,12 @@ class Characteristic:
         -------
         float
             In 1/s; infinite for an advanced equation.
+
+        Raises
+        ------
+        ValueError
+            If roots between the chains and the last line that could be counted are possible and
+            none was found further right.
 
         Examples
         --------

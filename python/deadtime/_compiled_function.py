@@ -11,7 +11,7 @@ import scipy
 __all__ = ["addresses"]
 
 _SIGNATURE = "void (double, double *, double *, double *, double *, void *)"
-_ARGUMENTS = 6
+_NUMBERS = 4  # pointers to doubles between the time and the user data
 
 _name = ctypes.PYFUNCTYPE(ctypes.c_char_p, ctypes.py_object)(
     ("PyCapsule_GetName", ctypes.pythonapi)
@@ -27,7 +27,8 @@ _context = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object)(
 def addresses(function: Any) -> tuple[int, int] | None:
     """Return the addresses of a C function and of its user data, None for a Python function.
 
-    A signature that is known and is not that of a right-hand side raises ValueError.
+    A signature that is known and is not that of a right-hand side raises ValueError. Functions
+    of a `ctypes` library without ``argtypes`` do not know theirs.
     """
     if isinstance(function, scipy.LowLevelCallable):
         capsule = tuple.__getitem__(function, 0)
@@ -37,17 +38,44 @@ def addresses(function: Any) -> tuple[int, int] | None:
             raise _refusal(signature)
         return int(_pointer(capsule, name)), int(_context(capsule) or 0)
     if isinstance(function, CFuncPtr):
-        types = function.argtypes
-        if types is not None and len(types) not in (0, _ARGUMENTS):
-            raise _refusal(f"{len(types)} arguments")
+        _check_ctypes(function)
         address = ctypes.cast(function, ctypes.c_void_p).value
+    elif hasattr(function, "_sig") and isinstance(getattr(function, "address", None), int):
+        _check_numba(function._sig)
+        address = function.address
     else:
-        address = getattr(function, "address", None)
-        if not isinstance(address, int):
-            return None
+        return None
     if not address:
         raise ValueError(f"fun={function!r} is a null pointer: give a function")
     return address, 0
+
+
+def _check_ctypes(function: Any) -> None:
+    """Refuse a ctypes function whose declared types are others."""
+    types, result = function.argtypes, function.restype
+    if types is None:
+        return
+    pointers = (ctypes.POINTER(ctypes.c_double), ctypes.c_void_p)
+    fits = (
+        len(types) == _NUMBERS + 2
+        and types[0] is ctypes.c_double
+        and all(kind in pointers for kind in types[1:-1])
+        and (types[-1] is ctypes.c_void_p or issubclass(types[-1], ctypes._Pointer))
+        # What a library's function has unless it was told otherwise.
+        and result in (None, ctypes.c_int)
+    )
+    if not fits:
+        names = ", ".join(kind.__name__ for kind in types)
+        raise _refusal(f"{getattr(result, '__name__', 'void')} ({names})")
+
+
+def _check_numba(signature: Any) -> None:
+    """Refuse a numba cfunc that was compiled for other types."""
+    types = [str(kind) for kind in signature.args]
+    numbers = ["float64", *["float64*"] * _NUMBERS]
+    fits = types[:-1] == numbers and types[-1].endswith("*")
+    if not fits or str(signature.return_type) != "none":
+        raise _refusal(f"{signature.return_type} ({', '.join(types)})")
 
 
 def _refusal(signature: str) -> ValueError:

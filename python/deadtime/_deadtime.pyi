@@ -403,6 +403,16 @@ def sampled_abscissa_grid(
 
 @final
 class DelayPieces:
+    def __new__(
+        cls,
+        dim: int,
+        end: float,
+        starts: NDArray[np.float64],
+        ends: NDArray[np.float64],
+        terms: NDArray[np.uint64],
+        coefficients: NDArray[np.float64],
+    ) -> DelayPieces: ...
+    def __reduce__(self) -> tuple[type[DelayPieces], tuple[Any, ...]]: ...
     @property
     def span(self) -> tuple[float, float]: ...
     @property
@@ -451,6 +461,8 @@ def solve_delay_equation(
     longest: float,
     times: NDArray[np.float64] | None,
     keep: bool,
+    sparsity: tuple[list[int], list[int]] | None,
+    most: int | None,
     events: list[tuple[Any, int, int]],
     jumps: list[tuple[float, Any]],
 ) -> DelayRun: ...

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._deadtime import DelayPieces
+from deadtime._frozen import ReadOnlyArrays, equal
 from deadtime._validation import real_array
 
 __all__ = ["DelayResult", "DelaySolution"]
@@ -35,6 +36,14 @@ class DelaySolution:
     def __init__(self, pieces: DelayPieces) -> None:
         self._pieces = pieces
         self.t_min, self.t_max = pieces.span
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DelaySolution):
+            return NotImplemented
+        return equal(self._pieces.__reduce__()[1], other._pieces.__reduce__()[1])
+
+    def __hash__(self) -> int:
+        return hash((self.t_min, self.t_max, self._pieces.count))
 
     def __repr__(self) -> str:
         return (
@@ -71,7 +80,7 @@ class DelaySolution:
 
 
 @dataclass(frozen=True, eq=False)
-class DelayResult:
+class DelayResult(ReadOnlyArrays):
     """Result of `solve_dde`, with the names of `scipy.integrate.solve_ivp`.
 
     Attributes

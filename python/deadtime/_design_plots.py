@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from deadtime._plots import COLOURS, REFERENCE
+from deadtime._plots import COLOURS, REFERENCE, empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,9 +43,7 @@ def plot_filter_choice(choice: FilterChoice) -> Figure:
 
 
 def _panels(choice: bool = False) -> tuple[Figure, dict[str, Any]]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(13.5 if choice else 11.0, 7.0), layout="constrained")
+    figure = empty_figure(13.5 if choice else 11.0, 7.0)
     layout: Any = [["map", "gain"], ["step", "phase"]]
     if choice:
         layout = [["map", "size", "gain"], ["step", "turn", "phase"]]

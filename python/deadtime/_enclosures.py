@@ -17,8 +17,8 @@ __all__ = ["angle", "cos_sin", "dyadic", "exponential", "pi"]
 
 _GUARD = 16
 
-# Exponents beyond these are not of this world: e^(2**20) has 450 000 digits.
-_LARGEST_EXPONENT = 20
+# Exponents beyond these are in no certificate: weights are doubles, up to e^745.
+_LARGEST_EXPONENT = 13
 _LARGEST_ANGLE = 58
 
 

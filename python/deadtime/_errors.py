@@ -16,9 +16,11 @@ __all__ = [
     "DeadtimeError",
     "FlightAbortedError",
     "LinkError",
+    "MissingExtraError",
     "NotIdentifiableError",
     "PacketError",
     "RecordingError",
+    "WorkerError",
 ]
 
 
@@ -108,6 +110,14 @@ class NotIdentifiableError(DeadtimeError):
 
 class RecordingError(DeadtimeError, ValueError):
     """A recording cannot be used as it is; the message says what is wrong and where."""
+
+
+class MissingExtraError(DeadtimeError, ImportError):
+    """An optional package is not installed; the message holds the line that installs it."""
+
+
+class WorkerError(DeadtimeError, RuntimeError):
+    """Other processes that were to work cannot start, or were killed."""
 
 
 class LinkError(DeadtimeError):

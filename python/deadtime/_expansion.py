@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 
 __all__ = ["Expansion"]
 
@@ -35,7 +35,3 @@ class Expansion(ReadOnlyArrays):
     coefficients: NDArray[np.complex128]
     errors: NDArray[np.float64]
     delay: float
-
-    def __post_init__(self) -> None:
-        read_only(self.coefficients)
-        read_only(self.errors)

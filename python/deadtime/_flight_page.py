@@ -68,7 +68,7 @@ def _fitted(study: FlightStudy) -> str:
         + (
             "what is left is white noise."
             if fit.adequate
-            else "what is left is not white, so the intervals are the robust ones."
+            else "what is left is not white, so the intervals are an indication and no promise."
         )
     )
     if learned.split is None:

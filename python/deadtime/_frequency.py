@@ -1,14 +1,13 @@
-"""Quasi-polynomials on the imaginary axis: all zeros of a real function there, and arguments.
+"""Quasi-polynomials on the imaginary axis: all zeros of a real function there.
 
 With |f^(K)| <= B on the interval of half width r about m, a real f has by Taylor's formula
 
     no zero there           if |f(m)| > sum_{0<k<K} |f^(k)(m)| r^k / k! + B r^K / K!,
     one zero there at most  if |f'(m)| > sum_{1<k<K} |f^(k)(m)| r^(k-1) / (k-1)! + ...,
 
-and the argument of a complex f keeps within a half plane in the first case. Intervals of which
-neither is known are halved. B comes from the moduli of the coefficients, so nothing is passed
-over between the points of a grid; bounds on rounding are added to both tests. What is left where
-rounding hides the sign is a point at which f touches zero.
+Intervals of which neither is known are halved. B comes from the moduli of the coefficients, so
+nothing is passed over between the points of a grid; bounds on rounding are added to both tests.
+What is left where rounding hides the sign is a point at which f touches zero.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ __all__ = [
     "DifferenceOfSquares",
     "OnAxis",
     "RealFunction",
-    "argument",
     "powers_of_s",
     "ratio_rows",
     "without_common_power",
@@ -325,58 +323,3 @@ def _touched(f: RealFunction, intervals: list[Vector]) -> list[float]:
             middles = group.mean(axis=1)
             points.append(float(middles[np.argmin(np.abs(f.value(middles)))]))
     return points
-
-
-def argument(h: QuasiPolynomial, omega: Vector) -> Vector:
-    """Argument of h(j omega) in rad, continuous from omega = 0+ on, for omega > 0.
-
-    It starts from k quarter turns for a factor s^k, and half a turn more where the rest is
-    negative. Passing a zero on the axis, it grows by half a turn for each multiplicity, as if the
-    zero lay just left of the axis.
-    """
-    k = powers_of_s(h)
-    h = without_powers(h, k)
-    lead = int(np.argmax(h.coefficients[:, -1] != 0.0))
-    centre = float(h.delays[lead])
-    g = OnAxis(h, centre)
-
-    def value(w: Vector) -> NDArray[np.complex128]:
-        return np.asarray(g(w) * np.exp(1j * w * centre))
-
-    places, back = np.unique(omega, return_inverse=True)
-    if places.size == 0:
-        return np.zeros_like(omega)
-    origin = 0.0
-    start = value(np.zeros(1))[0]
-    if abs(start) <= g.rounding(np.zeros(1))[0] * g.bounds(np.zeros(1))[0][0]:
-        origin = 1e-3 * float(places[0])
-        start = value(np.array([origin]))[0]
-    nodes = np.concatenate([[origin], places])
-    grown = np.zeros(places.size)
-    a, b, owner = nodes[:-1], nodes[1:], np.arange(places.size)
-    for _ in range(_HALVINGS):
-        if a.size == 0:
-            break
-        m, r = 0.5 * (a + b), 0.5 * (b - a)
-        at = value(m)
-        slope = np.abs(g.slope(m) + 1j * centre * g(m))
-        bound, _, curvature = g.bounds(b)
-        noise = g.rounding(b) * bound
-        change = slope * r + 0.5 * curvature * r * r
-        inside = np.abs(at) > change + noise
-        hidden = ~inside & ((change <= noise) | (r <= 2.0 * _EPS * m))
-        for chosen, lowest in ((inside, -np.pi), (hidden, -0.5 * np.pi)):
-            if chosen.any():
-                first, last = value(a[chosen]), value(b[chosen])
-                middle = at[chosen]
-                if lowest == -np.pi:
-                    turned = np.angle(middle / first) + np.angle(last / middle)
-                else:
-                    turned = np.angle(last) - np.angle(first)
-                    turned = lowest + np.mod(turned - lowest, 2.0 * np.pi)
-                grown += np.bincount(owner[chosen], turned, minlength=places.size)
-        rest = ~inside & ~hidden
-        a, m, b, owner = a[rest], m[rest], b[rest], owner[rest]
-        a, b, owner = np.concatenate([a, m]), np.concatenate([m, b]), np.tile(owner, 2)
-    followed = np.angle(start) + np.cumsum(grown) - places * centre + 0.5 * np.pi * k
-    return np.asarray(followed[back].reshape(omega.shape))

@@ -5,11 +5,10 @@ One class, kept whole: most of the file is its documentation.
 
 from __future__ import annotations
 
-import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
@@ -21,17 +20,18 @@ from deadtime._loop_run import settled_step, simulate_loop
 from deadtime._loop_stability import (
     characteristic,
     closed_loop,
+    continuous_range,
     open_loop,
     sampled_abscissa,
+    sampled_range,
     sampled_roots,
-    stable_end,
-    stable_range,
 )
 from deadtime._plants import Plant
 from deadtime._response import Response
 from deadtime._sampled_gain import SampledLoopGain
-from deadtime._sampled_margins import delay_loss, sampled_margins
-from deadtime._validation import finite, non_negative, positive
+from deadtime._sampled_margins import sampled_margins
+from deadtime._sampled_ranges import SampledNumber, further_delay
+from deadtime._validation import finite, non_negative, positive, real_array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,10 +43,6 @@ __all__ = ["ControlLoop"]
 
 _FIELDS = ("plant", "controller", "delay", "sample_time", "limit", "delay_path")
 _PATHS = ("command", "measurement")
-
-# Samples in the delay at which the search for a stable range ends: the transition matrix grows with
-# them.
-_MOST_SAMPLES = 200
 
 
 @dataclass(frozen=True)
@@ -388,7 +384,7 @@ class ControlLoop:
         Margins
             Of a sampled loop: hold and delay taken exactly. Its `delay_margins` are empty, because
             further delay changes the hold's share and with it every crossing; `delay_margin` is
-            what `stable_range` finds or, beyond 200 samples, where a crossing comes to -1.
+            what `stable_range` finds.
 
         Raises
         ------
@@ -499,7 +495,7 @@ class ControlLoop:
                 low = min(low, 0.01 * high)
             omega = np.geomspace(low, high, 1001)
         drawn = shown_rows(axes, 2)
-        plot_bode(drawn, self, np.asarray(omega, dtype=np.float64), found)
+        plot_bode(drawn, self, real_array("omega", omega), found)
         return drawn
 
     def transition_matrix(self) -> NDArray[np.float64]:
@@ -607,9 +603,10 @@ class ControlLoop:
     def stable_range(self, name: str) -> tuple[float, float]:
         """Interval of one named number, around its present value, on which the loop is stable.
 
-        Walks outwards from the present value in growing steps to the first loss of stability on
-        either side and refines each by Brent's method to twelve digits. A loss that is regained
-        within one step (1/64 of the value at first) can be passed over.
+        The ends are the nearest values on either side at which a pole comes to the edge of
+        stability, or a neutral loop loses strong stability. None is passed over, however soon
+        stability is regained: of a continuous loop they are among all its `crossings`; of a
+        sampled one, steps are taken for which the loop gain on the unit circle keeps clear of -1.
 
         Parameters
         ----------
@@ -619,15 +616,20 @@ class ControlLoop:
         Returns
         -------
         (low, high) : tuple of float
-            An end is infinite where stability is not lost within a thousand times the value (for
-            the delay of a sampled loop: within 200 samples), and 0 for a number that cannot be
-            negative where stability is not lost on the way down (the walk then ends at a
-            millionth of the value, for a sample time at 200 samples in the delay).
+            An end is infinite only where nothing beyond can make the loop unstable, and 0 for a
+            number that cannot be negative where stability is not lost on the way down; a number
+            without a meaning at zero is followed down to a millionth of its value.
 
         Raises
         ------
         ValueError
-            If the loop is unstable as it is, its delay is None or it has no such number.
+            If the loop is unstable as it is, its delay is None or it has no such number; if an end
+            is neither found nor ruled out: the message says up to where the loop is stable.
+
+        Notes
+        -----
+        Of a sampled loop the frequencies at which the loop gain is looked at are dense, but chosen
+        by its poles, zeros and peaks and not by a proof.
 
         Examples
         --------
@@ -645,18 +647,13 @@ class ControlLoop:
                 f"{name!r} is not a number whose range can be sought: choose one of "
                 f"{', '.join(known for known in values if known != 'limit')}"
             )
-        nearest, farthest = 0.0, math.inf
-        if self.sample_time is not None and name == "delay":
-            farthest = _MOST_SAMPLES * self.sample_time
-        if name == "sample_time":
-            nearest = self._known_delay() / _MOST_SAMPLES
-        return stable_range(
-            lambda value: self._abscissa(values | {name: value}),
-            name,
-            values[name],
-            nearest,
-            farthest,
-        )
+        if not self.is_stable():
+            raise ValueError(
+                f"the loop is not stable at {name}={values[name]}: start from a stable one, for "
+                "example with lower gains"
+            )
+        seek = sampled_range if self.is_sampled else continuous_range
+        return seek(self.plant, self.controller, values, name)
 
     def _abscissa(self, values: Mapping[str, float]) -> float:
         """Spectral abscissa with numbers from `values`, which may lie outside the usual range."""
@@ -676,25 +673,10 @@ class ControlLoop:
         return SampledLoopGain.of(self._model, self._known_delay(), period)
 
     def _further_delay(self) -> tuple[float, float]:
-        """How much more delay a stable sampled loop stands, and the frequency it then swings at."""
-        delay, period = self._known_delay(), cast(float, self.sample_time)
-        found = delay_loss(
-            lambda late: SampledLoopGain.of(self._model, late, period), delay, self._sampled_gain
-        )
-        if _MOST_SAMPLES * period < delay + found[0] < math.inf:
-            return found  # beyond the walk along the transition matrices
-        largest = stable_end(
-            lambda late: sampled_abscissa(self._model, late, period),
-            "delay",
-            delay,
-            1.0,
-            0.0,
-            min(_MOST_SAMPLES * period, delay + found[0]),
-        )
-        if largest - delay >= found[0]:
-            return found
-        pole = self.replace(delay=largest)._native.poles()[0]
-        return largest - delay, abs(float(pole.imag))
+        """How much more delay a stable sampled loop bears, and the frequency it then swings at."""
+        numbers = self.parameters
+        build = partial(LoopModel.build, self.plant, self.controller)
+        return further_delay(SampledNumber(build, numbers, "delay"))
 
     @cached_property
     def _native(self) -> LinearLoop:

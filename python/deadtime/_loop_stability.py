@@ -6,45 +6,52 @@ a g + b f e^(-s Td); a sampled one the eigenvalues z of its transition matrix, p
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig
-from scipy.optimize import brentq
 
+from deadtime._continuous_ranges import (
+    range_of_corner,
+    range_of_damping,
+    range_of_delay,
+    range_of_gain,
+)
 from deadtime._controllers import Controller
 from deadtime._deadtime import sampled_abscissa_grid
 from deadtime._loop_model import LoopModel, refuse_discretised
+from deadtime._margins import end_of_gain
+from deadtime._parametric import Parameter
 from deadtime._plants import Plant
-from deadtime._quasipolynomial import delay, s
+from deadtime._quasipolynomial import QuasiPolynomial, delay, s
 from deadtime._rootset import RootSet
+from deadtime._sampled_ranges import SampledNumber, further_delay
 from deadtime._transfer import TransferFunction
 
 __all__ = [
     "characteristic",
     "closed_loop",
+    "continuous_range",
     "open_loop",
     "sampled_abscissa",
     "sampled_grid",
+    "sampled_range",
     "sampled_roots",
-    "stable_end",
-    "stable_range",
 ]
 
-# Numbers of a loop that cannot be negative, those of them that may be zero, and those that keep
-# their sign because the loop has no meaning at zero.
+# Numbers of a loop that cannot be negative, and those that keep their sign because the loop has no
+# meaning at zero; those of a filter.
 _NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"})
-_MAY_BE_ZERO = frozenset({"delay", "lag"})
 _KEEPS_SIGN = frozenset({"time_constant"})
+_OF_FILTER = frozenset({"omega", "damping"})
 
-# The walk away from the present value: first step, growth from step to step, how far it goes and
-# what counts as zero on the way down; lengths as parts of the value.
-_FIRST_STEP = 1.0 / 64.0
-_GROWTH = 1.2
-_FARTHEST = 1e3
+# What counts as zero on the way down to it, and how far a sampled loop is followed where it may be
+# stable for ever, as parts of the value.
 _NEARLY_ZERO = 1e-6
+_FARTHEST = 1e6
 
 
 def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
@@ -116,57 +123,73 @@ def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> Ro
     )
 
 
-def stable_range(
-    abscissa: Callable[[float], float], name: str, value: float, nearest: float, farthest: float
+def continuous_range(
+    plant: Plant, controller: Controller, values: Mapping[str, float], name: str
 ) -> tuple[float, float]:
-    """Walk from `value` both ways to the first sign change of `abscissa`.
+    """Stable values of one number of a continuous loop, around its present one."""
+    value = values[name]
+    family = characteristic(plant, controller, {**values, name: Parameter(name)})
+    if name == "delay":
+        return range_of_delay(family, value)
+    if name in _OF_FILTER:
+        seek = range_of_damping if name == "damping" else range_of_corner
+        return seek(family, value, _highest_crossing(plant, controller, values))
+    return range_of_gain(family, name, value, _bounds(name, value))
 
-    The walk ends at `farthest`, and on the way down to zero at `nearest`.
+
+def _highest_crossing(
+    plant: Plant, controller: Controller, values: Mapping[str, float]
+) -> float | None:
+    """A frequency beyond which the loop gain is below one; None where there is none.
+
+    Whatever the corner of its filter is, and for all dampings from the present one on.
     """
-    if not abscissa(value) < 0.0:
+    b, a = plant._polynomials(values)
+    terms, damping = controller._terms(values), values["damping"]
+    # The least modulus of x^2 + 2 damping x + 1 where Re x >= 0.
+    least = 1.0 if damping >= math.sqrt(0.5) else 2.0 * damping * math.sqrt(1.0 - damping * damping)
+    feedback = [abs(terms.derivative) / least, abs(terms.proportional), abs(terms.integral)]
+    gain = np.polymul(np.abs(b), feedback)[::-1]
+    rest = np.append(0.0, np.asarray(a, dtype=np.float64)[::-1])
+    return end_of_gain(QuasiPolynomial([gain], [0.0]), QuasiPolynomial([rest], [0.0]), 1.0)
+
+
+def sampled_range(
+    plant: Plant, controller: Controller, values: Mapping[str, float], name: str
+) -> tuple[float, float]:
+    """Stable values of one number of a sampled loop, around its present one."""
+    number = SampledNumber(lambda given: LoopModel.build(plant, controller, given), values, name)
+    low, high = _bounds(name, number.value)
+    if number.is_idle:
+        return low, high
+    if name == "delay":
+        before = number.loss(0.0)
+        return 0.0 if before is None else before.value, number.value + further_delay(number)[0]
+    return _sampled_end(number, low, -1.0), _sampled_end(number, high, 1.0)
+
+
+def _sampled_end(number: SampledNumber, end: float, sign: float) -> float:
+    size = abs(number.value) if number.value != 0.0 else 1.0
+    if number.value == end:
+        return end
+    if end == 0.0:
+        found = number.loss(-sign * _NEARLY_ZERO * size)
+        return 0.0 if found is None else found.value
+    may_be_forever = number.name in _NON_NEGATIVE or number.name in _KEEPS_SIGN
+    found = number.loss(sign * _FARTHEST * size if may_be_forever else end)
+    if found is None:
         raise ValueError(
-            f"the loop is not stable at {name}={value}: start from a stable one, for example with "
-            "lower gains"
+            f"the loop is stable from {number.name}={number.value:g} to "
+            f"{sign * _FARTHEST * size:g}, and nothing beyond is ruled out"
         )
-    down = stable_end(abscissa, name, value, -1.0, nearest, farthest)
-    return down, stable_end(abscissa, name, value, 1.0, nearest, farthest)
+    return found.value
 
 
-def stable_end(
-    abscissa: Callable[[float], float],
-    name: str,
-    value: float,
-    direction: float,
-    nearest: float,
-    farthest: float,
-) -> float:
-    """Walk from a stable `value` one way, as `stable_range` does."""
-    size = abs(value) if value != 0.0 else 1.0
-    stops_at_zero = name in _NON_NEGATIVE or (name in _KEEPS_SIGN and value > 0.0)
-    inside, step = value, _FIRST_STEP * size
-    while abs(inside - value) < _FARTHEST * size:
-        outside = inside + direction * step
-        if stops_at_zero and direction < 0.0:
-            outside = max(outside, 0.5 * inside)
-            if outside < max(nearest, _NEARLY_ZERO * size):
-                if name not in _MAY_BE_ZERO or abscissa(0.0) < 0.0:
-                    return 0.0
-                return _refine(abscissa, inside, 0.0)
-        if outside > farthest:
-            break
-        if not abscissa(outside) < 0.0:
-            return _refine(abscissa, inside, outside)
-        inside, step = outside, step * _GROWTH
-    return direction * np.inf
-
-
-def _refine(abscissa: Callable[[float], float], inside: float, outside: float) -> float:
-    """Zero of `abscissa` between a stable and an unstable value."""
-    if abscissa(outside) == 0.0:
-        return outside
-    size = max(abs(inside), abs(outside))
-    zero = float(brentq(abscissa, inside, outside, xtol=1e-13 * size, rtol=1e-14, maxiter=200))
-    return 0.0 if abs(zero) < 1e-12 * size else zero
+def _bounds(name: str, value: float) -> tuple[float, float]:
+    """Between what a number can be."""
+    if name in _KEEPS_SIGN and value < 0.0:
+        return -math.inf, 0.0
+    return (0.0 if name in _NON_NEGATIVE or name in _KEEPS_SIGN else -math.inf), math.inf
 
 
 def sampled_grid(

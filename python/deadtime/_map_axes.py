@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._validation import finite
+from deadtime._validation import finite, unmasked
 
 __all__ = ["damping_demand", "map_axes"]
 
@@ -80,7 +80,7 @@ def _points(name: str, given: Any, size: int) -> _Floats:
         if low >= high:
             raise ValueError(f"{name}={given!r}: the low end of a range is below its high end")
         return np.linspace(low, high, size)
-    array = np.asarray(given)
+    array = np.asarray(unmasked(name, given))
     if array.dtype.kind not in "iuf":
         raise TypeError(f"{name}={given!r}: give a range (low, high) or an array of real numbers")
     points = np.array(array, dtype=np.float64)

@@ -38,10 +38,10 @@ from deadtime._frequency import (
     without_powers,
     zeros_between,
 )
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Margins", "first_loss", "gain_crossovers", "margins"]
+__all__ = ["Margins", "end_of_gain", "first_loss", "gain_crossovers", "margins"]
 
 Vector = NDArray[np.float64]
 
@@ -117,10 +117,6 @@ class Margins(ReadOnlyArrays):
     phase_crossovers: Vector
     gain_margins: Vector
     searched: tuple[float, float]
-
-    def __post_init__(self) -> None:
-        for value in vars(self).values():
-            read_only(value)
 
     def __repr__(self) -> str:
         if not self.stable:
@@ -212,9 +208,9 @@ def gain_crossovers(n: QuasiPolynomial, d: QuasiPolynomial) -> tuple[Vector, flo
     """All frequencies above zero with |n| = |d|, and up to where that is all."""
     k = min(powers_of_s(n), powers_of_s(d)) if n.coefficients.any() else 0
     n, d = without_powers(n, k), without_powers(d, k)
-    top, proved = _end(n, d, 1.0), True
+    top, proved = end_of_gain(n, d, 1.0), True
     if top is None:
-        top = _end(d, n, 1.0)
+        top = end_of_gain(d, n, 1.0)
     if top is None:
         top, proved = _BEYOND_CORNERS * _highest_corner(n, d), False
     found = zeros_between(DifferenceOfSquares(d, n), 0.0, top)
@@ -283,7 +279,9 @@ def _span(n: QuasiPolynomial, d: QuasiPolynomial) -> float:
     return float(max(n.delays[-1], d.delays[-1]) - min(n.delays[0], d.delays[0]))
 
 
-def _end(n: QuasiPolynomial, d: QuasiPolynomial, level: float, shift: int = 0) -> float | None:
+def end_of_gain(
+    n: QuasiPolynomial, d: QuasiPolynomial, level: float, shift: int = 0
+) -> float | None:
     """A frequency beyond which |s^shift n| < level |d| is certain, None if that is not.
 
     |d| is at least the modulus of its leading term less those of all others, |n| at most the sum
@@ -308,7 +306,7 @@ def _end(n: QuasiPolynomial, d: QuasiPolynomial, level: float, shift: int = 0) -
 
 def _end_or(n: QuasiPolynomial, d: QuasiPolynomial, shift: int, level: float) -> float:
     """`_end`, or a frequency far beyond all corners where there is none."""
-    end = _end(n, d, level, shift)
+    end = end_of_gain(n, d, level, shift)
     return _BEYOND_CORNERS * _highest_corner(n, d) if end is None else end
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from deadtime._plots import COLOURS, REFERENCE
+from deadtime._plots import COLOURS, REFERENCE, empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,10 +22,8 @@ TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
 
 def plot_identifiability(plan: Identifiability) -> Figure:
     """The expected flight over its sensitivities, and delay against lag where both are free."""
-    from matplotlib.figure import Figure
-
     both = plan.correlation is not None
-    figure = Figure(figsize=(10.0 if both else 7.0, 5.0), layout="constrained")
+    figure = empty_figure(10.0 if both else 7.0, 5.0)
     layout: Any = (
         [["flight", "ellipse"], ["slopes", "ellipse"]] if both else [["flight"], ["slopes"]]
     )

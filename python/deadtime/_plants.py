@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from deadtime._batch import matrix, number, vector
 from deadtime._transfer import TransferFunction
-from deadtime._validation import finite, non_negative, non_zero
+from deadtime._validation import finite, non_negative, non_zero, unmasked
 
 __all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
 
@@ -106,6 +106,11 @@ class Plant(ABC):
         return realise(*self._polynomials(self.parameters))
 
 
+# Why numbers cannot be zero.
+NO_GAIN = "a plant without gain does not answer its command, so the loop is open"
+NO_TIME = "the plant is then a gain alone, RationalPlant([gain], [1.0])"
+
+
 @dataclass(frozen=True)
 class Integrator(Plant):
     """gain / (s (lag s + 1)).
@@ -136,7 +141,7 @@ class Integrator(Plant):
     lag: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", non_zero("gain", self.gain))
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
         object.__setattr__(self, "lag", non_negative("lag", self.lag))
 
     @property
@@ -176,8 +181,10 @@ class FirstOrder(Plant):
     time_constant: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gain", non_zero("gain", self.gain))
-        object.__setattr__(self, "time_constant", non_zero("time_constant", self.time_constant))
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
+        object.__setattr__(
+            self, "time_constant", non_zero("time_constant", self.time_constant, NO_TIME)
+        )
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -225,7 +232,7 @@ class RationalPlant(Plant):
             )
         object.__setattr__(self, "num", num)
         object.__setattr__(self, "den", den)
-        object.__setattr__(self, "gain", non_zero("gain", self.gain))
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -320,6 +327,7 @@ def _trimmed(coefficients: Sequence[float]) -> NDArray[np.float64]:
 
 
 def _coefficients(name: str, given: Sequence[SupportsFloat]) -> tuple[float, ...]:
+    given = unmasked(name, given)
     try:
         listed = list(given)
     except TypeError as error:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from deadtime._errors import MissingExtraError
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "as_svg",
+    "check_matplotlib",
+    "empty_figure",
     "new_figure",
     "plot_bode",
     "plot_estimate",
@@ -45,6 +49,25 @@ CHAIN: dict[str, Any] = {"color": "#d1481f", "lw": 1.0, "ls": "--", "zorder": 3}
 COLOURS = ("#0b6fb8", "#d1481f", "#2f8f4e", "#8a4fbf")
 
 
+def check_matplotlib() -> None:
+    """Refuse to draw where matplotlib is missing, with the line that installs it."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError(
+            "drawing needs matplotlib, which is not installed; this line installs it: "
+            "pip install 'deadtime[plot]'"
+        ) from error
+
+
+def empty_figure(width: float, height: float) -> Figure:
+    """A figure that belongs to nobody's window, without axes."""
+    check_matplotlib()
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
 def new_figure(
     width: float = 7.0, height: float = 4.0, rows: int = 1, columns: int = 1, even: bool = False
 ) -> tuple[Figure, Any]:
@@ -52,9 +75,7 @@ def new_figure(
 
     The first row is the highest unless they are to be even.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = empty_figure(width, height)
     ratios = None if rows == 1 or even else [3.0, *([1.0] * (rows - 1))]
     axes = figure.subplots(rows, columns, sharex=rows > 1, height_ratios=ratios)
     for one in np.ravel(axes):
@@ -67,6 +88,7 @@ def shown_axes(ax: Axes | None) -> Axes:
     """The given axes, or those of a new pyplot figure."""
     if ax is not None:
         return ax
+    check_matplotlib()
     from matplotlib import pyplot
 
     return pyplot.subplots(layout="constrained")[1]
@@ -78,6 +100,7 @@ def shown_rows(axes: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
         if len(axes) != rows:
             raise ValueError(f"axes has {len(axes)} of them: give {rows}")
         return axes
+    check_matplotlib()
     from matplotlib import pyplot
 
     return list(pyplot.subplots(rows, 1, sharex=True, layout="constrained")[1])
@@ -114,12 +137,10 @@ def plot_fits(
 
 def plot_estimate(fit: DelayEstimate) -> Figure:
     """Fit over data, below it the residuals, beside it the profile of the delay if it has one."""
-    from matplotlib.figure import Figure
-
     flights = fit.flights
     profiled = fit.has_profile and "delay" in fit.stderr
     width = max(7.0, 3.5 * len(flights)) + 2.6 * profiled
-    figure = Figure(figsize=(width, 4.6), layout="constrained")
+    figure = empty_figure(width, 4.6)
     across = len(flights) + int(profiled)
     ratios = [2.2] * len(flights) + [1.5] * int(profiled)
     grid = figure.add_gridspec(2, across, height_ratios=[3.0, 1.0], width_ratios=ratios)

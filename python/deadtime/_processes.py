@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from typing import TypeAlias, TypeVar
 
+from deadtime._errors import MissingExtraError, WorkerError
 from deadtime._validation import whole_number
 
 __all__ = ["Progress", "shared_out"]
@@ -70,7 +71,7 @@ def _elsewhere(
             done += len(found[futures[future]])
             report(done, count)
     except BrokenProcessPool as error:
-        raise RuntimeError(
+        raise WorkerError(
             "the other processes cannot start or were killed: in a script, keep what it "
             'does under `if __name__ == "__main__":`, or give processes=1'
         ) from error
@@ -113,7 +114,7 @@ def _reporting(progress: Progress, count: int) -> Iterator[Report]:
     try:
         from rich import progress as bars
     except ImportError as error:
-        raise ImportError(
+        raise MissingExtraError(
             "a progress bar needs rich: install it with pip install 'deadtime[cli]', or give a "
             "function as progress"
         ) from error

@@ -18,6 +18,7 @@ from deadtime._expansion import Expansion
 if TYPE_CHECKING:
     from deadtime._parametric import ParametricQuasiPolynomial
     from deadtime._transfer import TransferFunction
+from deadtime._validation import unmasked
 
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
@@ -373,7 +374,7 @@ def is_number(value: object) -> bool:
 
 
 def _places(s: Any) -> NDArray[np.complex128]:
-    points = np.asarray(s)
+    points = np.asarray(unmasked("s", s))
     if points.dtype.kind not in "biufc":
         raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
     return points.astype(np.complex128, copy=False)
@@ -385,6 +386,7 @@ def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _real_array(name: str, values: ArrayLike, ndim: int) -> NDArray[np.float64]:
+    values = unmasked(name, values)
     try:
         array = np.asarray(values)
     except ValueError as error:

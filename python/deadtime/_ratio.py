@@ -54,12 +54,15 @@ def _scaled_ratio(
 ) -> NDArray[np.complex128]:
     """n/d from mantissas and exponents."""
     (above, up), (below, down) = _scaled(n, points), _scaled(d, points)
-    mantissa = above / below
-    size = np.abs(mantissa)
-    scale = np.exp(up - down + np.log(size))
-    values = np.empty_like(mantissa)
-    for into, part in ((values.real, mantissa.real), (values.imag, mantissa.imag)):
-        into[:] = np.where(part == 0.0, 0.0, part / size * scale)
+    # Neither quotient overflows: a part may be finite where the modulus is not.
+    sizes = np.abs(above), np.abs(below)
+    direction = (above / sizes[0]) / (below / sizes[1])
+    exponent = up - down + np.log(sizes[0]) - np.log(sizes[1])
+    values = np.empty_like(direction)
+    for into, part in ((values.real, direction.real), (values.imag, direction.imag)):
+        into[:] = np.where(
+            part == 0.0, 0.0, np.sign(part) * np.exp(exponent + np.log(np.abs(part)))
+        )
     # NumPy divides complex numbers by zero part by part.
     values[(below == 0.0) & (above != 0.0)] = np.inf
     values[(below == 0.0) & (above == 0.0)] = np.nan

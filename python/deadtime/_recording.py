@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._errors import RecordingError
-from deadtime._frozen import ReadOnlyArrays
+from deadtime._frozen import FrozenDict, ReadOnlyArrays
+from deadtime._validation import unmasked
 
 __all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
 
@@ -68,7 +70,12 @@ class Recording(ReadOnlyArrays):
     ------
     RecordingError
         When the time does not increase, lengths differ, values are not finite or beyond 1e100,
-        or there are fewer than 8 samples.
+        or there are fewer than 8 samples; when a masked row hides a change of the reference or
+        of the command.
+
+    Notes
+    -----
+    A row in which one of the columns is masked (`numpy.ma`) is missing and left out.
 
     Examples
     --------
@@ -99,7 +106,7 @@ class Recording(ReadOnlyArrays):
         columns = {"time": time, "reference": reference, "output": output}
         if command is not None:
             columns["command"] = command
-        arrays = {name: _column(name, values) for name, values in columns.items()}
+        arrays = {name: _column(name, values) for name, values in _present(columns).items()}
         lengths = {name: array.size for name, array in arrays.items()}
         if len(set(lengths.values())) > 1:
             raise RecordingError(f"the columns of a recording differ in length: {lengths}")
@@ -108,7 +115,7 @@ class Recording(ReadOnlyArrays):
         object.__setattr__(self, "reference", arrays["reference"])
         object.__setattr__(self, "output", arrays["output"])
         object.__setattr__(self, "command", arrays.get("command"))
-        object.__setattr__(self, "units", dict(units or {}))
+        object.__setattr__(self, "units", FrozenDict(units or {}))
         object.__setattr__(self, "source", source)
 
     def __len__(self) -> int:
@@ -178,9 +185,46 @@ class Recording(ReadOnlyArrays):
         ]
 
 
+def _present(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
+    """Leave out the rows in which a column is masked: they are missing.
+
+    Reference and command hold until they change, so a missing row takes nothing away where
+    neither changes there. Where one does, or may, nobody knows when.
+    """
+    masks = {
+        name: np.ma.getmaskarray(values)
+        for name, values in columns.items()
+        if isinstance(values, np.ma.MaskedArray)
+    }
+    if len({np.shape(values) for values in columns.values()}) > 1:
+        return columns  # refused below, with the lengths
+    missing = np.logical_or.reduce(list(masks.values())) if masks else np.zeros(0, dtype=bool)
+    if missing.ndim != 1 or not missing.any():
+        return columns
+    kept = np.flatnonzero(~missing)
+    # Each missing row with those that are kept before and after it.
+    rows = np.flatnonzero(missing)
+    place = np.searchsorted(kept, rows)
+    rows, place = rows[(place > 0) & (place < kept.size)], place[(place > 0) & (place < kept.size)]
+    before, after = kept[place - 1], kept[place]
+    for name in ("reference", "command"):
+        if name not in columns:
+            continue
+        values: Any = np.ma.asarray(columns[name])
+        unknown = masks.get(name, np.zeros(missing.size, dtype=bool))[rows]
+        data = values.data
+        moved = np.where(unknown, data[after] != data[before], data[rows] != data[before])
+        if moved.any():
+            raise RecordingError(
+                f"row {rows[moved][0]} is masked, and the {name} changes there: when it did would "
+                "be lost with the row; fill in what is masked, or choose a window without it"
+            )
+    return {name: np.ma.getdata(values)[kept] for name, values in columns.items()}
+
+
 def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     try:
-        given = np.asarray(values)
+        given = np.asarray(unmasked(name, values))
         if given.dtype.kind == "c":
             raise TypeError("it is complex")
         array = np.array(given, dtype=np.float64)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._frozen import ReadOnlyArrays, read_only
-from deadtime._validation import finite, positive
+from deadtime._frozen import FrozenDict, ReadOnlyArrays
+from deadtime._validation import finite, positive, real_array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +23,10 @@ Vector = NDArray[np.float64]
 # place is then known to 1e-8 of the output step, the height of a peak to rounding.
 _POINTS = 101
 _MAGNIFICATIONS = 4
+
+
+#: Sensitivities that nobody asked for.
+NONE = FrozenDict()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,10 +79,9 @@ class Response(ReadOnlyArrays):
 
     def __post_init__(self) -> None:
         for name in ("time", "outputs", "inputs", "breaks", "reference"):
-            array = np.array(getattr(self, name), dtype=np.float64)
-            object.__setattr__(self, name, read_only(array))
-        read_only(self.sensitivities)
-        read_only(self.input_sensitivities)
+            array = np.array(real_array(name, getattr(self, name)))
+            object.__setattr__(self, name, array)
+        self._freeze()
 
     @classmethod
     def _of_fresh(
@@ -97,7 +100,7 @@ class Response(ReadOnlyArrays):
             # Read-only, in a fifth of the time that `flags` takes.
             array.setflags(False)  # type: ignore[call-arg]
         fields["steady_state"] = steady_state
-        fields["sensitivities"], fields["input_sensitivities"] = {}, {}
+        fields["sensitivities"] = fields["input_sensitivities"] = NONE
         fields["_dense"] = dense
         return response
 
@@ -222,17 +225,12 @@ class Response(ReadOnlyArrays):
 
         Raises
         ------
-        ImportError
+        MissingExtraError
             If matplotlib is not installed.
         """
-        if ax is None:
-            try:
-                import matplotlib.pyplot as plt
-            except ImportError as error:
-                raise ImportError(
-                    "plotting needs matplotlib: install it with pip install 'deadtime[plot]'"
-                ) from error
-            _, ax = plt.subplots()
+        from deadtime._plots import shown_axes
+
+        ax = shown_axes(ax)
         ax.plot(self.time, self.outputs, **({"label": "output"} | style))
         ax.step(self.time, self.reference, "k", where="post", linewidth=0.8, label="reference")
         if command:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
+from deadtime._validation import unmasked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +33,8 @@ class RootSet(ReadOnlyArrays):
 
     Behaves like the array of its roots: it has a length, can be indexed and iterated over, and
     NumPy takes it for an array. Sorted by falling real part, then rising modulus of the imaginary
-    part, then the upper one of a pair first.
+    part, then the upper one of a pair first. Two are equal where all that they hold is, discs and
+    region included; a root set and an array never are: compare ``found.roots``.
 
     Attributes
     ----------
@@ -69,10 +71,6 @@ class RootSet(ReadOnlyArrays):
     counted: int
     region: tuple[tuple[float, float], tuple[float, float]]
 
-    def __post_init__(self) -> None:
-        for array in (self.roots, self.multiplicities, self.radii, self.resolved):
-            read_only(array)
-
     def __len__(self) -> int:
         return len(self.roots)
 
@@ -95,6 +93,13 @@ class RootSet(ReadOnlyArrays):
         # asarray knows `copy` since NumPy 2 only.
         array = np.asarray(self.roots, dtype=dtype)
         return array.copy() if copy else array
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        """Work on the roots as on an array, but compare as a whole: ``array == roots`` is False."""
+        if method == "__call__" and ufunc in (np.equal, np.not_equal):
+            return ufunc is np.not_equal
+        plain = [one.roots if isinstance(one, RootSet) else one for one in inputs]
+        return getattr(ufunc, method)(*plain, **options)
 
     def plot(self, ax: Axes | None = None, chains: Sequence[Chain] = ()) -> Axes:
         """Draw the roots in the complex plane; needs matplotlib.
@@ -135,6 +140,7 @@ def ends(name: str, given: Range | None) -> tuple[float, float]:
     """Ends of a range, infinite where open."""
     if given is None:
         return (-math.inf, math.inf)
+    given = unmasked(name, given)
     try:
         low, high = given
         pair = (

@@ -34,11 +34,22 @@ Vector = NDArray[np.float64]
 #: A pole so close to z = 1 stands on it: a double one is computed with the root of the rounding.
 _ON_ONE = 1e-6
 
-#: Points from the lowest angle to a half turn, for each turn of the delay, and around each pole
-#: and zero of L on a scale that begins at a quarter of its distance from the circle.
-_POINTS = 400
+#: Points from the lowest angle to a half turn in equal ratios and in equal steps, for each half
+#: turn of a sample of delay, and around each pole and zero of L on a scale that begins at a quarter
+#: of its distance from the circle.
+_POINTS = 200
+_EVEN = 50
 _PER_TURN = 16
 _AROUND = 40
+
+#: Where abs(L) is below this on both sides of a gap, L comes nowhere near -1 within it.
+_SMALL_GAIN = 0.3
+
+#: How often the place of a peak of abs(L) is closed in, by a factor of four.
+_ZOOMS = 6
+
+#: Most angles at which L is looked at.
+_MOST = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +84,8 @@ class SampledLoopGain:
         """L(e^(j angle)); infinite at a pole."""
         z = np.exp(1j * angle)
         size = len(self.b)
-        matrices = z[:, None, None] * np.eye(size) - self.T
+        # z I - T = (z - 1) I - (T - I), which loses no digits where all of it is close to z = 1.
+        matrices = np.expm1(1j * angle)[:, None, None] * np.eye(size) - (self.T - np.eye(size))
         with np.errstate(divide="ignore", invalid="ignore"):
             try:
                 states = np.linalg.solve(
@@ -111,23 +123,63 @@ class SampledLoopGain:
         return int(np.count_nonzero(np.abs(self.poles - 1.0) < _ON_ONE))
 
     @cached_property
-    def angles(self) -> Vector:
-        """Angles in (0, pi] so close that no pole, zero or turn of the delay lies between two."""
+    def corners(self) -> Vector:
+        """Angles in (0, pi] so close that no pole or zero lies between two, whatever the delay."""
         places = np.concatenate([self.poles, self.zeros])
         away = np.abs(places - 1.0)
         low = 1e-3 * min(1.0 / (self.whole + 1.0), away[away > _ON_ONE].min(initial=1.0))
         while self.integrators and abs(self.at(np.array([low]))[0]) < 1.0 and low > 1e-12:
             low *= 0.01  # below an integrator's crossover
-        pieces = [
-            np.geomspace(low, np.pi, _POINTS),
-            np.linspace(low, np.pi, 50 + _PER_TURN * (self.whole + 1)),
-        ]
+        pieces = [np.geomspace(low, np.pi, _POINTS), np.linspace(low, np.pi, _EVEN)]
         for place in places[places.imag > 0.0]:
             near = max(abs(1.0 - abs(place)), 1e-12)
             reach = np.geomspace(0.25 * near, np.pi, _AROUND)
             pieces += [np.angle(place) - reach, np.angle(place) + reach]
         found = np.unique(np.concatenate(pieces))
-        return np.asarray(found[(found >= low) & (found <= np.pi)])
+        found = found[(found >= low) & (found <= np.pi)]
+        return np.unique(np.append(found, self._peaks(found)))
+
+    def _peaks(self, angle: Vector) -> Vector:
+        """Where abs(L) is largest, next to those of `angle` at which it is larger than around."""
+        sizes = np.abs(self.at(angle))
+        highest = 1 + np.flatnonzero((sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:]))
+        highest = highest[(sizes[highest] > _SMALL_GAIN) & np.isfinite(sizes[highest])]
+        low, high = angle[highest - 1], angle[highest + 1]
+        share = np.linspace(0.0, 1.0, 9)
+        rows = np.arange(len(low))
+        for _ in range(_ZOOMS):
+            inner = low[:, None] + share * (high - low)[:, None]
+            sizes = np.abs(self.at(inner.ravel())).reshape(inner.shape)
+            best = np.clip(np.argmax(sizes, axis=1), 1, len(share) - 2)
+            low, high = inner[rows, best - 1], inner[rows, best + 1]
+        return 0.5 * (low + high)
+
+    @cached_property
+    def angles(self) -> Vector:
+        """`corners` and so many between them that no turn of the delay lies between two."""
+        return self._turned(np.full(len(self.corners) - 1, True))
+
+    @cached_property
+    def resolved(self) -> Vector:
+        """As `angles`, but turns are told apart only where abs(L) may be above a third."""
+        large = np.abs(self.at(self.corners)) > _SMALL_GAIN
+        return self._turned(large[1:] | large[:-1])
+
+    def _turned(self, chosen: NDArray[np.bool_]) -> Vector:
+        """Part the gaps between corners that are `chosen` by the turns of the delay in them."""
+        gaps = np.diff(self.corners)
+        parts = np.ceil(gaps * (_PER_TURN * (self.whole + 1.0) / np.pi))
+        parts = np.where(chosen, np.maximum(parts, 1.0), 1.0)
+        if parts.sum() > _MOST:
+            raise ValueError(
+                f"{self.whole} samples of delay turn the loop gain too often to look at every "
+                "turn: take a longer sample_time, or loop.continuous()"
+            )
+        parts = parts.astype(np.int64)
+        first = np.repeat(np.cumsum(parts) - parts, parts)
+        share = (np.arange(parts.sum()) - first) / np.repeat(parts, parts)
+        inner = np.repeat(self.corners[:-1], parts) + share * np.repeat(gaps, parts)
+        return np.append(inner, self.corners[-1])
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """L at frequencies in rad/s from 0 to pi/sample_time."""

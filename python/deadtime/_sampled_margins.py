@@ -26,13 +26,9 @@ from scipy.optimize import brentq, minimize_scalar
 from deadtime._margins import Margins, first_loss
 from deadtime._sampled_gain import SampledLoopGain
 
-__all__ = ["delay_loss", "sampled_margins"]
+__all__ = ["sampled_margins"]
 
 Vector = NDArray[np.float64]
-
-#: How often a delay is corrected until its crossing stands at -1; the fraction of a sample matters
-#: little to the crossing, so that two or three do.
-_CORRECTIONS = 20
 
 
 def sampled_margins(
@@ -81,34 +77,6 @@ def sampled_margins(
         gain_margins=factors,
         searched=(math.inf, math.inf),
     )
-
-
-def delay_loss(
-    gain_of: Callable[[float], SampledLoopGain], delay: float, start: SampledLoopGain
-) -> tuple[float, float]:
-    """Least further delay that turns a crossing of gain one to -1, and its frequency, rad/s.
-
-    The turn that a crossing lacks, over its frequency, is the delay but for the hold's fraction of
-    a sample; from there it is corrected. inf and NaN where no gain is one, or the crossing jumps
-    past -1 at a whole number of samples, as it may with an ideal derivative.
-    """
-    period = start.sample_time
-    best = (math.inf, math.nan)
-    for angle, lacking in zip(*_gain_crossovers(start), strict=True):
-        late = delay + lacking * period / angle
-        for _ in range(_CORRECTIONS):
-            places, turns = _gain_crossovers(gain_of(late))
-            if not places.size:
-                break
-            near = int(np.argmin(np.abs(places - angle)))
-            angle = places[near]
-            change = math.remainder(turns[near], 2.0 * math.pi) * period / angle
-            late += change
-            if abs(change) <= 1e-13 * late:
-                if late - delay < best[0]:
-                    best = (late - delay, angle / period)
-                break
-    return best
 
 
 def _gain_crossovers(gain: SampledLoopGain) -> tuple[Vector, Vector]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime import _deadtime
 from deadtime._compiled_function import addresses
 from deadtime._delay_solution import DelayResult, DelaySolution
-from deadtime._validation import finite, positive, real_array
+from deadtime._validation import finite, positive, real_array, whole_number
 
 __all__ = ["solve_dde"]
 
@@ -40,6 +40,8 @@ def solve_dde(
     args: tuple[Any, ...] = (),
     vectorized: bool = False,
     max_step: float = np.inf,
+    max_steps: int | None = 100_000,
+    jac_sparsity: Any = None,
 ) -> DelayResult:
     r"""Solve :math:`y'(t) = f(t, y(t), y(t - \tau_1), \dots, y(t - \tau_m))`, constant delays.
 
@@ -53,7 +55,8 @@ def solve_dde(
         by far the fastest way in Python. A compiled function, a `scipy.LowLevelCallable`, a numba
         ``cfunc`` or a ctypes function pointer, has the signature ``void (double t, const double
         *y, const double *z, const double *dz, double *dy, void *user_data)`` with `z` and `dz`
-        delay by delay; it is called a node at a time without the interpreter.
+        delay by delay; it is called a node at a time without the interpreter. One that is
+        declared with other types is refused.
     t_span : (float, float)
         Start and end.
     history : float, array_like, callable or (callable, callable)
@@ -79,7 +82,10 @@ def solve_dde(
     events : callable or list of callable, optional
         As in `scipy.integrate.solve_ivp`: zeros of ``event(t, y, *args)``, with attributes
         ``terminal`` (True, or the number of the crossing that ends the run) and ``direction``.
-        They are looked for between neighbouring nodes and found to rounding on the polynomial.
+        Every change of sign is found, to rounding, where the event is smooth along the solution,
+        one in `y` itself above all; features narrower than a twentieth of an element may be
+        missed, and `max_step` makes elements shorter. A change of sign at a jump of `y` is an
+        event at the time of the jump, with `y` after it. A zero at the start is none.
     jumps : iterable of float or (float, callable)
         Times at which the right-hand side jumps, with ``change(t, y)`` the times at which y
         becomes what that returns. Those outside `t_span` are left out.
@@ -93,13 +99,21 @@ def solve_dde(
     max_step : float
         Largest length of an element, and largest gap between samples of the history. `fun` is
         called at nodes alone, so what it does with `t` for a shorter time may be missed.
+    max_steps : int or None
+        Elements tried at most, accepted or not, None for no limit. A run that reaches it ends with
+        status -1.
+    jac_sparsity : array_like or sparse matrix, shape (dim, dim), optional
+        As in `scipy.integrate.solve_ivp`: other than zero where a component of `fun` depends on a
+        component of `y`, or of ``z[j]`` for a delay shorter than the elements. Without it the
+        pattern is found by differences, where a Jacobian is wanted at all: that takes a column a
+        component once. A pattern that lacks entries is noticed and replaced.
 
     Returns
     -------
     DelayResult
         ``t, y, sol, t_events, y_events, breaks, nfev, status, message, success`` and counts.
         ``status`` is -1, with ``y`` as far as it is known, where elements become too short or
-        `fun` is not finite; the message says where and what to try.
+        too many or `fun` is not finite; the message says where and what to try.
 
     Raises
     ------
@@ -108,14 +122,16 @@ def solve_dde(
         the history or of `fun` at the start that are not finite, wrong shapes, times out of
         order, unknown methods.
     TypeError
-        If `fun`, an event or a change is no function.
+        If `fun`, an event or a change is no function, or returned None or complex numbers.
     Exception
         Whatever a function raises comes through unchanged.
 
     Notes
     -----
     The solution is a polynomial of degree 4 to 24 on each element, by collocation at Radau points
-    (the Radau IIA family), so that stiff equations take long elements too. Elements end on
+    (the Radau IIA family), so that stiff equations take long elements too. The Jacobian that this
+    needs is taken by differences; large systems have one only where sweeps without it fail, banded
+    or full as it comes out, and its diagonal alone beyond 4 million entries. Elements end on
     breaking points: the start, the jumps, and what follows from them one delay later, an order
     smoother each time, or as rough as before in neutral equations. Through a breaking point of a
     neutral equation with a jump of y itself only the step is followed, not the impulse in y'.
@@ -162,10 +178,12 @@ def solve_dde(
         max_step if max_step == np.inf else positive("max_step", max_step),
         times,
         bool(dense_output),
+        _pattern(jac_sparsity, initial.size),
+        None if max_steps is None else whole_number("max_steps", max_steps),
         _events(events),
         _jumps(jumps, start, end),
     )
-    status = (0, 1, -1, -1)[run.outcome]
+    status = (0, 1, -1, -1, -1)[run.outcome]
     return DelayResult(
         t=run.times,
         y=run.values,
@@ -178,12 +196,21 @@ def solve_dde(
         n_elements=run.elements,
         n_rejected=run.refused,
         status=status,
-        message=_message(run.outcome, run.place),
+        message=_message(run),
         success=status >= 0,
     )
 
 
-def _message(outcome: int, place: float) -> str:
+def _message(run: Any) -> str:
+    outcome, place = run.outcome, run.place
+    if outcome == 4:
+        return (
+            f"max_steps={run.elements + run.refused} elements were tried by t={place!r}, and "
+            f"{run.refused} of them refused. Where fun switches on y and holds it at the switch "
+            "(a sliding mode), smooth the switch; where fun is noisy, or rtol and atol ask for "
+            "less than the rounding of t, raise them; where the run is long, give a larger "
+            "max_steps."
+        )
     if outcome == 0:
         return "The end of t_span was reached."
     if outcome == 1:
@@ -227,7 +254,13 @@ def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
         return _vector("y0", y0)
     if not callable(past):
         return np.asarray(past)
-    value = np.atleast_1d(np.asarray(past(start), dtype=np.float64))
+    found = past(start)
+    if found is None:
+        raise TypeError(
+            f"history at t={start} returned None: end it with a return statement that gives the "
+            "values"
+        )
+    value = np.atleast_1d(real_array(f"history at t={start}", found))
     if value.ndim != 1:
         raise ValueError(
             f"history returned shape {value.shape} at t={start}: give a number or (dim,)"
@@ -237,6 +270,18 @@ def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
             f"history is {value} at t={start}: give finite values, or y at the start as y0"
         )
     return np.ascontiguousarray(value)
+
+
+def _pattern(pattern: Any, dim: int) -> tuple[list[int], list[int]] | None:
+    """Return the rows and columns of the entries of a Jacobian."""
+    if pattern is None:
+        return None
+    if not hasattr(pattern, "tocoo"):
+        pattern = real_array("jac_sparsity", pattern)
+    if pattern.shape != (dim, dim):
+        raise ValueError(f"jac_sparsity has shape {pattern.shape}: give ({dim}, {dim})")
+    rows, columns = pattern.nonzero()
+    return rows.tolist(), columns.tolist()
 
 
 def _events(events: Any) -> list[tuple[Any, int, int]]:

@@ -9,6 +9,7 @@ from typing import SupportsFloat
 
 from deadtime import _deadtime
 from deadtime._families import family_of
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._intervals import MOST_MOVING, Range, System, inverse, native_family
 from deadtime._validation import finite, non_negative, positive
 
@@ -19,7 +20,7 @@ _RADIUS_BOXES = 200_000
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityRadius:
+class StabilityRadius(ReadOnlyArrays):
     """How far parameters may move; made by `stability_radius`.
 
     Attributes

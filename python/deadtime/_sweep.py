@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._deadtime import sweep_figures, sweep_responses
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._loop import ControlLoop
 from deadtime._loop_model import LoopModel, refuse_discretised, rest_of
 from deadtime._loop_run import LEAST, SHORTEST
@@ -96,10 +96,6 @@ class Sweep(ReadOnlyArrays):
     status: NDArray[np.uint8]
     metrics: dict[str, Vector]
     outputs: Vector | None = None
-
-    def __post_init__(self) -> None:
-        for part in (self.values, self.time, self.status, self.metrics, self.outputs):
-            read_only(part)
 
     def __repr__(self) -> str:
         sets = "x".join(map(str, self.shape)) or "1"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._response import Response
 
 if TYPE_CHECKING:
@@ -58,10 +58,6 @@ class SystemResponse(ReadOnlyArrays):
     _dense: Callable[[Array], Array] | None = None
     #: Outputs, shape (n_outputs,), at which the system rests under the last inputs.
     _rest: Callable[[], Array | None] | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("time", "outputs", "inputs", "states", "breaks"):
-            read_only(getattr(self, name))
 
     def __repr__(self) -> str:
         outputs = "1 output" if self.outputs.ndim == 1 else f"{len(self.outputs)} outputs"

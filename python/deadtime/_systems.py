@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._determinant import NotExpandedError, expanded
+from deadtime._frozen import equal
 from deadtime._matrix_roots import MatrixDeterminant
 from deadtime._quasipolynomial import QuasiPolynomial
 from deadtime._realisation import Realisation, of_delay_system
@@ -27,7 +28,7 @@ from deadtime._rootset import Range, RootSet
 from deadtime._system_response import SystemResponse
 from deadtime._system_run import respond, step_response
 from deadtime._transfer import TransferFunction
-from deadtime._validation import non_negative, real_array
+from deadtime._validation import non_negative, real_array, unmasked
 
 __all__ = ["DelaySystem"]
 
@@ -221,6 +222,17 @@ class DelaySystem:
         groups = (self._A, self._B, self._C, self._D, self._N)
         return np.array(sorted({tau for group in groups for tau in group} - {0.0}))
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DelaySystem):
+            return NotImplemented
+        return equal(self._matrices(), other._matrices())
+
+    def __hash__(self) -> int:
+        return hash((self.n_states, self.n_inputs, self.n_outputs, tuple(self.delays.tolist())))
+
+    def _matrices(self) -> list[Any]:
+        return [getattr(self, name) for name in ("_A", "_B", "_C", "_D", "_E", "_N")]
+
     def __repr__(self) -> str:
         listed = ", ".join(f"{tau:g}" for tau in self.delays)
         delays = f", delays {listed} s" if listed else ""
@@ -250,7 +262,7 @@ class DelaySystem:
         [[ 0. +1.j -1. +0.j]
          [ 4. +0.j  0.4+1.j]]
         """
-        points = np.asarray(s, dtype=np.complex128)
+        points = np.asarray(unmasked("s", s), dtype=np.complex128)
         shape = (*points.shape, self.n_states, self.n_states)
         late = _sum_at(self._N, points, shape) + self._E
         return points[..., None, None] * late - _sum_at(self._A, points, shape)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._frequency import argument, powers_of_s, without_powers
+from deadtime._frequency import powers_of_s, without_powers
 from deadtime._interchange import (
     control_package,
     polynomials_of_control,
@@ -21,13 +21,14 @@ from deadtime._interchange import (
     rational,
 )
 from deadtime._margins import Margins, margins
+from deadtime._phase import argument
 from deadtime._quasipolynomial import QuasiPolynomial, delay, is_number
 from deadtime._ratio import first_term, ratio
 from deadtime._realisation import Realisation, of_transfer_function
 from deadtime._rootset import Range, RootSet
 from deadtime._system_response import SystemResponse
 from deadtime._system_run import respond, step_response
-from deadtime._validation import non_negative, real_array
+from deadtime._validation import non_negative, real_array, unmasked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -203,7 +204,7 @@ class TransferFunction:
         Finite also where numerator and denominator leave the range of doubles and their ratio
         does not. Infinite where only the denominator is zero, NaN where both are.
         """
-        points = np.asarray(s)
+        points = np.asarray(unmasked("s", s))
         if points.dtype.kind not in "biufc":
             raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
         flat = points.astype(np.complex128).ravel()
@@ -236,7 +237,8 @@ class TransferFunction:
 
         A single delay of the numerator or denominator enters exactly, and intervals between the
         frequencies asked for are halved until no turn can go unseen, so the phase is right also
-        where it turns many times from one of them to the next.
+        where it turns many times from one of them to the next. Where one term outweighs all
+        others the intervals grow with the frequency, up to the largest one that a double holds.
 
         Parameters
         ----------
@@ -250,6 +252,12 @@ class TransferFunction:
             there, with half a turn up where the rest of the numerator is negative, down where
             that of the denominator is. At a pole on the axis it falls by half a turn, at a zero
             it rises.
+
+        Raises
+        ------
+        ValueError
+            Where it cannot be followed so far: no term of a neutral function outweighs the
+            others, or the product of delay and frequency is beyond 1e308.
 
         Examples
         --------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import SupportsFloat, SupportsIndex
+from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ __all__ = [
     "positive",
     "real_array",
     "thread_number",
+    "unmasked",
     "whole_number",
 ]
 
@@ -26,6 +27,7 @@ def finite(name: str, value: SupportsFloat) -> float:
     """Return `value` as a finite float, or raise."""
     if type(value) is float and math.isfinite(value):
         return value
+    value = unmasked(name, value)
     try:
         if isinstance(value, (str, bytes)):  # text that float() would read is still no number
             raise TypeError
@@ -55,18 +57,42 @@ def positive(name: str, value: SupportsFloat) -> float:
     return number
 
 
-def non_zero(name: str, value: SupportsFloat) -> float:
-    """Return `value` as a float other than zero, or raise."""
+def non_zero(name: str, value: SupportsFloat, reason: str) -> float:
+    """Return `value` as a float other than zero, or raise with the `reason` why it cannot be."""
     number = finite(name, value)
     if number == 0.0:
-        raise ValueError(f"{name}=0: the loop is open without it, give a number other than zero")
+        raise ValueError(f"{name}=0: {reason}; give a number other than zero")
     return number
+
+
+def unmasked(name: str, values: Any) -> Any:
+    """Return `values` without the mask of a masked array, or raise where one of them is masked.
+
+    NumPy drops the mask as it makes an array of them, and what was under it counts.
+    """
+    if type(values) is np.ndarray:
+        return values
+    if isinstance(values, np.ma.MaskedArray):
+        masked = np.argwhere(np.ma.getmaskarray(values))
+        if masked.size or values is np.ma.masked:
+            where = f"[{', '.join(map(str, masked[0]))}]" if values.ndim else ""
+            raise ValueError(
+                f"{name}{where} is masked, there is no number to take: leave masked entries out, "
+                "or fill them"
+            )
+        return values.data
+    if isinstance(values, (list, tuple)):
+        for index, value in enumerate(values):
+            if isinstance(value, (list, tuple, np.ma.MaskedArray)):
+                unmasked(f"{name}[{index}]", value)
+    return values
 
 
 def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return `values` as an array of floats, or raise where they are no real numbers."""
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
+    values = unmasked(name, values)
     try:
         array = np.asarray(values)
     except ValueError as error:

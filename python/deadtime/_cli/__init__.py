@@ -7,7 +7,7 @@ import sys
 
 __all__ = ["main"]
 
-EXTRAS = ("matplotlib", "rich", "typer")
+EXTRAS = ("rich", "typer")
 
 
 def _installed(name: str) -> bool:
@@ -24,13 +24,16 @@ def main() -> None:
     if missing:
         print(
             f"the deadtime command needs {', '.join(missing)}, not installed; this line installs "
-            "everything it needs:\n    pip install 'deadtime[all]'",
+            "what it needs:\n    pip install 'deadtime[cli]'\nand this one what draws as well:\n"
+            "    pip install 'deadtime[all]'",
             file=sys.stderr,
         )
         raise SystemExit(1)
     try:
         from deadtime._cli.app import run
+        from deadtime._cli.readable import make_readable
 
+        make_readable()
         run()
     except KeyboardInterrupt:  # also while the rest is still being imported
         print("deadtime: interrupted", file=sys.stderr)

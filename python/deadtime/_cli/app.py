@@ -6,6 +6,7 @@ import csv
 import os
 import shlex
 import sys
+import traceback
 from pathlib import Path
 from typing import Annotated
 
@@ -30,10 +31,12 @@ from deadtime._cli.show import (
     save_figure,
     stages,
 )
+from deadtime._cli.verdicts import listed, verdict
 from deadtime._errors import DeadtimeError
 from deadtime._experiment import demo_flight, study
 from deadtime._loop import ControlLoop
 from deadtime._plots import (
+    check_matplotlib,
     new_figure,
     plot_certificate,
     plot_responses,
@@ -58,24 +61,20 @@ app = typer.Typer(
 Ends = tuple[float, float]
 
 #: What ends a command with one line; anything else is a defect and shows where it is.
-FAILURES = (
-    DeadtimeError,
-    ArithmeticError,
-    ImportError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
+FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 
+#: Exit code after a defect: that of an error within a program, as `sysexits.h` has it.
+DEFECT = 70
 
 #: Exit code after Ctrl-C.
 INTERRUPTED = 130
 
 
 def run() -> None:
-    """Run the command; a failure is one line on standard error and a non-zero exit."""
+    """Run the command; a failure is one line on standard error and a non-zero exit.
+
+    What the command does not expect is a defect of its own: it shows where it happened.
+    """
     try:
         app()
     except SystemExit as ended:
@@ -92,9 +91,17 @@ def run() -> None:
         elif isinstance(error, ArithmeticError):
             told = f"a number leaves the range of double precision ({told}): choose other units"
         elif isinstance(error, MemoryError):
-            told = "out of memory: ask for less at once"
+            told = f"out of memory: {told or 'ask for less at once'}"
         print(f"deadtime: {' '.join(told.split())}", file=sys.stderr)
         raise SystemExit(1) from None
+    except Exception as error:
+        traceback.print_exc()
+        print(
+            f"deadtime: the command has failed internally ({type(error).__name__}); this is a "
+            "defect, please report it with the lines above and the command",
+            file=sys.stderr,
+        )
+        raise SystemExit(DEFECT) from None
 
 
 app.command("estimate")(estimate_delays)
@@ -111,7 +118,9 @@ def roots(
     filter: opt.Filter = None,  # noqa: A002
     re: Annotated[Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
     im: Annotated[Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
-    rightmost: Annotated[int, typer.Option(min=1, help="How many, without a region.")] = 3,
+    rightmost: Annotated[
+        int, typer.Option(min=1, help="At most how many of those with Im s >= 0, without a region.")
+    ] = 3,
     plot: opt.Plot = None,
     certificate: Annotated[
         Path | None,
@@ -150,6 +159,7 @@ def roots(
                 "multiplicities": found.multiplicities,
                 "radii": found.radii,
                 "counted": found.counted,
+                "region": {"re": found.region[0], "im": found.region[1]},
                 "chain_abscissa": chain,
                 "spectral_abscissa": loop.spectral_abscissa(),
                 "stable": loop.is_stable(),
@@ -157,10 +167,10 @@ def roots(
         )
         return
     print_table(_roots_table(found))
+    console.print(listed(found, rightmost if re is None else None, chain), highlight=False)
     if np.isfinite(chain):
         console.print(f"neutral: a chain of roots approaches Re s = {chain:.6g}", highlight=False)
-    state = "stable" if loop.is_stable() else "unstable"
-    console.print(f"spectral abscissa {loop.spectral_abscissa():.6g} 1/s: {state}", highlight=False)
+    console.print(verdict(loop), highlight=False)
 
 
 def _roots_table(found: RootSet) -> Table:
@@ -180,6 +190,10 @@ app.command("reproduce")(reproduce_paper)
 app.command("fly")(fly_drone)
 app.command("internet-loop")(run_loop)
 app.add_typer(emulators, name="emulate")
+
+
+#: What a step response has also where it comes to no steady state.
+PEAK = ("peak", "peak_time")
 
 
 @app.command()
@@ -232,19 +246,28 @@ def simulate(
         figure, axes = new_figure(7.0, 3.8)
         plot_responses(axes, {"response": response})
         save_figure(figure, plot)
+    stable = loop.is_stable()
+    figures = response.info()
+    if not stable:
+        # Measured against a steady state, to which this loop does not come.
+        figures = {name: figures[name] if name in PEAK else np.nan for name in figures}
     if as_json:
         print_json(
             {
                 "time": response.time,
                 "output": response.outputs,
                 "command": response.inputs,
-                "info": response.info(),
+                "stable": stable,
+                "info": figures,
             }
         )
         return
-    for name, value in response.info().items():
-        shown = f"{value:.6g}" if np.isfinite(value) else "never, or not defined"
-        console.print(f"{name.replace('_', ' '):<20}{shown}", highlight=False)
+    limited = " (without the limit on its command)" if limit is not None else ""
+    console.print(f"the loop{limited} is {verdict(loop)}", highlight=False)
+    for name, value in figures.items():
+        if stable or name in PEAK:
+            shown = f"{value:.6g}" if np.isfinite(value) else "not within the time simulated"
+            console.print(f"{name.replace('_', ' '):<20}{shown}", highlight=False)
 
 
 @app.command()
@@ -263,6 +286,7 @@ def report(
     as_json: opt.As_json = False,
 ) -> None:
     """Write one page about a recording: delay, map of gains, a controller to try."""
+    check_matplotlib()
     recording = read_recording(file, time=time, reference=reference, output=output, command=command)
     loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit)
     with stages(5, quiet=as_json) as begin:
@@ -282,6 +306,7 @@ def demo(
     as_json: opt.As_json = False,
 ) -> None:
     """Fly a simulated loop with known truth and find its delay and its gains; no hardware."""
+    check_matplotlib()
     with stages(6, quiet=as_json) as begin:
         begin("flying the simulated loop")
         flight = demo_flight(seed)

@@ -67,11 +67,27 @@ def ardrone2(
         typer.Option(help="Answer this IP address only; again for more. Needed with --host."),
     ] = None,
     port_base: Annotated[
-        int, typer.Option(min=0, max=65000, help="Ports from here: +4, +6, +9. 0: free ones.")
+        int,
+        typer.Option(min=0, max=65000, help="Ports from here: +1, +4, +5, +6, +9. 0: free ones."),
     ] = PORT_BASE,
     navdata_port: Port = None,
     command_port: Port = None,
     control_port: Port = None,
+    ftp_port: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Port that tells that there are no files; ps_drone needs 21."
+        ),
+    ] = None,
+    video_port: Port = None,
+    worst_case: Annotated[
+        bool,
+        typer.Option(
+            "--worst-case/--forgiving",
+            help="Do the worst that the vehicle may do: hold the last motion until the link is "
+            "lost, take off whenever the bit is set; or hover 0.25 s after the last motion.",
+        ),
+    ] = True,
     duration: Annotated[float | None, typer.Option(help="End after so long, s.")] = None,
     record: Annotated[
         Path | None, typer.Option(help="Write what the drone does, without noise, as CSV.")
@@ -87,6 +103,8 @@ def ardrone2(
         "navdata_port": navdata_port,
         "command_port": command_port,
         "control_port": control_port,
+        "ftp_port": ftp_port,
+        "video_port": video_port,
     }
     ports |= {name: port for name, port in chosen.items() if port is not None}
     if duration is not None:
@@ -101,6 +119,7 @@ def ardrone2(
         seed,
         host=host,
         clients=tuple(client or ()),
+        worst_case=worst_case,
         **ports,
     )
     asyncio.run(_emulate(options, duration, record, until_input_ends, as_json))
@@ -152,8 +171,11 @@ def tell(emulator: Emulator, as_json: bool) -> None:
             "navdata_port": emulator.navdata_port,
             "command_port": emulator.command_port,
             "control_port": emulator.control_port,
+            "ftp_port": emulator.ftp_port,
+            "video_port": emulator.video_port,
             "plant": options.plant,
             "delay": options.transport_delay,
+            "worst_case": options.worst_case,
         }
         print(json.dumps(found), flush=True)
         return
@@ -161,7 +183,8 @@ def tell(emulator: Emulator, as_json: bool) -> None:
     Console(soft_wrap=True, highlight=False).print(
         f"An AR.Drone 2.0 (plant {options.plant}, transport delay {options.transport_delay:g} s) "
         f"is on {emulator.host}: navdata on UDP {emulator.navdata_port}, commands on UDP "
-        f"{emulator.command_port}, configuration on TCP {emulator.control_port}. Ctrl-C ends it.",
+        f"{emulator.command_port}, configuration on TCP {emulator.control_port}, no files on TCP "
+        f"{emulator.ftp_port}, no video on TCP {emulator.video_port}. Ctrl-C ends it.",
         markup=False,
     )
     sys.stdout.flush()

@@ -23,6 +23,7 @@ from deadtime._experiment.flights import FlownSteps
 from deadtime._experiment.fly import Connect
 from deadtime._experiment.learn import COLUMNS
 from deadtime._flight_page import PARTS, write_flight_page
+from deadtime._plots import check_matplotlib
 from deadtime.links import Limits, Vehicle
 from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
@@ -101,6 +102,7 @@ def fly_drone(
         limits=Limits(max_climb=max_climb, max_height=max_height),
     )
     plan.check()
+    check_matplotlib()  # for the report, and before anything flies
     if host is not None:
         _ask_for_consent(host, plan, consent, virtual_time)
     elif not as_json:
@@ -114,10 +116,10 @@ def fly_drone(
             _flown_on(host, plant, seed, virtual_time, plan, ports) as flown,
             stages(plan.flights + 2, quiet=as_json) as begin,
         ):
-            study = fly_experiment(flown.connect, plan, where, begin, flown.run)
+            study = fly_experiment(flown.connect, plan, where, begin, flown.run, _say)
     except BaseException as error:
         for note in getattr(error, "__notes__", ()):
-            ERRORS.print(f"deadtime: {note}", highlight=False, markup=False, soft_wrap=True)
+            _say(note)
         _tell_what_is_kept(where)
         raise
     page = where / "report.html"
@@ -129,6 +131,10 @@ def fly_drone(
         print_json(told)
     else:
         _print_study(study, page)
+
+
+def _say(sentence: str) -> None:
+    ERRORS.print(f"deadtime: {sentence}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _numbers(gains: str) -> tuple[float, ...]:

@@ -12,7 +12,6 @@ from rich.table import Table
 
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
-    check_picture,
     console,
     print_json,
     print_table,
@@ -112,8 +111,6 @@ def run_loop(
             f"--duration {duration:g} leaves less than 1 s after the step at {trial.rest:g} s: "
             "give a longer one"
         )
-    if plot is not None:
-        check_picture(plot)
     with stages(2 * len(gains) + 1, quiet=as_json) as begin:
         found = run_internet_loop(
             trial,

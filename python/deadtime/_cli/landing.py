@@ -5,19 +5,20 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-from collections.abc import Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 __all__ = ["run_landing", "terminated_like_interrupted"]
 
 T = TypeVar("T")
 
-#: What ends a flight: Ctrl-C, a polite kill, and a terminal that was closed or lost.
-ENDING = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
+Stop: TypeAlias = Callable[[], None]
+
+#: What ends a flight: Ctrl-C, a polite kill, and a terminal that was closed or lost; SIGBREAK is
+#: Windows' word for the last. Each system has some of them.
+ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 def run_landing(main: Coroutine[Any, Any, T]) -> T:
@@ -43,12 +44,13 @@ def run_landing(main: Coroutine[Any, Any, T]) -> T:
 
         before = {one: signal.getsignal(one) or signal.SIG_DFL for one in _heeded()}
         for one in before:
-            loop.add_signal_handler(one, stop)
+            _handle(loop, one, stop)
         try:
             return await main
         finally:
             for one, handler in before.items():
-                loop.remove_signal_handler(one)
+                with suppress(NotImplementedError):
+                    loop.remove_signal_handler(one)
                 signal.signal(one, handler)
 
     try:
@@ -58,6 +60,14 @@ def run_landing(main: Coroutine[Any, Any, T]) -> T:
         for note in getattr(cancelled, "__notes__", ()):  # such as a landing that nobody confirmed
             interrupt.add_note(note)
         raise interrupt from None
+
+
+def _handle(loop: asyncio.AbstractEventLoop, number: signal.Signals, stop: Stop) -> None:
+    """Call `stop` in the event loop when a signal comes."""
+    try:
+        loop.add_signal_handler(number, stop)
+    except NotImplementedError:  # Windows: the interpreter takes it, and hands it on
+        signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop))
 
 
 @contextmanager
@@ -77,6 +87,7 @@ def terminated_like_interrupted() -> Iterator[None]:
 
 def _heeded() -> list[signal.Signals]:
     """The signals that end; a closed terminal does not where `nohup` has had that ignored."""
+    here = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
     return [
-        one for one in ENDING if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN
+        one for one in here if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN
     ]

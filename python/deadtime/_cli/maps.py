@@ -115,6 +115,7 @@ def map_gains(
                     "omega": crossed.omega,
                     "direction": crossed.direction,
                     "counts": crossed.counts,
+                    "unlisted": crossed.unlisted,
                 },
             }
         )
@@ -161,15 +162,19 @@ def _crossings_table(crossed: Crossings) -> Table:
     heads = (crossed.parameter, "omega / (rad/s)", "become unstable", "unstable above")
     for head in heads:
         table.add_column(head, justify="right")
+    places = zip(crossed.values, crossed.omega, crossed.direction, strict=True)
+    rows = [
+        (float(value), f"{value:.10g}", f"{omega:.6g}", f"{direction:+d}" if direction else "?")
+        for value, omega, direction in places
+    ]
+    edges = {edge for gap in crossed.unlisted for edge in gap} - set(crossed.range)
+    rows += [(edge, f"{edge:.6g}", "", "") for edge in edges]
     low = crossed.range[0]
-    table.add_row(f"{low:.6g}", "", "", _told(crossed.counts[0]))
-    for value, omega, direction, count in zip(
-        crossed.values, crossed.omega, crossed.direction, crossed.counts[1:], strict=True
-    ):
-        moved = f"{direction:+d}" if direction else "?"
-        table.add_row(f"{value:.10g}", f"{omega:.6g}", moved, _told(count))
+    rows = [(low, f"{low:.6g}", "", ""), *sorted(rows)]
+    for (_, *shown), count in zip(rows, crossed.counts, strict=True):
+        table.add_row(*shown, _told(count))
     return table
 
 
 def _told(count: int) -> str:
-    return str(count) if count >= 0 else "?"
+    return str(count) if count >= 0 else "not listed" if count == -1 else "?"

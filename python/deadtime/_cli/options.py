@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from deadtime._cli.show import check_picture
 from deadtime._controllers import PV, Controller, P
 from deadtime._derivative_filter import DerivativeFilter
 from deadtime._loop import ControlLoop
@@ -37,6 +38,14 @@ __all__ = [
     "pv_loop",
 ]
 
+
+def _drawn_later(path: Path | None) -> Path | None:
+    """A picture that cannot be written is refused before the work for it."""
+    if path is not None:
+        check_picture(path)
+    return path
+
+
 File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
 Files = Annotated[
     list[Path],
@@ -62,7 +71,10 @@ Filter = Annotated[
     float | None,
     typer.Option(help="Corner of the derivative's filter, rad/s. Without: ideal derivative."),
 ]
-Plot = Annotated[Path | None, typer.Option(help="Write a picture to this .png, .svg or .pdf.")]
+Plot = Annotated[
+    Path | None,
+    typer.Option(help="Write a picture to this .png, .svg or .pdf.", callback=_drawn_later),
+]
 As_json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 

@@ -34,7 +34,13 @@ def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
     # Its input ends with this process, however that ends.
     command.append("--until-input-ends")
     process = subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # What Windows has in place of sessions.
+        creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
     )
     try:
         yield _ports(process)

@@ -12,6 +12,7 @@ from rich.table import Table
 from deadtime._cli import options as opt
 from deadtime._cli.show import console, print_json, print_table, save_figure, stages
 from deadtime._paper_page import write_reproduction
+from deadtime._plots import check_matplotlib
 from deadtime.paper import PARTS, TITLES, Grid, Part, Verdict, reproduce
 
 __all__ = ["reproduce_paper"]
@@ -45,6 +46,7 @@ def reproduce_paper(
     as_json: opt.As_json = False,
 ) -> None:
     """Reproduce the paper on delays in quadrotor control: each printed number beside ours."""
+    check_matplotlib()
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
     count = len(PARTS) if names is None else len(set(names))
     with stages(count + 1, quiet=as_json) as begin:

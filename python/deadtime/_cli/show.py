@@ -14,7 +14,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from deadtime._cli.readable import shows
 from deadtime._estimation.compare import COLUMNS, Comparison, truth_row
+from deadtime._plots import check_matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +39,8 @@ PICTURES = (".png", ".svg", ".pdf")
 
 def print_json(found: Mapping[str, Any]) -> None:
     """Print plain values as JSON; what is not finite becomes null."""
-    print(json.dumps(plain(found), indent=2, ensure_ascii=False, allow_nan=False))
+    text = json.dumps(plain(found), indent=2, ensure_ascii=False, allow_nan=False)
+    print(text if shows(text) else json.dumps(json.loads(text), indent=2))
 
 
 def plain(value: Any) -> Any:
@@ -67,6 +70,7 @@ def print_table(table: Table) -> None:
 
 def check_picture(path: Path) -> None:
     """Refuse a file that no figure can be written to, before long work for the figure begins."""
+    check_matplotlib()
     if path.suffix.lower() not in PICTURES:
         raise ValueError(f"{path} is no picture: end it in {', '.join(PICTURES)}")
     if not path.parent.is_dir():

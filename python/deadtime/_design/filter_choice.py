@@ -36,7 +36,7 @@ from deadtime._design.result import Design, Trade, figure_in_words
 from deadtime._design.search import Search
 from deadtime._design.survey import Survey, surveyed
 from deadtime._design.worst import fine
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._loop import ControlLoop
 from deadtime._validation import increasing, positive
 
@@ -105,10 +105,6 @@ class FilterChoice(ReadOnlyArrays):
     ideal_noise_gain: float
     bandwidth: float
     noise: float | None
-
-    def __post_init__(self) -> None:
-        for array in (self.omegas, self.values, self.noise_gains):
-            read_only(array)
 
     def __repr__(self) -> str:
         return (

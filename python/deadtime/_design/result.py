@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from deadtime._design.objectives import ObjectiveName
 from deadtime._design.problem import Scenario
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._loop import ControlLoop
 from deadtime._stability import StabilityMap
 
@@ -29,8 +30,8 @@ class LeastMargins(NamedTuple):
     """Further delay, s."""
 
 
-@dataclass(frozen=True)
-class Trade:
+@dataclass(frozen=True, eq=False)
+class Trade(ReadOnlyArrays):
     """What one demand costs.
 
     Attributes
@@ -57,7 +58,7 @@ class Trade:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design:
+class Design(ReadOnlyArrays):
     """Gains, and the loop that has them; made by `design`.
 
     Attributes

@@ -75,7 +75,8 @@ def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
             f"the recording does not depend on the {' or '.join(blind) or 'parameters'}: the "
             "window holds no response to a step, or the command is at its limit throughout"
         )
-    _, singular, directions = np.linalg.svd(jacobian / norms)
+    # The thin factor: the full one has as many entries as samples squared.
+    _, singular, directions = np.linalg.svd(jacobian / norms, full_matrices=False)
     if singular[-1] < INDISTINGUISHABLE * singular[0]:
         weights = np.abs(directions[-1])
         mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]

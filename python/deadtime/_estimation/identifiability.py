@@ -18,6 +18,7 @@ from deadtime._estimation.planned_bound import (
     from_the_reference,
 )
 from deadtime._excitation import Experiment
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._loop import ControlLoop
 from deadtime._processes import Progress
 from deadtime._recording import Recording
@@ -30,7 +31,7 @@ __all__ = ["Identifiability", "identifiability"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identifiability:
+class Identifiability(ReadOnlyArrays):
     """How well an experiment determines the numbers of a loop, at best.
 
     Attributes

@@ -21,7 +21,7 @@ from deadtime._errors import DeadtimeError, NotIdentifiableError
 from deadtime._estimation.estimate import METHODS, estimate_delay
 from deadtime._estimation.result import DelayEstimate
 from deadtime._excitation import Experiment
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator
 from deadtime._processes import Progress, shared_out
@@ -72,9 +72,6 @@ class MonteCarlo(ReadOnlyArrays):
     level: float
     coverage: dict[str, float]
     failures: dict[str, int]
-
-    def __post_init__(self) -> None:
-        read_only(self.estimates)
 
     def summary(self) -> str:
         """The figures as a few lines of text."""

@@ -26,7 +26,6 @@ from deadtime._errors import NotIdentifiableError
 from deadtime._estimation.evidence import check_distinguishable, standard_errors
 from deadtime._estimation.result import CramerRaoBound
 from deadtime._excitation import Experiment
-from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._quasipolynomial import delay, s
 from deadtime._recording import Recording
@@ -46,7 +45,7 @@ START_CHANGE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class PlannedBound(CramerRaoBound, ReadOnlyArrays):
+class PlannedBound(CramerRaoBound):
     """The bound of an experiment, with what it comes from.
 
     Attributes
@@ -65,10 +64,6 @@ class PlannedBound(CramerRaoBound, ReadOnlyArrays):
 
     cov: Array
     sensitivities: dict[str, Array]
-
-    def __post_init__(self) -> None:
-        read_only(self.cov)
-        read_only(self.sensitivities)
 
     def correlation(self, one: str, other: str) -> float:
         """Correlation of the errors of two free quantities.

@@ -13,7 +13,7 @@ from scipy import special
 
 from deadtime._estimation.profile import Profile, floor_of
 from deadtime._estimation.residuals import Whiteness
-from deadtime._frozen import ReadOnlyArrays, read_only
+from deadtime._frozen import ReadOnlyArrays
 from deadtime._loop import ControlLoop
 from deadtime._recording import Recording
 from deadtime._validation import real_array
@@ -29,8 +29,8 @@ Array = NDArray[np.float64]
 UNITLESS = ("gain", "limit")
 
 
-@dataclass(frozen=True)
-class CramerRaoBound:
+@dataclass(frozen=True, eq=False)
+class CramerRaoBound(ReadOnlyArrays):
     """Smallest standard deviations an unbiased estimator can have on this recording.
 
     Attributes
@@ -65,9 +65,6 @@ class Flight(ReadOnlyArrays):
     recording: Recording
     loop: ControlLoop
     residuals: Array
-
-    def __post_init__(self) -> None:
-        read_only(self.residuals)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,10 +122,6 @@ class DelayEstimate(ReadOnlyArrays):
     details: Mapping[str, Any] = field(default_factory=dict)
     others: tuple[Flight, ...] = ()
     _profile: Profile | None = None
-
-    def __post_init__(self) -> None:
-        read_only(self.cov)
-        read_only(self.residuals)
 
     @property
     def flights(self) -> tuple[Flight, ...]:

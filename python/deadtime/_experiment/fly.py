@@ -8,8 +8,8 @@ air for it.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator, Sequence
-from contextlib import AbstractAsyncContextManager, contextmanager
+from collections.abc import Callable, Coroutine, Sequence
+from contextlib import AbstractAsyncContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -22,6 +22,7 @@ from deadtime._experiment.learn import FlightStudy, learn
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain, fly_steps
 from deadtime._readers import read_recording
 from deadtime._validation import positive
+from deadtime.links.clock import now
 from deadtime.links.journal import Journal
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import Vehicle, VehicleState
@@ -152,6 +153,7 @@ def fly_experiment(
     folder: Path,
     progress: Callable[[str], None] = lambda stage: None,
     run: Callable[[Coroutine[Any, Any, list[FlownSteps]]], list[FlownSteps]] = asyncio.run,
+    warn: Callable[[str], None] = lambda doubt: None,
 ) -> FlightStudy:
     """Fly the plan.
 
@@ -168,6 +170,9 @@ def fly_experiment(
     run : callable
         Runs a coroutine to its end: `asyncio.run`, or `deadtime.links.run` in virtual time. It is
         called once to learn and once to check.
+    warn : callable
+        Called with what is to be said of the gains before they are flown, if the fit that they were
+        designed from is not adequate.
 
     Returns
     -------
@@ -192,6 +197,8 @@ def fly_experiment(
     flown = run(fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
     progress("estimating the delay")
     learned = learn(flown, plan.limits.max_climb, plan.step, plan.gain_margin, progress)
+    for doubt in learned.doubts():
+        warn(doubt)
     # The best P first: if it does not fly as it should, PV had better not be tried.
     made = [design.loop.controller for design in (learned.proportional, learned.designed)]
     designed = [one for one in made if isinstance(one, (P, PV))]
@@ -222,54 +229,73 @@ async def fly_all(
 ) -> list[FlownSteps]:
     """One flight under each controller, over one link; `number` is that of the first."""
     flown = []
-    async with connect() as vehicle:
-        for place, controller in enumerate(controllers, number):
-            progress(f"flight {place} of {plan.flights}: {named(controller)}")
-            flown.append(await _fly_one(vehicle, controller, plan, hold, folder, place))
-    return flown
+    # The journals are closed last: however slow the disk is, the vehicle is down by then.
+    with ExitStack() as journals:
+        async with connect() as vehicle:
+            for place, controller in enumerate(controllers, number):
+                progress(f"flight {place} of {plan.flights}: {named(controller)}")
+                path = folder / f"flight-{place}-{type(controller).__name__}.csv"
+                told = await _fly_one(vehicle, controller, plan, hold, path, journals)
+                flown.append((controller, path, told))
+    return [
+        FlownSteps(
+            controller,
+            read_recording(
+                path,
+                time="time_s",
+                reference="reference_m",
+                output="height_m",
+                command="command_m_s",
+            ),
+            path,
+            told,
+            plan.sample_time,
+            plan.settle,
+        )
+        for controller, path, told in flown
+    ]
 
 
 async def _fly_one(
-    vehicle: Vehicle, controller: P | PV, plan: FlightPlan, hold: float, folder: Path, number: int
-) -> FlownSteps:
-    """One flight, from taking off to landing."""
+    vehicle: Vehicle,
+    controller: P | PV,
+    plan: FlightPlan,
+    hold: float,
+    path: Path,
+    journals: ExitStack,
+) -> Path | None:
+    """One flight, from taking off to landing; the file of its messages, if there is one."""
     smoothing = getattr(controller, "filter", None) or PAPER_FILTER
     control = HeightControl(controller, plan.sample_time, smoothing)
-    path = folder / f"flight-{number}-{type(controller).__name__}.csv"
     await vehicle.take_off()
-    begin = asyncio.get_running_loop().time()
-    messages = path.with_suffix(".messages.csv")
-    with Journal(path, ROW) as journal, _messages(vehicle, messages, begin) as told:
+    begin = now()
+    journal = journals.enter_context(Journal(path, ROW))
+    told = None
+    if isinstance(vehicle, TellsAll):
+        told = path.with_suffix(".messages.csv")
+        _keep_messages(vehicle, journals.enter_context(Journal(told, MESSAGE)), begin)
+    try:
         await fly_steps(vehicle, control, plan.programme(hold), plan.limits, journal, begin)
-    await vehicle.land()
-    recording = read_recording(
-        path, time="time_s", reference="reference_m", output="height_m", command="command_m_s"
-    )
-    return FlownSteps(controller, recording, path, told, plan.sample_time, plan.settle)
-
-
-@contextmanager
-def _messages(vehicle: Vehicle, path: Path, begin: float) -> Iterator[Path | None]:
-    """Save every message that comes while the context is open, if the vehicle hands them on."""
-    if not isinstance(vehicle, TellsAll):
-        yield None
-        return
-    with Journal(path, MESSAGE) as journal:
-
-        def save(state: VehicleState) -> None:
-            journal.write(
-                (
-                    state.time - begin,
-                    state.vehicle_time,
-                    state.sequence,
-                    state.height,
-                    state.climb,
-                    state.climb_demand,
-                )
-            )
-
-        vehicle.listen(save)
-        try:
-            yield path
-        finally:
+    finally:
+        if isinstance(vehicle, TellsAll):
             vehicle.listen(None)
+    await vehicle.land()
+    return told
+
+
+def _keep_messages(vehicle: TellsAll, journal: Journal, begin: float) -> None:
+    """Save every message that comes from now on."""
+
+    def save(state: VehicleState) -> None:
+        journal.write(
+            (
+                state.time - begin,
+                state.vehicle_time,
+                state.sequence,
+                state.height,
+                state.climb,
+                state.climb_demand,
+            )
+        )
+
+    vehicle.listen(save)

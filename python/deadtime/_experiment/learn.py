@@ -61,6 +61,17 @@ class Learned:
     designed: Design
     proportional: Design
 
+    def doubts(self) -> list[str]:
+        """What is to be said of the gains if the fit does not explain the flights."""
+        if self.fit.adequate:
+            return []
+        return [
+            "The fit is not adequate (adequate=False): what it leaves of the flights is more than "
+            "noise of the sensor, for example wind. Its intervals are an indication, and may be "
+            "too narrow; the gains were designed for them, so their margin is not assured. Fly "
+            "such gains with room around, and learn again in still air."
+        ]
+
 
 @dataclass(frozen=True)
 class FlightStudy:
@@ -117,6 +128,7 @@ class FlightStudy:
         said.append(
             f"A step {_did(before)} under {before.name}, and {_did(after)} under {after.name}."
         )
+        said += self.learned.doubts()
         return " ".join(said)
 
     def rows(self) -> list[tuple[str, ...]]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from deadtime._errors import FlightAbortedError
+from deadtime._errors import FlightAbortedError, LinkError
 from deadtime._experiment.height_control import HeightControl
 from deadtime._validation import finite, positive
+from deadtime.links.clock import now
 from deadtime.links.journal import Journal
 from deadtime.links.safety import Limits, Watch, largest_gain
 from deadtime.links.vehicle import Vehicle
@@ -172,7 +174,7 @@ async def fly_steps(
     journal : Journal
         Takes a row of `ROW` for each sample.
     begin : float, optional
-        Time of the first sample on the loop's clock, s; now if not given.
+        Time of the first sample, s of `deadtime.links.now`; now if not given.
 
     Raises
     ------
@@ -181,8 +183,7 @@ async def fly_steps(
     LinkError
         If the link is lost.
     """
-    clock = asyncio.get_running_loop().time
-    begin = clock() if begin is None else begin
+    begin = now() if begin is None else begin
     first = await vehicle.state()
     base = programme.heights[0]
     way = abs(first.height - base)
@@ -196,17 +197,17 @@ async def fly_steps(
     sample = 0
     try:
         while sample < programme.samples:
-            await asyncio.sleep(max(0.0, begin + sample * programme.sample_time - clock()))
+            await asyncio.sleep(max(0.0, begin + sample * programme.sample_time - now()))
             state = await vehicle.state()
             if not state.flying:
                 raise FlightAbortedError("the vehicle no longer flies, without having been told so")
-            now = clock()
+            time = now()
             reference = programme.reference(sample * programme.sample_time)
-            watch.check(state, now, reference)
+            watch.check(state, time, reference)
             command = vehicle.command(control.command(reference, state.height, state.climb))
             journal.write(
                 (
-                    now - begin,
+                    time - begin,
                     reference,
                     state.height,
                     command,
@@ -214,7 +215,7 @@ async def fly_steps(
                     state.climb_demand,
                     state.vehicle_time,
                     state.sequence,
-                    now - state.time,
+                    time - state.time,
                     state.roll,
                     state.pitch,
                     state.battery,
@@ -222,7 +223,10 @@ async def fly_steps(
             )
             # A sample that was missed is left out, not made up for: two commands at once would
             # shorten the hold of the first.
-            passed = math.floor((now - begin) / programme.sample_time + 1e-9)
+            passed = math.floor((time - begin) / programme.sample_time + 1e-9)
             sample = max(sample, passed) + 1
-    finally:
-        vehicle.hover()
+    except BaseException:
+        with suppress(LinkError):  # what ended the flight is said, not that it cannot hover
+            vehicle.hover()
+        raise
+    vehicle.hover()

@@ -5,6 +5,7 @@ leaves, the rules that end a flight, recordings that are saved as they come, and
 from event to event, for tests and for experiments in seconds. Each vehicle has a package beside it.
 """
 
+from deadtime.links.clock import now
 from deadtime.links.journal import Journal
 from deadtime.links.safety import Limits, UnitCommand, Watch, largest_gain
 from deadtime.links.vehicle import Vehicle, VehicleState
@@ -18,5 +19,6 @@ __all__ = [
     "VehicleState",
     "Watch",
     "largest_gain",
+    "now",
     "run",
 ]

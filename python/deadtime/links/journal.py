@@ -1,12 +1,16 @@
-"""A recording that is saved row by row as it comes, so that no crash loses what was flown."""
+"""A recording that is saved row by row as it comes, on a thread that nobody waits for."""
 
 from __future__ import annotations
 
 import math
 import os
+import threading
+import weakref
 from collections.abc import Iterable, Sequence
 from errno import EEXIST
+from io import FileIO
 from pathlib import Path
+from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
@@ -14,10 +18,12 @@ __all__ = ["Journal"]
 
 
 class Journal:
-    """Rows of numbers in a CSV file; each is in the file before `write` returns.
+    """Rows of numbers in a CSV file, written by a thread of its own as they come.
 
-    A process that dies between two rows leaves a whole file behind. Against a machine that loses
-    power there is `sync`, which closing does as well.
+    `write` waits for no disk, so a slow one delays nobody who flies. Rows are in the file, whole
+    and in their order, as soon as the system takes them; `close` waits until all are on the disk.
+    What a program leaves open is closed when it ends, by an exception as well. A process that is
+    killed loses the rows that the disk has not taken yet.
 
     Parameters
     ----------
@@ -31,7 +37,8 @@ class Journal:
     FileExistsError
         If the file is there: a recording is never written over.
     OSError
-        Also of `write`: if the disk is full, or the file cannot be made.
+        If the file cannot be made. Also of `write` and `close`: if the disk did not take a row
+        before, for example because it is full.
     ValueError
         If names repeat or hold a comma, a quote or the end of a line.
 
@@ -58,25 +65,25 @@ class Journal:
             if not name or any(sign in name for sign in ',"\r\n'):
                 raise ValueError(f"the column name {name!r} cannot stand in the first line of CSV")
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        # Unbuffered: one row is one call of the system, whole or not at all.
+        # Unbuffered: what a call of the system took is in the file.
         try:
-            self._file = open(self.path, "xb", buffering=0)  # noqa: SIM115
+            file = open(self.path, "xb", buffering=0)  # noqa: SIM115
         except FileExistsError:
             raise FileExistsError(
                 EEXIST, "there already; give another name", str(self.path)
             ) from None
-        self._size = 0
-        try:
-            self._put(self.columns)
-        except OSError:
-            self._file.close()
-            raise
+        self._writer = _Writer(file, str(self.path))
+        # Also at the end of the program, if nobody has closed it.
+        self._finish = weakref.finalize(self, self._writer.finish)
+        self._put(self.columns)
 
     def write(self, row: Iterable[float | None]) -> None:
         """Append one row; `None` leaves a cell empty.
 
         Raises
         ------
+        OSError
+            If the disk did not take an earlier row.
         ValueError
             If the row has another length than the columns, a value is not finite, or the journal
             is closed.
@@ -95,28 +102,21 @@ class Journal:
         self.rows += 1
 
     def _put(self, cells: Iterable[str]) -> None:
-        if self._file.closed:
+        if not self._finish.alive:
             raise ValueError(f"the journal {self.path} is closed: open another one")
-        line = (",".join(cells) + "\n").encode()
-        written = 0
-        try:
-            while written < len(line):  # a disk that is all but full takes a part
-                written += self._file.write(line[written:])
-        except OSError as error:
-            self._file.seek(self._size)
-            self._file.truncate()
-            raise OSError(error.errno, error.strerror, str(self.path)) from None
-        self._size += len(line)
-
-    def sync(self) -> None:
-        """Have the system put all rows on the disk."""
-        os.fsync(self._file.fileno())
+        self._writer.check()
+        self._writer.lines.put((",".join(cells) + "\n").encode())
 
     def close(self) -> None:
-        """Put all rows on the disk and close the file; may be called twice."""
-        if not self._file.closed:
-            self.sync()
-            self._file.close()
+        """Wait until all rows are on the disk and close the file; may be called twice.
+
+        Raises
+        ------
+        OSError
+            If the disk did not take a row.
+        """
+        self._finish()
+        self._writer.check()
 
     def __enter__(self) -> Self:
         return self
@@ -127,7 +127,66 @@ class Journal:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except OSError as full:
+            if error is None:
+                raise
+            if error is not full:
+                error.add_note(f"{full.filename}: {full.strerror}")
+
+
+class _Writer:
+    """The thread of one journal, and its file; it knows nothing of the journal, which may go."""
+
+    def __init__(self, file: FileIO, path: str) -> None:
+        #: Lines to be written; None ends it.
+        self.lines: SimpleQueue[bytes | None] = SimpleQueue()
+        self._file, self._path = file, path
+        self._error: OSError | None = None
+        # A daemon, so that the end of the program comes to `finish` and does not wait before.
+        self._thread = threading.Thread(target=self._write_all, daemon=True, name=f"journal {path}")
+        self._thread.start()
+
+    def check(self) -> None:
+        """Raise what the disk has said."""
+        if self._error is not None:
+            raise self._error
+
+    def finish(self) -> None:
+        """Write what waits, have the system put it on the disk, and close the file."""
+        self.lines.put(None)
+        self._thread.join()
+
+    def _write_all(self) -> None:
+        try:
+            with self._file:
+                while self._write(self._waiting()):
+                    pass
+                os.fsync(self._file.fileno())
+        except OSError as error:
+            self._error = OSError(error.errno, error.strerror, self._path)
+
+    def _waiting(self) -> list[bytes | None]:
+        """All lines that are there; waits for the first."""
+        waiting = [self.lines.get()]
+        while not self.lines.empty():
+            waiting.append(self.lines.get())
+        return waiting
+
+    def _write(self, waiting: list[bytes | None]) -> bool:
+        """Write lines; False once the end is among them."""
+        lines = b"".join(line for line in waiting if line is not None)
+        begin, written = self._file.tell(), 0
+        try:
+            while written < len(lines):  # a disk that is all but full takes a part
+                written += self._file.write(lines[written:])
+        except OSError:
+            whole = lines.rfind(b"\n", 0, written) + 1
+            self._file.seek(begin + whole)
+            self._file.truncate()
+            raise
+        return None not in waiting
 
 
 def _printed(value: float) -> str:

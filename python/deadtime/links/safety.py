@@ -179,7 +179,7 @@ class Watch:
         state : VehicleState
             The newest there is; the same one may come again.
         now : float
-            The event loop's clock, s.
+            `deadtime.links.now`, s.
         reference : float, optional
             Height that was asked for, m; without it the error is not watched.
 

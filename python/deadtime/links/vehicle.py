@@ -16,7 +16,7 @@ class VehicleState:
     Attributes
     ----------
     time : float
-        When the message arrived, s of the event loop's clock.
+        When the message arrived, s of `deadtime.links.now`.
     height : float
         Above the ground, m.
     flying : bool

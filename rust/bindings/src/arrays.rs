@@ -2,18 +2,46 @@
 
 use std::borrow::Cow;
 
+use deadtime::{Error, memory};
 use numpy::ndarray::ArrayViewD;
 use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::errors::to_python;
+
+/// What memory is asked for.
+const COPY: &str = "the copy of an array";
 
 /// The elements in C order: a borrow when they lie so in memory, a gathered copy otherwise.
 pub(crate) fn in_order<'a, T: Element + Copy>(
     array: &'a PyReadonlyArrayDyn<'_, T>,
-) -> Cow<'a, [T]> {
+) -> PyResult<Cow<'a, [T]>> {
     // `as_slice` also serves Fortran order, where memory order is not C order.
     match array.as_slice() {
-        Ok(slice) if array.is_c_contiguous() => Cow::Borrowed(slice),
-        _ => Cow::Owned(view(array).iter().copied().collect()),
+        Ok(slice) if array.is_c_contiguous() => Ok(Cow::Borrowed(slice)),
+        _ => converted(memory::collected(COPY, view(array).iter().copied())).map(Cow::Owned),
     }
+}
+
+/// A copy of the elements in C order.
+pub(crate) fn owned<T: Element + Copy>(array: &PyReadonlyArrayDyn<'_, T>) -> PyResult<Vec<T>> {
+    match in_order(array)? {
+        Cow::Borrowed(slice) => converted(memory::copied(COPY, slice)),
+        Cow::Owned(copy) => Ok(copy),
+    }
+}
+
+/// One column of a list of results.
+pub(crate) fn column<S, T>(list: &[S], of: impl Fn(&S) -> T) -> PyResult<Vec<T>> {
+    converted(memory::collected(
+        "the list of results",
+        list.iter().map(of),
+    ))
+}
+
+/// The outcome of work at the seam itself.
+pub(crate) fn converted<T>(outcome: Result<T, Error>) -> PyResult<T> {
+    outcome.map_err(|error| Python::attach(|py| to_python(py, error)))
 }
 
 fn view<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> ArrayViewD<'a, T> {

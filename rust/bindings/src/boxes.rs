@@ -1,10 +1,10 @@
 //! Bindings of the proved boxes of `deadtime::stability`.
 
 use deadtime::stability::{self, Axis, Limits, Node};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use crate::arrays::in_order;
+use crate::arrays::{column, in_order};
 use crate::runtime::run;
 use crate::stability::PyFamily;
 
@@ -41,28 +41,25 @@ pub(crate) fn proved_boxes<'py>(
         stability::proved_boxes(family, &ranges, limits, task)
     })?;
     let shape = [found.unstable.len(), ranges.len()];
-    let parts = found.nodes.iter().map(|node| match node {
+    let part = |node: &Node| match node {
         Node::Leaf(index) => (-1, 0.0, *index as i64),
         Node::Halved {
             parameter,
             at,
             first,
         } => (*parameter as i8, *at, *first as i64),
-    });
-    let (mut parameters, mut places, mut links) = (Vec::new(), Vec::new(), Vec::new());
-    for (parameter, place, link) in parts {
-        parameters.push(parameter);
-        places.push(place);
-        links.push(link);
-    }
+    };
+    let parameters = column(&found.nodes, |node| part(node).0)?;
+    let places = column(&found.nodes, |node| part(node).1)?;
+    let links = column(&found.nodes, |node| part(node).2)?;
     Ok((
-        found.low.to_pyarray(py).reshape(shape)?,
-        found.high.to_pyarray(py).reshape(shape)?,
-        found.unstable.to_pyarray(py),
+        found.low.into_pyarray(py).reshape(shape)?,
+        found.high.into_pyarray(py).reshape(shape)?,
+        found.unstable.into_pyarray(py),
         (
-            parameters.to_pyarray(py),
-            places.to_pyarray(py),
-            links.to_pyarray(py),
+            parameters.into_pyarray(py),
+            places.into_pyarray(py),
+            links.into_pyarray(py),
         ),
         found.undecided,
     ))
@@ -118,12 +115,12 @@ pub(crate) fn robust_map<'py>(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Table<'py, i32>> {
-    let (first, second) = (in_order(&first), in_order(&second));
+    let (first, second) = (in_order(&first)?, in_order(&second)?);
     let axis = |parameter, points| Axis { parameter, points };
     let axes = [axis(parameters.0, &first), axis(parameters.1, &second)];
     let family = &family.inner;
     let counts = run(py, threads, progress.as_ref(), |task| {
         stability::robust_map(family, &ranges, axes, boxes, task)
     })?;
-    counts.to_pyarray(py).reshape([first.len(), second.len()])
+    counts.into_pyarray(py).reshape([first.len(), second.len()])
 }

@@ -3,10 +3,10 @@
 use deadtime::dde::sampled::{self, LoopCells};
 use deadtime::dde::{Equations, LinearLoop, Reference, Request, Start, Update, on_sample};
 use num_complex::Complex64;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use crate::arrays::in_order;
+use crate::arrays::{column, in_order, owned};
 use crate::errors::to_python;
 use crate::runtime::{run, run_here};
 
@@ -52,21 +52,24 @@ impl PyLinearLoop {
         update: Option<(Floats<'_>, Floats<'_>, Floats<'_>)>,
     ) -> PyResult<Self> {
         let equations = Equations {
-            a: in_order(&a).into_owned(),
-            b: in_order(&b).into_owned(),
-            e: in_order(&e).into_owned(),
-            k: in_order(&k).into_owned(),
+            a: owned(&a)?,
+            b: owned(&b)?,
+            e: owned(&e)?,
+            k: owned(&k)?,
             l,
             m,
-            c: in_order(&c).into_owned(),
+            c: owned(&c)?,
             d,
             impulse,
         };
-        let update = update.map(|(states, command, reference)| Update {
-            states: in_order(&states).into_owned(),
-            command: in_order(&command).into_owned(),
-            reference: in_order(&reference).into_owned(),
-        });
+        let update = match update {
+            Some((states, command, reference)) => Some(Update {
+                states: owned(&states)?,
+                command: owned(&command)?,
+                reference: owned(&reference)?,
+            }),
+            None => None,
+        };
         LinearLoop::new(equations, delay, sample_time, limit)
             .and_then(|plain| match update {
                 Some(update) => plain.with_update(update),
@@ -98,17 +101,17 @@ impl PyLinearLoop {
         command_history: Floats<'py>,
         sample_phase: f64,
     ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, Vector<'py>)> {
-        let (output_times, input_times) = (in_order(&output_times), in_order(&input_times));
+        let (output_times, input_times) = (in_order(&output_times)?, in_order(&input_times)?);
         let reference = Reference::new(
             reference_before,
-            in_order(&reference_times).into_owned(),
-            in_order(&reference_values).into_owned(),
+            owned(&reference_times)?,
+            owned(&reference_values)?,
         )
         .map_err(|error| to_python(py, error))?;
         let start = Start {
-            state: in_order(&state).into_owned(),
+            state: owned(&state)?,
             command,
-            command_history: in_order(&command_history).into_owned(),
+            command_history: owned(&command_history)?,
             sample_phase,
         };
         let plant = &self.inner;
@@ -116,10 +119,10 @@ impl PyLinearLoop {
             plant.simulate(&start, &reference, &output_times, &input_times, task)
         })?;
         Ok((
-            found.outputs.to_pyarray(py),
-            found.inputs.to_pyarray(py),
-            found.output_breaks.to_pyarray(py),
-            found.input_breaks.to_pyarray(py),
+            found.outputs.into_pyarray(py),
+            found.inputs.into_pyarray(py),
+            found.output_breaks.into_pyarray(py),
+            found.input_breaks.into_pyarray(py),
         ))
     }
 
@@ -144,14 +147,15 @@ impl PyLinearLoop {
         sample_phase: f64,
     ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, Vector<'py>)> {
         let start = Start {
-            state: in_order(&state).into_owned(),
+            state: owned(&state)?,
             command,
             command_history: command_history
-                .map(|history| in_order(&history).into_owned())
+                .map(|history| owned(&history))
+                .transpose()?
                 .unwrap_or_default(),
             sample_phase,
         };
-        let times = in_order(&time);
+        let times = in_order(&time)?;
         let (step, jumps);
         let (reference_times, reference_values) = match &reference {
             Jumps::Step(value) => {
@@ -159,7 +163,7 @@ impl PyLinearLoop {
                 (times.get(..1).unwrap_or_default(), &step[..])
             }
             Jumps::Held(at, values) => {
-                jumps = (in_order(at), in_order(values));
+                jumps = (in_order(at)?, in_order(values)?);
                 (&*jumps.0, &*jumps.1)
             }
         };
@@ -182,12 +186,12 @@ impl PyLinearLoop {
     /// The transition matrix of a sampled loop, limit left out.
     fn transition_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (matrix, size) = run_here(py, |_| sampled::transition_matrix(&self.inner))?;
-        matrix.to_pyarray(py).reshape([size, size])
+        matrix.into_pyarray(py).reshape([size, size])
     }
 
     /// Poles s = ln(z)/Ts of a sampled loop, limit left out, rightmost first.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
-        Ok(run_here(py, |_| sampled::poles(&self.inner))?.to_pyarray(py))
+        Ok(run_here(py, |_| sampled::poles(&self.inner))?.into_pyarray(py))
     }
 }
 
@@ -221,8 +225,12 @@ pub(crate) fn sampled_abscissa_grid<'py>(
     Bound<'py, PyArray1<i32>>,
     Bound<'py, PyArray1<u8>>,
 )> {
-    let (a, b, k, l) = (in_order(&a), in_order(&b), in_order(&k), in_order(&l));
-    let (scale, delay, sample_time) = (in_order(&scale), in_order(&delay), in_order(&sample_time));
+    let (a, b, k, l) = (in_order(&a)?, in_order(&b)?, in_order(&k)?, in_order(&l)?);
+    let (scale, delay, sample_time) = (
+        in_order(&scale)?,
+        in_order(&delay)?,
+        in_order(&sample_time)?,
+    );
     let models = LoopCells {
         cells,
         states,
@@ -237,13 +245,13 @@ pub(crate) fn sampled_abscissa_grid<'py>(
     let found = run(py, threads, progress.as_ref(), |task| {
         sampled::abscissa_grid(&models, decay, task)
     })?;
-    let abscissa: Vec<f64> = found.iter().map(|cell| cell.abscissa).collect();
-    let unstable: Vec<i32> = found.iter().map(|cell| cell.unstable).collect();
-    let status: Vec<u8> = found.iter().map(|cell| cell.status as u8).collect();
+    let abscissa = column(&found, |cell| cell.abscissa)?;
+    let unstable = column(&found, |cell| cell.unstable)?;
+    let status = column(&found, |cell| cell.status as u8)?;
     Ok((
-        abscissa.to_pyarray(py),
-        unstable.to_pyarray(py),
-        status.to_pyarray(py),
+        abscissa.into_pyarray(py),
+        unstable.into_pyarray(py),
+        status.into_pyarray(py),
     ))
 }
 
@@ -255,11 +263,8 @@ pub(crate) fn on_samples<'py>(
     start: f64,
     sample_time: f64,
     sample_phase: f64,
-) -> Vector<'py> {
+) -> PyResult<Vector<'py>> {
     let sample = Some((sample_time, sample_phase));
-    let moved = in_order(&since)
-        .iter()
-        .map(|&t| on_sample(t, start, sample))
-        .collect::<Vec<_>>();
-    moved.into_pyarray(py)
+    let moved = column(&in_order(&since)?, |&t| on_sample(t, start, sample))?;
+    Ok(moved.into_pyarray(py))
 }

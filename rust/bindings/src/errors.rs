@@ -4,7 +4,7 @@
 //! docstrings and attributes like any other class of the package.
 
 use deadtime::Error;
-use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 /// The Python exception for a core error.
@@ -15,6 +15,7 @@ pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
             PyValueError::new_err(message)
         }
         Error::Interrupted => PyKeyboardInterrupt::new_err(message),
+        Error::Memory { .. } => PyMemoryError::new_err(message),
         Error::Caller => PyRuntimeError::new_err(message),
         Error::Convergence { best, .. } => own(py, "ConvergenceError", (message, best)),
         Error::Contour {

@@ -2,11 +2,11 @@
 
 use deadtime::dde::Reference;
 use deadtime::dde::fixed_step::{self, Blocks, Path, Rest, Settings, Solver};
-use numpy::{PyArray1, PyReadonlyArrayDyn, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::in_order;
+use crate::arrays::owned;
 use crate::errors::to_python;
 use crate::runtime::run_here;
 
@@ -50,16 +50,15 @@ pub(crate) fn fixed_step_run<'py>(
             names.join(", ")
         ))
     })?;
-    let owned = |array: &Floats<'_>| in_order(array).into_owned();
     let blocks = Blocks {
-        plant_matrix: owned(&plant.0),
-        plant_input: owned(&plant.1),
-        plant_output: owned(&plant.2),
+        plant_matrix: owned(&plant.0)?,
+        plant_input: owned(&plant.1)?,
+        plant_output: owned(&plant.2)?,
         plant_direct: plant.3,
-        controller_matrix: owned(&controller.0),
-        controller_input: owned(&controller.1),
-        controller_reference: owned(&controller.2),
-        controller_output: owned(&controller.3),
+        controller_matrix: owned(&controller.0)?,
+        controller_input: owned(&controller.1)?,
+        controller_reference: owned(&controller.2)?,
+        controller_output: owned(&controller.3)?,
         proportional: controller.4,
         derivative: controller.5,
         reference: controller.6,
@@ -78,14 +77,14 @@ pub(crate) fn fixed_step_run<'py>(
         steps,
     };
     let rest = Rest {
-        state: owned(&state),
+        state: owned(&state)?,
         output,
         command,
     };
-    let reference = Reference::new(reference.0, owned(&reference.1), owned(&reference.2))
+    let reference = Reference::new(reference.0, owned(&reference.1)?, owned(&reference.2)?)
         .map_err(|error| to_python(py, error))?;
     let (outputs, inputs) = run_here(py, |task| {
         fixed_step::run(&blocks, &settings, &rest, &reference, task)
     })?;
-    Ok((outputs.to_pyarray(py), inputs.to_pyarray(py)))
+    Ok((outputs.into_pyarray(py), inputs.into_pyarray(py)))
 }

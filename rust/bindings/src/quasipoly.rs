@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use crate::arrays::in_order;
+use crate::arrays::{in_order, owned};
 use crate::errors::to_python;
 use crate::runtime::{run, run_here};
 
@@ -102,7 +102,7 @@ impl QuasiPolynomial {
     ) -> PyResult<Self> {
         let rows = coefficients.as_array();
         let rows = rows.rows().into_iter().map(|row| row.to_vec()).collect();
-        wrapped(py, Core::new(rows, in_order(&delays).into_owned()))
+        wrapped(py, Core::new(rows, owned(&delays)?))
     }
 
     /// Ascending coefficients, one row for each delay.
@@ -165,7 +165,7 @@ impl QuasiPolynomial {
         py: Python<'py>,
         points: PyReadonlyArrayDyn<'py, Complex64>,
     ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
-        let points = in_order(&points);
+        let points = in_order(&points)?;
         let work = |task: &Task| self.core.values(&points, task);
         let values = if points.len() < FEW_VALUES {
             run_here(py, work)?
@@ -289,7 +289,7 @@ impl QuasiPolynomial {
         py: Python<'py>,
         points: PyReadonlyArrayDyn<'py, Complex64>,
     ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
-        let points = in_order(&points);
+        let points = in_order(&points)?;
         let work = |task: &Task| self.core.logarithmic_derivatives(&points, task);
         let values = if points.len() < FEW_VALUES {
             run_here(py, work)?

@@ -8,13 +8,13 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
 use deadtime::{Error, Task};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -73,7 +73,7 @@ type Finished<T> = std::thread::Result<Result<T, Error>>;
 ///
 /// What comes back is the result, if there is one, and the exception for which it was stopped.
 fn wait<T, F>(
-    pool: &Pool,
+    pool: &Arc<Pool>,
     task: &Task,
     progress: Option<&Py<PyAny>>,
     work: F,
@@ -82,28 +82,79 @@ where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
-    pool.pool.in_place_scope(|scope| {
-        let (tell, hear) = channel();
-        scope.spawn(move |_| {
-            let result = catch_unwind(AssertUnwindSafe(|| work(task)));
-            // The receiver outlives this job: the caller waits below until it has the result.
-            let _ = tell.send(result);
-        });
-        let mut refused = None;
-        loop {
-            match hear.recv_timeout(POLL) {
-                Ok(result) => return (Some(result), refused),
-                Err(RecvTimeoutError::Disconnected) => return (None, refused),
-                Err(RecvTimeoutError::Timeout) if refused.is_none() => {
-                    if let Err(error) = attached(|py| look_up(py, task, progress)) {
-                        task.stop();
-                        refused = Some(error);
-                    }
+    let (tell, hear) = channel();
+    let job: Box<dyn FnOnce() + Send + '_> = Box::new(move || {
+        let result = catch_unwind(AssertUnwindSafe(|| work(task)));
+        // The receiver outlives this job: the caller waits below until it has the result.
+        let _ = tell.send(result);
+    });
+    // SAFETY: the type of a job, but for the lifetime of what it borrows: `Waiting` keeps the
+    // caller here until the job has sent its last word, after which it touches nothing borrowed.
+    // A scope of rayon would do the same, but it cannot be left in a forked child, in which the
+    // job never ends: its thread is not there, so nothing borrowed is touched there either.
+    #[allow(unsafe_code)]
+    let job: Box<dyn FnOnce() + Send + 'static> = unsafe { std::mem::transmute(job) };
+    pool.pool.spawn(job);
+    let mut waiting = Waiting {
+        hear,
+        process: pool.process,
+        is_over: false,
+    };
+    let mut refused = None;
+    loop {
+        match waiting.listen() {
+            Ok(result) => return (Some(result), refused),
+            Err(RecvTimeoutError::Disconnected) => return (None, refused),
+            Err(RecvTimeoutError::Timeout) if refused.is_none() => {
+                task.look_at_memory();
+                if let Err(error) = attached(|py| look_up(py, task, progress)) {
+                    task.stop();
+                    refused = Some(error);
                 }
-                Err(RecvTimeoutError::Timeout) => {}
+                if waiting.is_elsewhere() {
+                    // It has no threads to join here: it is never dropped.
+                    std::mem::forget(Arc::clone(pool));
+                    return (None, refused.or_else(|| Some(forked())));
+                }
             }
+            Err(RecvTimeoutError::Timeout) => {}
         }
-    })
+    }
+}
+
+/// A job that is not left alone, unless a fork has taken the caller to another process.
+struct Waiting<T> {
+    hear: Receiver<Finished<T>>,
+    process: u32,
+    is_over: bool,
+}
+
+impl<T> Waiting<T> {
+    fn listen(&mut self) -> Result<Finished<T>, RecvTimeoutError> {
+        let heard = self.hear.recv_timeout(POLL);
+        self.is_over = !matches!(heard, Err(RecvTimeoutError::Timeout));
+        heard
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        std::process::id() != self.process
+    }
+}
+
+impl<T> Drop for Waiting<T> {
+    fn drop(&mut self) {
+        if !self.is_over && !self.is_elsewhere() {
+            // The word, or that the job is gone.
+            let _ = self.hear.recv();
+        }
+    }
+}
+
+fn forked() -> PyErr {
+    PyRuntimeError::new_err(
+        "this process was forked from within the progress function: the computation goes on in \
+         the parent only; end the child there, or start it in another way",
+    )
 }
 
 fn settle<T>(result: Option<Finished<T>>, refused: Option<PyErr>) -> PyResult<T> {
@@ -211,7 +262,7 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
         .num_threads(threads)
         .thread_name(|index| format!("deadtime-{index}"))
         .build()
-        .map_err(|error| PyRuntimeError::new_err(format!("no threads to be had: {error}")))?;
+        .map_err(|error| PyOSError::new_err(format!("no threads to be had: {error}")))?;
     let built = Arc::new(Pool {
         process,
         threads,

@@ -4,7 +4,7 @@ use deadtime::stability::{self, Affine, Axis, Damping, Demand, Family, Proof, Qu
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 
-use crate::arrays::in_order;
+use crate::arrays::{column, in_order};
 use crate::errors::to_python;
 use crate::runtime::{run, run_here};
 
@@ -93,7 +93,7 @@ impl PyFamily {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Charted<'py>> {
-        let (first, second) = (in_order(&first), in_order(&second));
+        let (first, second) = (in_order(&first)?, in_order(&second)?);
         let axes = axes(parameters, &first, &second);
         let question = Question {
             demand: demand(decay, damping),
@@ -105,7 +105,7 @@ impl PyFamily {
             stability::map(family, &values, axes, question, task)
         })?;
         let shape = [first.len(), second.len()];
-        let status: Vec<u8> = chart.status.iter().map(|status| *status as u8).collect();
+        let status = column(&chart.status, |status| *status as u8)?;
         let asked = abscissa.then_some(chart.abscissa);
         Ok((
             chart.unstable.into_pyarray(py).reshape(shape)?,
@@ -125,7 +125,7 @@ impl PyFamily {
         first: Floats<'py>,
         second: Floats<'py>,
     ) -> PyResult<Table<'py, f64>> {
-        let (first, second) = (in_order(&first), in_order(&second));
+        let (first, second) = (in_order(&first)?, in_order(&second)?);
         let axes = axes(parameters, &first, &second);
         let family = &self.inner;
         let found = run(py, None, None, |task| {
@@ -151,7 +151,7 @@ impl PyFamily {
         damping: Option<(f64, f64)>,
         threads: Option<usize>,
     ) -> PyResult<Option<(usize, Vec<Curve<'py>>)>> {
-        let (first, second) = (in_order(&first), in_order(&second));
+        let (first, second) = (in_order(&first)?, in_order(&second)?);
         let axes = axes(parameters, &first, &second);
         let family = &self.inner;
         let found = run(py, threads, None, |task| {

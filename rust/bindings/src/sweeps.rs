@@ -1,25 +1,18 @@
 //! Bindings of `deadtime::dde::{ensemble, sensitivity}`.
 
-use deadtime::dde::ensemble::{self, Outcome, Sets};
+use deadtime::dde::ensemble::{self, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
 use deadtime::dde::{Criteria, Reference};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use crate::arrays::in_order;
+use crate::arrays::{column, in_order, owned};
 use crate::errors::to_python;
 use crate::runtime::{run, run_here};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Outcomes<'py> = Bound<'py, PyArray1<u8>>;
-
-fn outcomes<'py>(py: Python<'py>, found: impl Iterator<Item = Outcome>) -> Outcomes<'py> {
-    found
-        .map(|outcome| outcome as u8)
-        .collect::<Vec<_>>()
-        .to_pyarray(py)
-}
 
 /// Figures of step responses from rest, a row a set, and what became of each set.
 #[pyfunction]
@@ -39,7 +32,7 @@ pub(crate) fn sweep_figures<'py>(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Table<'py>, Outcomes<'py>)> {
-    let (rows, steady) = (in_order(&rows), in_order(&steady));
+    let (rows, steady) = (in_order(&rows)?, in_order(&steady)?);
     let sets = Sets {
         states,
         rows: &rows,
@@ -50,15 +43,11 @@ pub(crate) fn sweep_figures<'py>(
     let found = run(py, threads, progress.as_ref(), |task| {
         ensemble::figures(&sets, &steady, span, &criteria, task)
     })?;
-    let figures: Vec<f64> = found
-        .iter()
-        .flat_map(|(figures, _)| figures.to_array())
-        .collect();
-    let figures = figures.to_pyarray(py).reshape([found.len(), 9])?;
-    Ok((
-        figures,
-        outcomes(py, found.iter().map(|&(_, outcome)| outcome)),
-    ))
+    let figures = column(&found, |(figures, _)| figures.to_array())?;
+    let outcomes = column(&found, |(_, outcome)| *outcome as u8)?;
+    let figures = figures.into_flattened().into_pyarray(py);
+    let figures = figures.reshape([found.len(), 9])?;
+    Ok((figures, outcomes.into_pyarray(py)))
 }
 
 /// Step responses from rest at given times after the start, a row a set, and what became of each.
@@ -75,7 +64,7 @@ pub(crate) fn sweep_responses<'py>(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Table<'py>, Outcomes<'py>)> {
-    let (rows, times) = (in_order(&rows), in_order(&times));
+    let (rows, times) = (in_order(&rows)?, in_order(&times)?);
     let sets = Sets {
         states,
         rows: &rows,
@@ -85,8 +74,11 @@ pub(crate) fn sweep_responses<'py>(
     let (outputs, found) = run(py, threads, progress.as_ref(), |task| {
         ensemble::responses(&sets, &times, task)
     })?;
-    let outputs = outputs.to_pyarray(py).reshape([found.len(), times.len()])?;
-    Ok((outputs, outcomes(py, found.into_iter())))
+    let outcomes = column(&found, |outcome| *outcome as u8)?;
+    let outputs = outputs
+        .into_pyarray(py)
+        .reshape([found.len(), times.len()])?;
+    Ok((outputs, outcomes.into_pyarray(py)))
 }
 
 /// Slopes of outputs and inputs with respect to parameters, a row a parameter.
@@ -117,15 +109,15 @@ pub(crate) fn loop_sensitivities<'py>(
     command_history: Floats<'py>,
     sample_phase: f64,
 ) -> PyResult<(Table<'py>, Table<'py>)> {
-    let (row, row_slopes) = (in_order(&row), in_order(&row_slopes));
-    let (state, state_slopes) = (in_order(&state), in_order(&state_slopes));
-    let (command_slopes, ahead) = (in_order(&command_slopes), in_order(&ahead));
-    let (output_times, input_times) = (in_order(&output_times), in_order(&input_times));
-    let history = in_order(&command_history);
+    let (row, row_slopes) = (in_order(&row)?, in_order(&row_slopes)?);
+    let (state, state_slopes) = (in_order(&state)?, in_order(&state_slopes)?);
+    let (command_slopes, ahead) = (in_order(&command_slopes)?, in_order(&ahead)?);
+    let (output_times, input_times) = (in_order(&output_times)?, in_order(&input_times)?);
+    let history = in_order(&command_history)?;
     let reference = Reference::new(
         reference_before,
-        in_order(&reference_times).into_owned(),
-        in_order(&reference_values).into_owned(),
+        owned(&reference_times)?,
+        owned(&reference_values)?,
     )
     .map_err(|error| to_python(py, error))?;
     let of = Sloped {
@@ -151,10 +143,12 @@ pub(crate) fn loop_sensitivities<'py>(
     })?;
     let count = command_slopes.len();
     let outputs = outputs
-        .to_pyarray(py)
+        .into_pyarray(py)
         .reshape([count, output_times.len()])?;
     Ok((
         outputs,
-        inputs.to_pyarray(py).reshape([count, input_times.len()])?,
+        inputs
+            .into_pyarray(py)
+            .reshape([count, input_times.len()])?,
     ))
 }

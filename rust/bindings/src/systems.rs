@@ -4,11 +4,11 @@ use deadtime::Error;
 use deadtime::dde::system::{self, Term};
 use deadtime::dde::{LinearSystem, Past, Signal, SystemEquations};
 use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods, ToPyArray,
+    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
-use crate::arrays::in_order;
+use crate::arrays::{in_order, owned};
 use crate::errors::to_python;
 use crate::runtime::run_here;
 
@@ -35,9 +35,9 @@ impl PySignal {
         let made = match series.shape() {
             [_, width, terms] => Signal::new(
                 *width,
-                &in_order(&edges),
+                &in_order(&edges)?,
                 *terms,
-                &in_order(&series),
+                &in_order(&series)?,
                 breaks,
             ),
             _ => Err(Error::argument("the series of a signal have three axes")),
@@ -52,8 +52,8 @@ impl PySignal {
 pub(crate) fn legendre_tables(py: Python<'_>) -> PyResult<(Vector<'_>, Bound<'_, PyArray2<f64>>)> {
     let (nodes, transform) = system::legendre_tables();
     let size = nodes.len();
-    let transform = transform.to_pyarray(py).reshape([size, size])?;
-    Ok((nodes.to_pyarray(py), transform))
+    let transform = transform.into_pyarray(py).reshape([size, size])?;
+    Ok((nodes.into_pyarray(py), transform))
 }
 
 /// The system x' + sum N x'(t - tau) = sum A x(t - tau) + sum B u(t - tau),
@@ -65,10 +65,12 @@ pub(crate) struct PyLinearSystem {
 
 type Terms<'py> = Vec<(f64, Floats<'py>)>;
 
-fn terms(given: &Terms<'_>) -> Vec<Term> {
-    let term = |(delay, matrix): &(f64, Floats<'_>)| Term {
-        delay: *delay,
-        matrix: in_order(matrix).into_owned(),
+fn terms(given: &Terms<'_>) -> PyResult<Vec<Term>> {
+    let term = |(delay, matrix): &(f64, Floats<'_>)| {
+        Ok(Term {
+            delay: *delay,
+            matrix: owned(matrix)?,
+        })
     };
     given.iter().map(term).collect()
 }
@@ -97,12 +99,12 @@ impl PyLinearSystem {
             states,
             inputs,
             outputs,
-            state: terms(&a),
-            derivative: terms(&n),
-            input: terms(&b),
-            output: terms(&c),
-            output_derivative: terms(&f),
-            direct: terms(&d),
+            state: terms(&a)?,
+            derivative: terms(&n)?,
+            input: terms(&b)?,
+            output: terms(&c)?,
+            output_derivative: terms(&f)?,
+            direct: terms(&d)?,
         };
         LinearSystem::new(equations)
             .map(|inner| Self { inner })
@@ -120,19 +122,19 @@ impl PyLinearSystem {
         slopes: Option<&PySignal>,
         inputs: &PySignal,
     ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, Vector<'py>)> {
-        let times = in_order(&times);
+        let times = in_order(&times)?;
         let past = Past {
-            state: in_order(&state).into_owned(),
+            state: owned(&state)?,
             history: history.inner.clone(),
             slopes: slopes.map(|signal| signal.inner.clone()),
         };
         let (system, inputs) = (&self.inner, &inputs.inner);
         let found = run_here(py, |task| system.simulate(past, inputs, &times, task))?;
         Ok((
-            found.outputs.to_pyarray(py),
-            found.states.to_pyarray(py),
-            found.inputs.to_pyarray(py),
-            found.breaks.to_pyarray(py),
+            found.outputs.into_pyarray(py),
+            found.states.into_pyarray(py),
+            found.inputs.into_pyarray(py),
+            found.breaks.into_pyarray(py),
         ))
     }
 }

@@ -2,6 +2,8 @@
 
 use num_complex::Complex64;
 
+use crate::memory::in_words;
+
 /// Every failure a kernel can report. The message says what was wrong and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -24,6 +26,19 @@ pub enum Error {
     /// The caller asked to stop (Ctrl-C).
     #[error("interrupted")]
     Interrupted,
+
+    /// Memory that was not to be had.
+    #[error(
+        "{what} needs {} of memory, which the system does not give: ask for less at once, or raise \
+         the limit",
+        in_words(*bytes)
+    )]
+    Memory {
+        /// What it is for.
+        what: &'static str,
+        /// How much.
+        bytes: u64,
+    },
 
     /// A function of the caller failed; what it said is the caller's to tell.
     #[error("a function given by the caller failed")]
@@ -98,6 +113,12 @@ impl Error {
     /// Shorthand for [`Error::Argument`].
     pub fn argument(message: impl Into<String>) -> Self {
         Self::Argument(message.into())
+    }
+
+    /// Whether the whole computation ends with it: the caller has asked to stop, or memory is
+    /// gone. No part of the work may take it for a finding.
+    pub const fn ends_all(&self) -> bool {
+        matches!(self, Self::Interrupted | Self::Memory { .. })
     }
 }
 

@@ -10,6 +10,7 @@ pub mod elementary;
 pub mod error;
 pub mod lambertw;
 mod lanes;
+pub mod memory;
 pub mod quasipoly;
 pub mod roots;
 pub mod stability;

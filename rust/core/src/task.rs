@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::Error;
+use crate::memory::{HEADROOM, is_scarce};
 
 /// Checks between two looks at the clock: reading it costs more than a check.
 const CHECKS: u64 = 32;
@@ -17,6 +18,7 @@ const CHECKS: u64 = 32;
 #[derive(Debug, Default)]
 pub struct Task {
     stop: AtomicBool,
+    scarce: AtomicBool,
     done: AtomicU64,
     lookout: Option<Lookout>,
 }
@@ -40,18 +42,18 @@ impl fmt::Debug for Lookout {
 }
 
 impl Lookout {
-    /// Ask, if it is time to.
-    fn go_on(&self) -> bool {
+    /// Whether it is time to ask.
+    fn is_due(&self) -> bool {
         if !self
             .checks
             .fetch_add(1, Ordering::Relaxed)
             .is_multiple_of(CHECKS)
         {
-            return true;
+            return false;
         }
         let period = self.start.elapsed().as_nanos() / self.every.as_nanos().max(1);
         let period = u64::try_from(period).unwrap_or(u64::MAX);
-        self.asked.swap(period, Ordering::Relaxed) == period || (self.go_on)()
+        self.asked.swap(period, Ordering::Relaxed) != period
     }
 }
 
@@ -60,6 +62,7 @@ impl Task {
     pub const fn new() -> Self {
         Self {
             stop: AtomicBool::new(false),
+            scarce: AtomicBool::new(false),
             done: AtomicU64::new(0),
             lookout: None,
         }
@@ -84,19 +87,32 @@ impl Task {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// `Err(Error::Interrupted)` once somebody has asked to stop.
-    pub fn check(&self) -> Result<(), Error> {
-        if self
-            .lookout
-            .as_ref()
-            .is_some_and(|lookout| !lookout.go_on())
-        {
+    /// Ask the computation to stop at its next check if memory is scarce.
+    pub fn look_at_memory(&self) {
+        if is_scarce() {
+            self.scarce.store(true, Ordering::Relaxed);
             self.stop();
         }
-        if self.stop.load(Ordering::Relaxed) {
-            Err(Error::Interrupted)
-        } else {
+    }
+
+    /// `Err(Error::Interrupted)` once somebody has asked to stop, [`Error::Memory`] once memory
+    /// was scarce.
+    pub fn check(&self) -> Result<(), Error> {
+        if let Some(lookout) = self.lookout.as_ref().filter(|lookout| lookout.is_due()) {
+            self.look_at_memory();
+            if !(lookout.go_on)() {
+                self.stop();
+            }
+        }
+        if !self.stop.load(Ordering::Relaxed) {
             Ok(())
+        } else if self.scarce.load(Ordering::Relaxed) {
+            Err(Error::Memory {
+                what: "the rest of the computation",
+                bytes: HEADROOM as u64,
+            })
+        } else {
+            Err(Error::Interrupted)
         }
     }
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import math
+import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
 from deadtime._errors import FlightAbortedError, LinkError
 from deadtime._validation import finite
 from deadtime.links.ardrone2.commands import FlatTrim
-from deadtime.links.ardrone2.connection import Connection
+from deadtime.links.ardrone2.connection import LOST, Connection
 from deadtime.links.ardrone2.handshake import Handshake, check_configuration
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import (
@@ -28,9 +31,6 @@ __all__ = ["ARDrone2"]
 #: How long the first navdata, and leaving bootstrap, may take, s.
 FIRST_NEWS = 5.0
 
-#: How long nothing may come until the link counts as lost, s.
-LOST = 1.0
-
 #: How long taking off may take until the drone holds its height, and landing, s.
 TAKING_OFF, LANDING = 15.0, 20.0
 
@@ -43,12 +43,18 @@ TRIMMING = 0.3
 #: How long nothing may come while landing, s: by then the drone's own watchdog lands it.
 SILENT_LANDING = 3.0
 
-#: Largest vertical speed that a command of 1 stands for, mm/s: what the drone may be told is
-#: 200 to 2000, its own default 700.
-VZ_MAX = 1000
+#: News that are by so much younger than what was sent show what came of it, s.
+ANSWERED = 1.0
 
-#: Longest heights of the drone's own limit, mm.
-ALTITUDE_MAX = (500, 5000)
+#: How long the drone is given to confirm a toggle of the emergency, s, and how often the datagram
+#: is sent: copies have the same number, and the drone carries out one.
+TOGGLING, COPIES = 5.0, 3
+
+#: What the drone takes as its largest vertical speed, mm/s, and as its largest height, mm.
+VZ_MAX, ALTITUDE_MAX = (200, 2000), (500, 5000)
+
+#: How long putting its settings back may take, s.
+PUTTING_BACK = 3.0
 
 
 class ARDrone2:
@@ -62,7 +68,8 @@ class ARDrone2:
     host : str
         Address of the drone.
     limits : Limits, optional
-        What it is kept within. The largest height is set in the drone, too.
+        What it is kept within. Largest climb and height are set in the drone, too, as far as it
+        takes them, and put back to what they were when the link is closed.
     full : bool
         All of navdata, 200 times a second, with vertical speed and the demand that is followed;
         otherwise the 15 small ones.
@@ -104,14 +111,22 @@ class ARDrone2:
         self.limits = Limits() if limits is None else limits
         self.full = full
         self.control_port = control_port
-        self._link = Connection(host, navdata_port, command_port, self.limits)
-        self._sender, self._reader = self._link.sender, self._link.reader
+        self._ports = navdata_port, command_port
         self._restarts = 0
         self._vz_max: float | None = None
+        self._before: dict[str, str] = {}
+        self._asked_up = -math.inf
+        self._link = self._new_link()
+
+    def _new_link(self) -> Connection:
+        """Both directions from their beginning: what an earlier link has heard is no news."""
+        link = Connection(self.host, *self._ports, self.limits)
+        self._sender, self._reader = link.sender, link.reader
+        return link
 
     @property
     def statistics(self) -> LinkStatistics:
-        """What came over the link until now."""
+        """What has come since it was connected last."""
         return self._reader.statistics
 
     @property
@@ -137,35 +152,64 @@ class ARDrone2:
         LinkError
             If it does not answer, or does not hold what it was told.
         """
+        if self._link.is_open:
+            raise LinkError(f"{self.host} is connected already")
+        if self._reader.heard is not None:
+            listener, self._link = self._link.listener, self._new_link()
+            self._link.listener = listener
         await self._link.open()
         try:
             await self._configure()
-        except BaseException:
+        except BaseException as error:
+            _note(error, await self._put_back())
             self._link.shut()
             raise
 
     async def _configure(self) -> None:
-        heard = await self._link.until(lambda navdata: True, FIRST_NEWS)
+        link, host = self._link, self.host
+        heard = await link.until(lambda navdata: True, FIRST_NEWS)
         if not heard:
             raise LinkError(
-                f"no navdata from {self.host}, UDP port {self._link.navdata_port}, within "
-                f"{FIRST_NEWS:g} s: is the drone on, and this computer in its network?"
+                f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NEWS:g} s: "
+                "is the drone on, this computer in its network, and no other client connected?"
             )
-        handshake = Handshake(self.host, self._link.send, self._link.until)
-        highest = round(1e3 * self.limits.max_height)
+        handshake = Handshake(host, link.send, link.until)
+        demo = {"general:navdata_demo": "FALSE" if self.full else "TRUE"}
+        await handshake.set(*demo.popitem())
+        before = await handshake.read_back(host, self.control_port)
+        climb = math.ceil(1e3 * self.limits.max_climb - 1e-6)
         wanted = {
-            "general:navdata_demo": "FALSE" if self.full else "TRUE",
-            "control:control_vz_max": str(VZ_MAX),
-            "control:altitude_max": str(min(max(highest, ALTITUDE_MAX[0]), ALTITUDE_MAX[1])),
+            "control:control_vz_max": str(min(max(climb, VZ_MAX[0]), VZ_MAX[1])),
+            "control:altitude_max": str(
+                min(max(round(1e3 * self.limits.max_height), ALTITUDE_MAX[0]), ALTITUDE_MAX[1])
+            ),
         }
         for key, value in wanted.items():
+            if before.get(key, value) != value:
+                self._before[key] = before[key]
             await handshake.set(key, value)
-        held = await handshake.read_back(self.host, self.control_port)
-        check_configuration(self.host, held, wanted)
-        if not await self._link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
-            raise LinkError(f"{self.host} sends navdata without height and battery: restart it")
+        held = await handshake.read_back(host, self.control_port)
+        check_configuration(host, held, wanted)
+        if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
+            raise LinkError(f"{host} sends navdata without height and battery: restart it")
         self._vz_max = 1e-3 * float(held["control:control_vz_max"])
         self._restarts = self._reader.restarts
+
+    async def _put_back(self) -> str | None:
+        """Set what was changed to what it was, if the drone is down and answers; what was not."""
+        before, self._before = self._before, {}
+        link, navdata = self._link, self._reader.navdata
+        handshake = Handshake(self.host, link.send, link.until)
+        with suppress(LinkError, TimeoutError):
+            async with asyncio.timeout(PUTTING_BACK):
+                while before and link.silent < LOST and navdata is not None and on_ground(navdata):
+                    key = next(iter(before))
+                    await handshake.set(key, before[key])
+                    del before[key]
+        if not before:
+            return None
+        kept = ", ".join(f"{key} = {value}" for key, value in before.items())
+        return f"could not be put back in {self.host} to what it was before: {kept}"
 
     # Flying
 
@@ -195,7 +239,15 @@ class ARDrone2:
                 f"vertical speed of {speed:g} m/s: ask for less"
             )
         self._link.send(FlatTrim())
+        asked = self._link.now
         await asyncio.sleep(TRIMMING)
+        late = self._link.now - asked - TRIMMING
+        if late > self.limits.command_age:
+            raise LinkError(
+                f"this program stood still for {late:.2f} s just before {self.host} would have "
+                "taken off: what was seen of it is old; take off again"
+            )
+        self._asked_up = self._link.now
         self._sender.fly()
         try:
             await self._rise()
@@ -220,7 +272,8 @@ class ARDrone2:
         Raises
         ------
         LinkError
-            If the drone fell silent, began to count anew, or was landed because no command came.
+            If the drone fell silent or began to count anew, another client commands it, or the
+            flight has ended without `land`, as of `command`.
         """
         if not self._link.is_open:
             raise LinkError(f"{self.host} is not connected")
@@ -236,16 +289,20 @@ class ARDrone2:
             raise LinkError(
                 f"what listens to {self.host} has failed: {self._link.failure}"
             ) from self._link.failure
-        if self._sender.expired is not None:
-            raise FlightAbortedError(self._sender.expired)
-        silent = self._link.silent
-        if silent > LOST:
-            raise LinkError(f"nothing heard of {self.host} for {silent:.1f} s")
+        self._check_wish()
+        if self._sender.rival is not None:
+            raise LinkError(self._sender.rival)
+        if self._link.silent > LOST:
+            raise LinkError(self._link.unheard)
         if self._vz_max is not None and self._reader.restarts > self._restarts:
-            raise LinkError(
-                f"{self.host} began to count anew, so it has forgotten this client: land, and "
-                "connect again"
-            )
+            raise LinkError(self._link.forgotten)
+
+    def _check_wish(self) -> None:
+        """Refuse to go on with a flight that has ended by itself."""
+        self._link.age()
+        if self._sender.expired is not None:
+            self._link.send()  # it says to land
+            raise FlightAbortedError(self._sender.expired)
 
     def command(self, climb: float) -> float:
         """Ask for a vertical speed; it is sent at once and repeated while it is young.
@@ -258,28 +315,36 @@ class ARDrone2:
         Returns
         -------
         float
-            What was sent, m/s.
+            What was sent, m/s: 0 while nothing tells yet whether the drone still flies after a
+            pause of this program.
 
         Raises
         ------
         ValueError
             If `climb` is not finite.
         LinkError
-            If the drone was not told to take off, or was landed because no command came.
+            If the drone was not told to take off, or if the flight has ended without `land`: no
+            command came, this program stood still, the drone landed or obeyed another client.
         """
         wanted = finite("climb", climb)
-        if self._sender.expired is not None:
-            raise FlightAbortedError(self._sender.expired)
-        if not self._sender.guarded:
+        if self._sender.expired is None and not self._sender.guarded:
             raise LinkError(f"{self.host} is not in the air: take off before commanding it")
+        self._check_wish()
         most = min(self.limits.max_climb, self.vz_max)
         share = UnitCommand.saturated(max(-most, min(most, wanted)) / self.vz_max)
-        self._sender.climb(share, self._link.now)
+        sent = self._sender.climb(share, self._link.now)
         self._link.send()
-        return float(share) * self.vz_max
+        return float(sent) * self.vz_max
 
     def hover(self) -> None:
-        """Ask for no motion; like a command it is good for a short while, then the drone lands."""
+        """Ask for no motion; like a command it is good for a short while, then the drone lands.
+
+        Raises
+        ------
+        LinkError
+            If the flight has ended without `land`, as of `command`.
+        """
+        self._check_wish()
         self._sender.hover(self._link.now)
         self._link.send()
 
@@ -306,7 +371,7 @@ class ARDrone2:
             return
         self._link.send()
         deadline = self._link.now + LANDING
-        while not await self._link.until(on_ground, LOOKING):
+        while not await self._link.until(self._is_down, LOOKING):
             silent = self._link.silent
             if silent > SILENT_LANDING:
                 raise LinkError(
@@ -316,29 +381,50 @@ class ARDrone2:
             if self._link.now > deadline:
                 raise LinkError(f"{self.host} has not landed in {LANDING:g} s")
 
+    def _is_down(self, navdata: Navdata) -> bool:
+        """Whether a drone is down, by news that would show that it has begun to take off."""
+        told = self._link.told
+        return on_ground(navdata) and told is not None and told >= self._asked_up + ANSWERED
+
     async def close(self) -> None:
-        """Land if in the air, and end the link; may be called twice.
+        """Land if in the air, put the drone's settings back, and end the link; may be called twice.
 
         Raises
         ------
         LinkError
             As `land` does; the link is closed all the same.
+
+        Warns
+        -----
+        RuntimeWarning
+            If it has landed and does not take its settings back.
         """
         try:
-            await _uninterrupted(self.land())
+            await _uninterrupted(self._end())
         finally:
             self._link.shut()
             self._vz_max = None
 
+    async def _end(self) -> None:
+        try:
+            await self.land()
+        except LinkError as error:
+            _note(error, await self._put_back())
+            raise
+        kept = await self._put_back()
+        if kept is not None:
+            warnings.warn(kept, RuntimeWarning, stacklevel=2)
+
     async def cut_motors(self) -> None:
         """Stop the motors at once, whatever the height: the drone falls.
 
-        For a drone that is about to hurt somebody. Landing never does this.
+        For a drone that is about to hurt somebody. Landing never does this. The drone is told once,
+        and again only if what it says 1 s later still shows its motors on.
 
         Raises
         ------
         LinkError
-            If the drone does not say within 2 s that it did.
+            If the drone does not say within 5 s that it did.
         """
         self._sender.land()
         if not await self._toggled(lambda navdata: navdata.emergency):
@@ -357,15 +443,26 @@ class ARDrone2:
             raise LinkError(f"{self.host} stays in emergency: check its motors and its level")
 
     async def _toggled(self, wanted: Callable[[Navdata], bool]) -> bool:
-        """Toggle between emergency and normal, which takes a rising edge, until it is so."""
-        for _ in range(10):
-            if await self._link.until(wanted, 0.0):
-                return True
+        """Toggle between emergency and normal until the drone says that it is as wanted.
+
+        The drone has one signal for both directions, so a second one too early would undo the
+        first. It is sent again only after news that must have been written long after the first,
+        and still show the old state.
+        """
+        link = self._link
+        deadline = link.now + TOGGLING
+        while not await link.until(wanted, 0.0):
             self._sender.cut = True
-            self._link.send()
-            if await self._link.until(wanted, 0.2):
-                return True
-        return False
+            link.send(copies=COPIES)
+            toggled = link.now
+            while not await link.until(wanted, LOOKING):
+                if link.now > deadline:
+                    return False
+                # What waited in the socket during a pause of this program is no news, either.
+                since = max(toggled, self._sender.resumed)
+                if link.told is not None and link.told >= since + ANSWERED:
+                    break
+        return True
 
     async def __aenter__(self) -> Self:
         await self.connect()
@@ -382,7 +479,13 @@ class ARDrone2:
         except LinkError as problem:
             if error is None:
                 raise
-            error.add_note(str(problem))
+            _note(error, str(problem), *getattr(problem, "__notes__", ()))
+
+
+def _note(error: BaseException, *said: str | None) -> None:
+    for one in said:
+        if one is not None:
+            error.add_note(one)
 
 
 def _is_up(navdata: Navdata) -> bool:
@@ -412,5 +515,5 @@ async def _uninterrupted(landing: Any) -> None:
     cancelled = asyncio.CancelledError()
     problem = task.exception()
     if problem is not None:
-        cancelled.add_note(str(problem))
+        _note(cancelled, str(problem), *getattr(problem, "__notes__", ()))
     raise cancelled

@@ -11,10 +11,14 @@ from deadtime.links.ardrone2.commands import Command
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import NavdataReader
 from deadtime.links.ardrone2.sender import CYCLE, CommandSender
+from deadtime.links.clock import now
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["Connection"]
+__all__ = ["LOST", "Connection"]
+
+#: How long nothing may come until the link counts as lost, s.
+LOST = 1.0
 
 #: What wakes the drone's navdata.
 WAKE_UP = b"\x01\x00\x00\x00"
@@ -70,8 +74,29 @@ class Connection:
 
     @property
     def now(self) -> float:
-        """The event loop's clock, s."""
-        return asyncio.get_running_loop().time()
+        """The clock of all ages, s."""
+        return now()
+
+    @property
+    def forgotten(self) -> str:
+        """What is said when the drone has begun to count anew."""
+        return (
+            f"{self.host} began to count anew, so it has forgotten this client: land, and connect "
+            "again"
+        )
+
+    @property
+    def unheard(self) -> str:
+        """What is said when nothing has been heard for too long."""
+        return (
+            f"nothing heard of {self.host} for {self.silent:.1f} s: it is off or out of reach, or "
+            "another client commands this drone and is sent its navdata"
+        )
+
+    @property
+    def told(self) -> float | None:
+        """When the newest news were sent, s; when they arrived, where the drone tells no clock."""
+        return self.reader.heard if self.reader.sent is None else self.reader.sent
 
     @property
     def silent(self) -> float:
@@ -122,10 +147,9 @@ class Connection:
         """A datagram each cycle, the wake-up while nothing comes."""
         try:
             while self._navdata is not None:
-                now = self.now
                 quiet = self.reader.heard is None or self.silent > WAKE_AGAIN
-                if quiet and now - self._woken >= WAKE_AGAIN:
-                    self._woken = now
+                if quiet and self.now - self._woken >= WAKE_AGAIN:
+                    self._woken = self.now
                     self._navdata.sendto(WAKE_UP)
                 self.send()
                 await asyncio.sleep(CYCLE)
@@ -138,17 +162,32 @@ class Connection:
         for _ in range(LAST_WORDS):
             self.send()
 
-    def send(self, *more: Command) -> None:
-        """Send the next datagram now; `more` is said once, in it."""
+    def send(self, *more: Command, copies: int = 1) -> None:
+        """Send the next datagram now, so many times; `more` is said once, in it."""
         if self._commands is None or self._commands.is_closing():
             return
+        self.age()
         navdata = self.reader.navdata
         alive = navdata is None or navdata.com_watchdog or self.silent > WAKE_AGAIN
-        self._commands.sendto(self.sender.datagram(self.now, alive, more))
+        datagram = self.sender.datagram(self.now, alive, more)
+        for _ in range(copies):
+            self._commands.sendto(datagram)
+
+    def age(self) -> None:
+        """Let what is too old by now lapse."""
+        self.sender.age(self.now)
+        if self.silent > LOST:  # it may have landed: commands may not reach it, either
+            self.sender.give_up(self.unheard)
 
     def take(self, packet: bytes) -> None:
         """Take in a packet of the drone."""
-        state = self.reader.accept(packet, self.now)
+        reader = self.reader
+        before, restarts = reader.navdata, reader.restarts
+        state = reader.accept(packet, self.now)
+        if reader.restarts > restarts:
+            self.sender.give_up(self.forgotten)
+        if reader.navdata is not None and reader.navdata is not before:
+            self.sender.told(reader.navdata, reader.sent)
         self._arrived.set()
         if state is None or self.listener is None:
             return

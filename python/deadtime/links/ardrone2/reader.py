@@ -17,7 +17,15 @@ from deadtime._errors import PacketError
 from deadtime.links.ardrone2.navdata import Navdata, State, parse_navdata
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["FLYING", "HOVERING", "LinkStatistics", "NavdataReader", "on_ground", "phase_of"]
+__all__ = [
+    "FLYING",
+    "HOVERING",
+    "LinkStatistics",
+    "NavdataReader",
+    "on_ground",
+    "phase_of",
+    "unasked_end",
+]
 
 #: The drone's clock counts its seconds in 11 bits.
 CLOCK_TURN = 2048.0
@@ -108,6 +116,10 @@ class NavdataReader:
         The packet it is from; also one of bootstrap, which holds no state.
     heard : float or None
         When the last believed packet arrived, s.
+    sent : float or None
+        When that packet was sent, s: by the drone's clock, set by the packet that took the shortest
+        way. It is later than the truth by the length of that way, which cannot be measured from one
+        end. None where the packet does not tell the drone's clock.
     restarts : int
         How often the drone began to count anew.
     """
@@ -117,10 +129,12 @@ class NavdataReader:
         self.newest: VehicleState | None = None
         self.navdata: Navdata | None = None
         self.heard: float | None = None
+        self.sent: float | None = None
         self.restarts = 0
         self._counts = LinkStatistics()
         self._first: float | None = None
         self._clock: float | None = None
+        self._least_ahead = math.inf
         self._lost: deque[tuple[float, int]] = deque()
 
     @property
@@ -143,7 +157,7 @@ class NavdataReader:
         packet : bytes
             As it arrived.
         now : float
-            When, s of the event loop's clock.
+            When, s.
 
         Returns
         -------
@@ -160,7 +174,7 @@ class NavdataReader:
         if last is not None and not self._follows(navdata, last, now):
             return None
         if navdata.demo is None:
-            self.navdata, self.heard = navdata, now
+            self.navdata, self.heard, self.sent = navdata, now, None
             return None
         clock = self._unwrapped(navdata.clock)
         passed = self._passed(clock, now)
@@ -186,7 +200,7 @@ class NavdataReader:
         anew = navdata.bootstrap != was_bootstrap
         if anew or (navdata.com_watchdog and silent > SILENCE):
             self.restarts += 1
-            self._clock = None
+            self._clock, self._least_ahead = None, math.inf
             return True
         if navdata.sequence == last:
             self._count(duplicates=1)
@@ -226,6 +240,10 @@ class NavdataReader:
         self._first = now if self._first is None else self._first
         self._count(states=1)
         self._counts = replace(self._counts, longest_gap=max(self._counts.longest_gap, gap))
+        self.sent = None
+        if clock is not None:
+            self._least_ahead = min(self._least_ahead, now - clock)
+            self.sent = clock + self._least_ahead
         self.navdata, self.heard, self._clock, self.newest = navdata, now, clock, state
         return state
 
@@ -248,6 +266,34 @@ def on_ground(navdata: Navdata) -> bool:
     return not navdata.flying and phase_of(navdata) not in in_air
 
 
+def unasked_end(navdata: Navdata, left_ground: bool) -> str | None:
+    """Why a drone that is asked to fly comes down or stays down; None while it does not.
+
+    Parameters
+    ----------
+    navdata : Navdata
+    left_ground : bool
+        Whether it was in the air since it was asked to take off.
+    """
+    if navdata.emergency:
+        return "the vehicle reports an emergency"
+    if navdata.communication_lost:
+        return "the vehicle has heard no command for 2 s, and lands by itself"
+    if phase_of(navdata) != LANDING and not (left_ground and on_ground(navdata)):
+        return None
+    fault = _fault_of(navdata)
+    if fault is not None:
+        return f"the vehicle lands by itself: {fault}"
+    return (
+        "the vehicle lands without having been told so from here, and reports no fault: most "
+        "likely another client commands this drone"
+    )
+
+
+def _fault_of(navdata: Navdata) -> str | None:
+    return next((says for bit, says in FAULTS.items() if navdata.state & bit), None)
+
+
 def _state_of(navdata: Navdata, clock: float | None, now: float, missing: int) -> VehicleState:
     return VehicleState(
         time=now,
@@ -263,6 +309,6 @@ def _state_of(navdata: Navdata, clock: float | None, now: float, missing: int) -
         pitch=math.nan if navdata.pitch is None else navdata.pitch,
         battery=navdata.battery,
         emergency=navdata.emergency,
-        fault=next((says for bit, says in FAULTS.items() if navdata.state & bit), None),
+        fault=_fault_of(navdata),
         missing=missing,
     )

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from deadtime._errors import DeadtimeError
+from deadtime.links.addresses import Address
 from deadtime.links.lifeline import input_ends
 from deadtime.links.udp.controller import Controller, ControllerOptions
 from deadtime.links.udp.described import (
@@ -29,7 +30,7 @@ from deadtime.links.udp.described import (
     plain,
     policy_of,
 )
-from deadtime.links.udp.endpoint import Address, resolved, speaking_to
+from deadtime.links.udp.endpoint import resolved, speaking_to
 from deadtime.links.udp.plant import Plant
 from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.relay import Relay, RelayOptions

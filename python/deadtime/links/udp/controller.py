@@ -18,8 +18,9 @@ from typing import Any
 
 from deadtime._recording import MINIMUM_SAMPLES, Recording
 from deadtime._validation import finite, positive
+from deadtime.links.addresses import Address
 from deadtime.links.journal import Journal
-from deadtime.links.udp.endpoint import Address, Endpoint
+from deadtime.links.udp.endpoint import Endpoint
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.statistics import KEPT, LinkReport, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
@@ -167,11 +168,6 @@ class Controller:
         statistics = self._endpoint.statistics
         fresh = []
         for packet, read in batch:
-            if not (math.isfinite(packet.value) and math.isfinite(packet.reference)):
-                statistics.invalid += 1
-                continue
-            if self._echoes(packet, read):
-                statistics.exchanged(packet, read)
             if self.options.every:
                 self._answer(packet, read)
             elif packet.sequence > self._newest:
@@ -183,11 +179,6 @@ class Controller:
         packet, read = max(fresh, key=lambda one: one[0].sequence)
         self._drained += len(fresh) - 1
         self._answer(packet, read)
-
-    def _echoes(self, packet: LoopPacket, read: float) -> bool:
-        """Whether a packet echoes one of this end in a way that can be."""
-        known = self._wire.has_times and 0 < packet.echo_sequence <= self._sequence
-        return known and 0.0 <= packet.held <= read - packet.echo_sent
 
     def _behind(self, packet: LoopPacket) -> float:
         """How much older than the last one that was answered a measurement is."""

@@ -8,23 +8,23 @@ import math
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, TypeAlias, cast
+from typing import Any, cast
 
 from deadtime._errors import LinkError, PacketError
+from deadtime.links.addresses import Address, canonical, for_socket, is_loopback
+from deadtime.links.udp.judgement import REMEMBERED, Judgement, Verdict
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.statistics import LinkStatistics
-from deadtime.links.udp.wires import Wire
+from deadtime.links.udp.wires import SAFE, Wire
 
-__all__ = ["Address", "Endpoint", "Socket", "open_socket", "resolved", "speaking_to"]
-
-Address: TypeAlias = tuple[str, int]
+__all__ = ["Endpoint", "Socket", "open_socket", "resolved", "speaking_to"]
 
 #: Packets of a batch that is still waiting for the last one; a flood must not keep it waiting.
 LARGEST_BATCH = 64
 
 
 class Socket(asyncio.DatagramProtocol):
-    """A UDP socket of the running loop that hands on what comes."""
+    """A UDP socket of the running loop that hands on what comes, and the `canonical` sender."""
 
     def __init__(self, receive: Callable[[bytes, Address], None]) -> None:
         self._receive = receive
@@ -36,7 +36,7 @@ class Socket(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: tuple[Any, ...]) -> None:
         """Called by asyncio."""
-        self._receive(data, (addr[0], addr[1]))
+        self._receive(data, (canonical(addr[0]), addr[1]))
 
     def error_received(self, exc: Exception) -> None:
         """Called by asyncio: nobody listens there (yet), which the watchdogs see to."""
@@ -51,7 +51,7 @@ class Socket(asyncio.DatagramProtocol):
     def send(self, data: bytes, address: Address) -> None:
         """Send a datagram."""
         if self._transport is not None and not self._transport.is_closing():
-            self._transport.sendto(data, address)
+            self._transport.sendto(data, for_socket(address, self.address[0]))
 
     def close(self) -> None:
         """Close the socket."""
@@ -77,14 +77,6 @@ async def open_socket(receive: Callable[[bytes, Address], None], address: Addres
     return socket
 
 
-def is_loopback(host: str) -> bool:
-    """Whether a host is this computer, as an address or by its name."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
-
-
 def speaking_to(address: Address) -> Address:
     """Where a socket listens that speaks to a numeric address: no wider than it has to."""
     there = ipaddress.ip_address(address[0])
@@ -94,7 +86,7 @@ def speaking_to(address: Address) -> Address:
 
 
 async def resolved(address: Address) -> Address:
-    """The numeric address that datagrams from this host come from; of a name, the IPv4 one.
+    """The `canonical` address that datagrams from this host come from; of a name, the IPv4 one.
 
     Raises
     ------
@@ -118,11 +110,11 @@ async def resolved(address: Address) -> Address:
         if not numeric:
             raise LinkError(f"the host {host!r} has no IPv4 address") from None
         return str(numeric[0]), port
-    return address
+    return canonical(host), port
 
 
 class Endpoint:
-    """The socket of one end of the loop: checked peer, decoded packets, in batches.
+    """The socket of one end of the loop: checked peer, decoded and judged packets, in batches.
 
     Parameters
     ----------
@@ -133,6 +125,11 @@ class Endpoint:
         came in until a pass of the event loop brought nothing more.
     peer : (str, int), optional
         The other end. Without, it is whoever sends the first packet that is one.
+    answers_only : bool
+        Take answers to what this end has sent, and no other packets. Bare doubles answer nothing
+        that could be told, and are all taken.
+    remembered : int
+        How many of the packets sent can be answered.
     """
 
     def __init__(
@@ -140,8 +137,13 @@ class Endpoint:
         wire: Wire,
         take: Callable[[list[tuple[LoopPacket, float]]], None],
         peer: Address | None = None,
+        *,
+        answers_only: bool = False,
+        remembered: int = REMEMBERED,
     ) -> None:
         self.statistics = LinkStatistics()
+        self._judgement = Judgement(remembered)
+        self._answers_only = answers_only and wire.has_times
         self._wire, self._take = wire, take
         self._fixed_peer = peer
         self.peer = peer
@@ -171,6 +173,7 @@ class Endpoint:
 
     def send(self, packet: LoopPacket) -> None:
         """Send a packet to the peer, if there is one."""
+        self._judgement.sent(packet.sequence, packet.sent)
         if self._socket is not None and self.peer is not None:
             self._socket.send(self._wire.encode(packet), self.peer)
 
@@ -210,9 +213,16 @@ class Endpoint:
         except PacketError:
             self.statistics.invalid += 1
             return
-        self.peer = address
-        if not self.statistics.arrived(packet, now):
+        verdict = self._judgement.of(packet, now)
+        answers = verdict is Verdict.ANSWER
+        if verdict is Verdict.IMPOSSIBLE or (self._answers_only and not answers):
+            self.statistics.invalid += 1
             return
+        self.peer = address
+        if not self.statistics.arrived(packet):
+            return
+        if answers and not packet.flags & SAFE:
+            self.statistics.exchanged(packet, now)
         self._batch.append((packet, now))
         if len(self._batch) == 1:
             self._loop.call_soon(self._look_again, 0)

@@ -14,12 +14,14 @@ from collections import deque
 from contextlib import ExitStack
 
 from deadtime._recording import MINIMUM_SAMPLES, Recording
+from deadtime.links.addresses import Address
 from deadtime.links.journal import Journal
-from deadtime.links.udp.endpoint import Address, Endpoint
+from deadtime.links.udp.endpoint import Endpoint
 from deadtime.links.udp.integrator import HeldIntegrator
+from deadtime.links.udp.judgement import REMEMBERED
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.plant_options import PlantOptions, PlantReport
-from deadtime.links.udp.statistics import KEPT, REMEMBERED, Percentiles
+from deadtime.links.udp.statistics import KEPT, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
 
 __all__ = ["Plant", "run_plant"]
@@ -49,15 +51,19 @@ class Plant:
     def __init__(self, options: PlantOptions) -> None:
         self.options = options
         self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
-        self._endpoint = Endpoint(self._wire, self._take, options.controller)
+        # Whatever is answered in time, and longer, to tell what is late from what cannot be.
+        self._endpoint = Endpoint(
+            self._wire,
+            self._take,
+            options.controller,
+            answers_only=True,
+            remembered=max(REMEMBERED, 2 * math.ceil(options.watchdog / options.sample_time)),
+        )
         self._journal: Journal | None = None
         self._model = HeldIntegrator(options.gain, options.lag)
         self._command, self._stamp = options.safe, math.nan
         self._newest = 0
         self._sequence = 0
-        self._sent: dict[int, float] = {}
-        # Whatever is answered in time, and longer, to tell what is late from what cannot be.
-        self._remembered = max(REMEMBERED, 2 * math.ceil(options.watchdog / options.sample_time))
         self._echo: tuple[LoopPacket, float] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self._hold: asyncio.TimerHandle | None = None
@@ -139,8 +145,6 @@ class Plant:
         output = self._model.output
         echo, read = self._echo or (None, now)
         self._sequence += 1
-        self._sent[self._sequence] = now
-        self._sent.pop(self._sequence - self._remembered, None)
         self._endpoint.send(
             LoopPacket(
                 sequence=self._sequence,
@@ -168,19 +172,9 @@ class Plant:
     def _judge(self, packet: LoopPacket, read: float) -> None:
         """Apply a command, now or later, or leave it."""
         statistics = self._endpoint.statistics
-        if not math.isfinite(packet.value):
-            statistics.invalid += 1
-            return
         # The plant's own numbers order what comes: a controller that was started anew has new ones.
         number = packet.echo_sequence if self._wire.has_times else packet.sequence
-        age = 0.0
-        if self._wire.has_times:
-            age = read - packet.echo_sent
-            # Only what answers a measurement of this plant, and could have done so, is an answer.
-            own = self._sent.get(number) == packet.echo_sent
-            if not (own and packet.held <= age):
-                statistics.invalid += 1
-                return
+        age = read - packet.echo_sent if self._wire.has_times else 0.0
         if packet.flags & SAFE:
             if number >= self._newest:
                 self._newest = number
@@ -189,7 +183,6 @@ class Plant:
             return
         if self._wire.has_times:
             self._echo = (packet, read)
-            statistics.exchanged(packet, read)
             self._arrivals.append((number, age))
             if age > self.options.watchdog:
                 statistics.came_late(age - self.options.watchdog)

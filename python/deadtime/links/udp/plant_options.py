@@ -8,7 +8,7 @@ from typing import Any
 
 from deadtime._recording import Recording
 from deadtime._validation import finite, non_negative, positive
-from deadtime.links.udp.endpoint import Address
+from deadtime.links.addresses import Address
 from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.statistics import LinkReport, Percentiles
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from deadtime._errors import LinkError
+from deadtime.links.addresses import Address
 from deadtime.links.udp.described import arguments_of
-from deadtime.links.udp.endpoint import Address
 from deadtime.links.udp.trial import ENDS, Trial
 
 __all__ = ["part", "run_processes"]

@@ -12,7 +12,8 @@ import itertools
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
-from deadtime.links.udp.endpoint import Address, Socket, open_socket, resolved, speaking_to
+from deadtime.links.addresses import Address
+from deadtime.links.udp.endpoint import Socket, open_socket, resolved, speaking_to
 from deadtime.links.udp.network import Network, Path
 
 __all__ = ["Relay", "RelayOptions"]

@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
+from deadtime.links.udp.judgement import REMEMBERED
 from deadtime.links.udp.packets import LoopPacket
 
 __all__ = [
     "KEPT",
-    "REMEMBERED",
     "ClockOffset",
     "LinkReport",
     "LinkStatistics",
@@ -34,10 +34,6 @@ __all__ = [
 
 #: Packets whose times are kept, the newest: an end may run for days.
 KEPT = 100_000
-
-#: Sequence numbers that are remembered: which came, to tell a duplicate from a packet that was
-#: overtaken, and when which was sent.
-REMEMBERED = 4096
 
 #: Width of a bin at least, s: no clock tells less.
 NARROWEST = 1e-6
@@ -227,7 +223,7 @@ class LinkStatistics:
         expected = 0 if self._first is None else self._highest - self._first + 1
         return self._missed + max(0, expected - self._unique)
 
-    def arrived(self, packet: LoopPacket, now: float) -> bool:
+    def arrived(self, packet: LoopPacket) -> bool:
         """Take in a packet; False if it is a duplicate."""
         self.received += 1
         if self._may_begin_anew and packet.sequence <= self._highest:
@@ -253,7 +249,7 @@ class LinkStatistics:
             self._seen.discard(self._order.popleft())
 
     def exchanged(self, packet: LoopPacket, now: float) -> None:
-        """Take in the times of a packet that echoes one of this end."""
+        """Take in the times of a packet that was judged to answer one of this end."""
         received_there = packet.sent - packet.held
         there, back = received_there - packet.echo_sent, now - packet.sent
         if self._back:
@@ -262,7 +258,8 @@ class LinkStatistics:
         self._there.append(there)
         self._back.append(back)
         self.held.append(packet.held)
-        self.round_trips.append(there + back)
+        # Not the sum of both ways, in which a far-off clock would leave its rounding.
+        self.round_trips.append((now - packet.echo_sent) - packet.held)
         self.clock.add(packet.echo_sent, received_there, packet.sent, now)
 
     def came_late(self, by: float) -> None:

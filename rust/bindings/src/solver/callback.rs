@@ -1,5 +1,7 @@
 //! Right-hand sides, events and changes that are Python functions.
 
+use std::ops::Range;
+
 use deadtime::dde::spectral::{Columns, Equation};
 use deadtime::{Error, Task};
 use numpy::ndarray::{ArrayView2, ArrayView3};
@@ -42,17 +44,27 @@ impl<'py> Callbacks<'py> {
         })
     }
 
-    pub(super) fn events(&mut self, t: f64, y: &[f64], out: &mut [f64]) -> Result<(), Error> {
-        let result = self.read_events(t, y, out);
+    pub(super) fn events(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        which: Range<usize>,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        let result = self.read_events(t, y, which, out);
         self.keep(result)
     }
 
-    fn read_events(&self, t: f64, y: &[f64], out: &mut [f64]) -> PyResult<()> {
-        for (index, (event, out)) in self.events.iter().zip(out).enumerate() {
+    fn read_events(&self, t: f64, y: &[f64], which: Range<usize>, out: &mut [f64]) -> PyResult<()> {
+        for (index, out) in which.zip(out) {
+            let Some(event) = self.events.get(index) else {
+                continue;
+            };
             let py = event.py();
             let head = [PyFloat::new(py, t).into_any(), y.to_pyarray(py).into_any()];
             let value = call(event, head, &self.args)?;
-            numbers(&value, std::slice::from_mut(out), |shape| {
+            let who = || format!("event {index} at t={t}");
+            numbers(&value, std::slice::from_mut(out), who, |shape| {
                 format!("event {index} returned shape {shape} at t={t}: give one number")
             })?;
             if out.is_nan() {
@@ -71,7 +83,8 @@ impl<'py> Callbacks<'py> {
         let given = y.to_pyarray(change.py());
         let dim = y.len();
         let result = change.call1((t, given)).and_then(|value| {
-            numbers(&value, y, |shape| {
+            let who = || format!("the change at t={t}");
+            numbers(&value, y, who, |shape| {
                 format!("the change at t={t} returned shape {shape}: give the {dim} new values")
             })
         });
@@ -174,10 +187,11 @@ impl<'py> PythonEquation<'py> {
                  (component, node) = ({dim}, {n}); leave vectorized out for a function of one t"
             )
         };
+        let who = || format!("fun for {n} nodes from t={t} on");
         let listed = value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>();
         if listed && value.len()? == dim {
             for (row, out) in value.try_iter()?.zip(out.chunks_exact_mut(n)) {
-                let array = as_array(&row?)?;
+                let array = as_array(&row?, who)?;
                 match array.shape() {
                     [] => out.fill(array.to_vec()?.first().copied().unwrap_or(f64::NAN)),
                     [length] if *length == n => copy(&array, out)?,
@@ -186,7 +200,7 @@ impl<'py> PythonEquation<'py> {
             }
             return Ok(());
         }
-        let array = as_array(value)?;
+        let array = as_array(value, who)?;
         let shape = array.shape();
         if shape == [dim, n] || (dim == 1 && shape == [n]) {
             return copy(&array, out);
@@ -217,7 +231,8 @@ impl<'py> PythonEquation<'py> {
                 let dz = column(at.dz).reshape([delays, dim])?.into_any();
                 call(&self.function, [t_given, y, z, dz], &self.args)?
             };
-            numbers(&value, &mut slope, |shape| {
+            let who = || format!("fun at t={t}");
+            numbers(&value, &mut slope, who, |shape| {
                 format!("fun returned shape {shape} at t={t}: give the {dim} components of dy/dt")
             })?;
             for (row, slope) in out.chunks_exact_mut(n).zip(&slope) {
@@ -243,8 +258,14 @@ impl Equation for PythonEquation<'_> {
         true
     }
 
-    fn events(&mut self, t: f64, y: &[f64], out: &mut [f64]) -> Result<(), Error> {
-        self.callbacks.events(t, y, out)
+    fn events(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        which: Range<usize>,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        self.callbacks.events(t, y, which, out)
     }
 
     fn change(&mut self, jump: usize, t: f64, y: &mut [f64]) -> Result<(), Error> {
@@ -278,6 +299,7 @@ fn cube<'py>(
 pub(super) fn numbers(
     value: &Bound<'_, PyAny>,
     out: &mut [f64],
+    who: impl Fn() -> String,
     advice: impl Fn(String) -> String,
 ) -> PyResult<()> {
     if let (Ok(number), [place]) = (value.cast_exact::<PyFloat>(), &mut *out) {
@@ -303,7 +325,7 @@ pub(super) fn numbers(
     }
     let array = match value.cast::<PyArrayDyn<f64>>() {
         Ok(array) => array.clone(),
-        Err(_) => as_array(value)?,
+        Err(_) => as_array(value, who)?,
     };
     let shape = array.shape();
     let single = out.len() == 1 && array.len() == 1 && shape.len() <= 1;
@@ -313,11 +335,38 @@ pub(super) fn numbers(
     Err(PyValueError::new_err(advice(words(shape))))
 }
 
-/// Whatever NumPy makes an array of floats of.
-fn as_array<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let py = value.py();
-    let array = py.import("numpy")?.call_method1("asarray", (value, "d"))?;
-    Ok(array.cast_into::<PyArrayDyn<f64>>()?)
+/// Whatever NumPy makes an array of real numbers of; `who` returned it.
+fn as_array<'py>(
+    value: &Bound<'py, PyAny>,
+    who: impl Fn() -> String,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let numpy = value.py().import("numpy")?;
+    let refuse = |what: &str| Err(PyTypeError::new_err(format!("{} returned {what}", who())));
+    if value.is_none() {
+        return refuse("None: end it with a return statement that gives the values");
+    }
+    let array = numpy.call_method1("asarray", (value,))?;
+    let dtype = array.getattr("dtype")?;
+    match dtype.getattr("kind")?.extract::<char>()? {
+        'b' | 'i' | 'u' | 'f' => {}
+        'c' => {
+            return refuse(
+                "complex numbers: give real ones, the real and the imaginary part as components \
+                 of their own",
+            );
+        }
+        // NumPy would read None as nan.
+        'O' => {
+            for item in array.getattr("flat")?.try_iter()? {
+                if item?.is_none() {
+                    return refuse("None in place of a number: give real numbers");
+                }
+            }
+        }
+        _ => return refuse(&format!("values of dtype {dtype}: give real numbers")),
+    }
+    let floats = numpy.call_method1("asarray", (array, "d"))?;
+    Ok(floats.cast_into::<PyArrayDyn<f64>>()?)
 }
 
 /// The elements in C order.

@@ -2,6 +2,7 @@
 #![allow(unsafe_code)]
 
 use std::ffi::c_void;
+use std::ops::Range;
 
 use deadtime::dde::spectral::{Columns, Equation};
 use deadtime::{Error, Task};
@@ -95,8 +96,14 @@ impl Equation for WithEvents<'_> {
         self.compiled.slope(at, out, task)
     }
 
-    fn events(&mut self, t: f64, y: &[f64], out: &mut [f64]) -> Result<(), Error> {
-        self.callbacks.events(t, y, out)
+    fn events(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        which: Range<usize>,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        self.callbacks.events(t, y, which, out)
     }
 
     fn change(&mut self, jump: usize, t: f64, y: &mut [f64]) -> Result<(), Error> {

@@ -9,18 +9,20 @@ mod compiled;
 mod past;
 
 use deadtime::dde::breaks::BreakingPoint;
-use deadtime::dde::history::History;
-use deadtime::dde::spectral::{Equation, Event, Jump, Outcome, Problem, Solution, solve};
+use deadtime::dde::history::{History, Piece};
+use deadtime::dde::spectral::{Equation, Event, Jump, Outcome, Problem, Solution, Sparsity, solve};
+use deadtime::memory::{collected, copied, filled, reserved};
 use deadtime::{Error, Task};
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyTuple, PyType};
 
 use callback::{Callbacks, PythonEquation};
 use compiled::{CompiledEquation, WithEvents};
 
+use crate::arrays::{column, converted};
 use crate::errors::to_python;
 use crate::runtime::{run_attached, run_here};
 
@@ -40,9 +42,9 @@ pub(crate) struct DelayRun {
     nodes: u64,
     elements: u64,
     refused: u64,
-    /// 0 finished, 1 terminal event, 2 elements too short, 3 not finite.
+    /// 0 finished, 1 terminal event, 2 elements too short, 3 not finite, 4 too many elements.
     outcome: u8,
-    /// Where the last two of them happened.
+    /// Where the last three of them happened.
     place: f64,
     pieces: Py<DelayPieces>,
 }
@@ -55,8 +57,81 @@ pub(crate) struct DelayPieces {
     end: f64,
 }
 
+/// Dimension, end of the solution; starts, ends and numbers of coefficients of the pieces; all
+/// coefficients one after the other.
+type Parts<'py> = (
+    usize,
+    f64,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
 #[pymethods]
 impl DelayPieces {
+    /// The pieces from what [`Self::__reduce__`] takes them apart into.
+    #[new]
+    fn new(
+        dim: usize,
+        end: f64,
+        starts: Vector<'_>,
+        ends: Vector<'_>,
+        terms: PyReadonlyArray1<'_, u64>,
+        coefficients: Vector<'_>,
+    ) -> PyResult<Self> {
+        let refused = || PyValueError::new_err("these are no pieces of a solution");
+        let spans = starts.as_array().into_iter().zip(ends.as_array());
+        let (lengths, coefficients) = (terms.as_array(), coefficients.as_slice()?);
+        let whole = starts.len() == ends.len() && starts.len() == terms.len();
+        let mut rest = coefficients;
+        let mut pieces = converted(reserved(
+            "the list of pieces of the solution",
+            lengths.len(),
+        ))?;
+        for ((start, end), terms) in spans.zip(lengths) {
+            let terms = usize::try_from(*terms).map_err(|_| refused())?;
+            let count = terms.checked_mul(dim).filter(|count| *count > 0);
+            let (own, others) = count
+                .and_then(|count| rest.split_at_checked(count))
+                .ok_or_else(refused)?;
+            rest = others;
+            let own = converted(copied("the list of pieces of the solution", own))?;
+            pieces.push(Piece::new(*start, *end, terms, own));
+        }
+        if !whole || !rest.is_empty() {
+            return Err(refused());
+        }
+        Ok(Self {
+            history: History::new(pieces),
+            dim,
+            end,
+        })
+    }
+
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Parts<'py>)> {
+        let pieces = || self.history.pieces();
+        let what = "the list of pieces of the solution";
+        let total = pieces().map(|piece| piece.coefficients.len()).sum();
+        let mut coefficients = converted(reserved(what, total))?;
+        for piece in pieces() {
+            coefficients.extend_from_slice(&piece.coefficients);
+        }
+        let starts = converted(collected(what, pieces().map(|piece| piece.start)))?;
+        let ends = converted(collected(what, pieces().map(|piece| piece.end)))?;
+        let terms = converted(collected(what, pieces().map(|piece| piece.terms as u64)))?;
+        let parts = (
+            self.dim,
+            self.end,
+            starts.into_pyarray(py),
+            ends.into_pyarray(py),
+            terms.into_pyarray(py),
+            coefficients.into_pyarray(py),
+        );
+        Ok((py.get_type::<Self>(), parts))
+    }
+
     /// First and last time at which there are values.
     #[getter]
     fn span(&self) -> (f64, f64) {
@@ -83,7 +158,8 @@ impl DelayPieces {
         nu: u8,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (first, last) = self.span();
-        let mut values = Array2::zeros((self.dim, times.as_array().len()));
+        let shape = (self.dim, times.as_array().len());
+        let mut values = array(0.0, shape)?;
         let mut value = vec![0.0; self.dim];
         for (mut column, &time) in values.columns_mut().into_iter().zip(times.as_array()) {
             if !(time >= first && time <= last) {
@@ -131,6 +207,8 @@ pub(crate) fn solve_delay_equation<'py>(
     longest: f64,
     times: Option<Vector<'py>>,
     keep: bool,
+    sparsity: Option<(Vec<usize>, Vec<usize>)>,
+    most: Option<u64>,
     events: Vec<(Bound<'py, PyAny>, i8, u32)>,
     jumps: Vec<(f64, Option<Bound<'py, PyAny>>)>,
 ) -> PyResult<DelayRun> {
@@ -145,8 +223,20 @@ pub(crate) fn solve_delay_equation<'py>(
         rtol,
         atol: atol.as_array().to_vec(),
         longest,
-        times: times.map(|times| times.as_array().to_vec()),
+        times: times
+            .map(|times| {
+                converted(collected(
+                    "the copy of t_eval",
+                    times.as_array().iter().copied(),
+                ))
+            })
+            .transpose()?,
         keep,
+        sparsity: sparsity
+            .map(|(rows, columns)| Sparsity::new(initial.as_array().len(), &rows, &columns))
+            .transpose()
+            .map_err(|error| to_python(py, error))?,
+        most,
         events: kinds(&events),
         jumps: jumps
             .iter()
@@ -216,24 +306,35 @@ fn kinds(events: &[(Bound<'_, PyAny>, i8, u32)]) -> Vec<Event> {
     events.iter().map(kind).collect()
 }
 
+/// An array of one value.
+fn array(value: f64, shape: (usize, usize)) -> PyResult<Array2<f64>> {
+    let values = filled(
+        "the array of values of the solution",
+        value,
+        shape.0.saturating_mul(shape.1),
+    );
+    Array2::from_shape_vec(shape, converted(values)?)
+        .map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
 fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
     let rows = |values: Vec<f64>| {
         Array2::from_shape_vec((values.len() / dim.max(1), dim), values)
             .map_err(|error| PyValueError::new_err(error.to_string()))
     };
-    let values = rows(found.values)?.reversed_axes();
+    let by_time = rows(found.values)?;
+    let mut values = array(0.0, (dim, by_time.nrows()))?;
+    values.assign(&by_time.t());
+    drop(by_time);
     let (outcome, place) = match found.outcome {
         Outcome::Finished => (0, found.end),
         Outcome::Event => (1, found.end),
         Outcome::Shrunk(place) => (2, place),
         Outcome::NotFinite(place) => (3, place),
+        Outcome::TooMany(place) => (4, place),
     };
     let event_values = found.event_values.into_iter().map(rows);
-    let breaks: Vec<f64> = found
-        .breaks
-        .iter()
-        .map(|point: &BreakingPoint| point.time)
-        .collect();
+    let breaks = column(&found.breaks, |point: &BreakingPoint| point.time)?;
     let pieces = DelayPieces {
         history: found.history,
         dim,
@@ -241,15 +342,11 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
     };
     Ok(DelayRun {
         times: found.times.into_pyarray(py).unbind(),
-        values: values
-            .as_standard_layout()
-            .into_owned()
-            .into_pyarray(py)
-            .unbind(),
+        values: values.into_pyarray(py).unbind(),
         event_times: found
             .event_times
-            .iter()
-            .map(|times| times.to_pyarray(py).unbind())
+            .into_iter()
+            .map(|times| times.into_pyarray(py).unbind())
             .collect(),
         event_values: event_values
             .map(|values| values.map(|values| values.into_pyarray(py).unbind()))

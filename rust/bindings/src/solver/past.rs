@@ -27,7 +27,8 @@ pub(super) fn read(
     let mut points = Vec::new();
     let pieces = if !history.is_callable() {
         let mut value = vec![0.0; dim];
-        numbers(history, &mut value, |shape| {
+        let who = || "history".to_owned();
+        numbers(history, &mut value, who, |shape| {
             format!("history has shape {shape}: give one number for each of {dim} components")
         })?;
         let before = if problem.delays.is_empty() {
@@ -112,7 +113,8 @@ fn fitted(
 fn sample(name: &str, function: &Bound<'_, PyAny>, time: f64, out: &mut [f64]) -> PyResult<()> {
     let dim = out.len();
     let found = function.call1((time,))?;
-    numbers(&found, out, |shape| {
+    let who = || format!("{name} at t={time}");
+    numbers(&found, out, who, |shape| {
         format!(
             "{name} returned shape {shape} at t={time}: give one number for each of {dim} \
              components"

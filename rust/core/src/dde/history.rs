@@ -7,6 +7,8 @@
 use std::collections::VecDeque;
 
 use super::chebyshev;
+use crate::Error;
+use crate::memory::push_back;
 
 /// One polynomial on an interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,8 +134,12 @@ impl History {
     }
 
     /// Append a piece.
-    pub(super) fn push(&mut self, piece: Piece) {
-        self.pieces.push_back(piece);
+    pub(super) fn push(&mut self, piece: Piece) -> Result<(), Error> {
+        push_back(
+            "the list of pieces of the solution",
+            &mut self.pieces,
+            piece,
+        )
     }
 
     /// Drop pieces that end before `time`.
@@ -152,7 +158,8 @@ mod tests {
     fn two() -> History {
         // 1 on [0, 1]; t on [1, 3], that is 2 + x.
         let mut history = History::new(vec![Piece::new(0.0, 1.0, 1, vec![1.0])]);
-        history.push(Piece::new(1.0, 3.0, 2, vec![2.0, 1.0]).with_slopes());
+        let piece = Piece::new(1.0, 3.0, 2, vec![2.0, 1.0]).with_slopes();
+        history.push(piece).unwrap();
         history
     }
 

@@ -337,7 +337,7 @@ impl<S: Scalar> LinearLoop<S> {
         input_times: &[f64],
         task: &Task,
     ) -> Result<Trajectory<S>, Error> {
-        let wanted = Wanted::new(output_times, input_times, S::default());
+        let wanted = Wanted::new(output_times, input_times, S::default())?;
         self.serve(start, reference, wanted, task)
     }
 

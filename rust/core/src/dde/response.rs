@@ -4,9 +4,11 @@
 //! only by the rounding of that clock are moved onto it; breaking points of output and command
 //! become one list, those within rounding of one another one point.
 
+use crate::memory::{append, collected, copied};
 use crate::{Error, Task};
 
 use super::linear::{LinearLoop, Reference, Start};
+use super::wanted::RESPONSE;
 
 /// Roundings of a time of the clock, in units of the last place.
 const CLOCK: f64 = 4.0 * f64::EPSILON;
@@ -54,32 +56,32 @@ impl LinearLoop {
         let Some(&first) = request.times.first() else {
             return Ok(Response::default());
         };
-        let since = |times: &[f64]| -> Vec<f64> {
+        let since = |times: &[f64]| {
             let sample = self.sample_time().map(|ts| (ts, start.sample_phase));
-            times
+            let moved = times
                 .iter()
-                .map(|time| on_sample(time - first, first, sample))
-                .collect()
+                .map(|time| on_sample(time - first, first, sample));
+            collected(RESPONSE, moved)
         };
-        let jumps = since(request.reference_times);
-        let reference = Reference::new(request.before, jumps, request.reference_values.to_vec())?;
-        let input_times = since(request.times);
+        let jumps = since(request.reference_times)?;
+        let values = copied(RESPONSE, request.reference_values)?;
+        let reference = Reference::new(request.before, jumps, values)?;
+        let input_times = since(request.times)?;
         let later: Vec<f64>;
         let output_times = if request.ahead == 0.0 {
             &input_times
         } else {
-            later = input_times.iter().map(|t| t + request.ahead).collect();
+            later = collected(RESPONSE, input_times.iter().map(|t| t + request.ahead))?;
             &later
         };
         let found = self.simulate(start, &reference, output_times, &input_times, task)?;
 
-        let mut breaks: Vec<f64> = found
-            .output_breaks
-            .iter()
-            .map(|t| t - request.ahead)
-            .chain(found.input_breaks)
-            .filter(|&t| t >= 0.0)
-            .collect();
+        let mut breaks = found.output_breaks;
+        for t in &mut breaks {
+            *t -= request.ahead;
+        }
+        append(RESPONSE, &mut breaks, &found.input_breaks)?;
+        breaks.retain(|&t| t >= 0.0);
         breaks.sort_unstable_by(f64::total_cmp);
         let delay = self.delay();
         let mut last = f64::NEG_INFINITY;
@@ -89,14 +91,15 @@ impl LinearLoop {
         }
         let absolute = Reference::new(
             request.before,
-            request.reference_times.to_vec(),
-            request.reference_values.to_vec(),
+            copied(RESPONSE, request.reference_times)?,
+            copied(RESPONSE, request.reference_values)?,
         )?;
+        let reference = request.times.iter().map(|&t| absolute.at(t));
         Ok(Response {
             outputs: found.outputs,
             inputs: found.inputs,
             breaks,
-            reference: request.times.iter().map(|&t| absolute.at(t)).collect(),
+            reference: collected(RESPONSE, reference)?,
         })
     }
 }

@@ -64,7 +64,7 @@ pub fn sensitivities(
             sample_phase,
         };
         let plant = Row::new(n, &row)?.checked()?;
-        let wanted = Wanted::new(output_times, input_times, Dual::new(0.0, ahead));
+        let wanted = Wanted::new(output_times, input_times, Dual::new(0.0, ahead))?;
         let found = plant.serve(&start, reference, wanted, task)?;
         outputs.extend(found.outputs.iter().map(|y| y.slope));
         inputs.extend(found.inputs.iter().map(|u| u.slope));

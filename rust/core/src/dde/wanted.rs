@@ -4,6 +4,11 @@ use super::continuous::Series;
 use super::gauge::Gauge;
 use super::linear::Trajectory;
 use super::scalar::Scalar;
+use crate::Error;
+use crate::memory::{push, reserved};
+
+/// What memory is asked for.
+pub(crate) const RESPONSE: &str = "the response";
 
 /// Output and input times of a run, and how many of each are served.
 #[derive(Debug)]
@@ -19,18 +24,22 @@ pub(crate) struct Wanted<'a, S = f64> {
 
 impl<'a, S: Scalar> Wanted<'a, S> {
     /// Times to be served; the output times move with the slope of `ahead`.
-    pub(crate) fn new(output_times: &'a [f64], input_times: &'a [f64], ahead: S) -> Self {
-        Self {
+    pub(crate) fn new(
+        output_times: &'a [f64],
+        input_times: &'a [f64],
+        ahead: S,
+    ) -> Result<Self, Error> {
+        Ok(Self {
             output_times,
             input_times,
             ahead,
             trajectory: Trajectory {
-                outputs: Vec::with_capacity(output_times.len()),
-                inputs: Vec::with_capacity(input_times.len()),
+                outputs: reserved(RESPONSE, output_times.len())?,
+                inputs: reserved(RESPONSE, input_times.len())?,
                 ..Trajectory::default()
             },
             gauge: None,
-        }
+        })
     }
 
     /// Have the output measured as well, at least up to the last of the times.
@@ -83,19 +92,21 @@ impl<'a, S: Scalar> Wanted<'a, S> {
     }
 
     /// Note a break of y at `t` unless it lies after the last output time.
-    pub(crate) fn output_break(&mut self, t: S) {
+    pub(crate) fn output_break(&mut self, t: S) -> Result<(), Error> {
         let t = t.value();
         if self.output_times.last().is_some_and(|&last| t <= last) {
-            self.trajectory.output_breaks.push(t);
+            push(RESPONSE, &mut self.trajectory.output_breaks, t)?;
         }
+        Ok(())
     }
 
     /// Note a break of the command at `t` unless it lies after the last input time.
-    pub(crate) fn input_break(&mut self, t: S) {
+    pub(crate) fn input_break(&mut self, t: S) -> Result<(), Error> {
         let t = t.value();
         if self.input_times.last().is_some_and(|&last| t <= last) {
-            self.trajectory.input_breaks.push(t);
+            push(RESPONSE, &mut self.trajectory.input_breaks, t)?;
         }
+        Ok(())
     }
 
     /// Is every time served?

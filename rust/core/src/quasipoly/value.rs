@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::{Probe, QuasiPolynomial, beyond, modulus};
 use crate::elementary::{exp, sin_cos};
+use crate::memory::filled;
 use crate::{Error, Task};
 
 /// Points that one thread takes at a time.
@@ -119,14 +120,17 @@ fn at_all(
     task: &Task,
     value: impl Fn(Complex64) -> Complex64 + Sync,
 ) -> Result<Vec<Complex64>, Error> {
-    let chunks: Result<Vec<Vec<Complex64>>, Error> = points
-        .par_chunks(CHUNK)
-        .map(|chunk| {
+    let mut values = filled("the array of values", Complex64::ZERO, points.len())?;
+    let places = values.par_chunks_mut(CHUNK);
+    places
+        .zip(points.par_chunks(CHUNK))
+        .try_for_each(|(places, points)| {
             task.check()?;
-            let values = chunk.iter().map(|s| value(*s)).collect();
-            task.advance(chunk.len() as u64);
-            Ok(values)
-        })
-        .collect();
-    Ok(chunks?.concat())
+            for (place, point) in places.iter_mut().zip(points) {
+                *place = value(*point);
+            }
+            task.advance(points.len() as u64);
+            Ok(())
+        })?;
+    Ok(values)
 }

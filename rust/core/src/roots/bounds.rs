@@ -12,6 +12,7 @@
 //!    |1 + w_j|² differs from 1 by at most 2 β_j1 |x|/r² + O(1/r²), β_jk = |b_j,n−k / b_jn|. As
 //!    long as r² d_j ≥ β_j1 + 2 β_01 the exponentials e^(−x d_j) outrun the growth of that with x,
 //!    and the sum of |p_j e^(−s d_j) / p_0| is bounded by its terms at x = |σ|.
+//!    Terms of almost equal delays that cancel: `close_delays`.
 //! 3. In a strip |Im s| ≤ H, the first row exceeds the others far to the right whatever the
 //!    kind, since each of them carries an e^(−x d). Far to the left: the same for h(−s).
 //!
@@ -22,11 +23,12 @@
 
 use num_complex::Complex64;
 
+use super::close_delays::radius_by_groups;
 use crate::elementary::{exp, exp_above, log};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 
 /// What an inequality must be fulfilled by, relative to its larger side.
-const MARGIN: f64 = 1e-9;
+pub(super) const MARGIN: f64 = 1e-9;
 
 /// The leading term that exceeds all others together outside a disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,8 +42,16 @@ pub(super) struct Dominance {
 /// How a [`Dominance`] is found.
 pub(super) type Bound = fn(&QuasiPolynomial, (f64, f64)) -> Option<Dominance>;
 
-/// Bounds 1 and 2 on the strip `re`; `None` where no single term dominates.
+/// Bounds 1 and 2 on the strip `re`, and that of close delays; `None` where no single term dominates.
 pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
+    nearest(h, re, |row, radius| match row {
+        0 => along_the_chains(h, re.0, radius).min(radius_by_groups(h, re.0)),
+        _ => radius,
+    })
+}
+
+/// Bounds 1 and 2, which hold for smaller moduli of the coefficients as well.
+fn dominance_of_moduli(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
     nearest(h, re, |row, radius| match row {
         0 => along_the_chains(h, re.0, radius),
         _ => radius,
@@ -51,7 +61,7 @@ pub(super) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance
 /// A radius beyond which there is no root with Re s ≥ `sigma`, nor where moduli of coefficients are smaller but
 /// that of the leading one; `None` where chains may lie there.
 pub(crate) fn radius_right_of(h: &QuasiPolynomial, sigma: f64) -> Option<f64> {
-    let found = dominance(h, (sigma, f64::INFINITY))?;
+    let found = dominance_of_moduli(h, (sigma, f64::INFINITY))?;
     (found.row == 0).then_some(found.radius * (1.0 + MARGIN))
 }
 

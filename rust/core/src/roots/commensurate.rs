@@ -13,6 +13,7 @@ use num_complex::Complex64;
 
 use super::bounds::{cauchy_radius, right_edge};
 use super::cell::Cell;
+use super::lines::{between_lines, is_beside_chains};
 use super::neutral::chain_abscissa;
 use super::set::locate;
 use super::winding::Walker;
@@ -212,10 +213,10 @@ pub(super) fn cell_right_of(
 }
 
 /// The largest real part of a root, or of the chains if that is larger, for delays taken as exact multiples of
-/// their base; no root lies right of C_D. `None` where there is no base.
+/// their base; no root is known right of C_D. `None` where there is no base.
 ///
 /// # Errors
-/// Those of counting and locating roots.
+/// Those of counting and locating roots; [`Error::TooMuch`] where no line next to the chains can be counted.
 pub(super) fn exact_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<Option<f64>, Error> {
     let Some(chain) = exact_chain_abscissa(h, task)? else {
         return Ok(None);
@@ -224,6 +225,10 @@ pub(super) fn exact_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<Option<
         return Ok(Some(chain));
     }
     let distance = chain_abscissa(h) - chain;
+    let delays = h.delays();
+    let span = delays.last().unwrap_or(&0.0) - delays.first().unwrap_or(&0.0);
+    // Right of it there is no root.
+    let mut clear = chain + distance;
     for share in LINES {
         let sigma = chain + share * distance;
         let mut walker = Walker::new(h, task);
@@ -236,7 +241,7 @@ pub(super) fn exact_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<Option<
                     .fold(chain, f64::max);
                 return Ok(Some(right));
             }
-            Ok(Some(_)) => {}
+            Ok(Some(_)) => clear = sigma,
             // A root on the line: the next one holds it.
             Err(Error::Contour { .. }) => {}
             // Too close to the chains to count.
@@ -244,5 +249,9 @@ pub(super) fn exact_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<Option<
             Err(error) => return Err(error),
         }
     }
-    Ok(Some(chain))
+    if is_beside_chains(clear, chain, distance.max(1.0 / span)) {
+        Ok(Some(chain))
+    } else {
+        Err(between_lines(clear, chain))
+    }
 }

@@ -92,7 +92,7 @@ fn sorted(
         let set = match roots(h, &widened(h, region, margin), task) {
             Ok(set) => set,
             Err(Error::Contour { .. }) => continue,
-            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(error) if error.ends_all() => return Err(error),
             // Such as a chain of roots within the margin.
             Err(_) => return Err(refusal),
         };

@@ -30,6 +30,10 @@ const MAX_EVASIONS: u32 = 20;
 /// A line this close to the chains, in units of one over the longest delay, is as good as on them.
 const CHAIN_MARGIN: f64 = 1e-4;
 
+/// Roots closer to the chains than this, in the same unit, are not told from them; where no line that close
+/// could be counted, that is an error.
+const NEAR_CHAINS: f64 = 1e-3;
+
 /// Evaluations after which the first line is given up: those that hug the chains cost without end. Every
 /// one after it may cost half as much, but not less than the second number.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
@@ -71,6 +75,26 @@ const CLEARANCE: f64 = 0.3;
 /// The distance from the chains at which the search ends; `step` is one over the longest delay.
 pub(crate) fn chain_margin(step: f64) -> f64 {
     CHAIN_MARGIN * step
+}
+
+/// Is the line Re s = `sigma` so close to the chains, `step` being one over the longest delay, that roots
+/// between are not told from these?
+pub(super) fn is_beside_chains(sigma: f64, chain: f64, step: f64) -> bool {
+    sigma - chain <= NEAR_CHAINS * step
+}
+
+/// The error where no root lies right of `sigma`, but that line is not close to the chains.
+pub(super) fn between_lines(sigma: f64, chain: f64) -> Error {
+    Error::TooMuch {
+        what: "the search for the rightmost root",
+        limit: EVALUATIONS_PER_LINE,
+        unit: "evaluations on a line",
+        advice: format!(
+            "no root lies right of Re s = {sigma:.6}, but what lies between that and the chains of \
+             roots at Re s = {chain:.6} could not be counted; use count with both ends of im, or \
+             give delays that are almost equal one value"
+        ),
+    }
 }
 
 /// What a line may cost.
@@ -209,6 +233,11 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             few: None,
             enough: None,
         }
+    }
+
+    /// One over the longest delay.
+    pub(super) fn step_of_delays(&self) -> f64 {
+        self.first_step
     }
 
     pub(super) fn sort_in(&mut self, line: Line, wanted: u64) {

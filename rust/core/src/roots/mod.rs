@@ -5,7 +5,7 @@
 //! `count` half planes; `newton` proves discs around single roots, `cluster` around several; `isolate` finds
 //! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability, along `lines`; `neutral` knows the chains, `commensurate`
 //! those of exact delays, `stable`
-//! decides; `sensitivity` says how a root moves; `bounds` says where roots cannot be;
+//! decides, `unstable` sooner where one root shows it; `sensitivity` says how a root moves; `bounds` says where roots cannot be, `close_delays` where almost equal delays cancel;
 //! `tropical` guesses where roots far out are; `unit` chooses the unit of time; `certificate`
 //! writes the proof of a count down. `matrix` does the same for det M(s), not expanded. Elementary functions are those of `crate::elementary`, with
 //! proved bounds; each file says what its inequalities leave for rounding.
@@ -13,6 +13,7 @@
 mod bounds;
 mod cell;
 mod certificate;
+mod close_delays;
 mod cluster;
 mod commensurate;
 mod contour;
@@ -32,6 +33,7 @@ mod set;
 mod stable;
 mod tropical;
 mod unit;
+mod unstable;
 mod winding;
 
 pub(crate) use bounds::radius_right_of;

@@ -4,11 +4,12 @@
 //! A line Re s = σ is sought with at least the wanted number of roots to its right, but not many
 //! more (`lines`). If the discs known add up to the count of a line, all is known, else the half plane
 //! is searched cell by cell. Right of the chains of a neutral equation there may be fewer roots than
-//! wanted, or none at all: the chains themselves then lead, and the set holds what there is.
+//! wanted, or none at all: the chains themselves then lead, and the set holds what there is. That there is
+//! none takes a line next to the chains: one further right, left of which nothing could be counted, is an error.
 
 use super::commensurate::exact_abscissa;
 use super::count::{Prepared, count_right_of, half_plane};
-use super::lines::{Line, Lines, Spectrum, half_plane_discs};
+use super::lines::{Line, Lines, Spectrum, between_lines, half_plane_discs, is_beside_chains};
 use super::neutral::chain_abscissa;
 use super::newton::Disc;
 use super::region::Region;
@@ -89,7 +90,7 @@ pub fn unstable_and_rightmost(
             };
             (Ok(count), search(&prepared, 1, Some(line), task))
         }
-        Err(Error::Interrupted) => (Err(Error::Interrupted), Err(Error::Interrupted)),
+        Err(error) if error.ends_all() => (Err(error.clone()), Err(error)),
         Err(error) => (Err(error), search(&prepared, 1, None, task)),
     }
 }
@@ -146,10 +147,12 @@ pub(super) fn leading<S: Spectrum>(
         let discs = listed(discs, sigma);
         if discs.len() >= n || last {
             // Right of its chains a neutral equation may have none, a retarded one always has.
-            return if discs.is_empty() && chain == f64::NEG_INFINITY {
+            return if !discs.is_empty() || is_beside_chains(sigma, chain, lines.step_of_delays()) {
+                Ok(first(discs, n, sigma))
+            } else if chain == f64::NEG_INFINITY {
                 Err(beyond_reach())
             } else {
-                Ok(first(discs, n, sigma))
+                Err(between_lines(sigma, chain))
             };
         }
         // A pair counts twice in the half plane but once in the list.
@@ -159,8 +162,8 @@ pub(super) fn leading<S: Spectrum>(
 
 /// The largest real part of a root, or the abscissa of the chains if that is larger.
 ///
-/// Roots between the chains and the last line that could be counted (the `region` of
-/// [`rightmost`]) are not told from the chains. With `strong` the chains are those that arbitrarily
+/// Roots between the chains and a line right beside them (the `region` of [`rightmost`]) are not told from
+/// the chains; where no line that close could be counted and no root was found, that is an error. With `strong` the chains are those that arbitrarily
 /// small changes of the delays can bring about; without, delays with a common base are taken as exact.
 ///
 /// # Errors

@@ -1,16 +1,21 @@
 //! Stability: is every root proved to lie left of the imaginary axis?
 //!
 //! Where the undelayed leading coefficient outweighs the delayed ones, a count of the right half
-//! plane decides. A neutral equation for which it does not is not strongly stable. With delays
+//! plane decides; where that takes long, or cannot be done, one root proved to lie right of the axis
+//! (`unstable`). A neutral equation for which it does not is not strongly stable. With delays
 //! taken as exact it may still be stable if these are whole multiples of one base (`commensurate`).
 
 use super::bounds::dominance;
 use super::commensurate::cell_right_of;
 use super::count::{Prepared, half_plane};
 use super::neutral::chain_abscissa;
+use super::unstable::has_unstable_root;
 use super::winding::Walker;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::{Error, Task};
+
+/// Evaluations along the axis before a root right of it is looked for.
+const AT_A_GLANCE: u64 = 5_000;
 
 /// Is every root proved to lie left of the imaginary axis?
 ///
@@ -32,8 +37,24 @@ pub fn is_stable(h: &QuasiPolynomial, strong: bool, task: &Task) -> Result<bool,
     if zeros > 0 || h.kind() == Kind::Advanced || strong && chain_abscissa(&h) >= 0.0 {
         return Ok(false);
     }
+    let dominated = dominance(&h, (0.0, f64::INFINITY)).is_some();
+    let mut glance = Walker::with_limit(&h, task, AT_A_GLANCE);
+    let at_first = if dominated {
+        half_plane(&mut glance, 0.0).map(Some)
+    } else {
+        Ok(None)
+    };
+    match at_first {
+        Ok(Some(number)) => return Ok(number == 0),
+        Err(Error::Contour { .. }) => return Ok(false),
+        Err(Error::Interrupted) => return Err(Error::Interrupted),
+        Ok(None) | Err(_) => {}
+    }
+    if has_unstable_root(&h, glance.hints, task)? {
+        return Ok(false);
+    }
     let mut walker = Walker::new(&h, task);
-    let number = if dominance(&h, (0.0, f64::INFINITY)).is_some() {
+    let number = if dominated {
         half_plane(&mut walker, 0.0)
     } else {
         match cell_right_of(&mut walker, 0.0, task) {

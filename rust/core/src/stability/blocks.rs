@@ -11,6 +11,7 @@ use super::chart::Chart;
 use super::crossing::Crossing;
 use super::grid::{Axis, Map, put};
 use super::reduced::Reduced;
+use crate::memory::in_parallel;
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
@@ -48,24 +49,29 @@ pub(super) fn crossings(map: &Map<'_>) -> Result<Option<Crossed>, Error> {
     } else {
         (1, second, first)
     };
-    let rows = (0..across.points.len()).into_par_iter().map(|index| {
-        let mut values = map.values.to_vec();
-        put(&mut values, across, index);
-        let reduced = Reduced::new(map.family, &values, &[axis.parameter]);
-        let mut row = Grid {
-            reduced: reduced.demanding(map.question.demand),
-            points: [axis.points],
-        };
-        row.refer_to_middle(&Block {
-            start: [0],
-            end: [axis.points.len()],
-        });
-        let found = row.crossings(map.task)?;
-        map.task.advance(axis.points.len() as u64);
-        Ok(found)
-    });
-    let rows: Result<_, Error> = rows.collect();
-    Ok(Some((along, rows?)))
+    let count = across.points.len();
+    let rows = in_parallel(
+        "the list of rows of the map",
+        count,
+        || (),
+        |(), index| {
+            let mut values = map.values.to_vec();
+            put(&mut values, across, index);
+            let reduced = Reduced::new(map.family, &values, &[axis.parameter]);
+            let mut row = Grid {
+                reduced: reduced.demanding(map.question.demand),
+                points: [axis.points],
+            };
+            row.refer_to_middle(&Block {
+                start: [0],
+                end: [axis.points.len()],
+            });
+            let found = row.crossings(map.task)?;
+            map.task.advance(axis.points.len() as u64);
+            Ok(found)
+        },
+    )?;
+    Ok(Some((along, rows)))
 }
 
 impl Grid<'_, 2> {
@@ -75,7 +81,7 @@ impl Grid<'_, 2> {
     /// [`Error::Interrupted`] alone.
     pub(super) fn chart(&self, task: &Task) -> Result<Chart, Error> {
         let (height, width) = (self.points[0].len(), self.points[1].len());
-        let mut chart = Chart::stable(height * width);
+        let mut chart = Chart::stable(height * width)?;
         let bands = chart
             .unstable
             .par_chunks_mut(SIDE * width)

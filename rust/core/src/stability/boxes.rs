@@ -18,7 +18,7 @@ use super::family::Family;
 use super::local::{Local, Range};
 use super::prove::{Claim, Verdict, judge_box};
 use super::reduced::Reduced;
-use crate::{Error, Task};
+use crate::{Error, Task, memory};
 
 /// Most parameters that may vary.
 const MOST_PARAMETERS: usize = 3;
@@ -160,6 +160,9 @@ pub(super) fn reduce<'a, const D: usize>(
     Ok((reduced, whole))
 }
 
+/// What memory is asked for.
+const BOXES: &str = "the list of boxes";
+
 /// A box that waits for its verdict.
 struct Waiting<const D: usize> {
     claim: Claim<D>,
@@ -206,11 +209,11 @@ impl<'a, const D: usize> Tree<'a, D> {
             let group: Vec<Waiting<D>> = waiting.drain(..size).collect();
             let verdicts = tree.judge(&group, task)?;
             for (judged, verdict) in group.into_iter().zip(verdicts) {
-                tree.file(judged, verdict, &mut waiting);
+                tree.file(judged, verdict, &mut waiting)?;
             }
         }
         for left in waiting {
-            tree.leaf(&left, UNKNOWN);
+            tree.leaf(&left, UNKNOWN)?;
         }
         Ok(tree.boxes)
     }
@@ -229,7 +232,12 @@ impl<'a, const D: usize> Tree<'a, D> {
             .collect()
     }
 
-    fn file(&mut self, judged: Waiting<D>, verdict: Verdict, waiting: &mut VecDeque<Waiting<D>>) {
+    fn file(
+        &mut self,
+        judged: Waiting<D>,
+        verdict: Verdict,
+        waiting: &mut VecDeque<Waiting<D>>,
+    ) -> Result<(), Error> {
         let (parameter, stretches) = match verdict {
             Verdict::Proved(count) => {
                 self.boxes.undecided -= judged.share;
@@ -250,26 +258,31 @@ impl<'a, const D: usize> Tree<'a, D> {
             };
         }
         for (range, node) in halves.into_iter().zip(first..) {
-            self.boxes.nodes.push(Node::Leaf(0));
-            waiting.push_back(Waiting {
-                claim: Claim {
-                    range,
-                    stretches: stretches.clone(),
+            memory::push(BOXES, &mut self.boxes.nodes, Node::Leaf(0))?;
+            memory::push_back(
+                BOXES,
+                waiting,
+                Waiting {
+                    claim: Claim {
+                        range,
+                        stretches: stretches.clone(),
+                    },
+                    node,
+                    share: 0.5 * judged.share,
                 },
-                node,
-                share: 0.5 * judged.share,
-            });
+            )?;
         }
+        Ok(())
     }
 
-    fn leaf(&mut self, one: &Waiting<D>, unstable: i32) {
+    fn leaf(&mut self, one: &Waiting<D>, unstable: i32) -> Result<(), Error> {
         if let Some(node) = self.boxes.nodes.get_mut(one.node) {
             *node = Node::Leaf(self.boxes.unstable.len());
         }
-        self.boxes.unstable.push(unstable);
+        memory::push(BOXES, &mut self.boxes.unstable, unstable)?;
         let Range { low, high } = &one.claim.range;
-        self.boxes.low.extend(self.reduced.values_at(low));
-        self.boxes.high.extend(self.reduced.values_at(high));
+        memory::append(BOXES, &mut self.boxes.low, &self.reduced.values_at(low))?;
+        memory::append(BOXES, &mut self.boxes.high, &self.reduced.values_at(high))
     }
 }
 

@@ -114,7 +114,7 @@ pub fn judge(
     };
     match isolated {
         Ok(isolated) => Ok(with_abscissa(cell, isolated, chain)),
-        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(error) if error.ends_all() => Err(error),
         Err(_) => Ok(Cell {
             status: match status {
                 CellStatus::Ok => CellStatus::Undecided,
@@ -172,7 +172,7 @@ fn by_count(number: Result<u64, Error>) -> Result<(i32, CellStatus), Error> {
             Ok(number) => (number, CellStatus::Ok),
             Err(_) => (UNKNOWN, CellStatus::Undecided),
         }),
-        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(error) if error.ends_all() => Err(error),
         Err(Error::Contour { .. }) => Ok((UNKNOWN, CellStatus::Boundary)),
         Err(_) => Ok((UNKNOWN, CellStatus::Undecided)),
     }

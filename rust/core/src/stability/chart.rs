@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::row::Row;
 use crate::status::CellStatus;
+use crate::{Error, memory};
 
 /// Lines filled together, so that strided columns stay in the cache.
 const BLOCK: usize = 32;
@@ -20,17 +21,17 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// Nothing unstable; zeros cost nothing until they are written to.
-    pub(super) fn stable(cells: usize) -> Self {
-        Self {
-            unstable: vec![0; cells],
+    /// Nothing unstable.
+    pub(super) fn stable(cells: usize) -> Result<Self, Error> {
+        Ok(Self {
+            unstable: memory::filled("the map", 0, cells)?,
             abscissa: Vec::new(),
-            status: vec![CellStatus::Ok; cells],
-        }
+            status: memory::filled("the map", CellStatus::Ok, cells)?,
+        })
     }
 
     /// Write the rows down, as lines of the given width or as its columns.
-    pub(super) fn fill(&mut self, rows: &[Row], width: usize, columns: bool) {
+    pub(super) fn fill(&mut self, rows: &[Row], width: usize, columns: bool) -> Result<(), Error> {
         let blocks = self
             .unstable
             .par_chunks_mut(BLOCK * width)
@@ -67,12 +68,13 @@ impl Chart {
             }
         });
         if rows.iter().any(|row| !row.abscissas.is_empty()) {
-            self.fill_abscissas(rows, width, columns);
+            self.fill_abscissas(rows, width, columns)?;
         }
+        Ok(())
     }
 
-    fn fill_abscissas(&mut self, rows: &[Row], width: usize, columns: bool) {
-        self.abscissa = vec![f64::NAN; self.unstable.len()];
+    fn fill_abscissas(&mut self, rows: &[Row], width: usize, columns: bool) -> Result<(), Error> {
+        self.abscissa = memory::filled("the map", f64::NAN, self.unstable.len())?;
         let blocks = self.abscissa.par_chunks_mut(BLOCK * width);
         blocks.enumerate().for_each(|(block, abscissa)| {
             let top = block * BLOCK;
@@ -93,6 +95,7 @@ impl Chart {
                 }
             }
         });
+        Ok(())
     }
 }
 

@@ -18,7 +18,7 @@ use super::demand::Demand;
 use super::family::Family;
 use super::rows::Rows;
 use crate::roots::chain_abscissa;
-use crate::{Error, Task};
+use crate::{Error, Task, memory};
 
 /// More cells than anyone can look at.
 const MAX_CELLS: usize = 50_000_000;
@@ -77,6 +77,9 @@ pub fn map(
     if cells == 0 {
         return Ok(Chart::default());
     }
+    // Before the work, what it is for: a count and a status a cell, and an abscissa.
+    memory::room::<[u8; 5]>("the map", cells)?;
+    memory::room::<f64>("the map", if question.abscissa { cells } else { 0 })?;
     if question.proof == Proof::Cells {
         return map.cell_by_cell();
     }
@@ -158,10 +161,7 @@ pub fn chains(
         put(values, second, index % width);
         Ok(family.at(values).map_or(f64::NAN, |h| chain_abscissa(&h)))
     };
-    (0..cells)
-        .into_par_iter()
-        .map_init(|| values.to_vec(), cell)
-        .collect()
+    memory::in_parallel("the map", cells, || values.to_vec(), cell)
 }
 
 pub(super) struct Map<'a> {
@@ -180,8 +180,8 @@ impl Map<'_> {
         let [first, second] = self.axes;
         let width = second.points.len();
         let cells = first.points.len() * width;
-        let mut chart = Chart::stable(cells);
-        chart.abscissa = vec![f64::NAN; if abscissa { cells } else { 0 }];
+        let mut chart = Chart::stable(cells)?;
+        chart.abscissa = memory::filled("the map", f64::NAN, if abscissa { cells } else { 0 })?;
         let judged = |values: &mut Vec<f64>, index: usize| {
             self.task.check()?;
             put(values, first, index / width);

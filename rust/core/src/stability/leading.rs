@@ -14,6 +14,7 @@ use super::branch::{Branches, Root};
 use super::cell::{Cell, judge, with_abscissa};
 use super::plane::Plane;
 use super::row::{Members, Row};
+use crate::memory::reserved;
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::{Region, chain_abscissa, chain_margin, rightmost, roots};
 use crate::{Error, Task};
@@ -81,28 +82,26 @@ impl Members<'_> {
             .parts
             .as_ref()
             .and_then(|(a, b)| Leading::new(self, a, b, task));
-        let cells: Result<Vec<Cell>, Error> = counted
-            .enumerate()
-            .map(|(index, cell)| {
-                task.check()?;
-                let known = match &mut leading {
-                    Some(leading) if leading.lines.len() < MAX_LINES => leading.look(index)?,
-                    _ => Known::Nothing,
-                };
-                let chain = leading
-                    .as_ref()
-                    .map_or(f64::NEG_INFINITY, |leading| leading.chain);
-                match known {
-                    Known::Isolated(abscissa) => Ok(with_abscissa(cell, abscissa, chain)),
-                    Known::Chains => Ok(with_abscissa(cell, f64::NEG_INFINITY, chain)),
-                    Known::Nothing => match (self.member)(index) {
-                        Some(h) => judge(&h, self.demand, true, task),
-                        None => Ok(Cell::UNDECIDED),
-                    },
-                }
-            })
-            .collect();
-        Ok(Row::of(&cells?))
+        let mut cells = reserved("a row of the map", self.points.len())?;
+        for (index, cell) in counted.enumerate() {
+            task.check()?;
+            let known = match &mut leading {
+                Some(leading) if leading.lines.len() < MAX_LINES => leading.look(index)?,
+                _ => Known::Nothing,
+            };
+            let chain = leading
+                .as_ref()
+                .map_or(f64::NEG_INFINITY, |leading| leading.chain);
+            cells.push(match known {
+                Known::Isolated(abscissa) => with_abscissa(cell, abscissa, chain),
+                Known::Chains => with_abscissa(cell, f64::NEG_INFINITY, chain),
+                Known::Nothing => match (self.member)(index) {
+                    Some(h) => judge(&h, self.demand, true, task)?,
+                    None => Cell::UNDECIDED,
+                },
+            });
+        }
+        Row::of(&cells)
     }
 }
 
@@ -288,7 +287,7 @@ impl<'a> Leading<'a> {
         };
         let found = match rightmost(&h, 1, self.task) {
             Ok(found) => found,
-            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(error) if error.ends_all() => return Err(error),
             Err(_) => return Ok(Known::Nothing),
         };
         self.chains_led = found.roots.is_empty() && self.chain > f64::NEG_INFINITY;
@@ -304,7 +303,7 @@ impl<'a> Leading<'a> {
         let behind = (first.re - NEARBY * self.scale).max(0.5 * (self.chain + first.re));
         let others = match roots(&h, &Region::right_of(behind), self.task) {
             Ok(others) => others,
-            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(error) if error.ends_all() => return Err(error),
             Err(_) => found.clone(),
         };
         let upper = others.roots.iter().filter(|root| root.im >= 0.0);

@@ -4,8 +4,6 @@
 //! intervals is: proved by boxes of those others. It is not as soon as one member is found that is
 //! not stable; members at both ends and in the middle are tried first.
 
-use rayon::prelude::*;
-
 use super::boxes::{check, reduce};
 use super::cell::{ENDLESS, UNKNOWN, judge};
 use super::demand::Demand;
@@ -14,7 +12,7 @@ use super::grid::Axis;
 use super::local::Local;
 use super::prove::{Finding, find_unstable};
 use super::reduced::Reduced;
-use crate::{Error, Task};
+use crate::{Error, Task, memory};
 
 /// Judge the cells over `axes`: 0 where all members are stable, the largest number of unstable roots
 /// met, −1 for infinitely many, −2 where undecided. `ranges` holds intervals and values of the others.
@@ -62,24 +60,20 @@ pub fn robust_map(
     }
     check(family, &cell)?;
     let width = second.points.len();
-    (0..first.points.len() * width)
-        .into_par_iter()
-        .map_init(
-            || cell.clone(),
-            |cell, index| {
-                task.check()?;
-                for (axis, index) in [(first, index / width), (second, index % width)] {
-                    let point = axis.points.get(index);
-                    if let (Some(range), Some(point)) = (cell.get_mut(axis.parameter), point) {
-                        *range = (*point, *point);
-                    }
-                }
-                let judged = judge_cell(family, cell, boxes, task);
-                task.advance(1);
-                judged
-            },
-        )
-        .collect()
+    let judged = |cell: &mut Vec<(f64, f64)>, index: usize| {
+        task.check()?;
+        for (axis, index) in [(first, index / width), (second, index % width)] {
+            let point = axis.points.get(index);
+            if let (Some(range), Some(point)) = (cell.get_mut(axis.parameter), point) {
+                *range = (*point, *point);
+            }
+        }
+        let judged = judge_cell(family, cell, boxes, task);
+        task.advance(1);
+        judged
+    };
+    let cells = first.points.len().saturating_mul(width);
+    memory::in_parallel("the map", cells, || cell.clone(), judged)
 }
 
 /// A point of an interval.
@@ -119,7 +113,7 @@ fn judge_cell(
     match found {
         Ok(Finding::Stable) => Ok(0),
         Ok(Finding::Unstable(count)) => Ok(count),
-        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(error) if error.ends_all() => Err(error),
         Ok(Finding::Unknown) | Err(_) => Ok(UNKNOWN),
     }
 }

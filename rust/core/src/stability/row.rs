@@ -15,11 +15,14 @@ use super::pencil::{Pencil, united};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{chain_abscissa, radius_right_of};
 use crate::status::CellStatus;
-use crate::{Error, Task};
+use crate::{Error, Task, memory};
 
 /// Cells closer to a crossing than this, relative to the largest |k| of the row, are judged alone: a proved count of
 /// one of them may refuse what the crossing decides.
 const MARGIN: f64 = 1e-9;
+
+/// What memory is asked for.
+const ROW: &str = "a row of the map";
 
 /// Cells with a common count and status.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,25 +43,27 @@ pub(super) struct Row {
 
 impl Row {
     /// The row of these cells with their abscissas.
-    pub(super) fn of(cells: &[Cell]) -> Self {
+    pub(super) fn of(cells: &[Cell]) -> Result<Self, Error> {
         let mut spans: Vec<Span> = Vec::new();
+        let abscissas = cells.iter().map(|cell| cell.abscissa);
+        let abscissas = memory::collected(ROW, abscissas)?;
         for (index, cell) in cells.iter().enumerate() {
             let same = |span: &&mut Span| {
                 (span.cell.unstable, span.cell.status) == (cell.unstable, cell.status)
             };
             match spans.last_mut().filter(same) {
                 Some(span) => span.end = index + 1,
-                None => spans.push(Span {
-                    start: index,
-                    end: index + 1,
-                    cell: *cell,
-                }),
+                None => {
+                    let span = Span {
+                        start: index,
+                        end: index + 1,
+                        cell: *cell,
+                    };
+                    memory::push(ROW, &mut spans, span)?;
+                }
             }
         }
-        Self {
-            spans,
-            abscissas: cells.iter().map(|cell| cell.abscissa).collect(),
-        }
+        Ok(Self { spans, abscissas })
     }
 
     /// A cell whose count holds.
@@ -164,10 +169,9 @@ impl Members<'_> {
 
     /// Every cell judged alone.
     fn alone(&self, task: &Task) -> Result<Row, Error> {
-        Ok(Row {
-            spans: self.judge_all(0..self.points.len(), task)?,
-            ..Row::default()
-        })
+        let mut row = Row::default();
+        self.judge_all(0..self.points.len(), &mut row.spans, task)?;
+        Ok(row)
     }
 
     /// All crossings of the row by ω; `None` where they do not decide.
@@ -242,7 +246,7 @@ impl Members<'_> {
                 let (start, end, _) = *part;
                 match cell {
                     Some(cell) if end > start => spans.push(Span { start, end, cell }),
-                    _ => spans.extend(self.judge_all(start..end, task)?),
+                    _ => self.judge_all(start..end, &mut spans, task)?,
                 }
                 let Some(window) = gaps.next() else {
                     continue;
@@ -252,7 +256,7 @@ impl Members<'_> {
                     let known = cell.and_then(|cell| self.beside_zero(window, cell, start));
                     let cell = known.map_or_else(|| self.judge(start, task), Ok)?;
                     let end = start + 1;
-                    spans.push(Span { start, end, cell });
+                    memory::push(ROW, &mut spans, Span { start, end, cell })?;
                 }
             }
         }
@@ -364,18 +368,19 @@ impl Members<'_> {
         }
     }
 
-    fn judge_all(&self, cells: Range<usize>, task: &Task) -> Result<Vec<Span>, Error> {
-        cells
-            .map(|start| {
-                task.check()?;
-                let cell = self.judge(start, task)?;
-                Ok(Span {
-                    start,
-                    end: start + 1,
-                    cell,
-                })
-            })
-            .collect()
+    fn judge_all(
+        &self,
+        cells: Range<usize>,
+        spans: &mut Vec<Span>,
+        task: &Task,
+    ) -> Result<(), Error> {
+        for start in cells {
+            task.check()?;
+            let cell = self.judge(start, task)?;
+            let end = start + 1;
+            memory::push(ROW, spans, Span { start, end, cell })?;
+        }
+        Ok(())
     }
 }
 

@@ -1,14 +1,13 @@
 //! All rows of a map: a gain in which the family is affine varies along each, the other parameter from one to
 //! the next.
 
-use rayon::prelude::*;
-
 use super::chart::Chart;
 use super::crossing::Crossing;
 use super::family::Family;
 use super::grid::{Axis, Map, put, put_value};
 use super::row::{Members, Row};
 use crate::Error;
+use crate::memory::in_parallel;
 
 /// A map whose family is affine in the parameter along its rows.
 pub(super) struct Rows<'a> {
@@ -120,40 +119,45 @@ impl<'a> Rows<'a> {
     }
 
     /// Do the same for all rows.
-    fn each<T: Send>(
+    fn each<T: Default + Send>(
         &self,
         work: impl Fn(usize, Members<'_>) -> Result<T, Error> + Sync,
     ) -> Result<Vec<T>, Error> {
         let (axis, across) = (self.axis(), self.across());
-        let rows = (0..across.points.len()).into_par_iter().map(|index| {
-            self.map.task.check()?;
-            let mut values = self.map.values.to_vec();
-            put(&mut values, across, index);
-            let member = |cell: usize| {
-                let mut values = values.clone();
-                put(&mut values, axis, cell);
-                self.map.family.at(&values).ok()
-            };
-            let mut bare = values.clone();
-            put_value(&mut bare, axis.parameter, 0.0);
-            let parts = self.constant.at(&bare).ok().zip(self.slope.at(&bare).ok());
-            let members = Members {
-                parts: parts.as_ref(),
-                points: axis.points,
-                member: &member,
-                demand: self.map.question.demand,
-                anchor: None,
-            };
-            work(index, members)
-        });
-        rows.collect()
+        let rows = across.points.len();
+        in_parallel(
+            "the list of rows of the map",
+            rows,
+            || (),
+            |(), index| {
+                self.map.task.check()?;
+                let mut values = self.map.values.to_vec();
+                put(&mut values, across, index);
+                let member = |cell: usize| {
+                    let mut values = values.clone();
+                    put(&mut values, axis, cell);
+                    self.map.family.at(&values).ok()
+                };
+                let mut bare = values.clone();
+                put_value(&mut bare, axis.parameter, 0.0);
+                let parts = self.constant.at(&bare).ok().zip(self.slope.at(&bare).ok());
+                let members = Members {
+                    parts: parts.as_ref(),
+                    points: axis.points,
+                    member: &member,
+                    demand: self.map.question.demand,
+                    anchor: None,
+                };
+                work(index, members)
+            },
+        )
     }
 
     pub(super) fn chart(&self) -> Result<Chart, Error> {
         let rows = self.rows()?;
         let [first, second] = self.map.axes;
-        let mut chart = Chart::stable(first.points.len() * second.points.len());
-        chart.fill(&rows, second.points.len(), self.along == 0);
+        let mut chart = Chart::stable(first.points.len() * second.points.len())?;
+        chart.fill(&rows, second.points.len(), self.along == 0)?;
         Ok(chart)
     }
 }

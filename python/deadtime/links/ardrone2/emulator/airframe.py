@@ -121,6 +121,10 @@ class Airframe:
         """Height, m."""
         return self._vertical.at(time)[0]
 
+    def vertical_at(self, time: Micros) -> tuple[float, float]:
+        """Height and climb, m and m/s."""
+        return self._vertical.at(time)
+
     def at(self, time: Micros) -> Pose:
         """Everything about the body at a time not before the last demand."""
         height, climb = self._vertical.at(time)

@@ -30,11 +30,11 @@ from deadtime.links.ardrone2.emulator.flight import HOVER, TICK, Demand, Flight,
 from deadtime.links.ardrone2.emulator.link import Address, Listener, Order
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.sensors import Reading, Sensors
-from deadtime.links.ardrone2.emulator.settings import Settings
+from deadtime.links.ardrone2.emulator.settings import IDS, Settings
 
 __all__ = ["Drone", "Truth"]
 
-#: A motion command is followed for so long; without a newer one the drone hovers.
+#: A forgiving drone follows a motion command for so long; without a newer one it hovers.
 HOVER_AFTER: Micros = SECOND // 4
 
 #: Navdata a second of the short kind; the long kind comes at every tick.
@@ -219,8 +219,8 @@ class Drone:
     def _refer(self, number: int, ref: Ref, time: Micros) -> None:
         """Take the wish to be in the air or on the ground, and the emergency switch.
 
-        A drone that has landed by itself must not take off again because somebody goes on
-        repeating the wish of before: the wish counts from when it is expressed anew.
+        A drone that has landed by itself takes off again in the worst case because somebody goes on
+        repeating the wish of before. For a forgiving one it has to be expressed anew.
         """
         before, self._ref, self._ref_number = self._ref, ref, number
         flight = self._flight
@@ -230,7 +230,7 @@ class Drone:
             flight.land(time)
         if not ref.take_off or flight.phase in (Phase.TAKING_OFF, Phase.FLYING):
             self._asked = False
-        elif not before.take_off:
+        elif self.options.worst_case or not before.take_off:
             self._asked = True
         if self._asked and not flight.airborne:
             flight.take_off(time)
@@ -258,13 +258,13 @@ class Drone:
         )
 
     def _configure(self, command: Config, ids: ConfigIds | None) -> None:
-        """Take a setting, one at a time: the next one after the acknowledgement of the last."""
+        """Take a setting, and say in navdata that one was received."""
         settings = self.settings
         told = None if ids is None else (ids.session, ids.user, ids.application)
         entering = command.key.startswith("custom:")
         if settings.asks_for_ids and not entering and told != settings.ids:
             return
-        if self._to_acknowledge or not settings.set(command.key, command.value):
+        if not settings.set(command.key, command.value):
             return
         self._to_acknowledge = True
         if command.key == "general:navdata_demo":
@@ -274,9 +274,8 @@ class Drone:
         if mode == ACKNOWLEDGE:
             self._to_acknowledge = False
         elif mode in (SEND_CONFIGURATION, SEND_IDS):
-            only = "" if mode == SEND_CONFIGURATION else "custom:"
             values = self.settings.values
-            told = {key: value for key, value in values.items() if key.startswith(only)}
+            told = values if mode == SEND_CONFIGURATION else {key: values[key] for key in IDS}
             # One answer to a host at a time: more questions are no reason for more answers.
             if all(host != source[0] for host, _ in self._dumps):
                 self._dumps.append((source[0], write_configuration(told)))
@@ -300,12 +299,9 @@ class Drone:
 
     def _next_event(self) -> tuple[Micros, Callable[[Micros], None]]:
         """The next event; of several at one time, the first in this list."""
-        flying = self._flight.phase is Phase.FLYING
-        asked = bool(self._under_way) or (flying and not self._flight.hovering)
-        hover = None if self._moved_at is None or not asked else self._moved_at + HOVER_AFTER
         events = (
             (self._under_way[0][0] if self._under_way else None, self._arrive),
-            (hover, self._hover),
+            (self._hovers_at, self._hover),
             (self._order.loses_at, self._lose_link),
             (self._listener.leaves_at, self._listener_leaves),
             (_after(self._ticked) if self._flight.airborne else None, self._tick),
@@ -315,6 +311,15 @@ class Drone:
             ((NEVER if time is None else time, happen) for time, happen in events),
             key=lambda event: event[0],
         )
+
+    @property
+    def _hovers_at(self) -> Micros | None:
+        """When the last motion command is too old; in the worst case it never is."""
+        flying = self._flight.phase is Phase.FLYING
+        asked = bool(self._under_way) or (flying and not self._flight.hovering)
+        if self.options.worst_case or self._moved_at is None or not asked:
+            return None
+        return self._moved_at + HOVER_AFTER
 
     def _arrive(self, time: Micros) -> None:
         _, demand = self._under_way.popleft()
@@ -327,6 +332,7 @@ class Drone:
 
     def _lose_link(self, time: Micros) -> None:
         self._order.lose()
+        self._under_way.clear()
         self._asked = self._to_acknowledge = False
         self._listener.commander_left()
         self._bootstrap = True
@@ -339,7 +345,7 @@ class Drone:
     def _tick(self, time: Micros) -> None:
         self._ticked = time
         self._flight.tick(time)
-        self._sensors.tick(time, self._flight.airframe.height_at(time))
+        self._sensors.tick(time, *self._flight.airframe.vertical_at(time))
 
     def _next_navdata(self) -> Micros | None:
         if self._bootstrap or self._listener.address is None:

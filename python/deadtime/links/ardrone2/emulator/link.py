@@ -3,7 +3,7 @@
 Nothing authenticates anybody on this link. What an emulator can do against being used to flood
 others: answer a wake-up to its sender only, and by no more than one packet of 24 bytes until a
 valid command has come from the same host; send navdata to one address; and stop after two seconds
-without a sign of life from it.
+without a sign of life from its host.
 """
 
 from __future__ import annotations
@@ -79,15 +79,17 @@ class Order:
 
 
 class Listener:
-    """The one address that navdata go to.
+    """The one address that navdata go to: where the host of the commands has asked for them last.
 
-    Another address is kept in mind until the listener has left.
+    A client is known by its host. It may have a socket for each command, and ask again from
+    another one; any command from its host is a sign of its life. Another host that asks while
+    nobody commands is kept in mind until it is clear which one does.
     """
 
     def __init__(self) -> None:
         self.address: Address | None = None
         self._waiting: Address | None = None
-        self._commander: Address | None = None
+        self._commander: str | None = None
         self._heard: Micros = 0
         self._answered: Micros | None = None
 
@@ -95,16 +97,18 @@ class Listener:
         """Take a wake-up; True if its sender has become the listener."""
         if len(datagram) not in WAKE_UP_SIZES or datagram[0] != UNICAST:
             return False
-        if self._commander is not None and source[0] != self._commander[0]:
+        if self._commander not in (None, source[0]):
             return False
-        if self.address is None:
-            self.address, self._heard = source, time
-            return True
-        if source == self.address:
-            self._heard = time
-        else:
+        if not self._is_here(self.address, source[0]):
             self._waiting = source
-        return False
+            return False
+        before, self.address, self._heard = self.address, source, time
+        return before != source
+
+    @staticmethod
+    def _is_here(address: Address | None, host: str) -> bool:
+        """Whether nobody but this host has the address."""
+        return address is None or address[0] == host
 
     def may_answer(self, source: Address, time: Micros) -> bool:
         """Whether a packet may go out in answer to a wake-up, now."""
@@ -116,20 +120,18 @@ class Listener:
         return True
 
     def commanded(self, source: Address, time: Micros) -> bool:
-        """A command was executed: a sign of life of the listener if it comes from its socket.
+        """A command was executed: a sign of life of the host that commands.
 
-        Commands and wake-ups come from two sockets of one host; which belong together is told by
-        who was first. A listener on another host leaves: True, if so.
+        A listener on another host leaves: True, if so.
         """
+        host = source[0]
         if self._commander is None:
-            self._commander = source
-            if self.address is not None and self.address[0] != source[0]:
-                waits = self._waiting is not None and self._waiting[0] == source[0]
-                self.address, self._waiting = self._waiting if waits else None, None
-                self._heard = time
+            self._commander = host
+            if not self._is_here(self.address, host):
+                self.address = self._waiting if self._is_here(self._waiting, host) else None
+                self._waiting, self._heard = None, time
                 return True
-        here = self.address is not None and self.address[0] == source[0]
-        if here and source == self._commander:
+        if host == self._commander:
             self._heard = time
         return False
 

@@ -7,6 +7,7 @@ from ipaddress import ip_address
 from typing import get_args
 
 from deadtime._validation import non_negative
+from deadtime.links.addresses import canonical, is_loopback
 from deadtime.links.ardrone2.emulator.motion import DELAYS, PlantName
 
 __all__ = ["LOOPBACK", "PORT_BASE", "EmulatorOptions", "ports_from"]
@@ -18,7 +19,13 @@ PORT_BASE = 5550
 #: Longer delays would need more commands and navdata under way than are kept, and navdata have no
 #: place for much more noise.
 LARGEST = {"delay": 100.0, "jitter": 100.0, "downlink": 20.0, "noise": 10.0}
-PORTS_FROM_BASE = {"navdata_port": 4, "command_port": 6, "control_port": 9}
+PORTS_FROM_BASE = {
+    "ftp_port": 1,
+    "navdata_port": 4,
+    "video_port": 5,
+    "command_port": 6,
+    "control_port": 9,
+}
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,14 @@ class EmulatorOptions:
         has it send navdata to an address that is not one of these.
     navdata_port, command_port, control_port : int
         0 takes a free one.
+    ftp_port, video_port : int, optional
+        Where connections for files and for the video are taken, to tell that there are none;
+        nowhere by default.
+    worst_case : bool
+        Do the worst that the vehicle may do where its behaviour is not known for certain: hold the
+        last motion until the link is lost, and take off whenever it stands and the take-off bit is
+        set. Without, be forgiving: hover 0.25 s after the last motion command, and take off when
+        the bit becomes set.
 
     Raises
     ------
@@ -78,6 +93,9 @@ class EmulatorOptions:
     command_port: int = 5556
     control_port: int = 5559
     clients: tuple[str, ...] = ()
+    ftp_port: int | None = None
+    video_port: int | None = None
+    worst_case: bool = True
 
     def __post_init__(self) -> None:
         if self.plant not in DELAYS:
@@ -95,7 +113,7 @@ class EmulatorOptions:
             raise ValueError(f"seed={self.seed} is negative: give 0 or more")
         for name in PORTS_FROM_BASE:
             port = getattr(self, name)
-            if not 0 <= port <= 65535:
+            if port is not None and not 0 <= port <= 65535:
                 raise ValueError(f"{name}={port} is no port: give 1 to 65535, or 0 for a free one")
         for client in self.clients:
             try:
@@ -116,16 +134,13 @@ class EmulatorOptions:
     @property
     def only_here(self) -> bool:
         """Whether only this machine can reach it."""
-        try:
-            return ip_address(self.host).is_loopback
-        except ValueError:
-            return self.host == "localhost"
+        return is_loopback(self.host)
 
     def answers(self, host: str) -> bool:
-        """Whether a host is listened to."""
-        return not self.clients or host in self.clients
+        """Whether a host is listened to, however its address is spelled."""
+        return not self.clients or canonical(host) in map(canonical, self.clients)
 
 
 def ports_from(base: int) -> dict[str, int]:
-    """The three ports that lie as the vehicle's do, from a base on; 0 asks for free ones."""
+    """The ports that lie as the vehicle's do, from a base on; 0 asks for free ones."""
     return {name: base and base + offset for name, offset in PORTS_FROM_BASE.items()}

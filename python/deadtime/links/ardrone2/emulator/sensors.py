@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime.links.ardrone2.commands import Ref
-from deadtime.links.ardrone2.emulator.airframe import Pose
+from deadtime.links.ardrone2.emulator.airframe import DRAG, Pose
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, seconds
 from deadtime.links.ardrone2.emulator.flight import LOW_BATTERY, TICK, Phase
+from deadtime.links.ardrone2.emulator.motion import GRAVITY
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.navdata import (
     FULL_OPTIONS,
@@ -25,6 +26,7 @@ from deadtime.links.ardrone2.navdata import (
     Demo,
     KalmanPressure,
     Navdata,
+    PhysicalMeasures,
     Pressure,
     Pwm,
     RawMeasures,
@@ -39,9 +41,15 @@ __all__ = ["Reading", "Sensors"]
 ECHO_EVERY: Micros = SECOND // 25
 HEARS_UP_TO = 6.0
 
-#: Noise of the climb (1/s) and of the angles (rad/m) per noise of the height.
+#: Noise of the climb (1/s), of the angles (rad/m) and of the accelerations (1/m, in units of the
+#: standard gravity) per noise of the height.
 CLIMB_NOISE = 10.0
 ANGLE_NOISE = 0.4
+FORCE_NOISE = 1.0
+
+#: The accelerometers have 12 bits with 512 counts a g; in recordings of the vehicle at rest the one
+#: that points down counts 2560 and tells -1 g.
+ZERO_COUNT, COUNTS_PER_G, LARGEST_COUNT = 2048, 512, 4095
 
 #: Times at once whose noise is made together.
 BLOCK = 1024
@@ -62,6 +70,7 @@ TAGS = {
     "demo": Demo.tag,
     "clock": 1,
     "raw_measures": RawMeasures.tag,
+    "physical_measures": PhysicalMeasures.tag,
     "pwm": Pwm.tag,
     "altitude": AltitudeOption.tag,
     "video_stream": VideoStream.tag,
@@ -131,10 +140,14 @@ class Sensors:
         self._size = options.noise
         self._noise = _Noise(options.seed, channels=5)
         self._echo_noise = _Noise(options.seed, channels=1)
+        self._force_noise = _Noise(options.seed, channels=3)
         self._echo = 0.0
+        self._climb = self._acceleration = 0.0
 
-    def tick(self, time: Micros, height: float) -> None:
-        """Listen to the echo, if this tick is one of those; on the ground it stays what it was."""
+    def tick(self, time: Micros, height: float, climb: float) -> None:
+        """Feel how the climb has changed, and listen to the echo if this tick is one of those."""
+        self._acceleration = (climb - self._climb) / seconds(TICK)
+        self._climb = climb
         if time % ECHO_EVERY == 0 and height <= HEARS_UP_TO:
             self._echo = height
 
@@ -144,6 +157,27 @@ class Sensors:
         if not reading.bootstrap:
             told = self._measured(reading, told)
         return build_navdata(told)
+
+    def _forces(self, reading: Reading) -> tuple[float, float, float]:
+        """What accelerometers feel, forward, right and down, in units of the standard gravity.
+
+        Thrust acts along the drone, drag against its speed; on the ground, the ground.
+        """
+        pose, noise = reading.pose, self._force_noise.at(reading.time // TICK)
+        standing = reading.phase is Phase.LANDED
+        lift = GRAVITY + (0.0 if standing else self._acceleration)
+        forces = (
+            -DRAG * pose.forward,
+            -DRAG * pose.right,
+            -lift / (math.cos(pose.roll) * math.cos(pose.pitch)),
+        )
+        most = (LARGEST_COUNT - ZERO_COUNT) / COUNTS_PER_G
+        felt = [
+            force / GRAVITY + self._size * FORCE_NOISE * one
+            for force, one in zip(forces, noise, strict=True)
+        ]
+        x, y, z = (min(max(one, -most), most) for one in felt)
+        return x, y, z
 
     def _state(self, reading: Reading) -> int:
         state = WORKING
@@ -172,6 +206,7 @@ class Sensors:
         climb = pose.climb + size * CLIMB_NOISE * noise[1]
         echo = self._echo + size * echo_noise
         turning = TURNING if reading.phase not in (Phase.LANDED, Phase.FALLING) else 0
+        x, y, z = self._forces(reading)
         volts = EMPTY_VOLTAGE + (FULL_VOLTAGE - EMPTY_VOLTAGE) * reading.charge / 100.0
         told: dict[str, Any] = {
             "demo": Demo(
@@ -186,7 +221,16 @@ class Sensors:
                 vz=0.0,  # as on the vehicle
             ),
             "clock": seconds(reading.time),
-            "raw_measures": RawMeasures(battery_voltage=round(volts), height=echo),
+            "raw_measures": RawMeasures(
+                acceleration_x=round(ZERO_COUNT + COUNTS_PER_G * x),
+                acceleration_y=round(ZERO_COUNT - COUNTS_PER_G * y),
+                acceleration_z=round(ZERO_COUNT - COUNTS_PER_G * z),
+                battery_voltage=round(volts),
+                height=echo,
+            ),
+            "physical_measures": PhysicalMeasures(
+                acceleration_x=x, acceleration_y=y, acceleration_z=z
+            ),
             "pwm": Pwm(turning, turning, turning, turning, vz_ref=pose.demand),
             "altitude": AltitudeOption(
                 altitude_vision=height, altitude_vz=-climb, altitude_raw=echo

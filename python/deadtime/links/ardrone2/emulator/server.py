@@ -1,5 +1,9 @@
 """The emulated drone on sockets: navdata and commands on UDP, the configuration on TCP.
 
+Two more ports are there to be connected to. That for files tells that there are none, and closes;
+that for the video stays silent, as that of a drone whose camera sends nothing: clients wait for
+pictures meanwhile, and some do not survive an end of the stream.
+
 It runs in whatever event loop it is opened in, of real or of virtual time.
 """
 
@@ -13,6 +17,8 @@ from types import TracebackType
 from typing import Self
 
 from deadtime._errors import LinkError
+from deadtime.links.addresses import canonical, for_socket
+from deadtime.links.ardrone2.emulator.connections import Connection, Door
 from deadtime.links.ardrone2.emulator.drone import Drone, Truth
 from deadtime.links.ardrone2.emulator.link import Address
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
@@ -22,9 +28,11 @@ __all__ = ["Emulator"]
 #: Navdata that could not leave in time, because the machine was busy, are not sent later, s.
 STALE = 0.25
 
-#: Connections for the configuration at a time, and what one may leave unread, bytes.
-MOST_CONNECTIONS = 4
-MOST_UNREAD = 65536
+#: A configuration that was asked for before anybody connected is kept for so long, s.
+KEPT_FOR = 1.0
+
+#: What the port for files says (RFC 959: service not available, closing control connection).
+NO_FILES = b"421 This is an emulator: it has no files.\r\n"
 
 
 class _Port(asyncio.DatagramProtocol):
@@ -37,39 +45,7 @@ class _Port(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: Address) -> None:
         if self._answers(addr[0]):
-            self._received(data, (addr[0], addr[1]))
-
-
-class _Control(asyncio.Protocol):
-    """A connection that reads the configuration; what it says is not listened to."""
-
-    def __init__(self, emulator: Emulator) -> None:
-        self._emulator = emulator
-        self.transport: asyncio.Transport | None = None
-        self.host = ""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self.transport = transport
-        self.host = transport.get_extra_info("peername")[0]
-        self._emulator._connected(self)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._emulator._readers.discard(self)
-
-    def write(self, dump: bytes) -> None:
-        """Send a configuration, to whoever reads what is sent."""
-        if self.transport is None:
-            return
-        if self.transport.get_write_buffer_size() > MOST_UNREAD:
-            self.transport.abort()
-        else:
-            self.transport.write(dump)
-
-    @property
-    def reads(self) -> bool:
-        """Whether the other end is still there."""
-        return self.transport is not None and not self.transport.is_closing()
+            self._received(data, (canonical(addr[0]), addr[1]))
 
 
 class Emulator:
@@ -90,6 +66,8 @@ class Emulator:
     host : str
     navdata_port, command_port, control_port : int
         Where it listens, once it is open.
+    ftp_port, video_port : int or None
+        Where connections for files and for the video are taken, if they are.
 
     Raises
     ------
@@ -113,12 +91,19 @@ class Emulator:
         self.host = self.options.host
         self.navdata_port, self.command_port = self.options.navdata_port, self.options.command_port
         self.control_port = self.options.control_port
-        self._readers: set[_Control] = set()
+        self.ftp_port, self.video_port = self.options.ftp_port, self.options.video_port
+        answers = self.options.answers
+        self._doors = {
+            "control_port": Door(answers, self._connected),
+            "ftp_port": Door(answers, _refuse_files),
+            "video_port": Door(answers, lambda connection: None),
+        }
+        self._opening = "navdata_port"
         self._unread: dict[str, tuple[float, bytes]] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._commands: asyncio.DatagramTransport | None = None
         self._navdata: asyncio.DatagramTransport | None = None
-        self._control: asyncio.AbstractServer | None = None
+        self._servers: list[asyncio.AbstractServer] = []
 
     async def __aenter__(self) -> Self:
         try:
@@ -126,9 +111,9 @@ class Emulator:
         except OSError as error:
             await self.close()
             raise LinkError(
-                f"the emulator cannot listen on {self.host}, ports {self.navdata_port}, "
-                f"{self.command_port}, {self.control_port}: {error.strerror}; choose others, or 0 "
-                "for free ones"
+                f"the emulator cannot listen on {self.host}, {self._opening} "
+                f"{getattr(self, self._opening)}: {error.strerror}; choose another, or 0 for a "
+                "free one (a port below 1024 needs the right to it)"
             ) from error
         return self
 
@@ -143,21 +128,27 @@ class Emulator:
     async def _open(self) -> None:
         loop = asyncio.get_running_loop()
         self.drone = Drone(self.options, start=loop.time())
-        for name, received in (("navdata", self._woken), ("command", self._commanded)):
-            transport, _ = await loop.create_datagram_endpoint(
-                partial(_Port, received, self.options.answers),
-                local_addr=(self.host, getattr(self, f"{name}_port")),
-            )
-            setattr(self, f"{name}_port", transport.get_extra_info("sockname")[1])
-            if name == "navdata":
-                self._navdata = transport
-            else:
-                self._commands = transport
-        self._control = await loop.create_server(
-            lambda: _Control(self), self.host, self.control_port
-        )
-        self.control_port = self._control.sockets[0].getsockname()[1]
+        self._navdata = await self._listen("navdata_port", self._woken)
+        self._commands = await self._listen("command_port", self._commanded)
+        for name, door in self._doors.items():
+            self._opening = name
+            if getattr(self, name) is None:
+                continue
+            server = await loop.create_server(door, self.host, getattr(self, name))
+            self._servers.append(server)
+            setattr(self, name, server.sockets[0].getsockname()[1])
         self._go_on()
+
+    async def _listen(
+        self, name: str, received: Callable[[bytes, Address], None]
+    ) -> asyncio.DatagramTransport:
+        self._opening = name
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+            partial(_Port, received, self.options.answers),
+            local_addr=(self.host, getattr(self, name)),
+        )
+        setattr(self, name, transport.get_extra_info("sockname")[1])
+        return transport
 
     async def close(self) -> None:
         """Stop listening; safe to call twice."""
@@ -166,12 +157,12 @@ class Emulator:
         for transport in (self._navdata, self._commands):
             if transport is not None:
                 transport.close()
-        if self._control is not None:
-            self._control.close()
-        for reader in list(self._readers):
-            if reader.transport is not None:
-                reader.transport.abort()
-        self._timer = self._navdata = self._commands = self._control = None
+        for server in self._servers:
+            server.close()
+        self._servers.clear()
+        for door in self._doors.values():
+            door.close()
+        self._timer = self._navdata = self._commands = None
 
     def truth(self) -> Truth:
         """What the drone does now, without noise."""
@@ -183,6 +174,8 @@ class Emulator:
 
     def _commanded(self, datagram: bytes, source: Address) -> None:
         self.drone.commanded(datagram, source, asyncio.get_running_loop().time())
+        for door in self._doors.values():
+            door.hear(source[0])
         for host, dump in self.drone.dumps():
             self._tell(host, dump)
         self._go_on()
@@ -192,10 +185,10 @@ class Emulator:
         loop = asyncio.get_running_loop()
         if self._navdata is None or self._navdata.is_closing():
             return
-        now = loop.time()
+        now, own = loop.time(), self._navdata.get_extra_info("sockname")[0]
         self.drone.advance(now)
         for packet, address in self.drone.packets(now, oldest=STALE):
-            self._navdata.sendto(packet, address)
+            self._navdata.sendto(packet, for_socket(address, own))
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -203,14 +196,9 @@ class Emulator:
         if due < math.inf:
             self._timer = loop.call_at(due, self._go_on)
 
-    def _connected(self, reader: _Control) -> None:
-        welcome = len(self._readers) < MOST_CONNECTIONS and self.options.answers(reader.host)
-        if not welcome and reader.transport is not None:
-            reader.transport.abort()
-            return
-        self._readers.add(reader)
+    def _connected(self, reader: Connection) -> None:
         asked, dump = self._unread.pop(reader.host, (-math.inf, b""))
-        if asyncio.get_running_loop().time() - asked <= 1.0:
+        if asyncio.get_running_loop().time() - asked <= KEPT_FOR:
             reader.write(dump)
 
     def _tell(self, host: str, dump: bytes) -> None:
@@ -218,8 +206,13 @@ class Emulator:
 
         Some ask first and connect then.
         """
-        readers = [one for one in self._readers if one.host == host and one.reads]
+        readers = self._doors["control_port"].of(host)
         for reader in readers:
             reader.write(dump)
         if not readers:
             self._unread = {host: (asyncio.get_running_loop().time(), dump)}
+
+
+def _refuse_files(connection: Connection) -> None:
+    connection.write(NO_FILES)
+    connection.end()

@@ -1,76 +1,19 @@
-"""The configuration of an emulated drone: which keys it has, and what it takes for them.
+"""The configuration of an emulated drone: what it takes for its keys.
 
-A number outside its range is taken as the nearest one inside; a value of the wrong kind, a key
-that can only be read and an unknown key change nothing and are not acknowledged. Whoever sets a
-limit has to read it back.
+A number outside its range is taken as the nearest one inside; a value of the wrong kind and a key
+that can only be read change nothing. Every key of the drone is acknowledged, also where nothing
+changes: the acknowledgement says that a setting was received. Whoever sets a limit has to read it
+back. A key that the drone does not have is not acknowledged.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
-from typing import Literal
 
-__all__ = ["NAVDATA_OPTIONS", "Settings"]
+from deadtime.links.ardrone2.emulator.configuration_keys import ENTRIES, LONGEST, NO_ID, Entry
 
-#: DEMO and VISION_DETECT.
-NAVDATA_OPTIONS = 65537
-
-#: No value is longer.
-LONGEST = 64
-
-NO_ID = "00000000"
-
-Kind = Literal["whole", "number", "truth", "text", "id", "fixed"]
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One key: its value when switched on, its kind, and its range where it is a number."""
-
-    value: str
-    kind: Kind = "fixed"
-    low: float = -math.inf
-    high: float = math.inf
-
-
-# Ranges of the developer guide; what it leaves open is wide.
-ENTRIES: dict[str, Entry] = {
-    "general:num_version_config": Entry("1"),
-    "general:num_version_soft": Entry("2.4.8"),
-    "general:drone_serial": Entry("EMULATED"),
-    "general:ardrone_name": Entry("deadtime emulator", "text"),
-    "general:navdata_demo": Entry("TRUE", "truth"),
-    "general:navdata_options": Entry(str(NAVDATA_OPTIONS), "whole", 0, 2**31 - 1),
-    "general:com_watchdog": Entry("2"),
-    "general:video_enable": Entry("TRUE", "truth"),
-    "general:vision_enable": Entry("TRUE", "truth"),
-    "control:control_level": Entry("0", "whole", 0, 3),
-    "control:euler_angle_max": Entry("2.0943952e-01", "number", 0.0, 0.52),
-    "control:altitude_max": Entry("3000", "whole", 500, 100_000),
-    "control:altitude_min": Entry("50", "whole", 50, 1000),
-    "control:control_vz_max": Entry("7.0000000e+02", "number", 200.0, 2000.0),
-    "control:control_yaw": Entry("1.7453293e+00", "number", 0.7, 6.11),
-    "control:outdoor": Entry("FALSE", "truth"),
-    "control:flight_without_shell": Entry("FALSE", "truth"),
-    "control:indoor_euler_angle_max": Entry("2.0943952e-01", "number", 0.0, 0.52),
-    "control:indoor_control_vz_max": Entry("7.0000000e+02", "number", 200.0, 2000.0),
-    "control:indoor_control_yaw": Entry("1.7453293e+00", "number", 0.7, 6.11),
-    "control:outdoor_euler_angle_max": Entry("3.4906584e-01", "number", 0.0, 0.52),
-    "control:outdoor_control_vz_max": Entry("1.0000000e+03", "number", 200.0, 2000.0),
-    "control:outdoor_control_yaw": Entry("3.4906585e+00", "number", 0.7, 6.11),
-    "control:flying_mode": Entry("0", "whole", 0, 3),
-    "video:video_codec": Entry("32", "whole", 0, 255),
-    "video:codec_fps": Entry("30", "whole", 15, 30),
-    "video:video_channel": Entry("0", "whole", 0, 3),
-    "video:bitrate_ctrl_mode": Entry("0", "whole", 0, 2),
-    "leds:leds_anim": Entry("0,0,0", "text"),
-    "detect:detect_type": Entry("3", "whole", 0, 13),
-    "custom:session_id": Entry(NO_ID, "id"),
-    "custom:profile_id": Entry(NO_ID, "id"),
-    "custom:application_id": Entry(NO_ID, "id"),
-}
+__all__ = ["IDS", "Settings"]
 
 IDS = ("custom:session_id", "custom:profile_id", "custom:application_id")
 
@@ -86,19 +29,22 @@ class Settings:
     >>> settings = Settings()
     >>> settings.set("control:control_vz_max", "9000"), settings.climb_limit
     (True, 2.0)
-    >>> settings.set("control:control_vz_max", "nan"), settings.set("control:flight_anim", "1,5")
-    (False, False)
+    >>> settings.set("control:control_vz_max", "nan"), settings.climb_limit
+    (True, 2.0)
+    >>> settings.set("control:control_vz_maximum", "500")
+    False
     """
 
     def __init__(self) -> None:
         self.values = {key: entry.value for key, entry in ENTRIES.items()}
 
     def set(self, key: str, value: str) -> bool:
-        """Take a value; False if it is not acknowledged."""
-        entry = ENTRIES.get(key)
-        told = None if entry is None else _taken(entry, value)
-        if told is None:
+        """Take a value if it is one; False if the drone has no such key."""
+        if key not in ENTRIES:
             return False
+        told = _taken(ENTRIES[key], value)
+        if told is None:
+            return True
         self.values[key] = told
         section, _, name = key.partition(":")
         if section == "control":

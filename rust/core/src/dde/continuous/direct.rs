@@ -79,10 +79,10 @@ pub(super) fn run<S: Scalar>(
         let before = cursor.value();
         let r = cursor.advance(t.value(), tolerance);
         if jumps {
-            wanted.input_break(t);
+            wanted.input_break(t)?;
             let struck = closed.impulse * S::from(r - before);
             if !struck.is_nothing() {
-                wanted.output_break(t);
+                wanted.output_break(t)?;
                 for (x, &b) in x.iter_mut().zip(&equations.b) {
                     *x += b * struck;
                 }
@@ -155,8 +155,8 @@ pub(super) fn run<S: Scalar>(
             held.unwrap_or_else(|| saturate(v.at((time - t) / h), limit))
         });
         if end < 1.0 {
-            wanted.input_break(next);
-            wanted.output_break(next);
+            wanted.input_break(next)?;
+            wanted.output_break(next)?;
         }
         expansion.end(S::from(end), &mut x);
         check_growth(&x, S::default(), next)?;

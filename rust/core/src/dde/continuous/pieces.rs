@@ -10,6 +10,7 @@ use std::collections::VecDeque;
 use crate::Error;
 use crate::dde::linear::slack;
 use crate::dde::scalar::{Scalar, is_reached, part_ways};
+use crate::memory::push_back;
 
 use super::series::Series;
 
@@ -175,7 +176,6 @@ impl<S: Scalar> Pieces<S> {
                         .to_owned(),
             });
         }
-        self.rest.push_back(piece);
-        Ok(())
+        push_back("the command in one delay", &mut self.rest, piece)
     }
 }

@@ -88,7 +88,7 @@ pub(super) fn run<S: Scalar>(
             (u, scale) = (Series::constant(u.coefficients[0]), S::from(1.0));
         }
         if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
-            wanted.output_break(t);
+            wanted.output_break(t)?;
         }
         if wanted.is_measured() {
             let y = expansion.output(equations, &w);
@@ -121,7 +121,7 @@ pub(super) fn run<S: Scalar>(
                 mode = stretch.mode;
             }
             if order <= REPORTED {
-                wanted.input_break(t + S::from(stretch.start) * h);
+                wanted.input_break(t + S::from(stretch.start) * h)?;
             }
             let last = stretch.end >= 1.0;
             pieces.push(Piece {

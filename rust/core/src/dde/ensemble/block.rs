@@ -78,6 +78,13 @@ pub(super) fn samples_in_delay(row: &Row<'_>, span: f64) -> Option<usize> {
 }
 
 impl Block {
+    /// No lane takes more samples than this for `span` seconds of its output.
+    pub(super) fn most_samples(&self, span: f64) -> usize {
+        let lanes = self.sample_time.iter().zip(&self.ahead);
+        let longest = lanes.map(|(step, ahead)| (span + ahead) / step);
+        self.samples + longest.fold(0.0, f64::max).ceil() as usize
+    }
+
     /// Of at most [`SETS`] sets that hold equally many samples; the last one fills the block up.
     pub(super) fn new(sets: &Sets<'_>, members: &[usize]) -> Result<Self, Error> {
         let n = sets.states;

@@ -1,25 +1,38 @@
 //! Outputs of the sets of a block at given times, on the lines that their responses consist of.
 
+use crate::Error;
 use crate::lanes::{Real, Simd};
+use crate::memory::{collected, room};
 
 use super::Outcome;
 use super::block::{Block, Column, SETS};
 use super::through::{Visitor, through};
 use super::walk::{Line, Sink, store};
 
+/// What memory is asked for.
+const RESPONSES: &str = "the sweep";
+
 /// Outputs of the first `count` sets at `times` after the start.
-pub(super) fn responses(block: &Block, count: usize, times: &[f64]) -> Vec<(Vec<f64>, Outcome)> {
+///
+/// # Errors
+/// [`Error::Memory`] alone.
+pub(super) fn responses(
+    block: &Block,
+    count: usize,
+    times: &[f64],
+) -> Result<Vec<(Vec<f64>, Outcome)>, Error> {
     let span = times.last().copied().unwrap_or(0.0);
+    room::<[Column; 4]>(RESPONSES, block.most_samples(span))?;
     let found = through(block, span, Corners::default());
     (0..count)
         .map(|lane| {
             if found.lost[lane] != 0.0 {
-                return (Vec::new(), Outcome::Diverged);
+                return Ok((Vec::new(), Outcome::Diverged));
             }
             let outputs = times
                 .iter()
                 .map(|t| found.at(block, lane, t + block.ahead[lane]));
-            (outputs.collect(), Outcome::Ok)
+            Ok((collected(RESPONSES, outputs)?, Outcome::Ok))
         })
         .collect()
 }

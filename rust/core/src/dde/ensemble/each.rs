@@ -4,6 +4,7 @@ use crate::dde::figures::{Criteria, Figures};
 use crate::dde::gauge::Gauge;
 use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory};
 use crate::dde::wanted::Wanted;
+use crate::memory::collected;
 use crate::{Error, Task};
 
 use super::{Outcome, Sets};
@@ -23,13 +24,13 @@ pub(super) fn figures(
     let end = [ahead + span];
     let mut steady = steady;
     if steady.is_nan() {
-        match run(sets, &plant, Wanted::new(&end, &[], 0.0), task)? {
+        match run(sets, &plant, Wanted::new(&end, &[], 0.0)?, task)? {
             Ok(found) => steady = found.outputs.last().copied().unwrap_or(f64::NAN),
             Err(outcome) => return Ok((Figures::UNKNOWN, outcome)),
         }
     }
     let mut gauge = Gauge::new(ahead, ahead + span, steady, *criteria);
-    let wanted = Wanted::new(&end, &[], 0.0).measured_by(&mut gauge);
+    let wanted = Wanted::new(&end, &[], 0.0)?.measured_by(&mut gauge);
     Ok(match run(sets, &plant, wanted, task)? {
         Ok(_) => judged(gauge.figures()),
         Err(outcome) => (Figures::UNKNOWN, outcome),
@@ -46,9 +47,9 @@ pub(super) fn response(
     let Some((plant, ahead)) = loop_of(sets, set)? else {
         return Ok((Vec::new(), Outcome::Refused));
     };
-    let times: Vec<f64> = times.iter().map(|t| t + ahead).collect();
+    let times = collected("the sweep", times.iter().map(|t| t + ahead))?;
     Ok(
-        match run(sets, &plant, Wanted::new(&times, &[], 0.0), task)? {
+        match run(sets, &plant, Wanted::new(&times, &[], 0.0)?, task)? {
             Ok(found) => (found.outputs, Outcome::Ok),
             Err(outcome) => (Vec::new(), outcome),
         },
@@ -84,7 +85,7 @@ fn run(
     let reference = Reference::step(0.0, sets.amplitude)?;
     match plant.serve(&start, &reference, wanted, task) {
         Ok(found) => Ok(Ok(found)),
-        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(error) if error.ends_all() => Err(error),
         Err(Error::Diverges { .. }) => Ok(Err(Outcome::Diverged)),
         Err(_) => Ok(Err(Outcome::Refused)),
     }

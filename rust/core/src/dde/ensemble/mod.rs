@@ -20,9 +20,19 @@ use rayon::prelude::*;
 
 use super::figures::{Criteria, Figures};
 use super::row::{Row, width};
+use crate::memory::{filled, push, reserved, room};
 use crate::{Error, Task};
 
 use block::Block;
+
+/// What memory is asked for.
+const SWEEP: &str = "the sweep";
+
+/// Results held before they are put in their places: enough to keep all threads busy.
+const AT_ONCE: usize = 1 << 14;
+
+/// Values of responses held so: no more than a share of what one array of results takes.
+const VALUES_AT_ONCE: usize = 1 << 22;
 
 /// What became of one set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -52,6 +62,9 @@ pub struct Sets<'a> {
     pub is_ahead: bool,
 }
 
+/// The whole samples in the delay of a set, and the set.
+type Alike = (usize, usize);
+
 impl<'a> Sets<'a> {
     /// How many.
     pub fn len(&self) -> usize {
@@ -74,59 +87,63 @@ impl<'a> Sets<'a> {
         if self.is_ahead { row.delay } else { 0.0 }
     }
 
-    /// Blocks of sets for the lanes, and the sets that are left, for responses of `span` seconds.
-    fn sorted(&self, span: f64) -> Result<(Vec<Vec<usize>>, Vec<usize>), Error> {
+    /// The sets for the lanes with the whole samples in their delay, those of equal numbers one
+    /// after the other, and the sets that are left, for responses of `span` seconds.
+    fn sorted(&self, span: f64) -> Result<(Vec<Alike>, Vec<usize>), Error> {
         let mut fit = Vec::new();
         let mut left = Vec::new();
         for set in 0..self.len() {
             match block::samples_in_delay(&self.row(set)?, span) {
-                Some(samples) => fit.push((samples, set)),
-                None => left.push(set),
+                Some(samples) => push(SWEEP, &mut fit, (samples, set))?,
+                None => push(SWEEP, &mut left, set)?,
             }
         }
         fit.sort_unstable();
-        let alike = fit.chunk_by(|one, other| one.0 == other.0);
-        let blocks = alike
-            .flat_map(|group| group.chunks(block::SETS))
-            .map(|block| block.iter().map(|&(_, set)| set).collect())
-            .collect();
-        Ok((blocks, left))
+        Ok((fit, left))
     }
 
     /// Work on all sets, `in_lanes` on blocks and `alone` on single ones; `keep` is given every
-    /// set with its result.
+    /// set with its result, after at most `at_once` of them were held.
     fn each<T: Send>(
         &self,
-        span: f64,
+        (span, at_once): (f64, usize),
         task: &Task,
-        in_lanes: impl Fn(&Block, &[usize]) -> Vec<T> + Sync,
+        in_lanes: impl Fn(&Block, &[usize]) -> Result<Vec<T>, Error> + Sync,
         alone: impl Fn(usize) -> Result<T, Error> + Sync,
         mut keep: impl FnMut(usize, T),
     ) -> Result<(), Error> {
-        let (blocks, left) = self.sorted(span)?;
-        let from_blocks: Vec<_> = blocks
-            .par_iter()
-            .map(|members| {
+        let (fit, left) = self.sorted(span)?;
+        let alike = fit.chunk_by(|one, other| one.0 == other.0);
+        let mut blocks = reserved(SWEEP, fit.len())?;
+        blocks.extend(alike.flat_map(|group| group.chunks(block::SETS)));
+        for group in blocks.chunks(at_once.div_ceil(block::SETS)) {
+            let work = |members: &&[Alike]| {
                 task.check()?;
-                let found = in_lanes(&Block::new(self, members)?, members);
-                task.advance(members.len() as u64);
+                let sets: Vec<usize> = members.iter().map(|&(_, set)| set).collect();
+                let found = in_lanes(&Block::new(self, &sets)?, &sets)?;
+                task.advance(sets.len() as u64);
                 Ok(found)
-            })
-            .collect::<Result<_, Error>>()?;
-        let from_rest: Vec<_> = left
-            .par_iter()
-            .map(|&set| {
+            };
+            let found: Result<Vec<_>, Error> = group.par_iter().map(work).collect();
+            let members = group.iter().copied().flatten();
+            let found = found?.into_iter().flatten();
+            members
+                .zip(found)
+                .for_each(|((_, set), found)| keep(*set, found));
+        }
+        for group in left.chunks(at_once) {
+            let work = |set: &usize| {
                 task.check()?;
-                let found = alone(set)?;
+                let found = alone(*set)?;
                 task.advance(1);
                 Ok(found)
-            })
-            .collect::<Result<_, Error>>()?;
-        let members = blocks.iter().flatten().chain(&left);
-        let found = from_blocks.into_iter().flatten().chain(from_rest);
-        members
-            .zip(found)
-            .for_each(|(&set, found)| keep(set, found));
+            };
+            let found: Result<Vec<_>, Error> = group.par_iter().map(work).collect();
+            group
+                .iter()
+                .zip(found?)
+                .for_each(|(set, found)| keep(*set, found));
+        }
         Ok(())
     }
 }
@@ -142,13 +159,14 @@ pub fn figures(
     task: &Task,
 ) -> Result<Vec<(Figures, Outcome)>, Error> {
     let goal = |set: usize| steady.get(set).copied().unwrap_or(f64::NAN);
-    let mut found = vec![(Figures::UNKNOWN, Outcome::Refused); sets.len()];
+    let mut found = filled(SWEEP, (Figures::UNKNOWN, Outcome::Refused), sets.len())?;
     sets.each(
-        span,
+        (span, AT_ONCE),
         task,
         |block, members| {
             let goals: Vec<f64> = members.iter().map(|&set| goal(set)).collect();
-            measured::figures(block, &goals, span, criteria)
+            room::<block::Column>(SWEEP, block.samples)?;
+            Ok(measured::figures(block, &goals, span, criteria))
         },
         |set| each::figures(sets, set, goal(set), span, criteria, task),
         |set, result| {
@@ -168,10 +186,11 @@ pub fn responses(
     task: &Task,
 ) -> Result<(Vec<f64>, Vec<Outcome>), Error> {
     let length = times.len();
-    let mut outputs = vec![f64::NAN; sets.len() * length];
-    let mut outcomes = vec![Outcome::Refused; sets.len()];
+    let mut outputs = filled(SWEEP, f64::NAN, sets.len().saturating_mul(length))?;
+    let mut outcomes = filled(SWEEP, Outcome::Refused, sets.len())?;
+    let span = times.last().copied().unwrap_or(0.0);
     sets.each(
-        times.last().copied().unwrap_or(0.0),
+        (span, (VALUES_AT_ONCE / length.max(1)).clamp(1, AT_ONCE)),
         task,
         |block, members| corners::responses(block, members.len(), times),
         |set| each::response(sets, set, times, task),

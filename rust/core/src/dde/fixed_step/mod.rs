@@ -16,6 +16,8 @@ mod prince_dormand;
 mod tableau;
 
 use crate::dde::linear::{Reference, check_growth, dot, saturate};
+use crate::dde::wanted::RESPONSE;
+use crate::memory::{reserved, room};
 use crate::{Error, Task};
 
 use buffer::Buffer;
@@ -107,6 +109,11 @@ pub fn run(
     task: &Task,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     check(blocks, settings, rest)?;
+    let lag = settings.delay / settings.step;
+    room::<[f64; 2]>(
+        "the buffer of the delay",
+        (lag as usize).min(settings.steps),
+    )?;
     let mut simulation = Simulation {
         blocks,
         settings,
@@ -116,7 +123,7 @@ pub fn run(
                 Path::Command => rest.command,
                 Path::Measurement => rest.output,
             },
-            settings.delay / settings.step,
+            lag,
         ),
         held: None,
         last: None,
@@ -128,7 +135,8 @@ pub fn run(
     let mut x = rest.state.clone();
     let mut stage = vec![0.0; n];
     let mut slopes = vec![0.0; n * formula.weights.len()];
-    let (mut outputs, mut inputs) = (Vec::new(), Vec::new());
+    let times = settings.steps.saturating_add(1);
+    let (mut outputs, mut inputs) = (reserved(RESPONSE, times)?, reserved(RESPONSE, times)?);
     for k in 0..=settings.steps {
         if k.is_multiple_of(CHECK_EVERY) {
             task.check()?;

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::dde::linear::{Equations, LinearLoop};
 use crate::status::CellStatus;
-use crate::{Error, Task};
+use crate::{Error, Task, memory};
 
 use super::transition::{Sample, check_size, eigenvalues};
 
@@ -69,14 +69,12 @@ pub fn abscissa_grid(
     } else {
         None
     };
-    let mut found = vec![
-        CellPoles {
-            abscissa: f64::NAN,
-            unstable: 0,
-            status: CellStatus::Undecided,
-        };
-        cells.cells
-    ];
+    let unknown = CellPoles {
+        abscissa: f64::NAN,
+        unstable: 0,
+        status: CellStatus::Undecided,
+    };
+    let mut found = memory::filled("the map", unknown, cells.cells)?;
     found
         .par_chunks_mut(CHUNK)
         .enumerate()

@@ -5,7 +5,8 @@ use crate::dde::linear::{
 };
 use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
-use crate::dde::wanted::Wanted;
+use crate::dde::wanted::{RESPONSE, Wanted};
+use crate::memory::push;
 use crate::{Error, Task};
 
 use super::Timing;
@@ -48,7 +49,7 @@ pub(crate) fn run<S: Scalar>(
     if phase > 0.0 {
         // The run begins inside the interval that follows sample −1.
         walk.held = S::from(cursor.value());
-        walk.partial(-1, sample_time - S::from(phase), S::default());
+        walk.partial(-1, sample_time - S::from(phase), S::default())?;
     }
     let mut k = 0_u64;
     while !walk.wanted.is_done() {
@@ -69,12 +70,12 @@ pub(crate) fn run<S: Scalar>(
         let arrived = walk.commands.at(index - walk.lag() - 1);
         let u = equations.command(&walk.x, arrived, walk.held.value());
         check_growth(&walk.x, u, now)?;
-        walk.commands.issue(saturate(u, plant.limit()));
+        walk.commands.issue(saturate(u, plant.limit()))?;
         if let Some(update) = plant.update() {
             walk.update(update, arrived);
         }
-        walk.wanted.input_break(now);
-        walk.interval(index, now);
+        walk.wanted.input_break(now)?;
+        walk.interval(index, now)?;
         k += 1;
     }
     Ok(walk.wanted.trajectory)
@@ -94,8 +95,8 @@ impl<'a, S: Scalar> Commands<'a, S> {
         }
     }
 
-    fn issue(&mut self, u: S) {
-        self.issued.push(u);
+    fn issue(&mut self, u: S) -> Result<(), Error> {
+        push(RESPONSE, &mut self.issued, u)
     }
 
     fn at(&self, k: i64) -> S {
@@ -134,7 +135,7 @@ impl<S: Scalar> Walk<'_, S> {
     }
 
     /// From sample `k` at time `now` to the next one.
-    fn interval(&mut self, k: i64, now: S) {
+    fn interval(&mut self, k: i64, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
         let (before, after) = (
@@ -153,13 +154,14 @@ impl<S: Scalar> Walk<'_, S> {
             std::mem::swap(&mut self.x, &mut self.scratch);
         }
         if before != after {
-            self.wanted.output_break(now + early);
+            self.wanted.output_break(now + early)?;
         }
         self.measure(after, now + early, |windows| &windows.late);
         self.serve(after, now + early, (now + early + late).value() - tolerance);
         self.late
             .apply(&self.x, &[after, self.held], &mut self.scratch);
         std::mem::swap(&mut self.x, &mut self.scratch);
+        Ok(())
     }
 
     /// Move the states that move at samples.
@@ -176,7 +178,7 @@ impl<S: Scalar> Walk<'_, S> {
     }
 
     /// From `into` seconds after sample `k` (at time `now`) to the next one.
-    fn partial(&mut self, k: i64, into: S, now: S) {
+    fn partial(&mut self, k: i64, into: S, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
         let (before, after) = (
@@ -191,11 +193,12 @@ impl<S: Scalar> Walk<'_, S> {
             let switch = now + (early - into);
             self.serve(before, at, switch.value() - tolerance);
             self.jump(switch - at, before);
-            self.wanted.output_break(switch);
+            self.wanted.output_break(switch)?;
             at = switch;
         }
         self.serve(after, at, end.value() - tolerance);
         self.jump(end - at, after);
+        Ok(())
     }
 
     /// x over a step of any length under constant w.

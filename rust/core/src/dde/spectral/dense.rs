@@ -83,6 +83,7 @@ impl Factors {
 }
 
 /// Σ a_i b_i in four partial sums.
+#[inline]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a4, a1) = a.as_chunks::<4>();
     let (b4, b1) = b.as_chunks::<4>();
@@ -94,6 +95,14 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     let rest: f64 = a1.iter().zip(b1).map(|(a, b)| a * b).sum();
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// Add a multiple of one vector to another.
+#[inline]
+pub(super) fn add_multiple(out: &mut [f64], factor: f64, vector: &[f64]) {
+    for (out, entry) in out.iter_mut().zip(vector) {
+        *out += factor * entry;
+    }
 }
 
 #[cfg(test)]

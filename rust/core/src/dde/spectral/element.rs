@@ -81,6 +81,14 @@ pub(super) struct Begin<'a> {
 }
 
 impl Element {
+    /// Workspace that begins with what is known of the Jacobian.
+    pub(super) fn new(newton: Newton) -> Self {
+        Self {
+            newton,
+            ..Self::default()
+        }
+    }
+
     /// Place the element and read its past.
     pub(super) fn set(
         &mut self,
@@ -184,8 +192,10 @@ impl Element {
             if let Some(bad) = self.f.iter().position(|f| !f.is_finite()) {
                 return Ok(Sweeps::NotFinite(bad % n));
             }
-            if count == 1 && !self.newton.is_on() && equation.is_costly() {
+            let first_of_all = count == 1 && !self.newton.is_on() && equation.is_costly();
+            if first_of_all && self.newton.comes_first(problem.dim()) {
                 self.linearise(equation, task)?;
+                self.newton.wait_if_full();
             }
             self.residual(nodes, half);
             if self.newton.is_on() && !self.newton.solve(nodes, half, &mut self.residual) {
@@ -236,11 +246,9 @@ impl Element {
             z: &self.z,
             dz: &self.dz,
         };
-        self.calls += 1;
-        self.evaluated += (self.y.len() / self.t.len()) as u64;
         self.seen = None;
         self.newton
-            .evaluate(equation, at, &self.f, node, &self.delayed, task)
+            .evaluate(equation, at, node, &self.delayed, task)
     }
 
     /// Evaluate the Jacobian at the start, where the iterate is right whatever became of the sweeps.

@@ -1,16 +1,34 @@
 //! Zeros of event functions along accepted elements.
 //!
-//! An event is looked for between neighbouring nodes and found by false position and bisection on
-//! the polynomial, to rounding. A zero at a node counts when the function was not
-//! zero before; a function that is zero at the start has no event there. Two zeros between
-//! neighbouring nodes are missed.
+//! On the polynomial of an element an event is a function of time alone. It is sampled at the nodes
+//! and interpolated; where the interpolant explains four further samples to rounding, its zeros are
+//! taken apart, so that an event that is linear in y loses none. Where it does not, the element is
+//! halved, up to 32 parts of 25 samples; what is not smooth even there is searched between samples.
+//! An event is where the function reaches zero or changes its sign, also through a change of y at a
+//! jump; one that is zero at the start has none there, and one that only touches zero has none
+//! unless a sample meets it. The time is found by false position and bisection, to rounding.
+
+use std::ops::Range;
 
 use super::super::history::Piece;
+use super::isolate::separators;
+use super::nodes::{Nodes, nodes};
 use super::{Equation, Event};
 use crate::Error;
+use crate::dde::chebyshev;
 
 /// A false position is close to an end of its bracket within this part of it.
 const CLOSE: f64 = 0.01;
+/// Where an interpolant is held against the function.
+const CHECKED: [f64; 4] = [-0.891_37, -0.314_59, 0.271_83, 0.857_21];
+/// Difference there, relative to the coefficients, that is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Difference that is noise if halving does not lessen it.
+const NOISE: f64 = 1e-6;
+/// Part of a difference that is left when halving lessens it.
+const LESSENED: f64 = 0.25;
+/// Halvings of an element.
+const DEEPEST: u32 = 5;
 
 /// The event functions of a run and what was found.
 #[derive(Debug, Default)]
@@ -28,6 +46,18 @@ struct Crossing {
     value: Vec<f64>,
 }
 
+/// A time and the value of an event there.
+type Mark = (f64, f64);
+
+/// A part of an element.
+struct Part {
+    start: f64,
+    end: f64,
+    halvings: u32,
+    /// What the interpolant of twice the part was wrong by.
+    before: f64,
+}
+
 impl Watch {
     /// Watch events from the start of a run.
     pub(super) fn new<E: Equation + ?Sized>(
@@ -38,114 +68,247 @@ impl Watch {
     ) -> Result<Self, Error> {
         let mut watch = Self {
             kinds: kinds.to_vec(),
-            last: Vec::new(),
+            last: vec![0.0; kinds.len()],
             times: vec![Vec::new(); kinds.len()],
             values: vec![Vec::new(); kinds.len()],
         };
-        watch.restart(equation, t, y)?;
+        if !kinds.is_empty() {
+            equation.events(t, y, 0..kinds.len(), &mut watch.last)?;
+        }
         Ok(watch)
     }
 
-    /// Evaluate anew where y was changed.
-    pub(super) fn restart<E: Equation + ?Sized>(
+    /// Look at what a change of y did; whether it ends the run.
+    pub(super) fn change<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
         t: f64,
         y: &[f64],
-    ) -> Result<(), Error> {
-        self.last = vec![0.0; self.kinds.len()];
+    ) -> Result<bool, Error> {
         if self.kinds.is_empty() {
-            return Ok(());
+            return Ok(false);
         }
-        equation.events(t, y, &mut self.last)
+        let mut here = vec![0.0; self.kinds.len()];
+        equation.events(t, y, 0..self.kinds.len(), &mut here)?;
+        let pairs = self.last.iter().zip(&here).zip(&self.kinds).enumerate();
+        let crossings = pairs
+            .filter(|(_, ((before, after), kind))| crosses(kind.direction, **before, **after))
+            .map(|(event, _)| Crossing {
+                time: t,
+                event,
+                value: y.to_vec(),
+            });
+        let found = crossings.collect();
+        self.last = here;
+        Ok(self.take(found).is_some())
     }
 
-    /// Look at an element with nodes `t` and values `y` (component, node); the time of a terminal
-    /// event ends the run.
+    /// Note crossings in the order of time; the time of a terminal one.
+    fn take(&mut self, mut found: Vec<Crossing>) -> Option<f64> {
+        found.sort_by(|a, b| a.time.total_cmp(&b.time));
+        let mut stop = None;
+        for crossing in found {
+            if stop.is_some_and(|stop| crossing.time > stop) {
+                break;
+            }
+            self.times[crossing.event].push(crossing.time);
+            self.values[crossing.event].extend(crossing.value);
+            let terminal = self.kinds[crossing.event].terminal as usize;
+            if terminal > 0 && self.times[crossing.event].len() >= terminal {
+                stop = Some(crossing.time);
+            }
+        }
+        stop
+    }
+
+    /// Look at an element with values `y` (component, node); the time of a terminal event ends the
+    /// run.
     pub(super) fn scan<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
         piece: &Piece,
+        nodes: &Nodes,
         y: &[f64],
-        t: &[f64],
     ) -> Result<Option<f64>, Error> {
-        if self.kinds.is_empty() {
+        let (count, n) = (self.kinds.len(), nodes.order + 1);
+        if count == 0 {
             return Ok(None);
         }
-        let n = t.len();
-        let mut found = Vec::new();
-        let mut here = vec![0.0; self.kinds.len()];
+        // Row by row: the samples at the nodes, then those that check them.
+        let mut samples = self.last.clone();
         let mut column = vec![0.0; y.len() / n];
         for node in 1..n {
             for (value, row) in column.iter_mut().zip(y.chunks_exact(n)) {
                 *value = row[node];
             }
-            equation.events(t[node], &column, &mut here)?;
-            for (event, &after) in here.iter().enumerate() {
-                let before = self.last[event];
-                if crosses(self.kinds[event].direction, before, after) {
-                    let bracket = ((t[node - 1], before), (t[node], after));
-                    let (time, value) = self.refine(equation, piece, event, bracket)?;
+            let time = time_at(piece.start, piece.end, nodes.points[node]);
+            let first = samples.len();
+            samples.resize(first + count, 0.0);
+            equation.events(time, &column, 0..count, &mut samples[first..])?;
+        }
+        for x in CHECKED {
+            let time = time_at(piece.start, piece.end, x);
+            piece.value(time, &mut column);
+            let first = samples.len();
+            samples.resize(first + count, 0.0);
+            equation.events(time, &column, 0..count, &mut samples[first..])?;
+        }
+        let mut found = Vec::new();
+        for event in 0..count {
+            let own: Vec<f64> = samples[event..].iter().step_by(count).copied().collect();
+            let part = Part {
+                start: piece.start,
+                end: piece.end,
+                halvings: 0,
+                before: f64::INFINITY,
+            };
+            let mut seen = vec![(piece.start, self.last[event])];
+            self.divide(equation, piece, event, (part, nodes, own), &mut seen)?;
+            for pair in seen.windows(2) {
+                if crosses(self.kinds[event].direction, pair[0].1, pair[1].1) {
+                    let (time, value) = refine(equation, piece, event, (pair[0], pair[1]))?;
                     found.push(Crossing { time, event, value });
                 }
             }
-            self.last.copy_from_slice(&here);
+            self.last[event] = samples[(n - 1) * count + event];
         }
-        found.sort_by(|a, b| a.time.total_cmp(&b.time));
-        for crossing in found {
-            self.times[crossing.event].push(crossing.time);
-            self.values[crossing.event].extend(crossing.value);
-            let terminal = self.kinds[crossing.event].terminal as usize;
-            if terminal > 0 && self.times[crossing.event].len() >= terminal {
-                return Ok(Some(crossing.time));
-            }
-        }
-        Ok(None)
+        Ok(self.take(found))
     }
 
-    /// The zero of one event in a bracket.
-    fn refine<E: Equation + ?Sized>(
+    /// Append marks between which the event has no more than one zero, as far as it is smooth.
+    fn divide<E: Equation + ?Sized>(
         &self,
         equation: &mut E,
         piece: &Piece,
         event: usize,
-        ((mut a, mut fa), (mut b, mut fb)): ((f64, f64), (f64, f64)),
-    ) -> Result<(f64, Vec<f64>), Error> {
-        let dim = piece.coefficients.len() / piece.terms;
-        let mut y = vec![0.0; dim];
-        let mut all = vec![0.0; self.kinds.len()];
-        // A false position close to an end is pushed away from it to twice the distance: most often
-        // beyond the zero, so that the bracket closes on it. Every fourth step bisects, so that it
-        // shrinks whatever the function is.
-        for round in 0..240 {
-            let middle = 0.5 * (a + b);
-            if fb == 0.0 || middle <= a || middle >= b {
-                break;
-            }
-            let secant = a - fa * ((b - a) / (fb - fa));
-            let (left, right) = (secant - a, b - secant);
-            let rounding = f64::EPSILON * b.abs();
-            let time = if round % 4 == 3 || !(left >= 0.0 && right >= 0.0) {
-                middle
-            } else if left < CLOSE * (b - a) {
-                (a + 2.0 * left + rounding).clamp(a.next_up(), b.next_down())
-            } else if right < CLOSE * (b - a) {
-                (b - 2.0 * right - rounding).clamp(a.next_up(), b.next_down())
-            } else {
-                secant
+        (whole, own, first): (Part, &Nodes, Vec<f64>),
+        seen: &mut Vec<Mark>,
+    ) -> Result<(), Error> {
+        let mut sampler = Sampler {
+            piece,
+            event,
+            y: vec![0.0; piece.coefficients.len() / piece.terms],
+        };
+        let mut open = vec![(whole, Some(first))];
+        let mut coefficients = Vec::new();
+        let mut places = Vec::new();
+        while let Some((part, given)) = open.pop() {
+            let table = if given.is_some() { own } else { nodes(24) };
+            let n = table.order + 1;
+            let samples = match given {
+                Some(samples) => samples,
+                None => {
+                    let places = table.points.iter().chain(&CHECKED);
+                    places
+                        .map(|x| sampler.at(equation, time_at(part.start, part.end, *x)))
+                        .collect::<Result<Vec<f64>, Error>>()?
+                }
             };
-            piece.value(time, &mut y);
-            equation.events(time, &y, &mut all)?;
-            let value = all[event];
-            if (value < 0.0) == (fa < 0.0) && value != 0.0 {
-                (a, fa) = (time, value);
+            coefficients.resize(n, 0.0);
+            table.coefficients(&samples[..n], &mut coefficients);
+            let size: f64 = coefficients.iter().map(|c| c.abs()).sum();
+            let pairs = CHECKED.iter().zip(&samples[n..]);
+            let wrong = pairs.fold(0.0_f64, |worst, (x, value)| {
+                worst.max((chebyshev::value(&coefficients, *x) - value).abs())
+            });
+            let noise = wrong <= NOISE * size && wrong > LESSENED * part.before;
+            if wrong <= ROUNDING * size || noise {
+                places.clear();
+                separators(&coefficients, &mut places);
+                for x in places.iter().filter(|x| x.abs() < 1.0) {
+                    let time = time_at(part.start, part.end, *x);
+                    seen.push((time, sampler.at(equation, time)?));
+                }
+                seen.push((part.end, samples[n - 1]));
+            } else if part.halvings < DEEPEST {
+                let middle = 0.5 * (part.start + part.end);
+                for (start, end) in [(middle, part.end), (part.start, middle)] {
+                    let (halvings, before) = (part.halvings + 1, wrong);
+                    let half = Part {
+                        start,
+                        end,
+                        halvings,
+                        before,
+                    };
+                    open.push((half, None));
+                }
             } else {
-                (b, fb) = (time, value);
+                let times = table.points.iter().skip(1);
+                let marks = times.map(|x| time_at(part.start, part.end, *x));
+                seen.extend(marks.zip(samples[1..n].iter().copied()));
             }
         }
-        piece.value(b, &mut y);
-        Ok((b, y))
+        Ok(())
     }
+}
+
+/// One event along one element.
+struct Sampler<'a> {
+    piece: &'a Piece,
+    event: usize,
+    y: Vec<f64>,
+}
+
+impl Sampler<'_> {
+    fn at<E: Equation + ?Sized>(&mut self, equation: &mut E, time: f64) -> Result<f64, Error> {
+        let mut value = [0.0];
+        self.piece.value(time, &mut self.y);
+        equation.events(time, &self.y, only(self.event), &mut value)?;
+        Ok(value[0])
+    }
+}
+
+fn only(event: usize) -> Range<usize> {
+    event..event + 1
+}
+
+/// The time at a place of [−1, 1], exact at its ends.
+fn time_at(start: f64, end: f64, x: f64) -> f64 {
+    if x <= 0.0 {
+        start + 0.5 * (end - start) * (1.0 + x)
+    } else {
+        end - 0.5 * (end - start) * (1.0 - x)
+    }
+}
+
+/// The zero of one event in a bracket.
+fn refine<E: Equation + ?Sized>(
+    equation: &mut E,
+    piece: &Piece,
+    event: usize,
+    ((mut a, mut fa), (mut b, mut fb)): ((f64, f64), (f64, f64)),
+) -> Result<(f64, Vec<f64>), Error> {
+    let y = vec![0.0; piece.coefficients.len() / piece.terms];
+    let mut sampler = Sampler { piece, event, y };
+    // A false position close to an end is pushed away from it to twice the distance: most often
+    // beyond the zero, so that the bracket closes on it. Every fourth step bisects, so that it
+    // shrinks whatever the function is.
+    for round in 0..240 {
+        let middle = 0.5 * (a + b);
+        if fb == 0.0 || middle <= a || middle >= b {
+            break;
+        }
+        let secant = a - fa * ((b - a) / (fb - fa));
+        let (left, right) = (secant - a, b - secant);
+        let rounding = f64::EPSILON * b.abs();
+        let time = if round % 4 == 3 || !(left >= 0.0 && right >= 0.0) {
+            middle
+        } else if left < CLOSE * (b - a) {
+            (a + 2.0 * left + rounding).clamp(a.next_up(), b.next_down())
+        } else if right < CLOSE * (b - a) {
+            (b - 2.0 * right - rounding).clamp(a.next_up(), b.next_down())
+        } else {
+            secant
+        };
+        let value = sampler.at(equation, time)?;
+        if (value < 0.0) == (fa < 0.0) && value != 0.0 {
+            (a, fa) = (time, value);
+        } else {
+            (b, fb) = (time, value);
+        }
+    }
+    piece.value(b, &mut sampler.y);
+    Ok((b, sampler.y))
 }
 
 /// Whether a change from `before` to `after` is a crossing in a wanted direction.

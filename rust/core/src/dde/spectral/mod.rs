@@ -11,22 +11,30 @@
 //! Not guaranteed: the estimates are local, as in every method of this kind; how errors of the
 //! past grow is the equation's affair.
 
+mod banded;
 mod control;
 mod delayed;
 mod dense;
 mod element;
 mod events;
 mod fit;
+mod isolate;
+mod jacobian;
 mod newton;
 mod nodes;
 mod output;
 mod run;
+mod shifted;
+mod sparsity;
 #[cfg(test)]
 mod tests;
 mod unread;
 
 pub use fit::{Approximation, approximate};
 pub use run::solve;
+pub use sparsity::Sparsity;
+
+use std::ops::Range;
 
 use super::breaks::BreakingPoint;
 use super::history::{History, Piece};
@@ -55,8 +63,14 @@ pub trait Equation {
         false
     }
 
-    /// The event functions at a time.
-    fn events(&mut self, _t: f64, _y: &[f64], _out: &mut [f64]) -> Result<(), Error> {
+    /// Some of the event functions at a time.
+    fn events(
+        &mut self,
+        _t: f64,
+        _y: &[f64],
+        _which: Range<usize>,
+        _out: &mut [f64],
+    ) -> Result<(), Error> {
         Ok(())
     }
 
@@ -115,6 +129,10 @@ pub struct Problem {
     pub times: Option<Vec<f64>>,
     /// Keep every piece instead of those that a delay still reaches.
     pub keep: bool,
+    /// Which components the right-hand side depends on; found by differences where it is wanted.
+    pub sparsity: Option<Sparsity>,
+    /// Elements tried at most, accepted or not.
+    pub most: Option<u64>,
 }
 
 /// How a run ended.
@@ -128,6 +146,8 @@ pub enum Outcome {
     Shrunk(f64),
     /// The right-hand side is not finite from this time on.
     NotFinite(f64),
+    /// As many elements as allowed were tried by this time.
+    TooMany(f64),
 }
 
 /// A solution.

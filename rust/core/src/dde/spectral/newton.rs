@@ -1,39 +1,51 @@
 //! Simplified Newton steps for the collocation equations.
 //!
 //! The residual R of Y = y_0 + (h/2) B F(Y) is answered by δ with (I − (h/2) B ⊗ J) δ = R, where
-//! J = ∂f/∂y by forward differences at one node, together with ∂f/∂z for delays shorter than the
-//! element. With J = 0 this is a sweep of Picard's. Only the diagonal of J enters where it carries
-//! nearly all of J or where the full system would be too large; a system a component is then left.
-//! Factors serve all sweeps, and all elements of the same length and order.
+//! J = ∂f/∂y at one node, together with ∂f/∂z for delays shorter than the element. With J = 0 this
+//! is a sweep of Picard's. Where the diagonal of J carries nearly all of it, or its factors would
+//! be too large, a real system a component is left. A small system is solved whole; of a large one
+//! the eigenvalues of B make complex ones of the size of J. Factors serve all sweeps, and all
+//! elements of the same length and order.
 
 use super::delayed::Delayed;
-use super::dense::{Factors, dot};
+use super::dense::{Factors, add_multiple, dot};
+use super::jacobian::{Differences, Jacobian, Point};
 use super::nodes::Nodes;
+use super::shifted::Shifted;
+use super::sparsity::Sparsity;
 use super::{Columns, Equation};
 use crate::{Error, Task};
 
-/// Unknowns of a full system.
-const FULL: usize = 320;
 /// Off-diagonal part of J, relative to its diagonal, that is left to the sweeps.
 const OFF_DIAGONAL: f64 = 1e-3;
 
+/// Unknowns of a system that is solved whole.
+const WHOLE: usize = 100;
 /// Components with one system from which on its inverse pays.
 const SHARED: usize = 14;
+/// Columns up to which a Jacobian costs no more than a sweep or two.
+const CHEAP: usize = 32;
+/// Columns up to which the first Jacobian is worth a look at what it is like.
+const WORTH_A_LOOK: usize = 260;
 
 /// The linearisation of a run as it stands.
 #[derive(Debug, Default)]
 pub(super) struct Newton {
-    jacobian: Vec<f64>,
-    diagonal: bool,
+    jacobian: Option<Jacobian>,
+    differences: Differences,
+    /// The diagonal, where it is all that enters.
+    diagonal: Option<Vec<f64>>,
     /// (h/2, order) of the factors.
     key: Option<(f64, usize)>,
-    full: Option<Factors>,
+    whole: Option<Factors>,
+    shifted: Option<Shifted>,
     /// One system for each different entry of the diagonal.
     single: Vec<Single>,
     known: Vec<f64>,
     /// Elements since J was evaluated.
     pub(super) age: u32,
-    scratch: Columned,
+    /// J is full and large: it waits until sweeps without it fail.
+    waits: bool,
 }
 
 /// The system of all components with one entry of the diagonal.
@@ -45,114 +57,117 @@ struct Single {
     inverse: Option<Vec<f64>>,
 }
 
-/// Arguments for the differences: one column a component.
-#[derive(Debug, Default)]
-struct Columned {
-    t: Vec<f64>,
-    y: Vec<f64>,
-    z: Vec<f64>,
-    dz: Vec<f64>,
-    f: Vec<f64>,
-    steps: Vec<f64>,
-}
-
 impl Newton {
+    /// No Jacobian yet, but perhaps its pattern.
+    pub(super) fn new(pattern: Option<&Sparsity>) -> Self {
+        Self {
+            differences: Differences::given(pattern),
+            ..Self::default()
+        }
+    }
+
     /// Whether there is a Jacobian.
     pub(super) fn is_on(&self) -> bool {
-        !self.jacobian.is_empty()
+        self.jacobian.is_some()
     }
 
     /// Forget the Jacobian.
     pub(super) fn turn_off(&mut self) {
-        self.jacobian.clear();
+        self.jacobian = None;
         self.key = None;
     }
 
-    /// Differences at `node` of the element whose arguments are `at` and whose slopes are `f`.
+    /// Whether a Jacobian of so many components costs little.
+    pub(super) fn is_cheap(&self, dim: usize) -> bool {
+        self.differences.cost(dim) <= CHEAP
+    }
+
+    /// Whether the first sweep should have one, where calls cost more than nodes.
+    pub(super) fn comes_first(&self, dim: usize) -> bool {
+        !self.waits && self.differences.cost(dim) <= WORTH_A_LOOK
+    }
+
+    /// Leave a Jacobian whose factors cost much until sweeps without it fail.
+    pub(super) fn wait_if_full(&mut self) {
+        let dense = |jacobian: &Jacobian| Shifted::is_full(jacobian);
+        let costly = self.diagonal.is_none() && self.jacobian.as_ref().is_some_and(dense);
+        if costly && !self.is_cheap(self.jacobian.as_ref().map_or(0, Jacobian::dim)) {
+            self.turn_off();
+            self.waits = true;
+        }
+    }
+
+    /// Calls for Jacobians so far, and columns in them.
+    pub(super) fn spent(&self) -> (u64, u64) {
+        (self.differences.calls, self.differences.columns)
+    }
+
+    /// Differences at `node` of an element of this order whose arguments are `at`.
     pub(super) fn evaluate<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
         at: Columns<'_>,
-        f: &[f64],
         node: usize,
         delayed: &Delayed,
         task: &Task,
     ) -> Result<bool, Error> {
         let n = at.t.len();
         let dim = at.y.len() / n;
-        let work = &mut self.scratch;
-        work.t.clear();
-        work.t.resize(dim, at.t[node]);
-        let spread = |values: &[f64], out: &mut Vec<f64>| {
-            out.clear();
-            for row in values.chunks_exact(n) {
-                out.extend(std::iter::repeat_n(row[node], dim));
-            }
-        };
-        spread(at.y, &mut work.y);
-        spread(at.z, &mut work.z);
-        spread(at.dz, &mut work.dz);
-        work.steps.clear();
-        for d in 0..dim {
-            let row = &at.y[d * n..(d + 1) * n];
+        let pick =
+            |values: &[f64]| -> Vec<f64> { values.chunks_exact(n).map(|row| row[node]).collect() };
+        let (y, z, dz) = (pick(at.y), pick(at.z), pick(at.dz));
+        let steps = at.y.chunks_exact(n).zip(&y).map(|(row, y)| {
             let size = row.iter().fold(1e-3_f64, |size, y| size.max(y.abs()));
-            let step = f64::EPSILON.sqrt() * size;
-            let moved = row[node] + step;
-            work.steps.push(moved - row[node]);
-            work.y[d * dim + d] = moved;
-            for j in 0..at.z.len() / (dim * n) {
-                if delayed.reaches_itself(j) {
-                    work.z[(j * dim + d) * dim + d] += step;
-                }
-            }
-        }
-        work.f.clear();
-        work.f.resize(dim * dim, 0.0);
-        let columns = Columns {
-            t: &work.t,
-            y: &work.y,
-            z: &work.z,
-            dz: &work.dz,
+            (y + f64::EPSILON.sqrt() * size) - y
+        });
+        let inner = (0..at.z.len() / at.y.len()).map(|delay| delayed.reaches_itself(delay));
+        let point = Point {
+            t: at.t[node],
+            y: &y,
+            z: &z,
+            dz: &dz,
+            steps: &steps.collect::<Vec<f64>>(),
+            inner: &inner.collect::<Vec<bool>>(),
         };
-        equation.slope(columns, &mut work.f, task)?;
-        self.jacobian.clear();
-        for i in 0..dim {
-            for d in 0..dim {
-                let difference = work.f[i * dim + d] - f[i * n + node];
-                self.jacobian.push(difference / work.steps[d]);
-            }
-        }
+        self.jacobian = self.differences.jacobian(equation, &point, task)?;
         self.key = None;
         self.age = 0;
-        if self.jacobian.iter().any(|entry| !entry.is_finite()) {
-            self.turn_off();
+        let Some(jacobian) = &self.jacobian else {
             return Ok(false);
-        }
+        };
+        let mut diagonal = vec![0.0; dim];
         let (mut on, mut off) = (0.0_f64, 0.0_f64);
-        for (at, entry) in self.jacobian.iter().enumerate() {
-            if at % (dim + 1) == 0 {
-                on = on.max(entry.abs());
+        for (row, column, value) in jacobian.entries() {
+            if row == column {
+                diagonal[row] = value;
+                on = on.max(value.abs());
             } else {
-                off = off.max(entry.abs());
+                off = off.max(value.abs());
             }
         }
-        self.diagonal = off <= OFF_DIAGONAL * on || dim * n > FULL;
+        let alone = off <= OFF_DIAGONAL * on || !Shifted::fits(jacobian, n - 1);
+        self.diagonal = alone.then_some(diagonal);
         Ok(true)
     }
 
     /// Turn the residual (component, node) into the step δ; `false` where the system is singular.
     pub(super) fn solve(&mut self, nodes: &Nodes, half: f64, residual: &mut [f64]) -> bool {
         let order = nodes.order;
-        if self.key != Some((half, order)) && !self.factorise(nodes, half, residual.len() / order) {
+        if self.key != Some((half, order)) && !self.factorise(nodes, half) {
             return false;
         }
-        if let Some(full) = &self.full {
-            full.solve(residual);
+        if let Some(whole) = &self.whole {
+            whole.solve(residual);
             return true;
         }
-        let dim = residual.len() / order;
-        for (d, residual) in residual.chunks_exact_mut(order).enumerate() {
-            let entry = self.jacobian[d * dim + d];
+        let diagonal = match (&self.diagonal, &self.shifted, &self.jacobian) {
+            (Some(diagonal), _, _) => diagonal,
+            (None, Some(shifted), Some(jacobian)) => {
+                return shifted.solve(jacobian, nodes, half, residual);
+            }
+            _ => return false,
+        };
+        for (&entry, residual) in diagonal.iter().zip(residual.chunks_exact_mut(order)) {
             let single = self.single.iter().find(|one| close(one.slope, entry));
             match single.map(|one| (&one.factors, &one.inverse)) {
                 Some((_, Some(inverse))) => {
@@ -169,23 +184,25 @@ impl Newton {
         true
     }
 
-    fn factorise(&mut self, nodes: &Nodes, half: f64, dim: usize) -> bool {
+    fn factorise(&mut self, nodes: &Nodes, half: f64) -> bool {
         let order = nodes.order;
         self.key = None;
-        self.full = None;
+        self.whole = None;
+        self.shifted = None;
         self.single.clear();
         let entry = |i: usize, j: usize, slope: f64| {
             let identity = if i == j { 1.0 } else { 0.0 };
             identity - half * nodes.integrate[i * order + j] * slope
         };
-        if self.diagonal {
-            for d in 0..dim {
-                let slope = self.jacobian[d * dim + d];
+        if let Some(diagonal) = &self.diagonal {
+            for &slope in diagonal {
                 if self.single.iter().any(|one| close(one.slope, slope)) {
                     continue;
                 }
-                let diagonal = self.jacobian.iter().step_by(dim + 1);
-                let sharing = diagonal.filter(|other| close(**other, slope)).count();
+                let sharing = diagonal
+                    .iter()
+                    .filter(|other| close(**other, slope))
+                    .count();
                 let size = order * order;
                 let matrix = (0..size).map(|at| entry(at / order, at % order, slope));
                 let Some(factors) = Factors::new(order, matrix.collect()) else {
@@ -198,21 +215,30 @@ impl Newton {
                     inverse,
                 });
             }
-        } else {
-            let size = dim * order;
-            let mut matrix = Vec::with_capacity(size * size);
-            for row in 0..size {
-                for column in 0..size {
-                    let slope = self.jacobian[row / order * dim + column / order];
-                    let identity = if row == column { 1.0 } else { 0.0 };
-                    let weight = nodes.integrate[row % order * order + column % order];
-                    matrix.push(identity - half * weight * slope);
+        } else if let Some(jacobian) = &self.jacobian
+            && jacobian.dim() * order <= WHOLE
+        {
+            let size = jacobian.dim() * order;
+            let mut matrix = vec![0.0; size * size];
+            matrix
+                .iter_mut()
+                .step_by(size + 1)
+                .for_each(|one| *one = 1.0);
+            for (row, column, value) in jacobian.entries() {
+                for (i, weights) in nodes.integrate.chunks_exact(order).enumerate() {
+                    let at = (row * order + i) * size + column * order;
+                    add_multiple(&mut matrix[at..at + order], -half * value, weights);
                 }
             }
-            let Some(factors) = Factors::new(size, matrix) else {
+            self.whole = Factors::new(size, matrix);
+            if self.whole.is_none() {
                 return false;
-            };
-            self.full = Some(factors);
+            }
+        } else if let Some(jacobian) = &self.jacobian {
+            self.shifted = Shifted::new(jacobian, nodes, half);
+            if self.shifted.is_none() {
+                return false;
+            }
         }
         self.key = Some((half, order));
         true

@@ -5,6 +5,7 @@ use super::super::history::Piece;
 use super::control::{self, Verdict};
 use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
+use super::newton::Newton;
 use super::nodes::{Nodes, nodes};
 use super::output::Output;
 use super::unread::{Reading, Unread};
@@ -22,6 +23,10 @@ const EQUAL: f64 = 4.0;
 const MANY_SWEEPS: u32 = 12;
 /// Sweeps from which on a Jacobian is evaluated anew.
 const STALE_SWEEPS: u32 = 4;
+/// Sweeps by Picard's from which on elements grow no longer.
+const SLOW_SWEEPS: u32 = 16;
+/// A solution that takes this part of the coefficients at hand, or less, is smooth.
+const FEW_TERMS: usize = 4;
 /// Shortening where sweeps stall or the right-hand side is not finite.
 const RETREAT: f64 = 0.3;
 /// An element that holds its own delayed values takes many sweeps: it must be this many delays long
@@ -69,6 +74,8 @@ struct Run<'a> {
     order: usize,
     preferred: usize,
     shortest_delay: f64,
+    /// The longest element on which sweeps without a Jacobian failed since the last good one.
+    stalled: f64,
     /// Elements until one longer than a delay is tried, and how many it was last time.
     wait: (u32, u32),
     output: Output<'a>,
@@ -112,7 +119,7 @@ impl<'a> Run<'a> {
             breaks,
             jump: first.unwrap_or(problem.jumps.len()),
             watch: Watch::new(&problem.events, equation, problem.start, &problem.initial)?,
-            element: Element::default(),
+            element: Element::new(Newton::new(problem.sparsity.as_ref())),
             reading: Reading::default(),
             state: problem.initial.clone(),
             fresh: None,
@@ -120,10 +127,11 @@ impl<'a> Run<'a> {
             order: preferred,
             preferred,
             shortest_delay: delays.fold(f64::INFINITY, f64::min),
+            stalled: 0.0,
             wait: (0, 1),
             output: Output::new(problem.times.as_deref()),
         };
-        run.output.start(problem.start, &run.state);
+        run.output.start(problem.start, &run.state)?;
         Ok(run)
     }
 
@@ -139,6 +147,10 @@ impl<'a> Run<'a> {
             let end = self.next_end();
             if end - start <= SHORTEST * start.abs().max(end.abs()) {
                 return Ok(Some(Outcome::Shrunk(start)));
+            }
+            let tried = self.solution.elements + self.solution.refused;
+            if self.problem.most.is_some_and(|most| tried >= most) {
+                return Ok(Some(Outcome::TooMany(start)));
             }
             let nodes = nodes(self.order);
             let begin = Begin {
@@ -159,15 +171,27 @@ impl<'a> Run<'a> {
                     } else if let Some(unread) = self.unread(nodes) {
                         self.read(unread, verdict);
                     } else {
-                        self.renew_jacobian(count, equation, task)?;
-                        return self.accept(verdict, nodes, equation);
+                        let stiff = self.renew_jacobian(count, verdict, equation, task)?;
+                        let held = (!self.element.newton.is_on() && count > SLOW_SWEEPS)
+                            .then_some(end - start);
+                        let outcome = self.accept(verdict, nodes, equation)?;
+                        self.length = self.length.min(held.unwrap_or(f64::INFINITY)).max(stiff);
+                        return Ok(outcome);
                     }
                 }
                 Sweeps::Stalled => {
                     // With a Jacobian of this place once more, then shorter.
-                    let age = self.element.newton.age;
-                    let known = self.element.newton.is_on() && age == 0;
-                    if retried || known || !self.element.linearise_at_start(equation, task)? {
+                    let newton = &self.element.newton;
+                    let known = newton.is_on() && newton.age == 0;
+                    let waits = !newton.is_on() && !newton.is_cheap(self.problem.dim());
+                    if waits
+                        || retried
+                        || known
+                        || !self.element.linearise_at_start(equation, task)?
+                    {
+                        if waits {
+                            self.stalled = self.stalled.max(end - start);
+                        }
                         self.length = RETREAT * (end - start);
                         retried = false;
                     } else {
@@ -284,22 +308,35 @@ impl<'a> Run<'a> {
         self.breaks.add(BreakingPoint { time, order });
     }
 
-    /// Have a Jacobian where sweeps were many, a new one where it is stale.
+    /// Have a Jacobian where sweeps were many, a new one where it is stale; the length that the
+    /// next element may have because of it.
+    ///
+    /// A costly one waits until sweeps failed on elements much longer than the solution asks for:
+    /// that is what makes an equation stiff.
     fn renew_jacobian<E: Equation + ?Sized>(
         &mut self,
         sweeps: u32,
+        verdict: Verdict,
         equation: &mut E,
         task: &Task,
-    ) -> Result<(), Error> {
-        let most = if self.element.newton.is_on() {
-            STALE_SWEEPS
-        } else {
-            MANY_SWEEPS
-        };
-        if sweeps > most && (self.element.newton.age > 1 || !self.element.newton.is_on()) {
-            self.element.linearise(equation, task)?;
+    ) -> Result<f64, Error> {
+        let newton = &self.element.newton;
+        let stalled = std::mem::take(&mut self.stalled);
+        if newton.is_on() {
+            if sweeps > STALE_SWEEPS && newton.age > 1 {
+                self.element.linearise(equation, task)?;
+            }
+        } else if newton.is_cheap(self.problem.dim()) {
+            if sweeps > MANY_SWEEPS {
+                self.element.linearise(equation, task)?;
+            }
+        } else if stalled > 0.0
+            && FEW_TERMS * verdict.terms <= self.preferred
+            && self.element.linearise(equation, task)?
+        {
+            return Ok(stalled);
         }
-        Ok(())
+        Ok(0.0)
     }
 
     fn accept<E: Equation + ?Sized>(
@@ -316,11 +353,11 @@ impl<'a> Run<'a> {
         }
         self.follow(&piece);
         let (y, t) = (&self.element.y, &self.element.t);
-        let stop = self.watch.scan(equation, &piece, y, t)?;
+        let stop = self.watch.scan(equation, &piece, nodes, y)?;
         let until = stop.unwrap_or(end);
         let last = stop.is_some() || end >= self.problem.end;
-        self.output.give(&piece, (y, t), until, last);
-        self.solution.history.push(piece);
+        self.output.give(&piece, (y, t), until, last)?;
+        self.solution.history.push(piece)?;
         self.solution.elements += 1;
         self.solution.end = until;
         for (state, row) in self.state.iter_mut().zip(self.element.y.chunks_exact(n)) {
@@ -330,7 +367,10 @@ impl<'a> Run<'a> {
             return Ok(Some(Outcome::Event));
         }
         self.reach(end);
-        self.jump_at(end, equation)?;
+        if self.jump_at(end, equation)? {
+            self.output.end(end, &self.state);
+            return Ok(Some(Outcome::Event));
+        }
         if !self.problem.keep {
             self.solution.history.forget(end - self.problem.memory());
         }
@@ -375,8 +415,12 @@ impl<'a> Run<'a> {
         self.breaks.follow(point);
     }
 
-    /// What a jump does at `time`.
-    fn jump_at<E: Equation + ?Sized>(&mut self, time: f64, equation: &mut E) -> Result<(), Error> {
+    /// What a jump does at `time`, and whether that is a terminal event.
+    fn jump_at<E: Equation + ?Sized>(
+        &mut self,
+        time: f64,
+        equation: &mut E,
+    ) -> Result<bool, Error> {
         let mut changed = false;
         while let Some(jump) = self.problem.jumps.get(self.jump) {
             if jump.time > time {
@@ -389,10 +433,10 @@ impl<'a> Run<'a> {
             self.jump += 1;
         }
         if changed {
-            self.watch.restart(equation, time, &self.state)?;
-            self.output.start(time, &self.state);
+            self.output.start(time, &self.state)?;
+            return self.watch.change(equation, time, &self.state);
         }
-        Ok(())
+        Ok(false)
     }
 
     /// Length and order of the next element.
@@ -419,8 +463,9 @@ impl<'a> Run<'a> {
     fn finished(mut self) -> Solution {
         self.solution.times = self.output.times;
         self.solution.values = self.output.values;
-        self.solution.calls = self.element.calls;
-        self.solution.nodes = self.element.evaluated;
+        let (calls, columns) = self.element.newton.spent();
+        self.solution.calls = self.element.calls + calls;
+        self.solution.nodes = self.element.evaluated + columns;
         self.solution.event_times = self.watch.times;
         self.solution.event_values = self.watch.values;
         self.solution

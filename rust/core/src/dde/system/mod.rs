@@ -28,6 +28,7 @@ mod track;
 #[cfg(test)]
 mod tests;
 
+use crate::memory::room;
 use crate::{Error, Task};
 
 pub use terms::Term;
@@ -130,6 +131,8 @@ impl Signal {
                 "a signal holds {value}: give finite numbers"
             )));
         }
+        // A piece with its series; a run works on a copy.
+        room::<[f64; 48]>("the signal", edges.len())?;
         let piece = |(i, pair): (usize, &[f64])| {
             let own = &series[i * width * terms..(i + 1) * width * terms];
             let degree = own

@@ -4,6 +4,9 @@ use super::slack;
 use super::terms::Feed;
 use super::track::Track;
 use super::{SystemEquations, SystemResponse};
+use crate::Error;
+use crate::dde::wanted::RESPONSE;
+use crate::memory::{push, reserved};
 
 /// The signals of a run, as far as they are known.
 #[derive(Debug)]
@@ -30,15 +33,20 @@ pub(super) struct Outputs<'a> {
 }
 
 impl<'a> Outputs<'a> {
-    pub(super) fn new(equations: &SystemEquations, times: &'a [f64], longest: f64) -> Self {
+    pub(super) fn new(
+        equations: &SystemEquations,
+        times: &'a [f64],
+        longest: f64,
+    ) -> Result<Self, Error> {
         let (n, p, q) = (equations.states, equations.inputs, equations.outputs);
+        let columns = |width: usize| reserved(RESPONSE, width.saturating_mul(times.len()));
         let found = SystemResponse {
-            outputs: Vec::with_capacity(q * times.len()),
-            states: Vec::with_capacity(n * times.len()),
-            inputs: Vec::with_capacity(p * times.len()),
+            outputs: columns(q)?,
+            states: columns(n)?,
+            inputs: columns(p)?,
             breaks: Vec::new(),
         };
-        Self {
+        Ok(Self {
             times,
             n,
             p,
@@ -50,7 +58,7 @@ impl<'a> Outputs<'a> {
             longest,
             served: 0,
             found,
-        }
+        })
     }
 
     /// The last time asked for.
@@ -96,28 +104,31 @@ impl<'a> Outputs<'a> {
     }
 
     /// Note a break of the state at `t`, and when it shows in the output.
-    pub(super) fn state_break(&mut self, t: f64) {
-        self.note(t);
+    pub(super) fn state_break(&mut self, t: f64) -> Result<(), Error> {
+        self.note(t)?;
         for i in 0..self.state.len() {
-            self.note(t + self.state[i].delay);
+            self.note(t + self.state[i].delay)?;
         }
         for i in 0..self.slope.len() {
-            self.note(t + self.slope[i].delay);
+            self.note(t + self.slope[i].delay)?;
         }
+        Ok(())
     }
 
     /// Note a break of the input at `t`, and when it shows in the output.
-    pub(super) fn input_break(&mut self, t: f64) {
-        self.note(t);
+    pub(super) fn input_break(&mut self, t: f64) -> Result<(), Error> {
+        self.note(t)?;
         for i in 0..self.direct.len() {
-            self.note(t + self.direct[i].delay);
+            self.note(t + self.direct[i].delay)?;
         }
+        Ok(())
     }
 
-    fn note(&mut self, t: f64) {
+    fn note(&mut self, t: f64) -> Result<(), Error> {
         if t >= 0.0 && t <= self.last() + slack(t, self.longest) {
-            self.found.breaks.push(t);
+            push(RESPONSE, &mut self.found.breaks, t)?;
         }
+        Ok(())
     }
 
     /// All that was found, breaks in order and those within rounding of one another as one.

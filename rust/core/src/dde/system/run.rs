@@ -44,7 +44,7 @@ pub(super) fn run(
         .map(|group| terms::longest(group))
         .into_iter()
         .fold(0.0, f64::max);
-    let mut outputs = Outputs::new(equations, times, longest);
+    let mut outputs = Outputs::new(equations, times, longest)?;
     let last = outputs.last();
     let shortest = feeds[..2]
         .iter()
@@ -69,7 +69,7 @@ pub(super) fn run(
     let input_breaks = passed_breaks(inputs, unit);
     for passed in &input_breaks {
         if passed.is_reported(equations.inputs) {
-            outputs.input_break(passed.time);
+            outputs.input_break(passed.time)?;
         }
     }
     let before = passed_breaks(&history, unit);
@@ -83,7 +83,7 @@ pub(super) fn run(
         longest,
     );
     for passed in before {
-        outputs.state_break(passed.time);
+        outputs.state_break(passed.time)?;
         jumps.push(passed)?;
     }
     let (mut states, mut slopes) = (history.track, slopes);
@@ -91,7 +91,7 @@ pub(super) fn run(
     slopes.close(0.0);
     let first = first_break(&jumps, &feeds, [&states, &slopes, &inputs.track], &x);
     if first.is_reported(n) {
-        outputs.state_break(0.0);
+        outputs.state_break(0.0)?;
     }
     jumps.push(first)?;
 
@@ -106,7 +106,7 @@ pub(super) fn run(
                 *x += leap;
             }
             if passed.is_reported(n) {
-                outputs.state_break(t);
+                outputs.state_break(t)?;
             }
             jumps.push(passed)?;
         }

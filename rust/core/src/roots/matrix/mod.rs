@@ -30,6 +30,8 @@ use super::lines::{Effort, Spectrum, half_plane_discs};
 use super::region::Region;
 use super::rightmost::{first, leading};
 use super::set::{RootSet, all_discs};
+use super::unstable::{balances, leads_right, rightmost_first};
+use crate::quasipoly::QuasiPolynomial;
 use crate::{Error, Task};
 
 /// Most roots that can be asked for.
@@ -37,6 +39,9 @@ const MAX_WANTED: usize = 1000;
 
 /// Factorisations after which a line is given up.
 const EVALUATIONS_PER_LINE: u64 = 100_000;
+
+/// Factorisations along the axis before a root right of it is looked for.
+const AT_A_GLANCE: u64 = 2_000;
 
 /// Radii of half planes are at least this times the rate of the system: roots at 0 need room.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -294,9 +299,43 @@ pub fn is_stable(system: &CharacteristicMatrix, task: &Task) -> Result<bool, Err
     if chain_abscissa(system, task)?.1 >= 0.0 {
         return Ok(false);
     }
-    match count_right_of(system, 0.0, task) {
+    let mut glance = MatrixWalker::new(system, task, AT_A_GLANCE);
+    let cell = close(system, &Region::right_of(0.0), task).and_then(|closed| {
+        let upper = closed.and_then(|closed| Some((closed.re, closed.symmetric?)));
+        upper
+            .map(|(re, height)| Cell::new(&mut glance, re, (0.0, height), true))
+            .transpose()
+    });
+    let number = match cell {
+        Ok(cell) => Ok(cell.map_or(0, |cell| cell.count)),
+        Err(error @ (Error::Contour { .. } | Error::Interrupted)) => Err(error),
+        Err(_) => {
+            let mut starts = rightmost_first(glance.hints);
+            starts.extend(balances(&by_norms(system)?));
+            let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
+            if leads_right(&mut walker, &starts)? {
+                return Ok(false);
+            }
+            count_right_of(system, 0.0, task)
+        }
+    };
+    match number {
         Ok(number) => Ok(number == 0),
         Err(Error::Contour { .. }) => Ok(false),
         Err(error) => Err(error),
     }
+}
+
+/// A function with the norms of the matrices as coefficients, the roots of which are as large as those of
+/// det M, or so.
+fn by_norms(system: &CharacteristicMatrix) -> Result<QuasiPolynomial, Error> {
+    let norm = |matrix: &[Vec<f64>]| {
+        let sums = matrix.iter().map(|row| row.iter().map(|x| x.abs()).sum());
+        sums.fold(0.0, f64::max)
+    };
+    let rows = (0..system.delays().len()).map(|delay| {
+        let (slopes, values) = system.dense(delay);
+        vec![norm(&values), norm(&slopes)]
+    });
+    QuasiPolynomial::new(rows.collect(), system.delays().to_vec())
 }

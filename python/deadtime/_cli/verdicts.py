@@ -1,0 +1,53 @@
+"""What the commands say about the stability of a loop."""
+
+from __future__ import annotations
+
+import math
+
+from deadtime._loop import ControlLoop
+from deadtime._rootset import RootSet
+
+__all__ = ["listed", "verdict"]
+
+
+def verdict(loop: ControlLoop) -> str:
+    """Stable or unstable, with the root or the chain of roots that shows it; or neither proved."""
+    abscissa = loop.spectral_abscissa()
+    if loop.is_stable():
+        return f"stable: spectral abscissa {abscissa:.6g} 1/s"
+    rightmost = loop.rightmost()
+    for root, radius in zip(rightmost.roots.tolist(), rightmost.radii.tolist(), strict=True):
+        if root.real > radius:
+            turning = f" ± {abs(root.imag):.6g}j" if root.imag else ""
+            return (
+                f"unstable: a root at {root.real:.6g}{turning} grows by a factor e in "
+                f"{1.0 / root.real:.3g} s"
+            )
+    chain = -math.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
+    if chain > 0.0:
+        return f"unstable: a chain of roots approaches Re s = {chain:.6g} 1/s"
+    return (
+        f"not proved stable: spectral abscissa {abscissa:.6g} 1/s, on the imaginary axis or too "
+        "close to it to tell"
+    )
+
+
+def listed(found: RootSet, wanted: int | None, chain: float) -> str:
+    """How many roots a list holds and where these are all; `wanted` is None for a region."""
+    number = f"{found.counted} {'root' if found.counted == 1 else 'roots'}"
+    (low, high), (bottom, top) = found.region
+    if wanted is None:
+        return (
+            f"{number} in re=({low:g}, {high:g}), im=({bottom:g}, {top:g}): all there are, proved"
+        )
+    upper = sum(1 for root in found.roots.tolist() if root.imag >= 0.0)
+    if not math.isfinite(low):
+        return f"{number}: all there are, proved"
+    if upper >= wanted:
+        return f"{number}: all right of Re s = {low:.6g}, proved"
+    if math.isfinite(chain):
+        return (
+            f"{number}, not {wanted}: all right of Re s = {low:.6g}, proved; the next ones are "
+            "those of the chain"
+        )
+    return f"{number}, not {wanted}: all right of Re s = {low:.6g}, proved"

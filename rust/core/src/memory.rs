@@ -1,0 +1,183 @@
+//! Memory whose size the caller chose: asked for before it is used, and refused as an error.
+//!
+//! Rust ends the process when an allocation fails. So every array that grows with the request is
+//! made here, where a failure is [`Error::Memory`] with the size, and only if [`HEADROOM`] is left
+//! beside it for what is small: queues, series, matrices of one loop. Those grow while a kernel
+//! runs, so whoever waits for it looks now and then whether [`is_scarce`], and stops it in time.
+//! Not guaranteed: anything where the system promises more than it has and kills processes later.
+
+use std::collections::VecDeque;
+
+use rayon::prelude::*;
+
+use crate::Error;
+
+/// Room that has to be left, in bytes: more than kernels take for small things between two looks.
+/// Above 32 MiB, so that giving it back does not change how glibc serves other requests.
+pub const HEADROOM: usize = 48 << 20;
+
+/// Requests below this size are served from the headroom.
+const SMALL: usize = 1 << 20;
+
+/// Whether the headroom is gone.
+pub fn is_scarce() -> bool {
+    !there_is(HEADROOM)
+}
+
+fn there_is(bytes: usize) -> bool {
+    Vec::<u8>::new().try_reserve_exact(bytes).is_ok()
+}
+
+/// Refuse what needs `count` items of type `T` in all, if they are not to be had.
+pub fn room<T>(what: &'static str, count: usize) -> Result<(), Error> {
+    let bytes = count.saturating_mul(size_of::<T>());
+    if bytes < SMALL || there_is(bytes.saturating_add(HEADROOM)) {
+        return Ok(());
+    }
+    Err(refused(what, bytes))
+}
+
+fn refused(what: &'static str, bytes: usize) -> Error {
+    Error::Memory {
+        what,
+        bytes: bytes as u64,
+    }
+}
+
+/// An empty vector that holds `count` items without growing.
+pub fn reserved<T>(what: &'static str, count: usize) -> Result<Vec<T>, Error> {
+    room::<T>(what, count)?;
+    let mut made = Vec::new();
+    made.try_reserve_exact(count)
+        .map_err(|_| refused(what, count.saturating_mul(size_of::<T>())))?;
+    Ok(made)
+}
+
+/// `count` times the same value.
+pub fn filled<T: Clone>(what: &'static str, value: T, count: usize) -> Result<Vec<T>, Error> {
+    let mut made = reserved(what, count)?;
+    made.resize(count, value);
+    Ok(made)
+}
+
+/// A copy of a slice.
+pub fn copied<T: Copy>(what: &'static str, values: &[T]) -> Result<Vec<T>, Error> {
+    collected(what, values.iter().copied())
+}
+
+/// The items of an iterator that knows how many they are.
+pub fn collected<T>(
+    what: &'static str,
+    items: impl ExactSizeIterator<Item = T>,
+) -> Result<Vec<T>, Error> {
+    let mut made = reserved(what, items.len())?;
+    made.extend(items);
+    Ok(made)
+}
+
+/// Append a value to what grows with the length of a run.
+pub fn push<T>(what: &'static str, to: &mut Vec<T>, value: T) -> Result<(), Error> {
+    if to.len() == to.capacity() {
+        grow(what, to, 1)?;
+    }
+    to.push(value);
+    Ok(())
+}
+
+/// Append values to what grows with the length of a run.
+pub fn append<T: Copy>(what: &'static str, to: &mut Vec<T>, values: &[T]) -> Result<(), Error> {
+    if to.capacity() - to.len() < values.len() {
+        grow(what, to, values.len())?;
+    }
+    to.extend_from_slice(values);
+    Ok(())
+}
+
+/// Append a value to a queue that grows with the length of a run.
+pub fn push_back<T>(what: &'static str, to: &mut VecDeque<T>, value: T) -> Result<(), Error> {
+    if to.len() == to.capacity() {
+        let most = to.len().saturating_add(to.len().max(1));
+        room::<T>(what, most)?;
+        to.try_reserve(1)
+            .map_err(|_| refused(what, most.saturating_mul(size_of::<T>())))?;
+    }
+    to.push_back(value);
+    Ok(())
+}
+
+fn grow<T>(what: &'static str, to: &mut Vec<T>, more: usize) -> Result<(), Error> {
+    let most = to.len().saturating_add(more.max(to.len()));
+    room::<T>(what, most)?;
+    to.try_reserve(more)
+        .map_err(|_| refused(what, most.saturating_mul(size_of::<T>())))
+}
+
+/// What `work` gives for 0, 1, … `count`, in that order, on all threads; `start` makes what each
+/// of them works with.
+pub fn in_parallel<T, W>(
+    what: &'static str,
+    count: usize,
+    start: impl Fn() -> W + Sync + Send,
+    work: impl Fn(&mut W, usize) -> Result<T, Error> + Sync + Send,
+) -> Result<Vec<T>, Error>
+where
+    T: Default + Send,
+{
+    let mut found = reserved(what, count)?;
+    found.resize_with(count, T::default);
+    found
+        .par_iter_mut()
+        .enumerate()
+        .try_for_each_init(start, |own, (index, place)| {
+            *place = work(own, index)?;
+            Ok(())
+        })?;
+    Ok(found)
+}
+
+/// A size as people write it.
+pub(crate) fn in_words(bytes: u64) -> String {
+    const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
+    let mut size = bytes as f64 / 1024.0;
+    let mut unit = UNITS[0];
+    for larger in &UNITS[1..] {
+        if size < 1000.0 {
+            break;
+        }
+        size /= 1024.0;
+        unit = larger;
+    }
+    format!("{size:.3} {unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_machine_has_is_an_error_with_its_size() {
+        let found = filled("the test", 0.0, 1 << 58);
+        assert_eq!(
+            found.unwrap_err().to_string(),
+            "the test needs 2048.000 PiB of memory, which the system does not give: ask for less \
+             at once, or raise the limit"
+        );
+        assert!(reserved::<f64>("the test", usize::MAX).is_err());
+        assert!(in_parallel("the test", usize::MAX, || (), |(), _| Ok(0.0)).is_err());
+    }
+
+    #[test]
+    fn small_and_large_vectors_hold_what_was_asked_for() {
+        assert_eq!(filled("the test", 7, 3), Ok(vec![7, 7, 7]));
+        assert_eq!(collected("the test", 0..4), Ok(vec![0, 1, 2, 3]));
+        let squares = in_parallel("the test", 4, || (), |(), i| Ok(i * i));
+        assert_eq!(squares, Ok(vec![0, 1, 4, 9]));
+        let mut grown = Vec::new();
+        for i in 0..300_000 {
+            push("the test", &mut grown, i).unwrap();
+        }
+        append("the test", &mut grown, &[1, 2]).unwrap();
+        assert_eq!(grown.len(), 300_002);
+        assert!(!is_scarce());
+    }
+}

@@ -1,0 +1,275 @@
+"""A client that stood still: nothing may ask a drone that has landed to take off again."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+import time
+
+import pytest
+from deadtime import FlightAbortedError, LinkError
+from deadtime.links import Limits, clock, run
+from deadtime.links.ardrone2.commands import Move, Ref
+from deadtime.links.ardrone2.emulator import Phase
+from deadtime.links.ardrone2.sender import CYCLE, CommandSender
+from emulated import emulator, skip_if_too_busy
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from level_drone import level
+
+
+def now():
+    return asyncio.get_running_loop().time()
+
+
+def refs(told):
+    """Of each datagram when it was sent, whether it asks to fly (None: it does not say)."""
+    for sent, commands, _ in told:
+        said = [one.take_off for one in commands if isinstance(one, Ref)]
+        yield sent, said[0] if said else None
+
+
+async def go_on(client, how, times=1):
+    """What a program does next, as if it had not stood still."""
+    for _ in range(times):
+        if how == "hover":
+            client.hover()
+        elif how == "command":
+            client.command(0.3)
+        elif how == "state":
+            await client.state()
+        await asyncio.sleep(0.05)
+    await client.state()
+
+
+@pytest.mark.parametrize("going_on", ["hover", "command", "state", "nothing"])
+@pytest.mark.parametrize("pause", [2.1, 9.0])
+def test_after_a_pause_beyond_the_watchdog_a_landed_drone_is_not_asked_to_take_off(pause, going_on):
+    # An event loop that hung for 9 s: `hover()` sent seven take-off datagrams to a landed drone.
+    async def fly():
+        async with level() as (drone, client):
+            await client.take_off()
+            client.command(0.3)
+            drone.stand_still(pause)
+            went_on = now()
+            with pytest.raises(FlightAbortedError, match=rf"stood still for {pause:.0f}\."):
+                await go_on(client, going_on)
+            with pytest.raises(FlightAbortedError, match="told to land"):
+                client.hover()
+            await asyncio.sleep(0.5)
+            assert drone.phase == "landed"
+            later = [asked for sent, asked in refs(drone.told) if sent >= went_on]
+            assert len(later) > 10
+            assert set(later) == {False}
+
+    run(fly())
+
+
+@pytest.mark.parametrize("pause", [0.26, 0.6, 0.9])
+def test_after_a_short_pause_it_hovers_without_a_wish_until_the_drone_is_known_to_fly(pause):
+    async def fly():
+        async with level(late=0.1) as (drone, client):
+            await client.take_off()
+            client.command(0.3)
+            drone.stand_still(pause)
+            went_on = now()
+            assert client.command(0.3) == 0.0
+            for _ in range(20):
+                await asyncio.sleep(0.02)
+                client.command(0.3)
+            # News that are younger than the pause are 0.1 s on their way.
+            asked = [(sent - went_on, up) for sent, up in refs(drone.told) if sent >= went_on]
+            assert all(up is None for passed, up in asked if passed < 0.1)
+            assert all(up is True for passed, up in asked if passed > 0.1 + 3 * CYCLE)
+            moves = [
+                one.flag
+                for sent, commands, _ in drone.told
+                for one in commands
+                if isinstance(one, Move) and went_on <= sent < went_on + 0.1
+            ]
+            assert set(moves) == {0}
+            assert drone.gaz == pytest.approx(0.3)
+            assert drone.came_down < 0.0
+
+    run(fly())
+
+
+def test_where_no_clock_tells_old_news_from_new_a_pause_ends_the_flight():
+    async def fly():
+        async with level(options=("short",)) as (drone, client):
+            await client.take_off()
+            drone.stand_still(0.5)
+            went_on = now()
+            with pytest.raises(FlightAbortedError, match="after a pause of this program"):
+                await go_on(client, "hover", 60)
+            assert True not in [up for sent, up in refs(drone.told) if sent >= went_on]
+
+    run(fly())
+
+
+def test_a_pause_just_before_taking_off_ends_it_on_the_ground():
+    async def fly():
+        async with level() as (drone, client):
+            asyncio.get_running_loop().call_later(0.1, drone.stand_still, 5.0)
+            with pytest.raises(LinkError, match="just before"):
+                await client.take_off()
+            assert not any(up for _, up in refs(drone.told))
+
+    run(fly())
+
+
+LENGTHS = st.one_of(st.floats(0.01, 0.3), st.floats(0.25, 2.1), st.floats(1.9, 9.0))
+PAUSES = st.lists(st.tuples(st.floats(0.0, 3.0), LENGTHS), min_size=1, max_size=3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    pauses=PAUSES, own=st.lists(LENGTHS, max_size=2), every=st.integers(3, 9), late=st.booleans()
+)
+@example(pauses=[(0.5, 1.99), (2.5, 0.3)], own=[1.99], every=3, late=True)
+@example(pauses=[(0.2, 5.0)], own=[], every=3, late=False)
+def test_no_pause_anywhere_has_a_drone_that_came_down_asked_to_fly(pauses, own, every, late):
+    # Pauses of the whole program at any moment, and of the code between two commands.
+    async def fly():
+        async with level(late=0.03 if late else 0.0) as (drone, client):
+            loop, left = asyncio.get_running_loop(), list(own)
+            asked = now()
+            for begin, length in pauses:
+                loop.call_later(begin, drone.stand_still, length)
+            with contextlib.suppress(LinkError):
+                await client.take_off()
+                for turn in range(50):
+                    await client.state()
+                    if left and turn % every == 0:
+                        drone.stand_still(left.pop())
+                    client.command(0.3) if turn % 2 else client.hover()
+                    await asyncio.sleep(0.05)
+            with contextlib.suppress(LinkError):
+                await client.land()
+            await asyncio.sleep(3.0)
+            for (_, up), (_, _, came_down) in zip(refs(drone.told), drone.told, strict=True):
+                assert not (up and asked <= came_down)
+            assert drone.phase == "landed"
+
+    run(fly())
+
+
+@pytest.mark.parametrize("out", [1.5, 2.5, 6.0])
+def test_a_drone_that_landed_while_the_radio_was_out_is_not_asked_to_take_off(out):
+    # The wish to fly was repeated by a program that only hovers, and heard when the radio was back.
+    async def fly():
+        async with level() as (drone, client):
+            await client.take_off()
+            socket, begun = client._link._commands, now()
+            plain, deliver = socket.sendto, drone._deliver
+            socket.sendto, drone._deliver = (lambda data: None), (lambda packet: None)
+            ended = None
+            while now() < begun + out + 1.0:
+                if now() > begun + out and socket.sendto is not plain:
+                    socket.sendto, drone._deliver = plain, deliver
+                try:
+                    client.hover()
+                except FlightAbortedError as error:
+                    ended = error
+                await asyncio.sleep(0.05)
+            assert "nothing heard of 127.0.0.1 for 1.0 s" in str(ended)
+            assert drone.phase == "landed"
+            later = [up for sent, up in refs(drone.told) if sent > begun + 0.05]
+            assert len(later) > 10
+            assert True not in later
+
+    run(fly())
+
+
+def test_ages_run_on_while_the_machine_sleeps(monkeypatch):
+    # A laptop that was closed in flight: the clock of the event loop stood still meanwhile.
+    if not hasattr(time, "CLOCK_BOOTTIME"):
+        pytest.skip("this system has no clock that counts sleep beside one that does not")
+    plain, slept = time.clock_gettime, []
+
+    def slept_for(number):
+        return plain(number) + (sum(slept) if number == time.CLOCK_BOOTTIME else 0.0)
+
+    monkeypatch.setattr(time, "clock_gettime", slept_for)
+
+    async def look():
+        sender = CommandSender(Limits())
+        sender.fly()
+        sender.datagram(clock.now())
+        before, by_loop = clock.now(), now()
+        slept.append(3600.0)
+        assert clock.now() - before >= 3600.0
+        assert now() - by_loop < 1000.0
+        sender.hover(clock.now())
+        assert not sender.in_air
+        assert "stood still for 360" in sender.expired
+
+    asyncio.run(look())
+
+
+def test_without_such_a_clock_it_is_that_of_the_event_loop(monkeypatch):
+    monkeypatch.delattr(time, "CLOCK_BOOTTIME", raising=False)
+    assert abs(clock._counted() - time.monotonic()) < 1e6
+    assert clock._counted() <= clock._counted()
+
+
+STOPPED = """
+import asyncio, sys
+from deadtime.links import Limits
+from deadtime.links.ardrone2 import ARDrone2
+
+async def main():
+    ports = dict(zip(("navdata_port", "command_port", "control_port"), map(int, sys.argv[1:])))
+    async with ARDrone2("127.0.0.1", Limits(max_climb=1.0), **ports) as drone:
+        await drone.take_off()
+        print("up", flush=True)
+        while True:
+            drone.command(0.1)
+            await asyncio.sleep(0.05)
+
+asyncio.run(main())
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="this system stops no process")
+def test_a_client_process_that_was_stopped_in_flight_lands_what_has_landed():
+    # SIGSTOP until the drone has landed itself, then SIGCONT: take-off for up to 0.46 s.
+    async def fly():
+        async with emulator() as emulated:
+            ports = (emulated.navdata_port, emulated.command_port, emulated.control_port)
+            process = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-c", STOPPED, *map(str, ports)),
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+            )
+            try:
+                if not await asyncio.wait_for(process.stdout.readline(), 60.0):
+                    skip_if_too_busy((await process.communicate())[1].decode())
+                    raise AssertionError("the client did not take off")
+                process.send_signal(signal.SIGSTOP)
+                for _ in range(300):
+                    await asyncio.sleep(0.1)
+                    if emulated.truth().phase is Phase.LANDED:
+                        break
+                assert emulated.truth().phase is Phase.LANDED
+                await asyncio.sleep(0.3)
+                asked, plain = [], emulated.drone.commanded
+                emulated.drone.commanded = lambda data, source, at: (
+                    asked.append(data),
+                    plain(data, source, at),
+                )
+                process.send_signal(signal.SIGCONT)
+                _, error = await asyncio.wait_for(process.communicate(), 60.0)
+                assert asked
+                assert not any(b"AT*REF" in one and b",290718208\r" in one for one in asked)
+                assert emulated.truth().phase is Phase.LANDED
+                assert process.returncode == 1
+                assert "FlightAbortedError: this program stood still for" in error.decode()
+            finally:
+                if process.returncode is None:
+                    os.kill(process.pid, signal.SIGCONT)
+                    process.kill()
+                    await process.communicate()
+
+    asyncio.run(fly())
