@@ -91,6 +91,7 @@ FLOORS = [
         "_transfer",
         "_systems",
         "_signals",
+        "_signals_fit",
         "_realisation",
         "_system_response",
         "_system_run",

@@ -442,7 +442,7 @@ TWO = dtm.DelaySystem({0.5: -np.eye(2)}, np.eye(2))
         (
             ONE,
             [0.0, 1.0],
-            {"inputs": lambda t: float(t > 0.3)},
+            {"inputs": lambda t: abs(t - 0.3)},
             r"not smooth at t = 0.3\d* s: name the time in input_breaks",
         ),
         (ONE, [0.0, 1.0], {"interpolation": "cubic"}, "interpolation='cubic'"),

@@ -1,37 +1,26 @@
 """Functions of time as the native part takes them: Legendre series by pieces.
 
-Constants, held samples and straight lines between samples are exact. A callable is sampled at the
-Gauss nodes of an interval; where the last coefficients of its series are not below rounding, the
-interval is halved. Nodes lie inside the intervals, so a callable is never asked for its value at
-one of its breaks. Times are counted from the start of the run.
+Constants, held samples and straight lines between samples are exact; a callable is fitted to
+rounding. Times are counted from the start of the run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._deadtime import Signal, legendre_tables
+from deadtime._deadtime import Signal
+from deadtime._signals_fit import RESOLUTION, pieces
 from deadtime._validation import real_array
 
 __all__ = ["Fitted", "constant", "fitted", "held", "lines", "sampled", "step"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-
-# Values at these nodes, times the matrix, are coefficients.
-_NODES, _TRANSFORM = legendre_tables()
-
-# A series has ended where its last two coefficients are below this part of the largest value.
-_ENDED = 16.0 * float(np.finfo(float).eps)
-
-# An interval shorter than this part of the whole is not halved any more: there is a break in it.
-_SHORTEST = 1e-9
 
 _FOREVER = float("inf")
 
@@ -133,34 +122,13 @@ def fitted(
     *,
     start: float,
     vectorized: bool,
+    max_step: float | None,
 ) -> Fitted:
     """Fit a callable of the user's time over `span`, in time from `start` on, between breaks."""
-    low, high = span
-    inner = sorted({float(b) for b in breaks if low < b < high})
-    corners = [low, *inner, high]
-    scale = np.zeros(width)
-    edges: list[float] = [low - start]
-    pieces: list[Matrix] = []
-    starts: list[int] = []
-    for left, right in pairwise(corners):
-        if left in inner:
-            starts.append(len(pieces))
-        waiting = [(left, right)]
-        while waiting:
-            a, b = waiting.pop()
-            times = 0.5 * ((1.0 - _NODES) * a + (1.0 + _NODES) * b)
-            values = sampled(name, function, times, width, vectorized)
-            series = values @ _TRANSFORM
-            scale = np.maximum(scale, np.abs(values).max(axis=1))
-            if (np.abs(series[:, -2:]).max(axis=1) <= _ENDED * scale).all():
-                pieces.append(series)
-                edges.append(b - start)
-                continue
-            if b - a <= _SHORTEST * (high - low):
-                raise ValueError(
-                    f"{name} is not smooth at t = {b:.10g} s: name the time in "
-                    f"{name.split()[0]}_breaks, or give samples"
-                )
-            middle = 0.5 * (a + b)
-            waiting += [(middle, b), (a, middle)]
-    return Fitted(np.array(edges), np.array(pieces), starts)
+
+    def sample(times: Vector) -> Matrix:
+        return sampled(name, function, times, width, vectorized)
+
+    gap = RESOLUTION * (span[1] - span[0]) if max_step is None else max_step
+    found = pieces(name, sample, span, breaks, gap)
+    return Fitted(found.edges - start, found.series, found.breaks)

@@ -42,6 +42,7 @@ def simulate(
     history_breaks: Iterable[float] = ...,
     initial_state: ArrayLike | None = ...,
     vectorized: bool = ...,
+    max_step: float | None = ...,
 ) -> SystemResponse: ...
 def simulate(
     system: ControlLoop | Realisable,
@@ -57,6 +58,7 @@ def simulate(
     history_breaks: Iterable[float] = (),
     initial_state: ArrayLike | None = None,
     vectorized: bool = False,
+    max_step: float | None = None,
 ) -> SystemResponse | Response:
     """Response of a linear system with delays, exact to rounding.
 
@@ -71,7 +73,8 @@ def simulate(
     inputs : float, array_like or callable
         A number, or one number for each of the p inputs: constant from the start on. An array of
         shape (p, m), or (m,) for one input: values at the times in `input_time`. A callable:
-        ``u(t)`` in s, one number or p of them, smooth but for the times in `input_breaks`.
+        ``u(t)`` in s, one number or p of them, smooth but for jumps and the times in
+        `input_breaks`.
     interpolation : {"hold", "linear"}
         What values of an array do between their times: hold, or join by straight lines.
     input_time : array_like, shape (m,), optional
@@ -81,7 +84,8 @@ def simulate(
         Inputs before the first of those times, or before the start. A transfer function starts
         from rest under it.
     input_breaks : iterable of float
-        Times at which a callable `inputs` or one of its derivatives jumps.
+        Times at which a callable `inputs` or one of its derivatives jumps. Jumps of the callable
+        itself are found, jumps of a derivative refused.
     history : float, array_like of shape (n_states,), or callable
         The state before the start: constant, or ``x(t)`` as far back as the longest delay, smooth
         but for the times in `history_breaks`. For a transfer function only zero.
@@ -95,6 +99,10 @@ def simulate(
     vectorized : bool
         Whether the callables take an array of m times and give m numbers, or an array of shape
         (p, m).
+    max_step : float, optional
+        Largest gap between even samples of a callable, s: what it does for longer is seen, what is
+        shorter may be missed unless its times are named as breaks. By default a thousandth of the
+        run, or of the longest delay for a history.
 
     Returns
     -------
@@ -144,6 +152,7 @@ def simulate(
             "input_breaks": tuple(input_breaks) != (),
             "history": callable(history) or np.any(history),
             "history_derivative": history_derivative is not None,
+            "max_step": max_step is not None,
             "initial_state": initial_state is not None,
             "a callable": callable(inputs),
         }
@@ -169,4 +178,5 @@ def simulate(
         history_breaks=history_breaks,
         initial_state=initial_state,
         vectorized=vectorized,
+        max_step=max_step,
     )

@@ -91,13 +91,14 @@ def solve_dde(
         becomes what that returns. Those outside `t_span` are left out.
     history_breaks : array_like
         Times at which the history or one of its derivatives jumps. Undeclared ones are found,
-        at some cost.
+        at some cost, where they are further apart than a thousandth of the largest delay.
     args : tuple
         Further arguments of `fun` and the events.
     vectorized : bool
         Whether `fun` takes many nodes at once; never guessed.
     max_step : float
-        Largest length of an element.
+        Largest length of an element, and largest gap between samples of the history. `fun` is
+        called at nodes alone, so what it does with `t` for a shorter time may be missed.
     max_steps : int or None
         Elements tried at most, accepted or not, None for no limit. A run that reaches it ends with
         status -1.

@@ -17,7 +17,7 @@ from deadtime import _signals as signals
 from deadtime._deadtime import Signal
 from deadtime._realisation import Realisable, Realisation
 from deadtime._system_response import SystemResponse
-from deadtime._validation import finite, increasing, real_array
+from deadtime._validation import finite, increasing, positive, real_array
 
 __all__ = ["Given", "respond", "step_response"]
 
@@ -79,6 +79,7 @@ def respond(
     history_breaks: Iterable[float] = (),
     initial_state: ArrayLike | None = None,
     vectorized: bool = False,
+    max_step: float | None = None,
 ) -> SystemResponse:
     """Check the arguments of `deadtime.simulate` and run the system."""
     input_breaks, history_breaks = tuple(input_breaks), tuple(history_breaks)
@@ -93,7 +94,8 @@ def respond(
         raise ValueError("time is empty: give at least one output time")
     start = float(times[0])
     before = _vector("input_before", input_before, model.inputs)
-    smooth: dict[str, Any] = {"start": start, "vectorized": vectorized}
+    step = None if max_step is None else positive("max_step", max_step)
+    smooth: dict[str, Any] = {"start": start, "vectorized": vectorized, "max_step": step}
     source, last = _input(
         model, times, inputs, interpolation, input_time, before, input_breaks, smooth
     )
@@ -125,6 +127,7 @@ def respond(
         "history_breaks": history_breaks,
         "initial_state": initial_state,
         "vectorized": vectorized,
+        "max_step": max_step,
     }
     return SystemResponse(
         time=np.array(times),

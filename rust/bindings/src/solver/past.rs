@@ -12,6 +12,8 @@ use crate::errors::to_python;
 
 /// Error of the history as a part of the tolerance.
 const SHARE: f64 = 0.01;
+/// What lasts longer than this part of the largest delay is seen in a history.
+const RESOLUTION: f64 = 1e-3;
 
 /// Fill in history and breaking points of a problem.
 pub(super) fn read(
@@ -80,7 +82,8 @@ fn fitted(
         SHARE * (atol.copied().unwrap_or(0.0) + problem.rtol * size)
     };
     let mut failure = None;
-    let found = approximate(first, start, breaks, rows, tolerance, |time, out| {
+    let gap = problem.longest.min(RESOLUTION * (start - first));
+    let found = approximate((first, start), gap, breaks, rows, tolerance, |time, out| {
         let (values, slopes) = out.split_at_mut(dim);
         let read = sample("history", history, time, values).and_then(|()| match slope {
             Some(slope) => sample("the derivative of the history", slope, time, slopes),

@@ -1,8 +1,11 @@
 //! Polynomial pieces for a history that is given as a function.
 //!
+//! The function is sampled evenly first, at no more than a given gap, and every piece must give the
+//! samples within it: what lasts longer than the gap is seen, what is shorter may be missed.
 //! Each piece is interpolated at 20 Chebyshev points of the first kind, which leave out its ends,
 //! so that what happens exactly at a jump does not matter. Where the last coefficients are not
-//! below the tolerance the piece is halved. Around a kink or jump that nobody declared the pieces
+//! below the tolerance, or a sample is missed, the piece is halved. The tolerance is no less than
+//! what rounding of the time makes of the values. Around a kink or jump that nobody declared the pieces
 //! become tiny, and a run of them is a breaking point, at the tiniest. Close to a joint, where there
 //! are no points, it shows in values or slopes that differ there; it is found by bisection.
 
@@ -32,6 +35,13 @@ const MARGIN: f64 = 2e-3;
 const ROUNDS: u32 = 3;
 /// Pieces of one history.
 const MOST: usize = 20_000;
+/// Even samples of one history, at most.
+const MOST_SAMPLES: f64 = 1e6;
+/// Units of rounding of the time that a function may err by: it multiplies and adds as well.
+const UNITS: f64 = 8.0 * f64::EPSILON;
+/// What rounding of the time makes of the values, at most, as a part of how much they vary on a
+/// piece: where it is more, the piece is too short to be told from a jump.
+const BLURRED: f64 = 1e-3;
 
 /// Pieces of a function, and the breaking points found in it.
 #[derive(Debug, Clone, Default)]
@@ -45,18 +55,20 @@ pub struct Approximation {
 }
 
 /// Approximate `function`, which writes `dim` values, on [start, end] to `tolerance`, with joints
-/// at the `breaks` in between.
+/// at the `breaks` in between. What differs from a smooth function for longer than `gap` is seen.
 pub fn approximate(
-    start: f64,
-    end: f64,
+    (start, end): (f64, f64),
+    gap: f64,
     breaks: &[f64],
     dim: usize,
     tolerance: impl Fn(usize, f64) -> f64,
     mut function: impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
 ) -> Result<Approximation, Error> {
     let mut breaks = breaks.to_vec();
+    let samples = Samples::new(&joints((start, end), &breaks), gap, dim, &mut function)?;
     for _ in 0..ROUNDS {
-        let found = divide(start, end, &breaks, dim, &tolerance, &mut function)?;
+        let joints = joints((start, end), &breaks);
+        let found = divide(&joints, &samples, dim, &tolerance, &mut function)?;
         let known = breaks.len();
         for pair in found.pieces.windows(2) {
             if !joins(&pair[0], &pair[1], &found.sizes, &tolerance) {
@@ -73,7 +85,61 @@ pub fn approximate(
             return Ok(found);
         }
     }
-    divide(start, end, &breaks, dim, &tolerance, &mut function)
+    let joints = joints((start, end), &breaks);
+    divide(&joints, &samples, dim, &tolerance, &mut function)
+}
+
+/// Start, breaks in between and end, in order.
+fn joints((start, end): (f64, f64), breaks: &[f64]) -> Vec<f64> {
+    let mut joints = vec![start];
+    joints.extend(breaks.iter().filter(|time| **time > start && **time < end));
+    joints.push(end);
+    joints.sort_by(f64::total_cmp);
+    joints.dedup();
+    joints
+}
+
+/// Even samples of a function between its joints.
+struct Samples {
+    times: Vec<f64>,
+    /// One time after the other.
+    values: Vec<f64>,
+}
+
+impl Samples {
+    /// At the middles of equal parts no longer than `gap`: never at a joint.
+    fn new(
+        joints: &[f64],
+        gap: f64,
+        dim: usize,
+        function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+    ) -> Result<Self, Error> {
+        let whole = joints
+            .last()
+            .zip(joints.first())
+            .map_or(0.0, |(b, a)| b - a);
+        let gap = gap.max(whole / MOST_SAMPLES);
+        let mut times = Vec::new();
+        for pair in joints.windows(2) {
+            let parts = ((pair[1] - pair[0]) / gap).ceil().max(1.0);
+            let width = (pair[1] - pair[0]) / parts;
+            times.extend((0..parts as usize).map(|i| pair[0] + (i as f64 + 0.5) * width));
+        }
+        let mut values = vec![0.0; dim * times.len()];
+        for (time, values) in times.iter().zip(values.chunks_exact_mut(dim.max(1))) {
+            function(*time, values)?;
+        }
+        Ok(Self { times, values })
+    }
+
+    /// Those within a piece, with their times.
+    fn within(&self, piece: &Piece, dim: usize) -> impl Iterator<Item = (f64, &[f64])> {
+        let first = self.times.partition_point(|time| *time <= piece.start);
+        let beyond = self.times.partition_point(|time| *time < piece.end);
+        let values = self.values.chunks_exact(dim.max(1));
+        let times = self.times.iter().copied().zip(values);
+        times.take(beyond).skip(first)
+    }
 }
 
 /// Where a function passes from one piece to the next, close to their joint: no point of either
@@ -106,24 +172,23 @@ fn meeting(
 
 /// Halve until every piece is resolved.
 fn divide(
-    start: f64,
-    end: f64,
-    breaks: &[f64],
+    joints: &[f64],
+    samples: &Samples,
     dim: usize,
     tolerance: &impl Fn(usize, f64) -> f64,
     function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
 ) -> Result<Approximation, Error> {
-    let mut joints = vec![start];
-    joints.extend(breaks.iter().filter(|time| **time > start && **time < end));
-    joints.push(end);
-    joints.sort_by(f64::total_cmp);
-    joints.dedup();
     let mut found = Approximation::default();
     let mut fitter = Fitter::new(dim);
     // Largest values seen of each component: around a zero, a function is no better than they are.
-    let mut sizes = vec![0.0; dim];
+    let mut sizes = vec![0.0_f64; dim];
+    for values in samples.values.chunks_exact(dim.max(1)) {
+        for (size, value) in sizes.iter_mut().zip(values) {
+            *size = size.max(value.abs());
+        }
+    }
     for pair in joints.windows(2) {
-        if pair[0] > start {
+        if pair[0] > joints[0] {
             found.breaks.push(BreakingPoint {
                 time: pair[0],
                 order: 0,
@@ -133,7 +198,7 @@ fn divide(
         let mut open = vec![(pair[0], pair[1], 0)];
         let mut tiniest: Option<(u32, f64)> = None;
         while let Some((start, end, depth)) = open.pop() {
-            let piece = fitter.piece(start, end, function)?;
+            let mut piece = fitter.piece(start, end, function)?;
             let middle = 0.5 * (start + end);
             let splits = depth < DEEPEST && start < middle && middle < end;
             for (largest, c) in sizes
@@ -142,8 +207,12 @@ fn divide(
             {
                 *largest = f64::max(*largest, size(c));
             }
-            let good = resolved(&piece, &sizes, tolerance)
-                && holds_at_ends(&piece, &sizes, tolerance, function)?;
+            let allowed: Vec<f64> = (0..dim)
+                .map(|d| allowed(tolerance(d, sizes[d]), sizes[d]).max(fitter.blur(d, &piece)))
+                .collect();
+            let good = resolved(&piece, &allowed)
+                && holds_at_samples(&piece, samples, &allowed)
+                && holds_at_ends(&piece, &allowed, function)?;
             if splits && !good {
                 if found.pieces.len() + open.len() > MOST {
                     return Err(Error::TooMuch {
@@ -160,6 +229,10 @@ fn divide(
                 open.push((start, middle, depth + 1));
                 continue;
             }
+            if !good {
+                // It holds a jump, and no number between its ends tells where.
+                piece = fitter.last_value(&piece);
+            }
             match tiniest {
                 Some((deepest, _)) if depth >= KINKED && depth > deepest => {
                     tiniest = Some((depth, start));
@@ -173,7 +246,7 @@ fn divide(
             }
             found.pieces.push(piece);
         }
-        if let Some((_, time)) = tiniest.filter(|(_, time)| *time > start) {
+        if let Some((_, time)) = tiniest.filter(|(_, time)| *time > pair[0]) {
             found.breaks.push(BreakingPoint { time, order: 0 });
         }
     }
@@ -199,8 +272,10 @@ fn joins(
     let (before, after) = (left.end - left.start, right.end - right.start);
     let shorter = before.min(after);
     pairs.enumerate().all(|(component, ((a, b), &size))| {
-        let noise = LOUD * tolerance(component, size).max(1e-15 * size);
         let ((value, slope), (next, beyond)) = (ends(a, 1.0), ends(b, -1.0));
+        let rate = 2.0 * (slope / before).abs().min((beyond / after).abs());
+        let blur = UNITS * left.end.abs() * rate;
+        let noise = LOUD * allowed(tolerance(component, size), size).max(blur);
         let turn = (slope / before - beyond / after).abs() * shorter;
         (value - next).abs() <= noise && turn <= noise * (POINTS * POINTS) as f64
     })
@@ -211,38 +286,52 @@ fn size(coefficients: &[f64]) -> f64 {
     coefficients.iter().map(|c| c.abs()).sum()
 }
 
-/// Whether the last coefficients are below the tolerance for values of these sizes.
-fn resolved(piece: &Piece, sizes: &[f64], tolerance: &impl Fn(usize, f64) -> f64) -> bool {
-    let rows = piece.coefficients.chunks_exact(piece.terms).zip(sizes);
-    rows.enumerate().all(|(component, (c, &size))| {
-        let tail = c[POINTS - TAIL..]
-            .iter()
-            .map(|c| c.abs())
-            .fold(0.0, f64::max);
-        tail <= tolerance(component, size).max(1e-15 * size)
+/// The tolerance, no less than the rounding of values.
+fn allowed(tolerance: f64, size: f64) -> f64 {
+    tolerance.max(1e-15 * size)
+}
+
+/// Whether the last coefficients are below what is allowed.
+fn resolved(piece: &Piece, allowed: &[f64]) -> bool {
+    let rows = piece.coefficients.chunks_exact(piece.terms).zip(allowed);
+    rows.into_iter().all(|(c, allowed)| {
+        let tail = c[POINTS - TAIL..].iter();
+        tail.fold(0.0_f64, |tail, c| tail.max(c.abs())) <= *allowed
     })
+}
+
+/// Whether the piece gives the samples within it.
+fn holds_at_samples(piece: &Piece, samples: &Samples, allowed: &[f64]) -> bool {
+    let mut found = vec![0.0; allowed.len()];
+    samples
+        .within(piece, allowed.len())
+        .all(|(time, values)| agrees(piece, time, values, &mut found, allowed))
 }
 
 /// Whether the piece is right next to its ends too, where it has no points.
 fn holds_at_ends(
     piece: &Piece,
-    sizes: &[f64],
-    tolerance: &impl Fn(usize, f64) -> f64,
+    allowed: &[f64],
     function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
 ) -> Result<bool, Error> {
-    let inset = EDGE * (piece.end - piece.start);
-    let (mut value, mut found) = (vec![0.0; sizes.len()], vec![0.0; sizes.len()]);
+    let rounding = 4.0 * f64::EPSILON * piece.start.abs().max(piece.end.abs());
+    let length = piece.end - piece.start;
+    let inset = (EDGE * length).max(rounding).min(0.5 * length);
+    let (mut value, mut found) = (vec![0.0; allowed.len()], vec![0.0; allowed.len()]);
     for time in [piece.start + inset, piece.end - inset] {
         function(time, &mut value)?;
-        piece.value(time, &mut found);
-        let pairs = value.iter().zip(&found).zip(sizes).enumerate();
-        for (component, ((value, found), &size)) in pairs {
-            if (value - found).abs() > NEAR * tolerance(component, size).max(1e-15 * size) {
-                return Ok(false);
-            }
+        if !agrees(piece, time, &value, &mut found, allowed) {
+            return Ok(false);
         }
     }
     Ok(true)
+}
+
+/// Whether a piece gives these values.
+fn agrees(piece: &Piece, time: f64, values: &[f64], found: &mut [f64], allowed: &[f64]) -> bool {
+    piece.value(time, found);
+    let mut pairs = values.iter().zip(&*found).zip(allowed);
+    pairs.all(|((value, found), allowed)| (value - found).abs() <= NEAR * allowed)
 }
 
 /// Interpolation at the Chebyshev points, with its tables.
@@ -296,6 +385,32 @@ impl Fitter {
         }
         Ok(Piece::new(start, end, POINTS, coefficients))
     }
+
+    /// What rounding of the time makes of a component of the piece in hand.
+    fn blur(&self, component: usize, piece: &Piece) -> f64 {
+        let values = || self.values[component..].iter().step_by(self.dim);
+        let half = 0.5 * (piece.end - piece.start);
+        let places = self
+            .points
+            .windows(2)
+            .map(|pair| half * (pair[1] - pair[0]));
+        let steps = values().zip(values().skip(1)).zip(places);
+        let rate = steps.fold(0.0_f64, |rate, ((a, b), gap)| rate.max((b - a).abs() / gap));
+        let low = values().fold(f64::INFINITY, |low, value| low.min(*value));
+        let high = values().fold(f64::NEG_INFINITY, |high, value| high.max(*value));
+        let time = piece.start.abs().max(piece.end.abs());
+        (UNITS * time * rate).min(BLURRED * (high - low))
+    }
+
+    /// The last values of the piece in hand, all along it.
+    fn last_value(&self, piece: &Piece) -> Piece {
+        let mut coefficients = vec![0.0; piece.coefficients.len()];
+        let last = &self.values[self.values.len() - self.dim..];
+        for (row, value) in coefficients.chunks_exact_mut(POINTS).zip(last) {
+            row[0] = *value;
+        }
+        Piece::new(piece.start, piece.end, POINTS, coefficients)
+    }
 }
 
 #[cfg(test)]
@@ -304,7 +419,7 @@ mod tests {
 
     fn fitted(breaks: &[f64], function: impl Fn(f64) -> f64) -> Approximation {
         let tolerance = |_, size: f64| 1e-10 * size;
-        approximate(-1.0, 0.0, breaks, 1, tolerance, |t, out| {
+        approximate((-1.0, 0.0), 1e-3, breaks, 1, tolerance, |t, out| {
             out[0] = function(t);
             Ok(())
         })
@@ -370,8 +485,8 @@ mod tests {
     fn noise_is_refused() {
         let mut state = 1_u64;
         let refused = approximate(
-            -1.0,
-            0.0,
+            (-1.0, 0.0),
+            1e-3,
             &[],
             1,
             |_, _| 1e-10,

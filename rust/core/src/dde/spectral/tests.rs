@@ -128,8 +128,8 @@ fn a_delay_far_shorter_than_the_elements_costs_no_more() {
     }
     let mut problem = scalar(delay, 10.0, 1e-9);
     let past = approximate(
-        -delay,
-        0.0,
+        (-delay, 0.0),
+        1e-3 * delay,
         &[],
         1,
         |_, _| 1e-14,
@@ -154,8 +154,8 @@ fn stiff_equations_take_long_elements() {
     };
     let mut problem = scalar(1.0, 5.0, 1e-8);
     let past = approximate(
-        -1.0,
-        0.0,
+        (-1.0, 0.0),
+        1e-3,
         &[],
         1,
         |_, _| 1e-13,
@@ -300,7 +300,7 @@ proptest! {
             delays: 1,
         };
         let mut problem = scalar(delay, 4.0, 1e-9);
-        let past = approximate(-delay, 0.0, &[], 1, |_, _| 1e-13, |t, out| {
+        let past = approximate((-delay, 0.0), 1e-3 * delay, &[], 1, |_, _| 1e-13, |t, out| {
             out[0] = (rate * t).exp();
             Ok(())
         });

@@ -135,7 +135,7 @@ pub(super) fn run(
             let parts = (whole / suggested - 1e-9).ceil().max(1.0);
             let h = if parts > 1.0 { whole / parts } else { whole };
             if let Some(read) = element.solve(&x, t, h, tolerance, tracks) {
-                (whole, suggested) = (read, read.min(suggested));
+                (whole, suggested) = (read, read.max(0.5 * h));
                 continue;
             }
             if element.is_resolved() || h <= 64.0 * tolerance {

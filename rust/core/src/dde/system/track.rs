@@ -18,15 +18,16 @@ pub(super) struct Piece {
     first: Vec<f64>,
 }
 
-/// What series through several pieces may be off, as a part of what their rounding is relative to:
-/// ends of pieces err by ten units, and interpolation adds up as many.
-const UNREAD: f64 = 256.0 * f64::EPSILON;
-
-/// Values so close to the smallest number that they are not resolved relative to their size.
-pub(super) const NEGLIGIBLE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+/// What series through several pieces may be off between nodes, as a part of what their rounding is
+/// relative to. Slopes of neutral systems carry some thousand units of rounding from one piece to the
+/// next; elements that ended at each of these would multiply with every delay.
+const UNREAD: f64 = 1e-11;
 
 /// Stretches of a piece shorter than this many times the rounding of times are not looked at.
 const THIN: f64 = 16.0;
+
+/// Values so close to the smallest number that they are not resolved relative to their size.
+pub(super) const NEGLIGIBLE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 /// Kinds of sizes.
 pub(super) const KINDS: usize = 4;

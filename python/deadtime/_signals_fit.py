@@ -1,0 +1,233 @@
+"""A function of time as Legendre series by pieces, to rounding.
+
+The function is sampled evenly first, no further apart than a given gap, and every piece has to give
+the samples within it: what lasts longer than the gap is seen, what is shorter may be missed. A
+piece takes the Gauss nodes of its interval and two points next to its ends. Where the last
+coefficients are not below rounding, or the series does not give all that is known, the interval is
+halved; all intervals of a round are asked for in one call. Where halving comes to an end there is a
+jump, which is found by bisection, or a kink, which is refused.
+
+Rounding is that of the values and that of the time, which moves a value by eps |t| |u'|.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from deadtime._deadtime import legendre_tables
+
+__all__ = ["RESOLUTION", "Pieces", "pieces"]
+
+Vector = NDArray[np.float64]
+Blocks = NDArray[np.float64]
+Sampler = Callable[[Vector], NDArray[np.float64]]
+
+#: What lasts longer than this part of the span is seen.
+RESOLUTION = 1e-3
+
+# Values at these nodes, times the matrix, are coefficients.
+_NODES, _TRANSFORM = legendre_tables()
+_TERMS = len(_NODES)
+
+_EPS = float(np.finfo(float).eps)
+
+# A series has ended where its last two coefficients are below this part of the largest value.
+_ENDED = 16.0 * _EPS
+
+# Units of rounding of the time that a function may err by: it multiplies and adds as well.
+_UNITS = 8.0 * _EPS
+
+# What rounding of the time makes of the values, at most, as a part of how much they vary on a
+# piece: where it is more, the piece is too short to be told from a jump.
+_BLURRED = 1e-3
+
+# A series may be off by so many times what its last coefficients may be.
+_OFF = 30.0
+
+# Points next to the ends, in units of rounding of the time.
+_INSET = 4.0 * _EPS
+
+# An interval shorter than this part of the whole is not halved any more: there is a break in it.
+_SHORTEST = 1e-9
+
+# Intervals of one function, and breaks found in it.
+_MOST = 20_000
+_MOST_BREAKS = 1_000
+_MOST_SAMPLES = 1_000_000
+
+
+class Pieces(NamedTuple):
+    """Coefficient k of component i in piece j at ``series[j, i, k]``; pieces after a break."""
+
+    edges: Vector
+    series: Blocks
+    breaks: list[int]
+
+
+class _Known(NamedTuple):
+    """Even samples, and how large each component is."""
+
+    times: Vector
+    values: NDArray[np.float64]
+    scale: Vector
+    shortest: float
+
+
+def pieces(
+    name: str, sample: Sampler, span: tuple[float, float], breaks: Iterable[float], gap: float
+) -> Pieces:
+    """Fit what `sample` gives, shape (width, m) at m times, over `span` between its breaks."""
+    low, high = span
+    corners = [low, *sorted({float(b) for b in breaks if low < b < high}), high]
+    if (high - low) / gap > _MOST_SAMPLES:
+        raise ValueError(
+            f"max_step={gap:g}: that is more than {_MOST_SAMPLES} samples of {name} from "
+            f"{low:g} to {high:g} s; give a larger one, and name what is shorter in "
+            f"{_option(name)}"
+        )
+    known = _known(sample, corners, gap)
+    found, rough = _divided(name, sample, corners, known)
+    if len(rough):
+        corners = sorted({*corners, *_jumps(name, sample, rough, known)})
+        found, rough = _divided(name, sample, corners, known)
+        if len(rough):
+            raise ValueError(_not_smooth(name, float(rough[0, 1])))
+    starts = [int(place) for place in np.searchsorted(found[0], corners[1:-1])]
+    return Pieces(found[0], found[1], starts)
+
+
+def _option(name: str) -> str:
+    return f"{name.split()[0]}_breaks"
+
+
+def _not_smooth(name: str, time: float) -> str:
+    return (
+        f"{name} is not smooth at t = {time:.10g} s: name the time in {_option(name)}, or give "
+        "samples"
+    )
+
+
+def _known(sample: Sampler, corners: list[float], gap: float) -> _Known:
+    """Sample at the middles of equal parts no longer than `gap`, never at a break."""
+    middles = []
+    for left, right in pairwise(corners):
+        parts = max(1, int(np.ceil((right - left) / gap)))
+        middles.append(left + (right - left) * (np.arange(parts) + 0.5) / parts)
+    times = np.concatenate(middles)
+    values = sample(times)
+    low, high = corners[0], corners[-1]
+    shortest = max(_SHORTEST * (high - low), 16.0 * _EPS * max(abs(low), abs(high)))
+    return _Known(times, values, np.abs(values).max(axis=1), shortest)
+
+
+def _divided(
+    name: str, sample: Sampler, corners: list[float], known: _Known
+) -> tuple[tuple[Vector, Blocks], NDArray[np.float64]]:
+    """Edges and series, or the intervals, shape (m, 2), in which no series ends."""
+    waiting = np.array(list(pairwise(corners)))
+    scale = known.scale
+    done: list[NDArray[np.float64]] = []
+    series: list[Blocks] = []
+    rough: list[NDArray[np.float64]] = []
+    count = 0
+    while len(waiting):
+        a, b = waiting.T
+        values, ends = _values(sample, a, b)
+        scale = np.maximum(scale, np.abs(values).max(axis=(0, 2)))
+        found = values @ _TRANSFORM
+        allowed = np.maximum(_ENDED * scale, _blur(values, a, b))
+        good = (np.abs(found[:, :, -2:]).max(axis=2) <= allowed).all(axis=1)
+        good &= _gives(found, waiting, allowed, ends, known)
+        done.append(waiting[good])
+        series.append(found[good])
+        count += int(good.sum())
+        is_short = ~good & (b - a <= known.shortest)
+        rough.append(waiting[is_short])
+        waiting = waiting[~good & ~is_short]
+        if count + 2 * len(waiting) > _MOST:
+            raise ValueError(
+                f"{name} needs more than {_MOST} polynomial pieces, first near t = "
+                f"{waiting[0, 0]:.10g} s: it is too rough or too fast for one run of "
+                f"{corners[-1] - corners[0]:g} s; shorten the run, or give samples"
+            )
+        middle = waiting.mean(axis=1)
+        halves = (np.stack([waiting[:, 0], middle], 1), np.stack([middle, waiting[:, 1]], 1))
+        waiting = np.concatenate(halves)
+    spans = np.concatenate(done)
+    order = np.argsort(spans[:, 0])
+    edges = np.append(spans[order, 0], corners[-1])
+    return (edges, np.concatenate(series)[order]), np.concatenate(rough)
+
+
+def _values(sample: Sampler, a: Vector, b: Vector) -> tuple[Blocks, tuple[Vector, Blocks]]:
+    """Values at the nodes, shape (m, width, node), and next to the ends, with their places."""
+    half, middle = 0.5 * (b - a), 0.5 * (a + b)
+    inset = np.minimum(_INSET * np.maximum(np.abs(a), np.abs(b)), 0.25 * (b - a))
+    inset = np.maximum(inset, _EPS * (b - a))
+    near = np.stack([a + inset, b - inset], 1)
+    nodes = 0.5 * (np.outer(a, 1.0 - _NODES) + np.outer(b, 1.0 + _NODES))
+    times = np.concatenate([nodes, near], axis=1)
+    values = sample(times.ravel()).reshape(-1, *times.shape).transpose(1, 0, 2)
+    places = (near - middle[:, None]) / half[:, None]
+    return np.ascontiguousarray(values[:, :, :-2]), (places, values[:, :, -2:])
+
+
+def _blur(values: Blocks, a: Vector, b: Vector) -> NDArray[np.float64]:
+    """What rounding of the time makes of the values of a piece."""
+    gaps = 0.5 * np.outer(b - a, np.diff(_NODES))
+    rates = (np.abs(np.diff(values, axis=2)) / gaps[:, None, :]).max(axis=2)
+    times = np.maximum(np.abs(a), np.abs(b))[:, None]
+    return np.asarray(np.minimum(_UNITS * times * rates, _BLURRED * np.ptp(values, axis=2)))
+
+
+def _gives(
+    series: Blocks,
+    spans: NDArray[np.float64],
+    allowed: NDArray[np.float64],
+    ends: tuple[Vector, Blocks],
+    known: _Known,
+) -> NDArray[np.bool_]:
+    """Whether series give what is known of the function: next to the ends, and the samples."""
+    places, values = ends
+    table = legendre.legvander(places, _TERMS - 1)
+    off = np.abs(np.einsum("mek,mwk->mwe", table, series) - values).max(axis=2)
+    good: NDArray[np.bool_] = (off <= _OFF * allowed).all(axis=1)
+    order = np.argsort(spans[:, 0])
+    owner = order[np.searchsorted(spans[order, 0], known.times, side="right") - 1]
+    left, right = spans[owner].T
+    inside = (known.times > left) & (known.times < right)
+    owner, left, right = owner[inside], left[inside], right[inside]
+    times, values = known.times[inside], known.values[:, inside]
+    table = legendre.legvander(((times - left) - (right - times)) / (right - left), _TERMS - 1)
+    off = np.abs(np.einsum("sk,swk->sw", table, series[owner]) - values.T)
+    good[owner[(off > _OFF * allowed[owner]).any(axis=1)]] = False
+    return good
+
+
+def _jumps(
+    name: str, sample: Sampler, rough: NDArray[np.float64], known: _Known
+) -> NDArray[np.float64]:
+    """First times after the jumps in these intervals; a kink is refused."""
+    if len(rough) > _MOST_BREAKS:
+        raise ValueError(_not_smooth(name, float(rough[0, 1])))
+    low, high = rough[:, 0].copy(), rough[:, 1].copy()
+    before, after = sample(low), sample(high)
+    middle = 0.5 * (low + high)
+    while ((low < middle) & (middle < high)).any():
+        value = sample(middle)
+        left = np.abs(value - before).sum(axis=0) <= np.abs(value - after).sum(axis=0)
+        low, high = np.where(left, middle, low), np.where(left, high, middle)
+        middle = 0.5 * (low + high)
+    height = np.abs(sample(high) - sample(low))
+    change = np.abs(after - before)
+    is_jump = (height > _OFF * _ENDED * known.scale[:, None]) & (height > 0.5 * change)
+    kinks = np.flatnonzero(~is_jump.any(axis=0))
+    if len(kinks):
+        raise ValueError(_not_smooth(name, float(rough[kinks[0], 1])))
+    return high
