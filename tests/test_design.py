@@ -1,5 +1,6 @@
 """Design: the best gains by closed forms and brute force, within exact margins, for all delays."""
 
+import itertools
 import math
 
 import deadtime as dtm
@@ -260,14 +261,23 @@ def test_chains_of_a_neutral_loop_have_no_damping():
     assert dominant_damping(LOOP.replace(controller=dtm.P(1.0)))[0] == 1.0
 
 
+def swept_settling(loop, gains):
+    """Settling times, the longest for gains half a percent beside these as well."""
+    every = [gains]
+    for signs in itertools.product((0.995, 1.005), repeat=len(gains)):
+        named = zip(gains.items(), signs, strict=True)
+        every.append({name: values * sign for (name, values), sign in named})
+    return np.max([dtm.sweep(loop, one, 20.0)["settling_time"] for one in every], axis=0)
+
+
 def test_the_settling_time_is_that_of_the_simulated_loop():
     best = dtm.design(SAMPLED, objective="settling_time")
     settled = best.loop.step_response().info()["settling_time"]
-    assert settled == pytest.approx(best.value, abs=1e-3)
+    assert settled <= best.value + 1e-3 <= 1.05 * settled
     # brute force over gains, the step simulated as far as it needs
     Kp, Kv = np.ix_(np.linspace(0.5, 5.0, 91), np.linspace(-0.1, 1.0, 89))
-    swept = dtm.sweep(SAMPLED.replace(controller=dtm.PV(1.0, 0.1)), {"Kp": Kp, "Kv": Kv}, 20.0)
-    assert best.value <= np.nanmin(swept["settling_time"]) * 1.05
+    swept = swept_settling(SAMPLED.replace(controller=dtm.PV(1.0, 0.1)), {"Kp": Kp, "Kv": Kv})
+    assert best.value <= np.nanmin(swept) * 1.05
     assert best.step_info["settling_time"] == pytest.approx(settled, abs=1e-3)
     assert best.step_info["peak_command"] == 1.0
     assert 0.5 < best.step_info["time_at_limit"] < 1.5
@@ -276,8 +286,8 @@ def test_the_settling_time_is_that_of_the_simulated_loop():
 def test_the_fastest_settling_along_one_gain():
     best = dtm.design(SAMPLED, controller=SMOOTH, fixed={"Kp": 2.0}, objective="settling_time")
     Kv = np.linspace(-0.1, 0.8, 2001)
-    swept = dtm.sweep(SAMPLED.replace(controller=dtm.PV(2.0, 0.1, FILTER)), {"Kv": Kv}, 20.0)
-    assert best.value <= np.nanmin(swept["settling_time"]) * 1.03
+    swept = swept_settling(SAMPLED.replace(controller=dtm.PV(2.0, 0.1, FILTER)), {"Kv": Kv})
+    assert best.value <= np.nanmin(swept) * 1.03
 
 
 def test_a_step_that_the_limit_forbids_is_refused():

@@ -26,7 +26,7 @@ def made(
     found = best_gains(search, demands)
     judged = [*fine(problem), found.worst]
     loops = [problem.at(found.gains, one) for one in judged]
-    value = objective.value(problem, found.gains, judged)
+    value = objective.proved(problem, found.gains, judged)
     loop = problem.at(found.gains)
     places = [*fine(problem, margins=True), found.worst]
     margins = LeastMargins(*least_margins(exact_margins(problem, found.gains, places)).tolist())

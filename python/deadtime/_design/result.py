@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 from deadtime._design.objectives import ObjectiveName
@@ -83,10 +84,13 @@ class Design(ReadOnlyArrays):
     objective : {"abscissa", "damping", "settling_time", "overshoot"}
         What was made best.
     value : float
-        What it came out at in the worst scenario: 1/s, a ratio, s or %.
+        What it came out at in the worst scenario: 1/s, a ratio, s or %. Of a settling time or an
+        overshoot the worst for gains half a percent beside these as well, so that they may be
+        rounded to three digits.
     step_info : dict of str to float
         The step of `amplitude` in `loop`, hold and limit included: `Response.info`, and
-        ``peak_command`` and ``time_at_limit`` (s, 0 without a limit).
+        ``peak_command`` and ``time_at_limit`` (s, 0 without a limit). The settling time is proved
+        for all times, NaN where it is not.
     amplitude : float
         Height of the step.
     worst : dict of str to float
@@ -152,10 +156,9 @@ class Design(ReadOnlyArrays):
             over += f" and a gain of {self.gain[0]:g} to {self.gain[1]:g}"
         info, least = self.step_info, self.margins
         proof = f"; proved: {', '.join(self.proved)}" if self.proved else ""
-        step = (
-            f"settles in {info['settling_time']:.3g} s, overshoot {info['overshoot']:.2g} %, "
-            f"peak command {info['peak_command']:.3g}"
-        )
+        settled = info["settling_time"]
+        step = f"settles in {settled:.3g} s" if isfinite(settled) else "not proved to settle"
+        step += f", overshoot {info['overshoot']:.2g} %, peak command {info['peak_command']:.3g}"
         if self.loop.limit is not None:
             step += f", {info['time_at_limit']:.2g} s at the limit of {self.loop.limit:g}"
         lines = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from deadtime._design.settling import proved_step
 from deadtime._loop import ControlLoop
 
 __all__ = ["step_info"]
@@ -16,9 +17,14 @@ _AT_LIMIT = 1.0 - 1e-9
 
 
 def step_info(loop: ControlLoop, amplitude: float) -> dict[str, float]:
-    """`Response.info` of the step, largest command, and how long it is at the limit, s."""
+    """`Response.info` of the step, largest command, and how long it is at the limit, s.
+
+    The settling time is NaN where it is not proved that the output stays in the band.
+    """
     response = loop.step_response(amplitude=amplitude)
-    info = response.info()
+    proved = proved_step(loop, amplitude)
+    known = {"settling_time": float("nan")} if proved is None else proved._asdict()
+    info = response.info() | known
     time = np.linspace(0.0, response.time[-1], _POINTS)
     command = np.abs(loop.simulate(time, amplitude).inputs)
     limited = 0.0
