@@ -470,7 +470,7 @@ def test_the_page_on_simulation_runs():
     pytest.importorskip("matplotlib").use("Agg")
     page = Path(__file__).parent.parent / "docs" / "simulating.md"
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 3
+    assert len(blocks) == 4
     exec("\n".join(blocks), {})
 
 

@@ -18,10 +18,11 @@ pub(super) struct Piece {
     first: Vec<f64>,
 }
 
-/// What series through several pieces may be off between nodes, as a part of what their rounding is
-/// relative to. Slopes of neutral systems carry some thousand units of rounding from one piece to the
-/// next; elements that ended at each of these would multiply with every delay.
-const UNREAD: f64 = 1e-11;
+/// What a series through several pieces may differ from them between its nodes, as a part of what their
+/// rounding is relative to. The rounding of one piece is a joint to the next, and elements that ended at
+/// such joints would multiply with every delay: with 1e-11 a stiff neutral system of three delays no
+/// longer ends, with 1e-9 its cost is linear in time.
+const UNREAD: f64 = 1e-9;
 
 /// Stretches of a piece shorter than this many times the rounding of times are not looked at.
 const THIN: f64 = 16.0;
