@@ -30,9 +30,9 @@ Vector = NDArray[np.float64]
 #: Sets built and simulated together.
 _BLOCK = 1 << 15
 
-# Sets that have not settled are measured over a longer time, up to so many times the first. It lasts
+# Sets that have not settled are measured over a longer time, up to so many steps of it. It lasts
 # until the output has been in its band for long enough, or so many of the slowest time constants
-# where it is still outside: an answer of the size of the step has then come down and stayed inside.
+# where it is still outside: an answer of the size of the step has then come down and stayed there.
 # Times are powers of the square root of 2, so that the sets of one time run together.
 _PER_DOUBLING = 2
 _MOST_STEPS = 10 * _PER_DOUBLING
