@@ -11,6 +11,9 @@ more       grids around the best point, each narrower than the one before (a map
            simplices of Nelder and Mead (1965), begun again around what they found, smaller and
            turned: a simplex that has collapsed on a kink is so freed.
 
+What is simulated is searched for the gains alone first, and in the last grids with gains half a
+percent beside them. There a gain whose axis begins at zero stays a quarter of a cell off it.
+
 Margins are demands, not costs: a shortfall costs many times as much as any gain in the objective,
 and becomes zero where the demands can be met. None of this proves a global minimum: the map sees
 to it, as far as its cells are close enough.
