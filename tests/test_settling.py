@@ -52,6 +52,8 @@ def test_a_designed_step_settles_when_it_is_said_to_and_after_rounding_its_gains
     # rounded to three digits.
     options = {"gain_margin": 2.0, "phase_margin": 45.0, "shape": (41, 41)}
     best = dtm.design(LAGGING, controller=dtm.PI, objective="settling_time", **options)
+    # 6.97 s came out where gains with an integral weaker than the first cell of the map settle.
+    assert best.value < 2.45
     own = own_settling(best.loop, 80.0)
     assert own == pytest.approx(best.step_info["settling_time"], abs=0.005)
     assert own <= best.value + 0.0025

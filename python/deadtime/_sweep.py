@@ -30,11 +30,12 @@ Vector = NDArray[np.float64]
 #: Sets built and simulated together.
 _BLOCK = 1 << 15
 
-# Sets that have not settled are measured over twice the time or more, up to so many doublings. From
-# the one of that number on their poles are asked for, and it lasts so many of their slowest time
-# constants: an answer of the size of the step has then come down to the band and stayed inside.
-_DOUBLINGS = 10
-_ASKED = 3
+# Sets that have not settled are measured over a longer time, up to so many steps of it. It lasts
+# until the output has been in its band for long enough, or so many of the slowest time constants
+# where it is still outside: an answer of the size of the step has then come down and stayed there.
+# Times are powers of the square root of 2, so that the sets of one time run together.
+_PER_DOUBLING = 2
+_MOST_STEPS = 10 * _PER_DOUBLING
 _TO_SETTLE = 8.0
 
 # What the native part gives where the response was inside its band at the end, and did not show
@@ -261,7 +262,7 @@ def sweep(
     times = _times(time, responses)
     if responses:
         return sets.outputs(times, progress)
-    return sets.measured(times, progress)
+    return sets.decided(times, progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,13 +277,13 @@ class _Sets:
     rise: tuple[float, float]
     threads: int | None
 
-    def only(self, chosen: NDArray[np.bool_]) -> _Sets:
+    def only(self, places: NDArray[np.intp]) -> _Sets:
         """Some of the sets, in one row."""
-        count = int(np.count_nonzero(chosen))
         arrays = {
-            name: np.broadcast_to(array, self.shape)[chosen] for name, array in self.arrays.items()
+            name: np.broadcast_to(array, self.shape).reshape(-1)[places]
+            for name, array in self.arrays.items()
         }
-        return replace(self, arrays=arrays, shape=(count,))
+        return replace(self, arrays=arrays, shape=places.shape)
 
     def blocks(
         self, progress: Callable[[int], object] | None
@@ -311,13 +312,8 @@ class _Sets:
         outputs = found.reshape(*self.shape, len(times))
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
-    def measured(
-        self,
-        times: Vector,
-        progress: Callable[[int], object] | None = None,
-        by_poles: bool = True,
-    ) -> Sweep:
-        """Metrics; `by_poles`, doubtful sets are decided, else their status tells of them."""
+    def measured(self, times: Vector, progress: Callable[[int], object] | None = None) -> Sweep:
+        """Metrics; the status tells of sets that are in the band, but may leave it later."""
         count, span = math.prod(self.shape), float(times[-1] - times[0])
         found, status = np.full((count, len(_FIGURES)), np.nan), np.empty(count, dtype=np.uint8)
         for place, numbers, rows, report in self.blocks(progress):
@@ -328,8 +324,6 @@ class _Sets:
             inside = span - figures[:, _SETTLING]
             slow = TIME_CONSTANTS * slowest_times(self.loop, numbers, len(place)) > inside
             ended[slow & (ended == SweepStatus.OK)] = _DOUBTFUL
-            if by_poles:
-                _refuse_passing(self.loop, numbers, figures, ended, inside, self.threads)
             found[place], status[place] = figures, ended
         metrics = {
             name: column.reshape(self.shape).copy()
@@ -337,50 +331,85 @@ class _Sets:
         }
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), metrics)
 
+    def decided(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+        """Metrics; doubtful sets are decided by how long they have been in the band."""
+        found = self.measured(times, progress)
+        status, settled = found.status.flatten(), found.metrics["settling_time"].ravel()
+        doubtful = np.flatnonzero(status == _DOUBTFUL)
+        if doubtful.size:
+            inside = float(times[-1] - times[0]) - settled[doubtful]
+            stays = inside * self.only(doubtful).rates() >= TIME_CONSTANTS
+            status[doubtful[stays]] = SweepStatus.OK
+        return self._told(found, times, found.metrics, status)
+
     def until_settled(self, progress: Callable[[int], object] | None) -> Sweep:
-        """Metrics of all sets, longer and longer where a set has not settled."""
+        """Metrics of all sets, over a longer time where a set has not settled."""
         loop = self.loop
         numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
         waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
         slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
         span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
-        found = self.measured(np.array([0.0, span]), progress, by_poles=False)
-        metrics = {name: figures.copy() for name, figures in found.metrics.items()}
-        status = found.status.copy()
-        due = np.isin(status, (SweepStatus.UNSETTLED, _DOUBTFUL))
-        doublings, longest = np.ones(self.shape), 0
-        for power in range(1, _DOUBLINGS + 1):
-            now = due & (doublings <= power)
-            if not now.any():
-                continue
-            by_poles = power >= _ASKED
-            times = np.array([0.0, 2.0**power * span])
-            longer = self.only(now).measured(times, by_poles=by_poles)
-            longest = power
-            simulated = longer.status != SweepStatus.REFUSED
-            places = np.flatnonzero(now)[simulated]
-            for name, figures in longer.metrics.items():
-                metrics[name].reshape(-1)[places] = figures[simulated]
-            status.reshape(-1)[places] = longer.status[simulated]
-            late = np.isin(longer.status, (SweepStatus.UNSETTLED, _DOUBTFUL))
-            due.reshape(-1)[np.flatnonzero(now)] = late
-            if power == _ASKED - 1 and due.any():
-                # Poles cost as much as these simulations: only now are they asked for.
-                doublings[due] = self.only(due).doublings(span)
-                due &= doublings <= _DOUBLINGS
-        unsure = status == _DOUBTFUL
-        status[unsure] = SweepStatus.UNSETTLED
-        metrics["settling_time"][unsure] = np.nan
-        time = np.array([0.0, 2.0**longest * span])
-        return replace(found, time=time, metrics=metrics, status=status)
+        found = self.measured(np.array([0.0, span]), progress)
+        metrics = {name: figures.flatten() for name, figures in found.metrics.items()}
+        settled, status = metrics["settling_time"], found.status.flatten()
 
-    def doublings(self, span: float) -> Vector:
-        """How often `span` is doubled until each set has settled; infinite for unstable ones."""
-        rates = -abscissae(self.loop, self.loop.parameters | dict(self.arrays), self.threads)
-        wanted = np.full(rates.shape, np.inf)
-        stable = rates > 0.0
-        wanted[stable] = np.ceil(np.log2(_TO_SETTLE / (rates[stable] * span)))
-        return np.where(stable, np.clip(wanted, _ASKED, _DOUBLINGS), np.inf)
+        def run_on(places: NDArray[np.intp], step: float) -> None:
+            longer = self.only(places).measured(np.array([0.0, span * _longer(step)]))
+            done = longer.status != SweepStatus.REFUSED
+            for name, figures in longer.metrics.items():
+                metrics[name][places[done]] = figures[done]
+            status[places] = np.where(done, longer.status, SweepStatus.UNSETTLED)
+
+        due, longest = np.flatnonzero(_is_open(status)), 0.0
+        if due.size:
+            # Most settle soon after the first time: only then are poles asked for.
+            longest = float(_PER_DOUBLING)
+            run_on(due, longest)
+            due = due[_is_open(status[due])]
+        rates = self.only(due).rates() if due.size else np.empty(0)
+        steps = np.full(due.size, longest)
+        while due.size:
+            # NaN where the output is outside at the end.
+            since = settled[due]
+            stays = (span * _longer(steps) - since) * rates >= TIME_CONSTANTS
+            status[due[stays]] = SweepStatus.OK
+            more = ~stays & (rates > 0.0) & (steps < _MOST_STEPS)
+            due, rates, steps, since = due[more], rates[more], steps[more], since[more]
+            lasts = np.where(np.isnan(since), _TO_SETTLE / rates, since + TIME_CONSTANTS / rates)
+            wanted = np.ceil(_PER_DOUBLING * np.log2(lasts / span) + 1e-6)
+            steps = np.minimum(np.maximum(wanted, steps + 1.0), _MOST_STEPS)
+            longest = max(longest, steps.max(initial=0.0))
+            for step in np.unique(steps):
+                run_on(due[steps == step], step)
+            late = _is_open(status[due])
+            due, rates, steps = due[late], rates[late], steps[late]
+        return self._told(found, np.array([0.0, span * _longer(longest)]), metrics, status)
+
+    def _told(
+        self, found: Sweep, times: Vector, metrics: dict[str, Vector], status: NDArray[np.uint8]
+    ) -> Sweep:
+        """What is known in the end: sets still in doubt have not settled."""
+        status = np.where(status == _DOUBTFUL, SweepStatus.UNSETTLED, status).astype(np.uint8)
+        status = status.reshape(self.shape)
+        late = status == SweepStatus.UNSETTLED
+        told = {name: np.array(figures).reshape(self.shape) for name, figures in metrics.items()}
+        told["settling_time"][late] = np.nan
+        return replace(found, time=times, metrics=told, status=status)
+
+    def rates(self) -> Vector:
+        """Decay rate of the slowest root of each set, 1/s."""
+        numbers = self.loop.parameters | dict(self.arrays)
+        rates = -abscissae(self.loop, numbers, self.threads)
+        return np.asarray(np.broadcast_to(rates, self.shape))
+
+
+def _is_open(status: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    return np.asarray(np.isin(status, (SweepStatus.UNSETTLED, _DOUBTFUL)))
+
+
+def _longer(steps: Any) -> Any:
+    """How much longer than the first simulation one of so many steps is."""
+    return 2.0 ** (steps / _PER_DOUBLING)
 
 
 def require_loop(loop: object) -> None:
@@ -426,27 +455,6 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
             "zero"
         )
     return loop
-
-
-def _refuse_passing(
-    loop: ControlLoop,
-    numbers: Mapping[str, Any],
-    figures: Vector,
-    ended: NDArray[np.uint8],
-    inside: Vector,
-    threads: int | None,
-) -> None:
-    """Decide doubtful sets, in place, by how long they have been in the band."""
-    doubtful = np.flatnonzero(ended == _DOUBTFUL)
-    if not doubtful.size:
-        return
-    chosen = {
-        name: value if np.ndim(value) == 0 else value[doubtful] for name, value in numbers.items()
-    }
-    rates = np.broadcast_to(-abscissae(loop, chosen, threads), doubtful.shape)
-    stays = inside[doubtful] * rates >= TIME_CONSTANTS
-    ended[doubtful] = np.where(stays, SweepStatus.OK, SweepStatus.UNSETTLED)
-    figures[doubtful[~stays], _SETTLING] = np.nan
 
 
 def _times(time: ArrayLike | None, responses: bool) -> Vector:

@@ -73,8 +73,12 @@ class Objective(ABC):
     def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
         """The figure itself, at its worst over the scenarios."""
 
+    def coarse(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        """The costs of the gains alone, where their neighbours count as well and make it dear."""
+        return self.costs(problem, points, scenarios)
+
     def proved(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
-        """The same, where it is simulated with a proof of what follows the simulated time."""
+        """The figure, where it is simulated with a proof of what follows the simulated time."""
         return self.value(problem, gains, scenarios)
 
     def worst(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
@@ -132,12 +136,13 @@ class _ByStep(Objective):
 
     def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
         around = _rounded(points)
-        settling, overshoot = _figures(
-            problem, around.reshape(-1, points.shape[-1]), scenarios, SEARCH_BAND
-        )
-        lost = ~np.isfinite(settling)
-        costs = np.where(lost, NEVER, self._cost(np.where(lost, 0.0, settling), overshoot))
+        costs = self.coarse(problem, around.reshape(-1, points.shape[-1]), scenarios)
         return np.asarray(costs.reshape(*around.shape[:2], -1).max(axis=1))
+
+    def coarse(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        settling, overshoot = _figures(problem, points, scenarios, SEARCH_BAND)
+        lost = ~np.isfinite(settling)
+        return np.where(lost, NEVER, self._cost(np.where(lost, 0.0, settling), overshoot))
 
     def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
         settling, overshoot = _figures(problem, _rounded(gains[None, :])[0], scenarios, BAND)

@@ -22,6 +22,12 @@ _SHAPES = {1: (401,), 2: (61, 61), 3: (21, 21, 9)}
 _CHART_DELAYS = 41
 _BEYOND = 0.5
 
+#: Between zero and the first cell of a gain, at these parts of it, and for so many values of each
+#: of the other gains: an integral so small makes steps that no cell shows. Smaller ones are as good
+#: as none, and their loops take hundreds of settling times to come to rest.
+_FRINGE = np.array([0.5, 0.25])
+_FRINGE_SIDES = {1: 1, 2: 31, 3: 7}
+
 
 @dataclass(frozen=True, eq=False)
 class Survey:
@@ -50,6 +56,25 @@ class Survey:
         return np.asarray(found)
 
     @property
+    def fringes(self) -> list[list[Vector]]:
+        """Grids with one gain between zero and its first cell, where an axis begins at zero."""
+        found = []
+        sides = _FRINGE_SIDES[len(self.axes)]
+        for i, (axis, side) in enumerate(zip(self.axes, self.spacing, strict=True)):
+            if axis[0] * axis[-1] == 0.0:
+                grid = [other[:: -(-len(other) // sides)] for other in self.axes]
+                grid[i] = np.sort(np.sign(axis[0] + axis[-1]) * side * _FRINGE)
+                found.append(grid)
+        return found
+
+    def off_zero(self, start: Vector) -> Vector:
+        """Lower and upper bounds of a search by simulation, rows: gains stay off zero."""
+        bounds = np.array(self.bounds).T
+        off = _FRINGE.min() * self.spacing
+        away = (bounds == 0.0) & (start != 0.0)
+        return np.asarray(np.where(away, np.array([off, -off]), bounds))
+
+    @property
     def spacing(self) -> Vector:
         return np.array([(axis[-1] - axis[0]) / (len(axis) - 1) for axis in self.axes])
 
@@ -57,9 +82,8 @@ class Survey:
     def bounds(self) -> list[tuple[float, float]]:
         return [(float(axis[0]), float(axis[-1])) for axis in self.axes]
 
-    def chosen(self, costs: Vector, most: int) -> Vector:
+    def chosen(self, points: Vector, costs: Vector, most: int) -> Vector:
         """The points with the least finite costs that are no neighbours of one another."""
-        points = self.points
         found: list[Vector] = []
         for place in np.argsort(costs, kind="stable"):
             if not np.isfinite(costs[place]) or len(found) == most:
