@@ -296,3 +296,24 @@ def test_an_unstable_loop_has_no_delay_margin():
         dtm.delay_margin(unstable, at={"Kp": 1.0})
     with pytest.raises(TypeError, match="loop of type float"):
         dtm.delay_margin(1.0)
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "start", "lost"),
+    [
+        ("wright1955", "a", 0.1, math.pi / 2.0),
+        ("armah2017", "Kp", 0.1, math.pi / 2.0 / 0.36),
+        ("armah2017", "Td", 0.1, math.pi / 4.0),
+        ("mackey1977", "tau", 0.1, math.acos(-0.25) / math.sqrt(15.0)),
+    ],
+)
+def test_published_ends_of_stability(key, name, start, lost):
+    """The first crossing is where the source of the problem says that stability ends."""
+    problem = dtm.gallery.problem(key)
+    others = {other: value for other, value in problem.values.items() if other != name}
+    found = dtm.crossings(problem.family, {name: (start, 1.1 * lost)}, at=others)
+    assert found.values[0] == pytest.approx(lost, rel=1e-12)
+    assert found.counts[:2].tolist() == [0, 2]
+    if name in ("tau", "Td"):
+        margin = dtm.delay_margin(problem.family, at={**others, name: start})
+        assert start + margin == pytest.approx(lost, rel=1e-12)

@@ -252,3 +252,27 @@ def test_grids_of_sampled_loops_are_their_single_loops(plant, controller):
         assert status[i] == 0
     shared = sampled_grid(plant, controller, values, threads=1)
     np.testing.assert_array_equal(shared[0], abscissa)
+
+
+@pytest.mark.parametrize("exponent", [-20, -7, 7, 19, 20])
+@pytest.mark.parametrize("delay", [0.0, 0.36, 1.0])
+def test_the_unit_of_the_command_changes_no_verdict(exponent, delay):
+    """At gains near 1e19 a sampled loop was judged by the rounding of a badly scaled matrix."""
+    unit = 10.0**exponent
+    for kp in (0.9, 6.0):
+        poles = []
+        for c in (1.0, unit):
+            loop = dtm.ControlLoop(
+                dtm.Integrator(c, 0.1), dtm.PI(kp / c, 0.2 / c), delay=delay, sample_time=0.065
+            )
+            poles.append((loop.is_stable(), loop.spectral_abscissa()))
+        assert poles[0][0] == poles[1][0]
+        assert poles[1][1] == pytest.approx(poles[0][1], rel=1e-8)
+
+
+def test_a_sampled_loop_slower_than_rounding_is_refused():
+    """z = 1 - 7e-19 rounds to one, and the loop was called unstable."""
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.4e-17), delay=0.1, sample_time=0.05)
+    with pytest.raises(ValueError, match="beyond double precision"):
+        loop.is_stable()
+    assert not loop.replace(Kp=1e20).is_stable()

@@ -23,6 +23,7 @@ from deadtime._loop_stability import (
     continuous_range,
     open_loop,
     sampled_abscissa,
+    sampled_is_stable,
     sampled_range,
     sampled_roots,
 )
@@ -555,7 +556,7 @@ class ControlLoop:
             raise ValueError(f"n={n}: ask for one pole at least")
         if self.sample_time is None:
             return self.characteristic().rightmost(number)
-        return sampled_roots(self.transition_matrix(), self.sample_time, number)
+        return sampled_roots(self._native.balanced_matrix(), self.sample_time, number)
 
     def spectral_abscissa(self) -> float:
         """Return the largest real part of the poles in 1/s, limit left out.
@@ -594,10 +595,11 @@ class ControlLoop:
         Raises
         ------
         ValueError
-            If the delay is None.
+            If the delay is None; if a pole of a sampled loop is as near to the unit circle as
+            rounding.
         """
-        if self.is_sampled:
-            return self.spectral_abscissa() < 0.0
+        if self.sample_time is not None:
+            return sampled_is_stable(self._model, self._known_delay(), self.sample_time)
         return bool(self.characteristic().is_stable())
 
     def stable_range(self, name: str) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eig
+from scipy.linalg import eig, matrix_balance
 
 from deadtime._continuous_ranges import (
     range_of_corner,
@@ -38,6 +38,7 @@ __all__ = [
     "open_loop",
     "sampled_abscissa",
     "sampled_grid",
+    "sampled_is_stable",
     "sampled_range",
     "sampled_roots",
 ]
@@ -96,15 +97,62 @@ def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> floa
     return float(model.native(delay, sample_time).poles()[0].real)
 
 
+def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> bool:
+    """Whether all poles of a sampled loop are inside the unit circle.
+
+    Raises
+    ------
+    ValueError
+        If a pole is nearer to the circle than the rounding of the transition matrix.
+    """
+    matrix = _balanced(model.native(delay, sample_time).balanced_matrix())
+    largest = np.abs(np.linalg.eigvals(matrix)).max()
+    # Rounding moves a triple pole by the third root of itself.
+    if abs(largest - 1.0) > 10.0 * np.cbrt(_rounding(matrix)):
+        return bool(largest < 1.0)
+    z, errors = _eigenvalues(matrix)
+    sizes = np.abs(z)
+    if (sizes + errors < 1.0).all():
+        return True
+    # Without feedback a pole at z = 1 is an integrator of the plant, and stays there.
+    is_open = not model.K.any() and model.L == 0.0
+    if (sizes - errors > 1.0).any() or (is_open and (z == 1.0).any()):
+        return False
+    nearest = int(np.argmax(sizes))
+    raise ValueError(
+        f"a pole at abs(z)={sizes[nearest]:.15g}, known to {errors[nearest]:.1e}, is as near to "
+        "the unit circle as rounding: whether this loop is stable is beyond double precision; "
+        "change a gain, or take a sample_time nearer to the time constants of the loop"
+    )
+
+
+def _balanced(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The matrix in units that make its norm small, each command in its own."""
+    return np.asarray(matrix_balance(matrix, permute=False)[0], dtype=np.float64)
+
+
+def _rounding(matrix: NDArray[np.float64]) -> float:
+    """Backward error of the QR algorithm."""
+    return float(len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix))
+
+
+def _eigenvalues(
+    matrix: NDArray[np.float64],
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """Eigenvalues and first-order bounds on their errors."""
+    z, left, right = cast(Any, eig)(matrix, left=True, right=True)
+    # |dz| <= ||error|| / |y* x|.
+    overlap = np.abs(np.sum(left.conj() * right, axis=0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return z.astype(np.complex128), _rounding(matrix) / overlap
+
+
 def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> RootSet:
     """Return the `n` rightmost poles and their mirror images, with first-order error bounds."""
-    z, left, right = cast(Any, eig)(matrix, left=True, right=True)
-    # |dz| <= ||error|| / |y* x| with the backward error of the QR algorithm.
-    overlap = np.abs(np.sum(left.conj() * right, axis=0))
-    error = len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix)
+    z, errors = _eigenvalues(_balanced(matrix))
     with np.errstate(divide="ignore", invalid="ignore"):
-        poles = np.log(z.astype(np.complex128)) / sample_time
-        radii = error / (overlap * np.abs(z) * sample_time)
+        poles = np.asarray(np.log(z) / sample_time, dtype=np.complex128)
+        radii = errors / (np.abs(z) * sample_time)
     order = np.lexsort((-z.imag, np.abs(poles.imag), -poles.real))
     # A pole and its mirror image are neighbours, the upper one first: keep n uppers.
     order = order[np.cumsum(z[order].imag >= 0.0) <= n]

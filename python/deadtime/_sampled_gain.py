@@ -22,7 +22,7 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigvals
+from scipy.linalg import eigvals, matrix_balance
 
 from deadtime._loop_model import LoopModel
 from deadtime._validation import real_array
@@ -42,8 +42,8 @@ _EVEN = 50
 _PER_TURN = 16
 _AROUND = 40
 
-#: Where abs(L) is below this on both sides of a gap, L comes nowhere near -1 within it.
-_SMALL_GAIN = 0.3
+#: Peaks of abs(L) lower than this are not looked for: between angles so dense none comes to one.
+_LOW_PEAK = 0.3
 
 #: How often the place of a peak of abs(L) is closed in, by a factor of four.
 _ZOOMS = 6
@@ -78,7 +78,11 @@ class SampledLoopGain:
         T = matrix(none, 0.0)
         b = matrix(none, 1.0)[:, -1] - T[:, -1]
         c = matrix(model.K, float(model.L))[n]
-        return cls(T, b, c, whole, sample_time)
+        # In units of states and command that make the matrices small, which changes no L.
+        joined = np.block([[T, b[:, None]], [c, np.zeros(1)]])
+        _, (unit, _) = matrix_balance(joined, permute=False, separate=True)
+        unit, own = unit[:-1], unit[-1]
+        return cls(T * unit / unit[:, None], b * own / unit, c * unit / own, whole, sample_time)
 
     def at(self, angle: Vector) -> NDArray[np.complex128]:
         """L(e^(j angle)); infinite at a pole."""
@@ -143,7 +147,7 @@ class SampledLoopGain:
         """Where abs(L) is largest, next to those of `angle` at which it is larger than around."""
         sizes = np.abs(self.at(angle))
         highest = 1 + np.flatnonzero((sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:]))
-        highest = highest[(sizes[highest] > _SMALL_GAIN) & np.isfinite(sizes[highest])]
+        highest = highest[(sizes[highest] > _LOW_PEAK) & np.isfinite(sizes[highest])]
         low, high = angle[highest - 1], angle[highest + 1]
         share = np.linspace(0.0, 1.0, 9)
         rows = np.arange(len(low))
@@ -161,9 +165,16 @@ class SampledLoopGain:
 
     @cached_property
     def resolved(self) -> Vector:
-        """As `angles`, but turns are told apart only where abs(L) may be above a third."""
-        large = np.abs(self.at(self.corners)) > _SMALL_GAIN
-        return self._turned(large[1:] | large[:-1])
+        """As `angles`, but turns are told apart only where abs(L) may come to one."""
+        sizes = np.abs(self.at(self.corners))
+        with np.errstate(invalid="ignore"):
+            change = np.abs(np.diff(sizes))
+            # Peaks are corners, so beyond its ends abs(L) goes by less than it does between them.
+            around = np.pad(change, 1)
+            reach = np.maximum(sizes[1:], sizes[:-1]) + np.max(
+                [around[:-2], change, around[2:]], axis=0
+            )
+            return self._turned(~(reach < 1.0))
 
     def _turned(self, chosen: NDArray[np.bool_]) -> Vector:
         """Part the gaps between corners that are `chosen` by the turns of the delay in them."""

@@ -189,6 +189,12 @@ impl PyLinearLoop {
         matrix.into_pyarray(py).reshape([size, size])
     }
 
+    /// The transition matrix in units of states and commands that make its norm small.
+    fn balanced_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (matrix, size) = run_here(py, |_| sampled::balanced_matrix(&self.inner))?;
+        matrix.into_pyarray(py).reshape([size, size])
+    }
+
     /// Poles s = ln(z)/Ts of a sampled loop, limit left out, rightmost first.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
         Ok(run_here(py, |_| sampled::poles(&self.inner))?.into_pyarray(py))

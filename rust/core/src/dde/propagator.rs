@@ -162,13 +162,19 @@ pub(crate) fn multiply_add<S: Scalar>(a: &[S], x: &[S], out: &mut [S]) {
 /// Rounds of balancing; few are needed, since states are few.
 const ROUNDS: usize = 100;
 
-/// ‖D⁻¹ A D‖₁, the largest column sum, with D = diag(2^k) chosen to make it small.
+/// ‖D⁻¹ A D‖₁, the largest column sum, with D of `balanced`.
+pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
+    norm(&balanced(a, n).0, n)
+}
+
+/// D⁻¹ A D and the exponents k of D = diag(2^k), chosen to make its norm small.
 ///
 /// Osborne 1960, in powers of two: each state in turn is scaled until its row and its column,
 /// diagonal left out, are of one size. A state that only drives or is only driven can be scaled
 /// at will, and is, until that no longer matters beside the diagonal.
-pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
+pub(crate) fn balanced<S: Scalar>(a: &[S], n: usize) -> (Vec<f64>, Vec<i32>) {
     let mut a: Vec<f64> = a.iter().map(|a| a.value()).collect();
+    let mut exponents = vec![0; n];
     let diagonal = (0..n).fold(0.0_f64, |most, i| most.max(a[i * n + i].abs()));
     let floor = (0.125 * diagonal).max(f64::MIN_POSITIVE);
     for _ in 0..ROUNDS {
@@ -193,6 +199,7 @@ pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
                 continue;
             }
             settled = false;
+            exponents[i] += exponent as i32;
             for j in 0..n {
                 if j != i {
                     a[j * n + i] *= factor;
@@ -204,7 +211,7 @@ pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
             break;
         }
     }
-    norm(&a, n)
+    (a, exponents)
 }
 
 /// ‖A‖₁, the largest column sum.

@@ -200,7 +200,7 @@ impl AllRows<'_> {
                 status: CellStatus::Undecided,
             });
         }
-        let sizes: Vec<f64> = eigenvalues(&matrix, sample.size())?
+        let sizes: Vec<f64> = eigenvalues(matrix, sample)?
             .iter()
             .map(|z| z.norm())
             .collect();

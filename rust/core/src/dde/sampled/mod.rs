@@ -15,7 +15,7 @@ mod window;
 
 pub use grid::{CellPoles, LoopCells, abscissa_grid};
 pub(crate) use run::run;
-pub use transition::{poles, transition_matrix};
+pub use transition::{balanced_matrix, poles, transition_matrix};
 
 /// How a delay lies on the sample grid.
 #[derive(Debug, Clone, Copy, PartialEq)]

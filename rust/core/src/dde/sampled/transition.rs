@@ -5,14 +5,16 @@
 //! Γ₀ = Γ(Ts − δ), Γ₁ = Φ(Ts − δ) Γ(δ); the state is (x_k, u_{k−1}, …, u_{k−m−1}), m + 1 commands
 //! behind x. Where a sample moves states, x_k is J x_k + G u_{k−m−1} in the first equation, with u_k
 //! computed before. Reference: Åström & Wittenmark, Computer-Controlled Systems (3rd ed. 1997), section
-//! 2.3, with the feedback closed. Eigenvalues by the QR algorithm (backward stable).
+//! 2.3, with the feedback closed. Eigenvalues by the QR algorithm (backward stable), of the matrix
+//! with states and commands in units of powers of two that make its norm small: the error is that
+//! of the norm, and a gain in one unit is not a hard problem because of its unit.
 
 use faer::MatRef;
 use num_complex::Complex64;
 
 use crate::Error;
 use crate::dde::linear::{LinearLoop, Update};
-use crate::dde::propagator::{Propagator, multiply_add};
+use crate::dde::propagator::{Propagator, balanced, multiply_add};
 
 use super::Timing;
 
@@ -56,7 +58,12 @@ impl Sample {
 
     /// Side of the transition matrix.
     pub(super) fn size(&self) -> usize {
-        self.now.len() + self.lag + 1
+        self.states() + self.lag + 1
+    }
+
+    /// Number of states, the commands under way left out.
+    pub(super) fn states(&self) -> usize {
+        self.now.len()
     }
 
     /// The loop closed with u = K x + L w and the command scaled by `gain` on its way to the
@@ -90,7 +97,27 @@ impl Sample {
 }
 
 /// The transition matrix, row-major, and its side.
+///
+/// # Errors
+/// [`Error::Argument`] for a continuous loop, [`Error::TooMuch`] for too many samples of delay.
 pub fn transition_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error> {
+    let (matrix, sample, _) = closed(plant)?;
+    Ok((matrix, sample.size()))
+}
+
+/// The transition matrix in units of states and commands that make its norm small: similar to
+/// [`transition_matrix`] by powers of two, so that the eigenvalues are the same.
+///
+/// # Errors
+/// As [`transition_matrix`].
+pub fn balanced_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error> {
+    let (mut matrix, sample, _) = closed(plant)?;
+    balance(&mut matrix, sample.states(), sample.size());
+    Ok((matrix, sample.size()))
+}
+
+/// The transition matrix, the sample it is of and the sample time.
+fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
     let Some(sample_time) = plant.sample_time() else {
         return Err(Error::argument(
             "a continuous loop has no transition matrix: give it a sample_time",
@@ -102,19 +129,45 @@ pub fn transition_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error>
     if let Some(update) = plant.update() {
         sample = sample.updated(update);
     }
-    Ok((sample.close(&equations.k, equations.l, 1.0), sample.size()))
+    let matrix = sample.close(&equations.k, equations.l, 1.0);
+    Ok((matrix, sample, sample_time))
 }
 
 /// Poles s = ln(z)/Ts of the sampled loop, rightmost first; z = 0 gives re s = −∞.
+///
+/// # Errors
+/// As [`transition_matrix`]; [`Error::Convergence`] where the QR algorithm fails.
 pub fn poles(plant: &LinearLoop) -> Result<Vec<Complex64>, Error> {
-    let (matrix, size) = transition_matrix(plant)?;
-    let sample_time = plant.sample_time().unwrap_or(f64::NAN);
-    let mut poles: Vec<_> = eigenvalues(&matrix, size)?
+    let (matrix, sample, sample_time) = closed(plant)?;
+    let mut poles: Vec<_> = eigenvalues(matrix, &sample)?
         .into_iter()
         .map(|z| Complex64::new(z.norm().ln() / sample_time, z.arg() / sample_time))
         .collect();
     poles.sort_by(|p, q| q.re.total_cmp(&p.re).then(q.im.total_cmp(&p.im)));
     Ok(poles)
+}
+
+/// Choose units of the states and one unit of all commands; `matrix` is row-major.
+fn balance(matrix: &mut [f64], states: usize, size: usize) {
+    // With the commands as one: each of them but the newest is the one before it.
+    let side = states + 1;
+    let mut small = vec![0.0; side * side];
+    for i in 0..states {
+        let line = &matrix[i * size..(i + 1) * size];
+        small[i * side..i * side + states].copy_from_slice(&line[..states]);
+        small[i * side + states] = line[states..].iter().map(|x| x.abs()).sum();
+    }
+    let newest = &matrix[states * size..(states + 1) * size];
+    small[states * side..states * side + states].copy_from_slice(&newest[..states]);
+    small[states * side + states] = newest[states..].iter().map(|x| x.abs()).sum::<f64>() + 1.0;
+    let (_, exponents) = balanced(&small, side);
+    let unit = |i: usize| exponents[i.min(states)];
+    for i in 0..size {
+        for j in 0..size {
+            let entry = &mut matrix[i * size + j];
+            *entry = libm::ldexp(*entry, unit(j) - unit(i));
+        }
+    }
 }
 
 /// Refuse what a dense eigenvalue problem is no tool for.
@@ -133,9 +186,11 @@ pub(super) fn check_size(n: usize, delay: f64, sample_time: f64) -> Result<(), E
     Ok(())
 }
 
-/// Eigenvalues of a row-major matrix.
-pub(super) fn eigenvalues(matrix: &[f64], size: usize) -> Result<Vec<Complex64>, Error> {
-    MatRef::from_row_major_slice(matrix, size, size)
+/// Eigenvalues of a transition matrix of `sample`.
+pub(super) fn eigenvalues(mut matrix: Vec<f64>, sample: &Sample) -> Result<Vec<Complex64>, Error> {
+    let size = sample.size();
+    balance(&mut matrix, sample.states(), size);
+    MatRef::from_row_major_slice(&matrix, size, size)
         .eigenvalues()
         .map_err(|_| Error::Convergence {
             what: "the eigenvalues of the transition matrix",
