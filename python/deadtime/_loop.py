@@ -407,7 +407,8 @@ class ControlLoop:
         <Margins: gain 2.012 at 4.002 rad/s, phase 45.09° at 1.997 rad/s, delay 0.3939 s at ...>
         """
         if self.is_sampled:
-            return sampled_margins(self._sampled_gain, self.is_stable(), self._further_delay)
+            stable = self.spectral_abscissa() < 0.0
+            return sampled_margins(self._sampled_gain, stable, self._further_delay)
         return self.open_loop().margin()
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:

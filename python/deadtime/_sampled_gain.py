@@ -80,7 +80,8 @@ class SampledLoopGain:
         c = matrix(model.K, float(model.L))[n]
         # In units of states and command that make the matrices small, which changes no L.
         joined = np.block([[T, b[:, None]], [c, np.zeros(1)]])
-        _, (unit, _) = matrix_balance(joined, permute=False, separate=True)
+        with np.errstate(invalid="ignore"):  # units beyond integers, read as places as well
+            _, (unit, _) = matrix_balance(joined, permute=False, separate=True)
         unit, own = unit[:-1], unit[-1]
         return cls(T * unit / unit[:, None], b * own / unit, c * unit / own, whole, sample_time)
 
