@@ -14,6 +14,9 @@ __all__ = ["trades"]
 #: A margin so close to what was asked for holds the design back.
 _ACTIVE = 1.0 + 1e-3
 
+#: Up to so much beyond its demand a margin is tried without: the search may stop short of it.
+_NEAR = 1.05
+
 #: A loss so small, relatively, is none.
 _NOTHING = 1e-3
 
@@ -37,8 +40,10 @@ def trades(
         active = had <= least * _ACTIVE
         what = f"{name} margin of at least {least:g}{_UNITS[name]}"
         without = value
-        if active:
+        if had <= least * _NEAR:
             without = best_without(demands.without(name), found.scenarios)
+            active = active or objective.lost(value, without) > _NOTHING
+        if active:
             words = f"{what} holds the design back: {_price(search, value, without)}"
         else:
             words = f"{what} is met anyway: {had:.4g}{_UNITS[name]}"
