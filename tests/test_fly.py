@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from deadtime import FlightAbortedError, NotIdentifiableError
 from deadtime._cli.fly import _print_study
+from deadtime._derivative_filter import PAPER_FILTER
 from deadtime._experiment import FlightPlan, fly_experiment
 from deadtime._experiment import learn as learn_module
 from deadtime._experiment.flights import FlownSteps, telemetry_of
 from deadtime._experiment.fly import fly_all
-from deadtime._experiment.height_control import PAPER_FILTER, HeightControl, Velocity
+from deadtime._experiment.height_control import HeightControl, Velocity
 from deadtime._experiment.learn import learn
 from deadtime._experiment.split import split_delay
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain

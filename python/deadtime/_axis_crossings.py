@@ -25,8 +25,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._crossovers import gain_crossovers
 from deadtime._frequency import DifferenceOfSquares, OnAxis
-from deadtime._margins import gain_crossovers
 from deadtime._multiples import crossings_of_multiples
 from deadtime._parametric import Parameter, ParametricQuasiPolynomial
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s

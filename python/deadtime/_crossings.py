@@ -7,26 +7,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, SupportsFloat, TypeAlias
+from typing import Any, Protocol, SupportsFloat, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._axis_crossings import alone, is_factor, leading, of_delay, of_gain, periods, rows_of
 from deadtime._errors import DeadtimeError
-from deadtime._families import family_of
+from deadtime._families import HasFamily, family_of
 from deadtime._frozen import ReadOnlyArrays, read_only
-from deadtime._loop import ControlLoop
-from deadtime._margins import Margins
-from deadtime._parametric import ParametricQuasiPolynomial, parameters
-from deadtime._quasipolynomial import delay, s
-from deadtime._systems import DelaySystem
-from deadtime._transfer import TransferFunction
+from deadtime._parametric import ParametricQuasiPolynomial
 from deadtime._validation import finite
 
-__all__ = ["Crossings", "crossings", "delay_margin"]
+__all__ = ["Crossings", "crossings", "delay_margin", "margin_of_family"]
 
 _Floats: TypeAlias = NDArray[np.float64]
+
+
+class HasDelayMargin(Protocol):
+    """A stable loop that bears some further delay."""
+
+    def _delay_margin(self) -> float: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,7 +132,7 @@ class Crossings(ReadOnlyArrays):
 
 
 def crossings(
-    family: ParametricQuasiPolynomial | ControlLoop | DelaySystem,
+    family: HasFamily,
     ranges: Mapping[str, tuple[float, float]],
     *,
     at: Mapping[str, SupportsFloat] | None = None,
@@ -206,7 +207,7 @@ def crossings(
 
 
 def delay_margin(
-    loop: ControlLoop | TransferFunction | ParametricQuasiPolynomial | DelaySystem,
+    loop: HasDelayMargin | ParametricQuasiPolynomial,
     *,
     at: Mapping[str, SupportsFloat] | None = None,
 ) -> float:
@@ -252,30 +253,21 @@ def delay_margin(
     0.4254
     """
     if isinstance(loop, ParametricQuasiPolynomial):
-        return _margin_of_family(loop, dict(at or {}))
+        return margin_of_family(loop, dict(at or {}))
     if at is not None:
         raise TypeError("at= gives the parameters of an equation; a loop has its numbers already")
-    if isinstance(loop, ControlLoop):
-        if loop.is_sampled:
-            return loop.stable_range("delay")[1] - loop._known_delay()
-        return _told(loop.margin())
-    if isinstance(loop, DelaySystem):
-        return _margin_of_family(_scaled(loop), {"delay": _smallest_delay(loop)})
-    if isinstance(loop, TransferFunction):
-        return _told(loop.margin())
-    raise TypeError(
-        f"loop of type {type(loop).__name__}: give a ControlLoop, a TransferFunction, or an "
-        "expression with the parameters of dtm.parameters('...')"
-    )
+    found = getattr(loop, "_delay_margin", None)
+    if found is None:
+        raise TypeError(
+            f"loop of type {type(loop).__name__}: give a ControlLoop, a TransferFunction, or an "
+            "expression with the parameters of dtm.parameters('...')"
+        )
+    margin: float = found()
+    return margin
 
 
-def _told(margins: Margins) -> float:
-    if not margins.stable:
-        raise ValueError("the loop is not stable as it is: it has no delay margin")
-    return margins.delay_margin
-
-
-def _margin_of_family(family: ParametricQuasiPolynomial, at: dict[str, SupportsFloat]) -> float:
+def margin_of_family(family: ParametricQuasiPolynomial, at: dict[str, SupportsFloat]) -> float:
+    """Growth of the one delay of an equation until its members lose stability, s."""
     member = family.at(**at)
     delays = {name for _, _, (_, slopes) in family._terms for name, _ in slopes}
     if len(delays) != 1:
@@ -322,7 +314,7 @@ def _one_range(ranges: Any) -> tuple[str, tuple[float, float]]:
 
 
 def _alone(
-    family: ParametricQuasiPolynomial | ControlLoop | DelaySystem,
+    family: HasFamily,
     name: str,
     at: Mapping[str, SupportsFloat],
 ) -> ParametricQuasiPolynomial:
@@ -330,30 +322,4 @@ def _alone(
     values = {other: finite(other, value) for other, value in at.items()}
     if name in values:
         raise ValueError(f"{name}={values[name]}: what varies has no value of its own")
-    if isinstance(family, DelaySystem):
-        family = _scaled(family)
     return alone(family_of(family, (name, *values)), name, values)
-
-
-def _scaled(system: DelaySystem) -> ParametricQuasiPolynomial:
-    """The characteristic function with all delays as multiples of the least one, `delay`."""
-    smallest = _smallest_delay(system)
-    (own,) = parameters("delay")
-    h = system.characteristic()
-    total: Any = 0.0 * own
-    for tau, row in zip(h.delays.tolist(), h.coefficients.tolist(), strict=True):
-        part = sum((c * s**power for power, c in enumerate(row) if c != 0.0), 0.0 * s)
-        ratio = tau / smallest
-        # Sums of delays carry their rounding.
-        ratio = float(round(ratio)) if abs(ratio - round(ratio)) <= 1e-12 * ratio else ratio
-        total = total + part * delay(ratio * own)
-    found: ParametricQuasiPolynomial = total
-    return found
-
-
-def _smallest_delay(system: DelaySystem) -> float:
-    """The least delay of the states that is not zero."""
-    late = [tau for tau in (*system.A, *system.N) if tau > 0.0]
-    if not late:
-        raise ValueError("this system has no delay in its states: its roots do not depend on one")
-    return min(late)

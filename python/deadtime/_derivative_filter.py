@@ -20,7 +20,7 @@ from scipy.signal import cont2discrete
 
 from deadtime._validation import positive
 
-__all__ = ["DerivativeFilter", "Discretisation", "SampledFilter", "discretised"]
+__all__ = ["PAPER_FILTER", "DerivativeFilter", "Discretisation", "SampledFilter", "discretised"]
 
 Vector = NDArray[np.float64]
 
@@ -86,6 +86,10 @@ class DerivativeFilter:
                 f"discretisation={self.discretisation!r}: give one of "
                 f"{', '.join(map(repr, rules))}, or None"
             )
+
+
+#: The derivative of the paper's PV controller: its vehicle reports no vertical speed.
+PAPER_FILTER = DerivativeFilter(omega=38.0, damping=1.0)
 
 
 class SampledFilter(NamedTuple):

@@ -6,7 +6,7 @@ One class, kept whole: most of the file is its documentation.
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._controllers import Controller
+from deadtime._loop_family import family_of_loop
 from deadtime._loop_model import LoopModel, state_at_rest
 from deadtime._loop_run import settled_step, simulate_loop
 from deadtime._loop_stability import (
@@ -27,17 +28,21 @@ from deadtime._loop_stability import (
     sampled_range,
     sampled_roots,
 )
+from deadtime._margins import Margins
+from deadtime._parametric import ParametricQuasiPolynomial
 from deadtime._plants import Plant
+from deadtime._quasipolynomial import QuasiPolynomial
 from deadtime._response import Response
+from deadtime._rootset import RootSet
 from deadtime._sampled_gain import SampledLoopGain
 from deadtime._sampled_margins import sampled_margins
 from deadtime._sampled_ranges import SampledNumber, further_delay
+from deadtime._transfer import TransferFunction
 from deadtime._validation import finite, non_negative, positive, real_array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from deadtime import Margins, QuasiPolynomial, RootSet, TransferFunction
     from deadtime._deadtime import LinearLoop
 
 __all__ = ["ControlLoop"]
@@ -322,6 +327,22 @@ class ControlLoop:
     def _characteristic(self, values: Mapping[str, Any]) -> Any:
         """Characteristic function with numbers or symbols from `values`, which name them all."""
         return characteristic(self.plant, self.controller, values)
+
+    def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
+        """Characteristic function with the numbers `names` as its parameters."""
+        if self.is_sampled:
+            raise ValueError(
+                f"a loop with sample_time={self.sample_time} has no characteristic function to "
+                "prove anything of, its poles are eigenvalues: judge loop.continuous() for the "
+                "loop without its hold, or look at single cells with dtm.stability_map"
+            )
+        return family_of_loop(self._characteristic, self.parameters, names)
+
+    def _delay_margin(self) -> float:
+        """Further delay that the stable loop bears, s."""
+        if self.is_sampled:
+            return self.stable_range("delay")[1] - self._known_delay()
+        return self.margin()._delay_margin()
 
     def open_loop(self) -> TransferFunction:
         """Return the loop gain of the continuous loop, cut at the command, its limit left out.

@@ -21,9 +21,9 @@ from deadtime._continuous_ranges import (
     range_of_gain,
 )
 from deadtime._controllers import Controller
+from deadtime._crossovers import end_of_gain
 from deadtime._deadtime import sampled_abscissa_grid
 from deadtime._loop_model import LoopModel, refuse_discretised
-from deadtime._margins import end_of_gain
 from deadtime._parametric import Parameter
 from deadtime._plants import Plant
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s

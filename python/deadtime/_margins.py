@@ -28,8 +28,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._crossovers import end_or_corner, gain_crossovers, span
 from deadtime._frequency import (
-    DifferenceOfSquares,
     OnAxis,
     RealFunction,
     powers_of_s,
@@ -41,7 +41,7 @@ from deadtime._frequency import (
 from deadtime._frozen import ReadOnlyArrays
 from deadtime._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Margins", "end_of_gain", "first_loss", "gain_crossovers", "margins"]
+__all__ = ["Margins", "first_loss", "margins"]
 
 Vector = NDArray[np.float64]
 
@@ -50,10 +50,6 @@ Vector = NDArray[np.float64]
 # times the crossover frequency or the turn of the longest delay.
 _SMALLEST_GAIN = 1e-8
 _TURNS = 1e3
-
-# A neutral loop whose gain has no proved end above or below one is searched this many times beyond
-# its highest corner.
-_BEYOND_CORNERS = 100.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,6 +113,12 @@ class Margins(ReadOnlyArrays):
     phase_crossovers: Vector
     gain_margins: Vector
     searched: tuple[float, float]
+
+    def _delay_margin(self) -> float:
+        """The delay margin of a loop that must be stable."""
+        if not self.stable:
+            raise ValueError("the loop is not stable as it is: it has no delay margin")
+        return self.delay_margin
 
     def __repr__(self) -> str:
         if not self.stable:
@@ -204,19 +206,6 @@ def _refuse_what_has_none(n: QuasiPolynomial, d: QuasiPolynomial) -> None:
         )
 
 
-def gain_crossovers(n: QuasiPolynomial, d: QuasiPolynomial) -> tuple[Vector, float]:
-    """All frequencies above zero with |n| = |d|, and up to where that is all."""
-    k = min(powers_of_s(n), powers_of_s(d)) if n.coefficients.any() else 0
-    n, d = without_powers(n, k), without_powers(d, k)
-    top, proved = end_of_gain(n, d, 1.0), True
-    if top is None:
-        top = end_of_gain(d, n, 1.0)
-    if top is None:
-        top, proved = _BEYOND_CORNERS * _highest_corner(n, d), False
-    found = zeros_between(DifferenceOfSquares(d, n), 0.0, top)
-    return found, math.inf if proved else top
-
-
 def _phase_crossovers(
     n: QuasiPolynomial, d: QuasiPolynomial, far: float
 ) -> tuple[Vector, Vector, float]:
@@ -235,9 +224,9 @@ def _phase_crossovers(
     f = RealFunction(without_common_power(rows))
     end = _last_real(rows)
     last, constant = (math.inf, False) if end is None else end
-    shortest = 2.0 * np.pi / max(_span(n, d), 1e-300)
+    shortest = 2.0 * np.pi / max(span(n, d), 1e-300)
     places = [0.0] if p == q else []
-    enough = min(max(_end_or(n, d, p - q, 1.0), shortest), 10.0 * max(far, shortest))
+    enough = min(max(end_or_corner(n, d, p - q, 1.0), shortest), 10.0 * max(far, shortest))
     low, high = 0.0, min(last, enough)
     while True:
         if high > low and not constant:
@@ -257,10 +246,10 @@ def _phase_crossovers(
         if far < math.inf:
             return omega, gains, high
         below = gains[gains < 1.0]
-        if below.size and _end_or(n, d, p - q, float(below.max())) <= high:
+        if below.size and end_or_corner(n, d, p - q, float(below.max())) <= high:
             return omega, gains, high
-        if high >= _end_or(n, d, p - q, _SMALLEST_GAIN) or high > _TURNS * max(
-            _end_or(n, d, p - q, 1.0), shortest
+        if high >= end_or_corner(n, d, p - q, _SMALLEST_GAIN) or high > _TURNS * max(
+            end_or_corner(n, d, p - q, 1.0), shortest
         ):
             return omega, gains, high
         low, high = high, min(last, 2.0 * high)
@@ -273,55 +262,6 @@ def _vanishes(h: QuasiPolynomial, omega: Vector) -> NDArray[np.bool_]:
     return np.asarray(
         np.abs(on_axis(omega)) <= 4.0 * on_axis.rounding(omega) * (value + omega * steep)
     )
-
-
-def _span(n: QuasiPolynomial, d: QuasiPolynomial) -> float:
-    return float(max(n.delays[-1], d.delays[-1]) - min(n.delays[0], d.delays[0]))
-
-
-def end_of_gain(
-    n: QuasiPolynomial, d: QuasiPolynomial, level: float, shift: int = 0
-) -> float | None:
-    """A frequency beyond which |s^shift n| < level |d| is certain, None if that is not.
-
-    |d| is at least the modulus of its leading term less those of all others, |n| at most the sum
-    of its own; the difference, as a polynomial in omega, has one change of sign (Descartes) and
-    its zero is below Fujiwara's bound.
-    """
-    width = max(n.degree + max(shift, 0), d.degree + max(-shift, 0)) + 1
-    less = np.zeros(width)
-    up, down = max(shift, 0), max(-shift, 0)
-    less[up : up + n.degree + 1] += np.abs(n.coefficients).sum(axis=0)
-    less[down : down + d.degree + 1] += level * np.abs(d.coefficients).sum(axis=0)
-    lead = float(np.abs(d.coefficients[:, -1]).max())
-    top = down + d.degree
-    less[top] -= level * lead
-    if less[top + 1 :].any() or less[top] >= level * lead:
-        return None
-    rest = less[:top] / (level * lead - less[top])
-    powers = top - np.arange(top)
-    with np.errstate(divide="ignore"):
-        return float(2.0 * np.exp(np.max(np.log(rest) / powers, initial=-np.inf)))
-
-
-def _end_or(n: QuasiPolynomial, d: QuasiPolynomial, shift: int, level: float) -> float:
-    """`_end`, or a frequency far beyond all corners where there is none."""
-    end = end_of_gain(n, d, level, shift)
-    return _BEYOND_CORNERS * _highest_corner(n, d) if end is None else end
-
-
-def _highest_corner(n: QuasiPolynomial, d: QuasiPolynomial) -> float:
-    """Largest of the frequencies at which terms of n or d, or turns of their delays, change."""
-    corners = [1e-300]
-    for h in (n, d):
-        size = np.abs(h.coefficients).sum(axis=0)
-        lead = np.abs(h.coefficients[:, -1]).max()
-        for k in range(h.degree):
-            if size[k] > 0.0:
-                corners.append(float((size[k] / lead) ** (1.0 / (h.degree - k))))
-        corners += [2.0 * np.pi / float(gap) for gap in np.diff(h.delays)]
-    gap = abs(float(n.delays[0] - d.delays[0]))
-    return max([*corners, 2.0 * np.pi / gap] if gap > 0.0 else corners)
 
 
 def _last_real(rows: dict[float, NDArray[np.complex128]]) -> tuple[float, bool] | None:

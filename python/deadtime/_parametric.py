@@ -14,7 +14,7 @@ from __future__ import annotations
 import keyword
 import math
 import numbers
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import SupportsFloat, TypeAlias, cast
 
@@ -139,6 +139,22 @@ class ParametricQuasiPolynomial:
             raise ValueError(f"no value for {', '.join(missing)}: give {missing[0]}=...")
         point = [finite(name, values[name]) for name in self._names]
         return QuasiPolynomial(*self._family.at(point))
+
+    def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
+        """Return this expression, whose parameters must be those in `names`."""
+        unknown = [name for name in names if name not in self.names]
+        if unknown:
+            raise ValueError(
+                f"ranges for {', '.join(unknown)}: no such parameter, there "
+                + (f"is {', '.join(self.names)}" if self.names else "is none")
+            )
+        missing = [name for name in self.names if name not in names]
+        if missing:
+            raise ValueError(
+                f"no value for {', '.join(missing)}: put a number in its place where the family is "
+                "written, or give it a range or a value"
+            )
+        return self
 
     def sensitivity(self, root: complex, /, **values: SupportsFloat) -> dict[str, complex]:
         """Derivatives of a simple root by the parameters, at a point.

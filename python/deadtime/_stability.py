@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._boundaries import Boundary, boundaries_of, chains_of
-from deadtime._families import family_of, numbers_of
+from deadtime._families import family_of
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
+from deadtime._loop_family import numbers_of
 from deadtime._loop_stability import sampled_grid
 from deadtime._map_axes import damping_demand, map_axes
 from deadtime._parametric import ParametricQuasiPolynomial
@@ -360,7 +361,13 @@ def stability_map(
                 f"damping={question.damping}: a sampled loop is judged by a circle; ask for decay="
             )
         found = _map_sampled(
-            family, numbers_of(family, names), names, axes, question.decay, threads, progress
+            family,
+            numbers_of(family.parameters, names),
+            names,
+            axes,
+            question.decay,
+            threads,
+            progress,
         )
     else:
         found = _map_family(family_of(family, names), names, axes, question, threads, progress)

@@ -13,18 +13,22 @@ documentation.
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._crossings import margin_of_family
 from deadtime._determinant import NotExpandedError, expanded
+from deadtime._families import family_of
 from deadtime._frozen import equal
 from deadtime._matrix_roots import MatrixDeterminant
+from deadtime._parametric import ParametricQuasiPolynomial
 from deadtime._quasipolynomial import QuasiPolynomial
 from deadtime._realisation import Realisation, of_delay_system
 from deadtime._rootset import Range, RootSet
+from deadtime._system_family import scaled_family, smallest_delay
 from deadtime._system_response import SystemResponse
 from deadtime._system_run import respond, step_response
 from deadtime._transfer import TransferFunction
@@ -302,6 +306,19 @@ class DelaySystem:
         return np.moveaxis(values, (-2, -1), (0, 1))
 
     # Through the expanded determinant
+
+    def _smallest_delay(self) -> float:
+        return smallest_delay((*self.A, *self.N))
+
+    def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
+        """Characteristic function in which all delays grow in proportion to `delay`."""
+        return family_of(scaled_family(self.characteristic(), self._smallest_delay()), names)
+
+    def _delay_margin(self) -> float:
+        """Further delay that the stable system bears, as growth of its least delay, s."""
+        least = self._smallest_delay()
+        family = scaled_family(self.characteristic(), least)
+        return margin_of_family(family, {"delay": least})
 
     def characteristic(self) -> QuasiPolynomial:
         """Expand det M(s), while that is numerically safe.

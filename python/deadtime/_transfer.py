@@ -508,6 +508,9 @@ class TransferFunction:
 
     # As a loop gain
 
+    def _delay_margin(self) -> float:
+        return self.margin()._delay_margin()
+
     def margin(self) -> Margins:
         """Gain, phase and delay margin of the loop closed around this one by ``feedback(G)``.
 

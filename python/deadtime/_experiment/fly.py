@@ -16,8 +16,9 @@ from tempfile import TemporaryFile
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 from deadtime._controllers import PV, P
+from deadtime._derivative_filter import PAPER_FILTER
 from deadtime._experiment.flights import FlownSteps, named
-from deadtime._experiment.height_control import PAPER_FILTER, HeightControl
+from deadtime._experiment.height_control import HeightControl
 from deadtime._experiment.learn import FlightStudy, learn
 from deadtime._experiment.step_test import ROW, StepProgramme, check_gain, fly_steps
 from deadtime._readers import read_recording

@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from deadtime._controllers import PV, P
-from deadtime._derivative_filter import DerivativeFilter, discretised
+from deadtime._derivative_filter import PAPER_FILTER, DerivativeFilter, discretised
 
-__all__ = ["PAPER_FILTER", "HeightControl", "Velocity"]
-
-#: The derivative of the paper's PV controller: its vehicle reports no vertical speed.
-PAPER_FILTER = DerivativeFilter(omega=38.0, damping=1.0)
+__all__ = ["HeightControl", "Velocity"]
 
 
 class Velocity:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from deadtime._controllers import PV, P
+from deadtime._derivative_filter import PAPER_FILTER
 from deadtime._design import Design, design
 from deadtime._errors import NotIdentifiableError
 from deadtime._estimation import DelayEstimate, estimate_delay
 from deadtime._experiment.flights import FlownSteps, read_telemetry
-from deadtime._experiment.height_control import PAPER_FILTER
 from deadtime._experiment.split import DelaySplit, split_delay
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator

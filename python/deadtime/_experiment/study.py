@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._controllers import PV, Controller, P
+from deadtime._derivative_filter import PAPER_FILTER
 from deadtime._design import Design, critical_gain, design
 from deadtime._estimation import DelayEstimate
 from deadtime._estimation.compare import Comparison, compare_methods
-from deadtime._experiment.height_control import PAPER_FILTER
 from deadtime._loop import ControlLoop
 from deadtime._plants import Integrator, kit_plant
 from deadtime._recording import Recording

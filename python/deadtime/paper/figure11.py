@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import deadtime as dtm
+from deadtime._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
-from deadtime.paper.figure10 import PAPER_FILTER, velocity_loop
+from deadtime.paper.figure10 import velocity_loop
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid
 
