@@ -13,7 +13,7 @@ from collections import Counter
 import deadtime as dtm
 import numpy as np
 from ball_count import EXACT_BITS, BallCounter, OnContourError, TooManyPiecesError, precision
-from deadtime._errors import ContourError
+from deadtime._base.errors import ContourError
 from flint import arb
 from trouble import trouble
 

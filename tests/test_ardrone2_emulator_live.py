@@ -13,8 +13,8 @@ import textwrap
 import pytest
 from deadtime import DeadtimeError
 from deadtime import links as dtl
+from deadtime._base.errors import LinkError
 from deadtime._cli.emulate import tell
-from deadtime._errors import LinkError
 from deadtime.links.ardrone2.commands import Config, Control, Move, Ref, Watchdog, encode
 from deadtime.links.ardrone2.configuration import parse_configuration
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from deadtime import FlightAbortedError
-from deadtime._experiment.flights import telemetry_of
-from deadtime._experiment.split import split_delay
+from deadtime.flights._runs import telemetry_of
+from deadtime.flights._split import split_delay
 from deadtime.links import Limits, Watch
 from deadtime.links.ardrone2 import Navdata, build_navdata
 from deadtime.links.ardrone2.navdata import State

@@ -5,7 +5,8 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime import delay, gallery, s
+from deadtime import delay, s
+from deadtime.gallery import _access as gallery
 
 SYSTEMS = {
     "scalar": s + 2.0 * delay(0.36),

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from deadtime import Certificate
+from deadtime.roots import Certificate
 from flights import flight_path
 
 DEADTIME = [sys.executable, "-m", "deadtime"]

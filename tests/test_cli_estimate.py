@@ -3,7 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._estimation.estimate import METHODS
+from deadtime.estimation._estimate import METHODS
 from flights import flight_path
 from test_cli import one_clear_line
 from test_cli_map import found, run

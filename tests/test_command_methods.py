@@ -3,9 +3,9 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._estimation.commands import commands_over_samples
-from deadtime._estimation.feedback import FEEDBACK, feedback_p_value
-from deadtime._estimation.held_response import HeldResponse
+from deadtime.estimation.data._commands import commands_over_samples
+from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
+from deadtime.estimation.models._held_response import HeldResponse
 from flown import CASES, TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -6,10 +6,10 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._design import critical_gain
-from deadtime._design.demands import MarginEstimate
-from deadtime._design.objectives import dominant_damping
-from deadtime._design.problem import pose
+from deadtime.tuning import critical_gain
+from deadtime.tuning._demands import MarginEstimate
+from deadtime.tuning._objectives import dominant_damping
+from deadtime.tuning._problem import pose
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
 SAMPLED = dtm.ControlLoop(

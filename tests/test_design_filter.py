@@ -5,7 +5,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._design.filter_choice import noise_gain
+from deadtime.tuning._filter_choice import noise_gain
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
 SAMPLED = LOOP.replace(sample_time=0.065)

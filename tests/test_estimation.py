@@ -6,8 +6,8 @@ import deadtime as dtm
 import mpmath
 import numpy as np
 import pytest
-from deadtime._estimation.overshoot import dominant_x, exact_overshoot, exact_x
-from deadtime._estimation.residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime.estimation.methods._overshoot import dominant_x, exact_overshoot, exact_x
 from flights import flight_path
 from hypothesis import given, settings
 from hypothesis import strategies as st

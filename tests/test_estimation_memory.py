@@ -5,9 +5,9 @@ import tracemalloc
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._estimation import arx_scan
-from deadtime._estimation.estimate import METHODS
-from deadtime._estimation.input_output import InputOutput
+from deadtime.estimation._estimate import METHODS
+from deadtime.estimation.data._input_output import InputOutput
+from deadtime.estimation.methods import _arx_scan as arx_scan
 from flown import fly
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)

@@ -7,7 +7,7 @@ import pickle
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._estimation.estimate import METHODS
+from deadtime.estimation._estimate import METHODS
 from flown import fly
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from deadtime import Expansion, QuasiPolynomial, delay, s
+from deadtime import QuasiPolynomial, delay, s
+from deadtime.roots import Expansion
 from flint import acb, acb_series, arb, ctx, fmpq
 from hypothesis import given
 from hypothesis import strategies as st

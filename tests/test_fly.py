@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 from deadtime import FlightAbortedError, NotIdentifiableError
 from deadtime._cli.fly import _print_study
-from deadtime._derivative_filter import PAPER_FILTER
-from deadtime._experiment import FlightPlan, fly_experiment
-from deadtime._experiment import learn as learn_module
-from deadtime._experiment.flights import FlownSteps, telemetry_of
-from deadtime._experiment.fly import fly_all
-from deadtime._experiment.height_control import HeightControl, Velocity
-from deadtime._experiment.learn import learn
-from deadtime._experiment.split import split_delay
-from deadtime._experiment.step_test import ROW, StepProgramme, check_gain
+from deadtime.flights import FlightPlan, FlownSteps, fly_experiment
+from deadtime.flights import _learn as learn_module
+from deadtime.flights._fly import fly_all
+from deadtime.flights._height_control import HeightControl, Velocity
+from deadtime.flights._learn import learn
+from deadtime.flights._runs import telemetry_of
+from deadtime.flights._split import split_delay
+from deadtime.flights._step_test import ROW, StepProgramme, check_gain
 from deadtime.links import Limits, run
 from deadtime.links import journal as journal_module
 from deadtime.links.journal import _Writer
+from deadtime.loops._derivative_filter import PAPER_FILTER
 from emulated import connecting
 from simulated_vehicle import KIT, SimulatedVehicle
 

@@ -14,7 +14,7 @@ import time
 import pytest
 from deadtime._cli.fly import _free_folder
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
-from deadtime._experiment.step_test import ROW
+from deadtime.flights._step_test import ROW
 from deadtime.links.ardrone2.emulator import Phase
 from emulated import emulator, skip_if_too_busy
 

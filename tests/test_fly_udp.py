@@ -7,9 +7,9 @@ from dataclasses import replace
 import deadtime as dtm
 import pytest
 from deadtime import FlightAbortedError
-from deadtime._experiment import FlightPlan
-from deadtime._experiment.fly import fly_all
-from deadtime._experiment.learn import learn
+from deadtime.flights import FlightPlan
+from deadtime.flights._fly import fly_all
+from deadtime.flights._learn import learn
 from emulated import client_of, emulator, skip_if_too_busy
 
 PLAN = FlightPlan(gains=(2.4,), settle=3.5, hold=4.0)

@@ -39,7 +39,7 @@ MADE = {
     "Certificate": lambda: h.certify((-1, 1), (0, 9)),
     "Chain": lambda: h.chains()[0],
     "ControlLoop": lambda: LOOP,
-    "CramerRaoBound": lambda: dtm.CramerRaoBound(**bound_fields()),
+    "CramerRaoBound": lambda: dtm.estimation.CramerRaoBound(**bound_fields()),
     "Crossings": lambda: dtm.crossings(FAMILY, {"Kp": (0.1, 9.0)}, at={"T": 0.3}),
     "DelayEstimate": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)),
     "DelayResult": solved,
@@ -56,7 +56,7 @@ MADE = {
     "Flight": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)).flights[0],
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
-    "LeastMargins": lambda: dtm.LeastMargins(2.0, 45.0, 0.1),
+    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
     "Margins": CONTINUOUS.margin,
     "MonteCarlo": lambda: planned().monte_carlo(3, processes=1, circulates=False),
     "P": lambda: dtm.P(2.0),
@@ -81,12 +81,12 @@ MADE = {
     "Sensitivity": lambda: h.sensitivity(h.rightmost()[0]),
     "StabilityMap": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)),
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
-    "Step": lambda: dtm.Step(1, 0.1, 0.0, 1.0),
+    "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
     "Sweep": lambda: dtm.sweep(LOOP, {"Kp": [1.0, 2.0]}),
     "SystemResponse": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
-    "Trade": lambda: dtm.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
+    "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
     "TransferFunction": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)),
-    "Whiteness": lambda: dtm.Whiteness(1.0, 0.5, 3, 0.1),
+    "Whiteness": lambda: dtm.estimation.Whiteness(1.0, 0.5, 3, 0.1),
 }
 WAYS = {
     "pickle": lambda one: pickle.loads(pickle.dumps(one)),
@@ -98,7 +98,8 @@ WAYS = {
 def bound_fields():
     bound = planned().bound
     return {
-        field.name: getattr(bound, field.name) for field in dataclasses.fields(dtm.CramerRaoBound)
+        field.name: getattr(bound, field.name)
+        for field in dataclasses.fields(dtm.estimation.CramerRaoBound)
     }
 
 
@@ -145,7 +146,7 @@ def test_no_comparison_raises(one):
         return  # a tuple is compared as one
     for foreign in (None, 1, "a", np.zeros(2), np.zeros((3, 1)), [1.0], object()):
         assert not np.any(one == foreign)
-    if isinstance(one, dtm.RootSet):
+    if isinstance(one, dtm.roots.RootSet):
         assert (np.zeros(7) == one) is False
         assert (np.zeros(7) != one) is True
     hash(one)

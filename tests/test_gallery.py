@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from deadtime import gallery
+from deadtime.gallery import _access as gallery
 
 KEYS = gallery.names()
 

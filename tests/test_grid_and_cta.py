@@ -3,7 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._estimation.cta import chebyshev_differentiation
+from deadtime.estimation.methods._cta import chebyshev_differentiation
 from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 
 METHODS = ("grid", "cta")

@@ -72,7 +72,7 @@ def test_polynomials_are_sequences(num):
 @pytest.mark.parametrize("name", ["", "a b", "s", "lambda", 3])
 def test_parameters_made_one_by_one_have_names_too(name):
     with pytest.raises((TypeError, ValueError), match=r"name|'s'"):
-        dtm.Parameter(name)
+        dtm.roots.Parameter(name)
 
 
 def test_algebra_takes_numbers_in_arrays_of_no_dimension():

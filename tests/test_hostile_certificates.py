@@ -5,8 +5,9 @@ import json
 import math
 
 import pytest
-from deadtime import Certificate, CertificateError, ContourError, QuasiPolynomial, delay, s
-from deadtime._certificate_parts import Segment
+from deadtime import CertificateError, ContourError, QuasiPolynomial, delay, s
+from deadtime.roots import Certificate
+from deadtime.roots.certificate._parts import Segment
 
 # Both kinds of parts of the real axis, a root at 0, an open side, two rows.
 PROOF = (s**2 * (s + 2.0) + s * (1.0 + 0.3 * s) * delay(0.36)).certify(re=(-3.0, None), im=(0, 40))

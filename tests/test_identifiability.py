@@ -10,8 +10,8 @@ import time
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._estimation.held_response import HeldResponse
-from deadtime._estimation.planned_bound import from_the_command, from_the_reference
+from deadtime.estimation.models._held_response import HeldResponse
+from deadtime.estimation.planning._planned_bound import from_the_command, from_the_reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

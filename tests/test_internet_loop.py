@@ -9,15 +9,15 @@ import subprocess
 import sys
 import time
 
-import deadtime._internet_loop
+import deadtime.internet._loop
 import numpy as np
 import pytest
 from deadtime import estimate_delay, read_recording
+from deadtime._base.errors import LinkError
 from deadtime._cli.app import app
-from deadtime._errors import LinkError
-from deadtime._internet_loop import GAINS, run_internet_loop
-from deadtime._internet_replay import _overshoot, answer_times
-from deadtime._internet_result import Spread
+from deadtime.internet._loop import GAINS, run_internet_loop
+from deadtime.internet._replay import _overshoot, answer_times
+from deadtime.internet._result import Spread
 from deadtime.links.udp import (
     Bursts,
     JitterBuffer,
@@ -96,7 +96,7 @@ def test_a_lag_is_found_apart_from_the_delay():
     ids=["jitter and loss", "bursts"],
 )
 def test_intervals_of_replayed_steps_cover_the_mean_age(way, monkeypatch):
-    monkeypatch.setattr("deadtime._internet_loop.REPLAYS", 100)
+    monkeypatch.setattr("deadtime.internet._loop.REPLAYS", 100)
     trials = [Trial(gain=8.0, there=way, back=way, seed=100 * index) for index in range(10)]
     methods = ("dominant", "exact")
     loops = [run_internet_loop(one, (6.0, 8.0, 10.0), methods=methods) for one in trials]
@@ -370,7 +370,7 @@ def test_the_command_shows_what_was_measured_beside_the_estimates_and_table_1(tm
 def test_where_nothing_can_be_written_nothing_runs(where, tmp_path, monkeypatch):
     (tmp_path / "a-file").touch()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(deadtime._internet_loop, "_run", lambda *_: pytest.fail("it runs"))
+    monkeypatch.setattr(deadtime.internet._loop, "_run", lambda *_: pytest.fail("it runs"))
     result = CliRunner().invoke(app, ["internet-loop", *where])
     assert isinstance(result.exception, (ValueError, FileExistsError))
 

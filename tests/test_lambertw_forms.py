@@ -122,14 +122,14 @@ def check_log_form(w, log_z, k):
 @given(logs, st.integers(-3, 3))
 @settings(max_examples=400)
 def test_the_log_form_solves_its_equation(log_z, k):
-    check_log_form(complex(dtm.lambertw_log(log_z, k)), log_z, k)
+    check_log_form(complex(dtm.special.lambertw_log(log_z, k)), log_z, k)
 
 
 @given(logs)
 @settings(max_examples=200)
 def test_omega_is_the_log_form_of_branch_zero(z):
     w = dtm.wrightomega(z)
-    alone = dtm.lambertw_log(z)
+    alone = dtm.special.lambertw_log(z)
     assert np.array([w]).tobytes() == np.array([alone]).tobytes()
 
 
@@ -138,7 +138,7 @@ def test_log_form_and_plain_form_agree(modulus, angle, k):
     z = cmath.rect(math.exp(modulus), angle)
     if z.imag == 0 or abs(abs(angle) - math.pi) < 1e-3:
         return  # rounding of z may leave the side of the cut
-    w, other = dtm.lambertw(z, k), dtm.lambertw_log(complex(modulus, angle), k)
+    w, other = dtm.lambertw(z, k), dtm.special.lambertw_log(complex(modulus, angle), k)
     # z is rounded, and its logarithm may be large: the same as an error of log z.
     assert abs(w - other) <= 4 * EPS * (abs(modulus) + 10) * abs(w / (1 + w)) + EPS * abs(w)
 
@@ -157,13 +157,13 @@ cancelling = st.builds(
 @example((37169030j, -5261527))
 def test_turns_that_cancel_in_the_log_form(case):
     log_z, k = case
-    check_log_form(complex(dtm.lambertw_log(log_z, k)), log_z, k)
+    check_log_form(complex(dtm.special.lambertw_log(log_z, k)), log_z, k)
 
 
 @given(logs, st.integers(-(2**40), 2**40))
 @settings(max_examples=200)
 def test_far_branches_of_the_log_form(log_z, k):
-    check_log_form(complex(dtm.lambertw_log(log_z, k)), log_z, k)
+    check_log_form(complex(dtm.special.lambertw_log(log_z, k)), log_z, k)
 
 
 def test_omega_agrees_with_scipy_where_scipy_is_right():
@@ -183,11 +183,11 @@ def test_special_values_of_the_log_form():
     assert dtm.wrightomega(-inf) == 0
     assert dtm.wrightomega(-1e6) == 0
     assert np.isnan(dtm.wrightomega(nan))
-    assert dtm.lambertw_log(complex(-inf, 0.5), 0) == 0
-    assert dtm.lambertw_log(-inf, 1) == complex(-inf, math.pi)
-    assert dtm.lambertw_log(complex(inf, 0.5), 0) == complex(inf, 0.5)
-    assert np.isnan(dtm.lambertw_log(complex(0, inf)))
-    assert np.isnan(dtm.lambertw_log(complex(nan, 0), 3).imag)
+    assert dtm.special.lambertw_log(complex(-inf, 0.5), 0) == 0
+    assert dtm.special.lambertw_log(-inf, 1) == complex(-inf, math.pi)
+    assert dtm.special.lambertw_log(complex(inf, 0.5), 0) == complex(inf, 0.5)
+    assert np.isnan(dtm.special.lambertw_log(complex(0, inf)))
+    assert np.isnan(dtm.special.lambertw_log(complex(nan, 0), 3).imag)
     # The signs of zeros are those of the half plane.
     assert math.copysign(1, dtm.wrightomega(complex(2.0, -0.0)).imag) == -1
 
@@ -207,7 +207,7 @@ offsets = st.one_of(
 @given(offsets, st.sampled_from([-2, -1, 0, 1, 2]))
 @settings(max_examples=500)
 def test_the_offset_form_knows_both_w_and_one_plus_w(delta, k):
-    w, one_plus_w = (complex(part) for part in dtm.lambertw_offset(delta, k))
+    w, one_plus_w = (complex(part) for part in dtm.special.lambertw_offset(delta, k))
     digits = 60 + 2 * max(0, -int(math.log10(abs(delta))))
     with mpmath.workdps(min(digits, 700)):
         z = mpmath.mpc(delta) - mpmath.exp(-1)
@@ -223,10 +223,10 @@ def test_the_offset_form_knows_both_w_and_one_plus_w(delta, k):
 
 def test_at_no_offset_the_sheets_meet():
     for k in (0, -1):
-        w, one_plus_w = dtm.lambertw_offset(0.0, k)
+        w, one_plus_w = dtm.special.lambertw_offset(0.0, k)
         assert w == -1
         assert one_plus_w == 0
-    assert abs(dtm.lambertw_offset(0.0, 1).w - dtm.lambertw(BRANCH_POINT, 1)) < 1e-14
+    assert abs(dtm.special.lambertw_offset(0.0, 1).w - dtm.lambertw(BRANCH_POINT, 1)) < 1e-14
 
 
 # --- derivative ---------------------------------------------------------------------------
@@ -243,12 +243,12 @@ def test_at_no_offset_the_sheets_meet():
 def test_the_derivative_is_exact_next_to_the_branch_point_too(z, k):
     if z == 0:
         return
-    slope = complex(dtm.lambertw_derivative(z, k))
+    slope = complex(dtm.special.lambertw_derivative(z, k))
     with mpmath.workdps(700 if abs(z) < 1e-290 else 120):
         start = mpmath.mpc(complex(dtm.lambertw(z, k)))
         if abs(start + 1) < 1e-6:
             # W itself does not tell the two sheets apart any more.
-            _, one_plus_w = dtm.lambertw_offset(
+            _, one_plus_w = dtm.special.lambertw_offset(
                 complex(float(mpmath.mpf(z.real) + mpmath.exp(-1)), z.imag), k
             )
             start = mpmath.mpc(complex(one_plus_w)) - 1
@@ -261,12 +261,12 @@ def test_the_derivative_is_exact_next_to_the_branch_point_too(z, k):
 
 
 def test_derivatives_at_the_ends():
-    assert dtm.lambertw_derivative(0.0) == 1
-    assert dtm.lambertw_derivative(-0.0) == 1
-    assert dtm.lambertw_derivative(0.0, 1).real == math.inf
-    assert dtm.lambertw_derivative(math.inf) == 0
-    assert np.isnan(dtm.lambertw_derivative(math.nan))
-    assert abs(dtm.lambertw_derivative(1.0, 2**40) - 1) < 1e-12
+    assert dtm.special.lambertw_derivative(0.0) == 1
+    assert dtm.special.lambertw_derivative(-0.0) == 1
+    assert dtm.special.lambertw_derivative(0.0, 1).real == math.inf
+    assert dtm.special.lambertw_derivative(math.inf) == 0
+    assert np.isnan(dtm.special.lambertw_derivative(math.nan))
+    assert abs(dtm.special.lambertw_derivative(1.0, 2**40) - 1) < 1e-12
 
 
 # --- one set of bits for every instruction set --------------------------------------------
@@ -290,9 +290,9 @@ results = [
     dtm.lambertw(z, k),
     dtm.lambertw0(z.real),
     dtm.lambertwm1(-np.abs(z.real)),
-    dtm.lambertw_log(logs, k),
-    dtm.lambertw_derivative(z, k),
-    *dtm.lambertw_offset(z, k),
+    dtm.special.lambertw_log(logs, k),
+    dtm.special.lambertw_derivative(z, k),
+    *dtm.special.lambertw_offset(z, k),
     dtm.dde_roots(*real, np.abs(logs.real), k),
 ]
 digest = hashlib.sha256()
@@ -320,11 +320,11 @@ def test_bits_do_not_depend_on_the_instruction_set():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: dtm.lambertw_log("x"), "log_z has dtype"),
-        (lambda: dtm.lambertw_log(1.0, 0.5), "k=0.5"),
+        (lambda: dtm.special.lambertw_log("x"), "log_z has dtype"),
+        (lambda: dtm.special.lambertw_log(1.0, 0.5), "k=0.5"),
         (lambda: dtm.wrightomega("x"), "z has dtype"),
-        (lambda: dtm.lambertw_derivative(1.0, 1.5), "k=1.5"),
-        (lambda: dtm.lambertw_offset(None), "delta has dtype"),
+        (lambda: dtm.special.lambertw_derivative(1.0, 1.5), "k=1.5"),
+        (lambda: dtm.special.lambertw_offset(None), "delta has dtype"),
         (lambda: dtm.lambertw0(1j), "x has dtype complex128"),
     ],
 )
@@ -338,12 +338,12 @@ def test_the_rightmost_branches_are_in_order():
     for sign in (-1.0, 1.0):
         a0, delay = generator.uniform(-3, 3, (50, 1)), generator.uniform(0.05, 3, (50, 1))
         a1 = sign * generator.uniform(0.1, 5, (50, 1))
-        s = dtm.dde_roots(a0, a1, delay, dtm.rightmost_branches(sign, 8))
+        s = dtm.dde_roots(a0, a1, delay, dtm.roots.rightmost_branches(sign, 8))
         assert (np.diff(s.real, axis=1) <= 1e-12 * np.abs(s[:, 1:])).all()
         # Nothing between them: the next branches out lie to the left.
-        rest = np.setdiff1d(np.arange(-9, 10), dtm.rightmost_branches(sign, 8))
+        rest = np.setdiff1d(np.arange(-9, 10), dtm.roots.rightmost_branches(sign, 8))
         left = dtm.dde_roots(a0, a1, delay, rest).real
         assert (left <= s.real[:, -1:] + 1e-12 * np.abs(s[:, -1:])).all()
     for bad in ((0.0, 2), (math.nan, 2), (1.0, 0)):
         with pytest.raises(ValueError, match=r"a1=|n=0"):
-            dtm.rightmost_branches(*bad)
+            dtm.roots.rightmost_branches(*bad)

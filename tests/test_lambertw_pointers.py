@@ -13,10 +13,10 @@ from lambertw_points import BRANCH_POINT
 
 def test_scipy_integrates_without_python():
     # The substitution x = w e^w turns it into the integral of w (1 + w) e^w.
-    value, _ = scipy.integrate.quad(dtm.low_level_callable("lambertw0"), 0.0, math.e)
+    value, _ = scipy.integrate.quad(dtm.special.low_level_callable("lambertw0"), 0.0, math.e)
     assert value == pytest.approx(math.e - 1.0, rel=1e-12)
     # From -2 e^-2 to -e^-1 on the lower branch: (w^2 - w + 1) e^w from w = -2 to -1.
-    lower = dtm.low_level_callable("lambertwm1")
+    lower = dtm.special.low_level_callable("lambertwm1")
     value, _ = scipy.integrate.quad(lower, -2.0 * math.exp(-2.0), -math.exp(-1.0))
     assert value == pytest.approx(3.0 * math.exp(-1.0) - 7.0 * math.exp(-2.0), rel=1e-9)
 
@@ -38,7 +38,7 @@ def test_pointers_compute_what_the_functions_do():
         for x in (-0.2, BRANCH_POINT, -1e-10):
             assert function(x) == getattr(dtm, name)(x)
     address, signature = pointer("lambertw")
-    assert signature == dtm.low_level_callable("lambertw").signature
+    assert signature == dtm.special.low_level_callable("lambertw").signature
     double, parts = ctypes.c_double, ctypes.c_double * 2
     types = (double, double, ctypes.c_int64, ctypes.POINTER(double))
     function, out = ctypes.CFUNCTYPE(None, *types)(address), parts()
@@ -46,7 +46,7 @@ def test_pointers_compute_what_the_functions_do():
         function(z.real, z.imag, k, out)
         assert complex(*out) == dtm.lambertw(z, k)
     with pytest.raises(ValueError, match="give one of lambertw, lambertw0, lambertwm1"):
-        dtm.low_level_callable("wright")
+        dtm.special.low_level_callable("wright")
 
 
 @pytest.mark.filterwarnings("default")

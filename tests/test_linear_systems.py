@@ -11,7 +11,7 @@ import deadtime as dtm
 import mpmath
 import numpy as np
 import pytest
-from deadtime import gallery
+from deadtime.gallery import _access as gallery
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
@@ -104,7 +104,7 @@ def test_loops_agree_with_their_own_simulation(gain, kp, kv, delay, lag, kind):
 def test_a_loop_is_passed_on():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36)
     found = dtm.simulate(loop, [0.0, 1.0, 2.0], 3.0)
-    assert isinstance(found, dtm.Response)
+    assert isinstance(found, dtm.systems.Response)
     assert np.array_equal(found.outputs, loop.simulate([0.0, 1.0, 2.0], 3.0).outputs)
     with pytest.raises(TypeError, match="history has no meaning"):
         dtm.simulate(loop, [0.0, 1.0], history=1.0)

@@ -232,7 +232,7 @@ def test_numbers_may_be_symbols(plant, controller):
     ],
 )
 def test_grids_of_sampled_loops_are_their_single_loops(plant, controller):
-    from deadtime._loop_stability import sampled_grid
+    from deadtime.loops._stability import sampled_grid
 
     rng = np.random.default_rng(7)
     cells = 40

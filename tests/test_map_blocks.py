@@ -3,7 +3,8 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime import MapStatus, delay, s
+from deadtime import delay, s
+from deadtime.stability import MapStatus
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -6,7 +6,8 @@ import pickle
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime import MapStatus, delay, s
+from deadtime import delay, s
+from deadtime.stability import MapStatus
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from map_families import FAMILIES, LAG, OMEGA, ZETA

@@ -66,7 +66,7 @@ TAKERS = {
     "lambertw": lambda x: dtm.lambertw(x),
     "lambertw branches": lambda x: dtm.lambertw(1.0, x.astype(int)),
     "lambertw0": lambda x: dtm.lambertw0(x),
-    "lambertw_offset": lambda x: dtm.lambertw_offset(x)[0],
+    "lambertw_offset": lambda x: dtm.special.lambertw_offset(x)[0],
     "wrightomega": lambda x: dtm.wrightomega(x),
     "number": lambda x: dtm.P(x[1]),
     "list of arrays": lambda x: dtm.QuasiPolynomial([x, x], [0.0, 1.0]),

@@ -11,7 +11,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from deadtime import DelaySystem
-from deadtime._matrix_roots import MatrixDeterminant
+from deadtime.roots._matrix_roots import MatrixDeterminant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

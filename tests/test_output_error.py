@@ -4,7 +4,7 @@ import deadtime as dtm
 import flown
 import numpy as np
 import pytest
-from deadtime._estimation.held_response import HeldResponse
+from deadtime.estimation.models._held_response import HeldResponse
 from flights import flight_path
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -13,8 +13,8 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import paper
-from deadtime._paper_page import render_reproduction
 from deadtime.paper import Comparison, Verdict, agreeing_digits, printed_digits
+from deadtime.paper._page import render_reproduction
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq

@@ -18,7 +18,7 @@ NAMES = ("Kp", "Kv", "T")
 def test_parameters_are_split_at_spaces_and_commas():
     assert [p.name for p in dtm.parameters("a, b  c,d")] == ["a", "b", "c", "d"]
     (single,) = dtm.parameters("Kp")
-    assert isinstance(single, dtm.Parameter)
+    assert isinstance(single, dtm.roots.Parameter)
     assert single == Kp
     assert hash(single) == hash(Kp)
     assert single != Kv
@@ -37,7 +37,7 @@ def test_names_in_anything_but_a_string_are_refused():
 
 def test_numbers_are_put_where_the_parameters_were():
     h = s**2 + (Kp + Kv * s) * delay(T)
-    assert isinstance(h, dtm.ParametricQuasiPolynomial)
+    assert isinstance(h, dtm.roots.ParametricQuasiPolynomial)
     assert h.names == NAMES
     assert h.at(Kp=2, Kv=np.float64(0.3), T=Fraction(1, 4)) == s**2 + (2 + 0.3 * s) * delay(0.25)
     assert h.at(Kp=2, Kv=0.3, T=0) == s**2 + 0.3 * s + 2
@@ -139,7 +139,7 @@ def test_values_are_checked():
 
 def test_it_is_made_by_algebra_and_does_not_change():
     with pytest.raises(TypeError, match="by algebra"):
-        dtm.ParametricQuasiPolynomial()
+        dtm.roots.ParametricQuasiPolynomial()
     with pytest.raises(AttributeError, match="does not change"):
         Kp._names = ("x",)
     h = s + Kp * delay(T)

@@ -6,7 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from deadtime import delay, s
-from deadtime._errors import ContourError
+from deadtime._base.errors import ContourError
 from root_cases import (
     CASES,
     CHAINS_LEAD,

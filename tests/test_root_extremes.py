@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ball_count import BallCounter
 from deadtime import QuasiPolynomial, delay, s
-from deadtime._errors import ContourError
+from deadtime._base.errors import ContourError
 
 EIGHT_REAL = np.poly(np.arange(-1.0, -9.0, -1.0))[::-1]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 from deadtime import QuasiPolynomial, delay, s
-from deadtime._errors import ContourError
+from deadtime._base.errors import ContourError
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 

@@ -6,8 +6,9 @@ import deadtime as dtm
 import mpmath as mp
 import numpy as np
 import pytest
-from deadtime import QuasiPolynomial, RootSet, delay, s
-from deadtime._errors import ContourError
+from deadtime import QuasiPolynomial, delay, s
+from deadtime._base.errors import ContourError
+from deadtime.roots import RootSet
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from root_cases import CASES, ULP, make

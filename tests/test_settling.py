@@ -3,7 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._design.tail import tail_bound
+from deadtime.tuning._tail import tail_bound
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from loops import loops
@@ -80,7 +80,7 @@ def test_a_sweep_calls_nothing_settled_that_leaves_the_band_later(seed):
             assert own <= found["settling_time"][i] + 0.0025, (one, time)
             claims += 1
         unsettled = np.isnan(found["settling_time"])
-        assert np.array_equal(unsettled, found.status != dtm.SweepStatus.OK)
+        assert np.array_equal(unsettled, found.status != dtm.loops.SweepStatus.OK)
     assert claims
 
 
@@ -90,9 +90,9 @@ def test_a_creeping_integral_is_not_settled_before_three_of_its_time_constants()
     slowest = -1.0 / loop.spectral_abscissa()
     assert slowest > 40.0
     early, late = (dtm.sweep(loop, {"Ki": 0.02}, n * slowest) for n in (0.5, 6.0))
-    assert early.status == dtm.SweepStatus.UNSETTLED
+    assert early.status == dtm.loops.SweepStatus.UNSETTLED
     assert np.isnan(early["settling_time"])
-    assert late.status == dtm.SweepStatus.OK
+    assert late.status == dtm.loops.SweepStatus.OK
     longest = dtm.sweep(loop, {"Ki": 0.02})
     assert longest.time[-1] > 3.0 * slowest
     assert longest["settling_time"] == pytest.approx(late["settling_time"], rel=1e-9)

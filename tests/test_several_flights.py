@@ -4,7 +4,7 @@ import deadtime as dtm
 import flown
 import numpy as np
 import pytest
-from deadtime._estimation.joint import JointModel
+from deadtime.estimation.fit._joint import JointModel
 from flights import flight_path
 
 TS = 0.065
@@ -70,8 +70,8 @@ def test_coloured_misfit_counts_by_the_size_of_the_step():
 
 
 def test_the_joint_model_is_its_parts():
-    from deadtime._estimation.several import each_flight
-    from deadtime._estimation.waveform import _model
+    from deadtime.estimation.data._several import each_flight
+    from deadtime.estimation.methods._waveform import _model
 
     pairs = [fly(Kp, 0.01, 3) for Kp in (0.8, 2.0)]
     flights = each_flight([p[0] for p in pairs], [p[1] for p in pairs], None)

@@ -3,7 +3,8 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._design.stabilising import critical_gain, stable_gains
+from deadtime.tuning import critical_gain
+from deadtime.tuning._stabilising import stable_gains
 from scipy.linalg import expm
 
 P1 = dtm.P(1.0)

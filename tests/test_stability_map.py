@@ -10,7 +10,8 @@ import threading
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime import MapStatus, delay, s
+from deadtime import delay, s
+from deadtime.stability import MapStatus
 from scipy.special import lambertw
 
 Kp, Kv, Td = dtm.parameters("Kp Kv Td")
@@ -288,7 +289,7 @@ def test_given_points_are_not_shared():
 
 
 def test_plot_returns_its_axes():
-    pytest.importorskip("deadtime._plots")
+    pytest.importorskip("deadtime._base.drawing")
     figure = pytest.importorskip("matplotlib.figure")
     ax = figure.Figure().subplots()
     chart = dtm.stability_map(VELOCITY, {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}, shape=(9, 8))

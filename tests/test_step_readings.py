@@ -5,8 +5,8 @@ import itertools
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._estimation.decrement import loop_with_root
-from deadtime._estimation.held_transfer import held_transfer
+from deadtime.estimation.methods._decrement import loop_with_root
+from deadtime.estimation.models._held_transfer import held_transfer
 from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -10,7 +10,7 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._loop_model import LoopModel, rest_of
+from deadtime.loops._model import LoopModel, rest_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from loops import loops
@@ -126,17 +126,17 @@ def test_what_grows_without_bound_says_so():
     free = DRONE.replace(limit=None)
     found = dtm.sweep(free, {"Kp": [1.0, 30.0, 1e3]}, 20.0)
     assert found.status.tolist() == [
-        dtm.SweepStatus.OK,
-        dtm.SweepStatus.UNSETTLED,
-        dtm.SweepStatus.UNSETTLED,
+        dtm.loops.SweepStatus.OK,
+        dtm.loops.SweepStatus.UNSETTLED,
+        dtm.loops.SweepStatus.UNSETTLED,
     ]
     found = dtm.sweep(free, {"Kp": [1.0, 30.0, 1e3]}, 400.0)
-    assert found.status[2] == dtm.SweepStatus.DIVERGED
+    assert found.status[2] == dtm.loops.SweepStatus.DIVERGED
     assert all(np.isnan(column[2]) for column in found.metrics.values())
     assert not any(np.isnan(column[0]) for column in found.metrics.values())
     outputs = dtm.sweep(free, {"Kp": [1.0, 1e3]}, [0.0, 400.0], responses=True)
     assert np.isnan(outputs.outputs[1]).all()
-    assert outputs.status.tolist() == [0, dtm.SweepStatus.DIVERGED]
+    assert outputs.status.tolist() == [0, dtm.loops.SweepStatus.DIVERGED]
     # The same beyond the lanes.
     lagging = free.replace(plant=dtm.Integrator(1.0, 0.1))
     assert dtm.sweep(lagging, {"Kp": [1.0, 1e3]}, 400.0).status.tolist() == [0, 2]
@@ -145,7 +145,7 @@ def test_what_grows_without_bound_says_so():
 def test_endless_work_is_refused_for_its_set_alone():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
     found = dtm.sweep(loop, {"delay": [0.3, 1e-8]}, 10.0)
-    assert found.status.tolist() == [0, dtm.SweepStatus.REFUSED]
+    assert found.status.tolist() == [0, dtm.loops.SweepStatus.REFUSED]
     assert np.isnan(found["overshoot"][1])
 
 
@@ -268,7 +268,7 @@ def test_without_a_time_sets_are_measured_until_they_settle():
     found = dtm.sweep(loop, {"Kp": [0.1, 1.0, 3.0]})
     # Kp = 0.1 takes 40 s to settle, ten delays are 3.6 s.
     assert found.time[-1] >= 40.0
-    assert (found.status == dtm.SweepStatus.OK).all()
+    assert (found.status == dtm.loops.SweepStatus.OK).all()
     for i, gain in enumerate((0.1, 1.0, 3.0)):
         info = loop.replace(Kp=gain).step_response().info()
         assert found["settling_time"][i] == pytest.approx(info["settling_time"], abs=1e-6)
@@ -276,6 +276,6 @@ def test_without_a_time_sets_are_measured_until_they_settle():
     assert grid.shape == (2, 2)
     # 9 * 0.36 is beyond pi/2: that loop never settles.
     assert grid.status.tolist()[0] == [0, 0]
-    assert grid.status[1, 1] != dtm.SweepStatus.OK
+    assert grid.status[1, 1] != dtm.loops.SweepStatus.OK
     with pytest.raises(ValueError, match="responses need output times"):
         dtm.sweep(loop, {"Kp": [1.0]}, responses=True)

@@ -5,7 +5,7 @@ import struct
 from dataclasses import replace
 
 import pytest
-from deadtime._errors import PacketError
+from deadtime._base.errors import PacketError
 from deadtime.links.ardrone2.configuration import parse_configuration, write_configuration
 from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_doubles
 from hypothesis import given

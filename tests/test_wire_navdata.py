@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 from itertools import pairwise
 
 import pytest
-from deadtime._errors import LinkError, PacketError
+from deadtime._base.errors import LinkError, PacketError
 from deadtime.links._wire import navdata_layouts
 from deadtime.links.ardrone2 import navdata as room
 from deadtime.links.ardrone2.navdata import (

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 import deadtime as dtm
-from deadtime._derivative_filter import PAPER_FILTER
+from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid
