@@ -15,13 +15,7 @@ import typer
 from rich import box
 from rich.table import Table
 
-from deadtime._base.drawing import (
-    check_matplotlib,
-    new_figure,
-    plot_certificate,
-    plot_responses,
-    plot_root_set,
-)
+from deadtime._base.drawing import check_matplotlib, new_figure
 from deadtime._base.errors import DeadtimeError
 from deadtime._cli import options as opt
 from deadtime._cli.designs import design_gains
@@ -45,6 +39,9 @@ from deadtime.recordings import Recording, read_recording
 from deadtime.reports import demo_flight, study
 from deadtime.reports._page import write_report
 from deadtime.roots import RootSet
+from deadtime.roots._plots import plot_root_set
+from deadtime.roots.certificate._plots import plot_certificate
+from deadtime.systems._plots import plot_responses
 
 __all__ = ["app", "run"]
 

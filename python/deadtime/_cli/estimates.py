@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from deadtime._base.drawing import new_figure, plot_estimate, plot_fits
+from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -18,6 +18,7 @@ from deadtime._cli.show import (
 )
 from deadtime.estimation import Comparison, compare_methods, estimate_delay
 from deadtime.estimation._estimate import JOINT, METHODS
+from deadtime.estimation._plots import plot_estimate, plot_fits
 from deadtime.recordings import read_recording
 
 __all__ = ["estimate_delays"]

@@ -305,7 +305,7 @@ class DelayEstimate(ReadOnlyArrays):
 
     def plot(self) -> Figure:
         """Fit over data, the residuals, and the profile of the delay; needs matplotlib."""
-        from deadtime._base.drawing import plot_estimate
+        from deadtime.estimation._plots import plot_estimate
 
         return plot_estimate(self)
 

@@ -503,7 +503,8 @@ class ControlLoop:
         ValueError
             As in `frequency_response` and `margin`.
         """
-        from deadtime._base.drawing import plot_bode, shown_rows
+        from deadtime._base.drawing import shown_rows
+        from deadtime.systems._plots import plot_bode
 
         found = self.margin()
         if omega is None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from deadtime._base.drawing import new_figure, plot_fits, plot_responses
+from deadtime._base.drawing import new_figure
 from deadtime._base.page import escaped, page, picture, table, table_row, write_page
 from deadtime.estimation._compare import COLUMNS, truth_row
+from deadtime.estimation._plots import plot_fits
 from deadtime.reports._study import Study
+from deadtime.systems._plots import plot_responses
 
 __all__ = ["write_report"]
 

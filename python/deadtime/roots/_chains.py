@@ -18,15 +18,13 @@ is almost as large.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
+from typing import Any, Literal, Protocol, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    from deadtime.roots._quasipolynomial import QuasiPolynomial
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array, unmasked
 
@@ -40,6 +38,24 @@ _ON_EDGE = 1e-9
 _MAX_DENOMINATOR = 64
 #: Degree in z up to which chains are told one by one.
 _MAX_DEGREE = 128
+
+
+class Function(Protocol):
+    """What the laws of chains take from a quasi-polynomial, and from their difference part."""
+
+    @property
+    def coefficients(self) -> _Floats: ...
+
+    @property
+    def delays(self) -> _Floats: ...
+
+    def roots(self, *, im: tuple[float, float] | None = None) -> Any: ...
+
+    def chain_abscissa(self) -> float: ...
+
+
+#: Makes a function from coefficients and delays.
+Make: TypeAlias = Callable[[Any, Any], Function]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +91,7 @@ class Chain(ReadOnlyArrays):
     multiplicity: int
     periodic: bool
     _phase: float = field(repr=False)
-    _difference: QuasiPolynomial | None = field(default=None, repr=False)
+    _difference: Function | None = field(default=None, repr=False)
 
     def real_part(self, im: ArrayLike) -> _Floats:
         """Real part of the law at given heights.
@@ -160,7 +176,7 @@ class Chain(ReadOnlyArrays):
             height *= 1.5
 
 
-def chains_of(h: QuasiPolynomial) -> tuple[Chain, ...]:
+def chains_of(h: Function) -> tuple[Chain, ...]:
     """All chains of `h`, from the least bend to the largest."""
     points: list[_Point] = []
     for tau, row in zip(h.delays.tolist(), h.coefficients, strict=True):
@@ -195,7 +211,7 @@ def _edges(points: list[_Point]) -> Iterator[list[_Point]]:
         first = on[-1]
 
 
-def _chains_of_edge(edge: list[_Point], make: type[QuasiPolynomial]) -> Iterator[Chain]:
+def _chains_of_edge(edge: list[_Point], make: Make) -> Iterator[Chain]:
     (tau, n, _), (last, m, _) = edge[0], edge[-1]
     span = last - tau
     bend = (n - m) / span
@@ -220,9 +236,7 @@ def _chains_of_edge(edge: list[_Point], make: type[QuasiPolynomial]) -> Iterator
         yield Chain(kind, bend, offset, spacing, multiplicity, True, phase)
 
 
-def _roots_in_z(
-    sizes: list[float], powers: list[int], make: type[QuasiPolynomial]
-) -> Iterator[tuple[complex, int]]:
+def _roots_in_z(sizes: list[float], powers: list[int], make: Make) -> Iterator[tuple[complex, int]]:
     """Roots of a polynomial with few terms, and their multiplicities."""
     if len(sizes) == 2:
         yield complex(-sizes[0] / sizes[1]), 1

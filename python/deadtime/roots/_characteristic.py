@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import TYPE_CHECKING, Literal, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from deadtime.roots._sensitivity import Sensitivity
 from deadtime.roots.certificate._certificate import Certificate
 
 if TYPE_CHECKING:
-    from deadtime.roots._quasipolynomial import QuasiPolynomial
+    pass
 
 __all__ = ["Characteristic", "Edge"]
 
@@ -305,7 +305,7 @@ class Characteristic:
         >>> [chain.kind for chain in (s + (2.0 + 0.3 * s) * delay(0.36)).chains()]
         ['neutral']
         """
-        return chains_of(cast("QuasiPolynomial", self))
+        return chains_of(cast("Any", self))
 
     def is_stable(self, strong: bool = True) -> bool:
         """Tell whether every root is proved to lie left of the imaginary axis.

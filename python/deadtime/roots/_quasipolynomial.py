@@ -6,23 +6,25 @@ import cmath
 import operator
 from collections.abc import Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeAlias, cast, overload
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeAlias, TypeVar, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
+from deadtime._base.validation import unmasked
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
 
 if TYPE_CHECKING:
-    from deadtime.roots._parametric import ParametricQuasiPolynomial
     from deadtime.systems import TransferFunction
-from deadtime._base.validation import unmasked
 
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
 Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "advanced"]
+
+#: A family of quasi-polynomials.
+_Family = TypeVar("_Family", covariant=True)
 
 
 class QuasiPolynomial(Characteristic):
@@ -63,9 +65,6 @@ class QuasiPolynomial(Characteristic):
 
     # NumPy leaves `array * h` and `number * h` to this class.
     __array_ufunc__ = None
-
-    # What a quotient is: set by the module of transfer functions, which builds on this one.
-    _ratio: ClassVar[type[TransferFunction]]
 
     _native: _deadtime.QuasiPolynomial
     _coefficients: NDArray[np.float64]
@@ -193,14 +192,14 @@ class QuasiPolynomial(Characteristic):
                 raise ZeroDivisionError("division of a quasi-polynomial by zero")
             return self._wrap(_deadtime.QuasiPolynomial(self._coefficients / divisor, self._delays))
         if isinstance(other, QuasiPolynomial):
-            return self._ratio(self, other)
+            return _quotient(self, other)
         return NotImplemented
 
     def __rtruediv__(self, other: float) -> TransferFunction:
         first = _operand(other)
         if first is None:
             return NotImplemented
-        return self._ratio(first, self)
+        return _quotient(first, self)
 
     def __pow__(self, exponent: object) -> Any:
         """To a whole power; to a negative one it is a `TransferFunction`."""
@@ -318,13 +317,23 @@ class QuasiPolynomial(Characteristic):
         return Expansion(coefficients, errors, tau)
 
 
+def _quotient(num: QuasiPolynomial, den: QuasiPolynomial) -> TransferFunction:
+    from deadtime.systems import TransferFunction
+
+    return TransferFunction(num, den)
+
+
+class Exponent(Protocol[_Family]):
+    """A delay with parameters in it."""
+
+    def _exponential(self) -> _Family: ...
+
+
 @overload
 def delay(T: float) -> QuasiPolynomial: ...
 @overload
-def delay(T: ParametricQuasiPolynomial) -> ParametricQuasiPolynomial: ...
-def delay(
-    T: float | ParametricQuasiPolynomial,
-) -> QuasiPolynomial | ParametricQuasiPolynomial:
+def delay(T: Exponent[_Family]) -> _Family: ...
+def delay(T: Any) -> Any:
     """Transfer function of a pure delay, exp(-s T).
 
     Parameters

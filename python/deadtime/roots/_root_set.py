@@ -115,7 +115,8 @@ class RootSet(ReadOnlyArrays):
         -------
         matplotlib.axes.Axes
         """
-        from deadtime._base.drawing import plot_root_set, shown_axes
+        from deadtime._base.drawing import shown_axes
+        from deadtime.roots._plots import plot_root_set
 
         axes = shown_axes(ax)
         plot_root_set(axes, self, chains)

@@ -27,7 +27,7 @@ from deadtime.roots._determinant import NotExpandedError, expanded
 from deadtime.roots._family import family_of
 from deadtime.roots._matrix_roots import MatrixDeterminant
 from deadtime.roots._root_set import Range
-from deadtime.systems._realisation import Realisation, of_delay_system
+from deadtime.systems._realisation import Realisation, of_matrices
 from deadtime.systems._run import respond, step_response
 from deadtime.systems._scaled_delays import scaled_family, smallest_delay
 from deadtime.systems._system_response import SystemResponse
@@ -686,7 +686,13 @@ class DelaySystem:
 
     def _realised(self) -> Realisation:
         if self._realisation is None:
-            object.__setattr__(self, "_realisation", of_delay_system(self))
+            object.__setattr__(
+                self,
+                "_realisation",
+                of_matrices(
+                    self.E, self.A, self.N, self.B, self.C, self.D, self.n_inputs, self.n_outputs
+                ),
+            )
         assert self._realisation is not None
         return self._realisation
 

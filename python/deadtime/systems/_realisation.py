@@ -12,19 +12,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._deadtime import LinearSystem
+from deadtime.roots import QuasiPolynomial
 
-if TYPE_CHECKING:
-    from deadtime.roots import QuasiPolynomial
-    from deadtime.systems._delay_system import DelaySystem
-    from deadtime.systems._transfer import TransferFunction
-
-__all__ = ["Realisable", "Realisation", "of_delay_system", "of_transfer_function"]
+__all__ = ["Realisable", "Realisation", "of_matrices", "of_ratio"]
 
 Group = Mapping[float, NDArray[np.float64]]
 
@@ -82,10 +78,17 @@ def _realised(
     )
 
 
-def of_delay_system(system: DelaySystem) -> Realisation:
+def of_matrices(
+    E: NDArray[np.float64],
+    a: Group,
+    n: Group,
+    b: Group,
+    c: Group,
+    d: Group,
+    inputs: int,
+    outputs: int,
+) -> Realisation:
     """Solve for the derivative, which takes an E that can be inverted."""
-    E = system.E
-    a, n, b = system.A, system.N, system.B
     size = len(E)
     if not np.array_equal(E, np.eye(size)):
         rank = int(np.linalg.matrix_rank(E))
@@ -95,8 +98,7 @@ def of_delay_system(system: DelaySystem) -> Realisation:
             {tau: np.asarray(np.linalg.solve(E, m), np.float64) for tau, m in group.items()}
             for group in (a, n, b)
         )
-    sizes = (size, system.n_inputs, system.n_outputs)
-    return _realised(sizes, a, n, b, system.C, {}, system.D, has_states=True)
+    return _realised((size, inputs, outputs), a, n, b, c, {}, d, has_states=True)
 
 
 def _singular(rank: int, size: int, is_late: bool) -> str:
@@ -115,20 +117,9 @@ def _singular(rank: int, size: int, is_late: bool) -> str:
 
 
 @lru_cache(maxsize=64)
-def of_transfer_function(system: TransferFunction) -> Realisation:
-    """Take the derivatives of one auxiliary signal as states."""
-    num, den = system.num, system.den
+def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
+    """Take the derivatives of one auxiliary signal as the states of a proper, causal num/den."""
     n = den.degree
-    if not system.is_proper:
-        raise ValueError(
-            f"the numerator has degree {num.degree}, the denominator {n}: an improper transfer "
-            "function differentiates its input and has no response to a step"
-        )
-    if not system.is_causal:
-        raise ValueError(
-            f"{system!r} is not causal: its output would depend on later inputs (or its equation "
-            "is advanced)"
-        )
     first = float(den.delays[0])
     leading = float(den.coefficients[0, n]) if n < den.coefficients.shape[1] else 0.0
     if n == 0 and len(den.delays) > 1:

@@ -13,9 +13,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import deadtime.systems._signals as signals
 from deadtime._base.validation import finite, increasing, positive, real_array
 from deadtime._deadtime import Signal
-from deadtime.systems import _signals as signals
 from deadtime.systems._realisation import Realisable, Realisation
 from deadtime.systems._system_response import SystemResponse
 

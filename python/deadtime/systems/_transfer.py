@@ -27,7 +27,7 @@ from deadtime.systems._interchange import (
 from deadtime.systems._margins import Margins, margins
 from deadtime.systems._phase import argument
 from deadtime.systems._ratio import first_term, ratio
-from deadtime.systems._realisation import Realisation, of_transfer_function
+from deadtime.systems._realisation import Realisation, of_ratio
 from deadtime.systems._run import respond, step_response
 from deadtime.systems._system_response import SystemResponse
 
@@ -502,7 +502,18 @@ class TransferFunction:
         return respond(self, time, inputs, **arguments)
 
     def _realised(self) -> Realisation:
-        return of_transfer_function(self)
+        num, den = self.num, self.den
+        if not self.is_proper:
+            raise ValueError(
+                f"the numerator has degree {num.degree}, the denominator {den.degree}: an "
+                "improper transfer function differentiates its input and has no response to a step"
+            )
+        if not self.is_causal:
+            raise ValueError(
+                f"{self!r} is not causal: its output would depend on later inputs (or its equation "
+                "is advanced)"
+            )
+        return of_ratio(num, den)
 
     def _gains_at_rest(self) -> NDArray[np.float64]:
         return np.array([[self.dcgain()]])
@@ -571,7 +582,8 @@ class TransferFunction:
         ValueError
             If the frequencies are no increasing ones above zero; with `margins` as in `margin`.
         """
-        from deadtime._base.drawing import plot_bode, shown_rows
+        from deadtime._base.drawing import shown_rows
+        from deadtime.systems._plots import plot_bode
 
         places = self._plotted(omega, 0.1, 10.0)
         found = self.margin() if margins else None
@@ -607,7 +619,8 @@ class TransferFunction:
         ValueError
             As in `bode`.
         """
-        from deadtime._base.drawing import plot_nyquist, shown_axes
+        from deadtime._base.drawing import shown_axes
+        from deadtime.systems._plots import plot_nyquist
 
         places = self._plotted(omega, 1e-3, 100.0)
         found = self.margin() if margins else None
@@ -858,6 +871,3 @@ def _is_sum(text: str) -> bool:
         start, end = inner.index("("), inner.index(")")
         inner = inner[:start] + inner[end + 1 :]
     return " + " in inner or " - " in inner
-
-
-QuasiPolynomial._ratio = TransferFunction

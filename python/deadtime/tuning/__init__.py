@@ -8,8 +8,8 @@ derivative.
 """
 
 from deadtime.tuning._design import design
-from deadtime.tuning._filter_choice import FilterChoice, design_filter
-from deadtime.tuning._result import Design, LeastMargins, Trade
+from deadtime.tuning._filter_choice import design_filter
+from deadtime.tuning._result import Design, FilterChoice, LeastMargins, Trade
 from deadtime.tuning._stabilising import critical_gain
 
 __all__ = [

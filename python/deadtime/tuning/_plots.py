@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
     from deadtime.loops import ControlLoop
     from deadtime.systems import Response
-    from deadtime.tuning._filter_choice import FilterChoice
-    from deadtime.tuning._result import Design
+    from deadtime.tuning._result import Design, FilterChoice
 
 __all__ = ["plot_design", "plot_filter_choice"]
 

@@ -10,14 +10,12 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.loops import ControlLoop
 from deadtime.stability import StabilityMap
 from deadtime.tuning._objectives import ObjectiveName
-from deadtime.tuning._problem import Scenario
+from deadtime.tuning._problem import Scenario, Vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from deadtime.tuning._filter_choice import FilterChoice
-
-__all__ = ["Design", "LeastMargins", "Trade", "figure_in_words"]
+__all__ = ["Design", "FilterChoice", "LeastMargins", "Trade", "figure_in_words"]
 
 
 class LeastMargins(NamedTuple):
@@ -197,3 +195,94 @@ def figure_in_words(objective: ObjectiveName, value: float) -> str:
         "settling_time": f"settling time {value:.4g} s",
         "overshoot": f"overshoot {value:.3g} %",
     }[objective]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FilterChoice(ReadOnlyArrays):
+    """How the corner of a filter was chosen; made by `design_filter`.
+
+    Attributes
+    ----------
+    omega : float
+        The corner that was chosen, rad/s.
+    rule : str
+        Why that one.
+    design : Design
+        The design with it.
+    ideal : Design
+        The design without a filter.
+    omegas : ndarray, shape (n,)
+        Corners that were tried, rad/s.
+    values : ndarray, shape (n,)
+        The objective at each, with the best gains for it; NaN where none meet the demands.
+    noise_gains : ndarray, shape (n,)
+        Standard deviation of the command over that of the measurement noise, at each.
+    value, noise_gain : float
+        The same of the chosen one.
+    ideal_noise_gain : float
+        The same without a filter.
+    bandwidth : float
+        Up to where the noise is white, rad/s.
+    noise : float or None
+        Standard deviation of the measurement noise, where it was given.
+    """
+
+    omega: float
+    rule: str
+    design: Design
+    ideal: Design
+    omegas: Vector
+    values: Vector
+    noise_gains: Vector
+    value: float
+    noise_gain: float
+    ideal_noise_gain: float
+    bandwidth: float
+    noise: float | None
+
+    def __repr__(self) -> str:
+        return (
+            f"<FilterChoice {self.omega:.4g} rad/s: "
+            f"{figure_in_words(self.design.objective, self.value)}, noise gain "
+            f"{self.noise_gain:.3g}>"
+        )
+
+    @property
+    def trade(self) -> Trade:
+        """The choice as what was traded."""
+        return Trade("filter", self.omega, self.omega, True, self.ideal.value, self.summary())
+
+    def summary(self) -> str:
+        """The choice in a sentence.
+
+        Returns
+        -------
+        str
+        """
+        name = self.design.objective
+        words = (
+            f"filter at {self.omega:.4g} rad/s, {self.rule}: "
+            f"{figure_in_words(name, self.value)} against "
+            f"{figure_in_words(name, self.ideal.value)} without a filter; the command has "
+            f"{self.noise_gain:.3g} times the noise of the measurement (white to "
+            f"{self.bandwidth:.4g} rad/s) against {self.ideal_noise_gain:.3g}"
+        )
+        if self.noise is not None:
+            words += f", a standard deviation of {self.noise * self.noise_gain:.3g}"
+        return words
+
+    def plot(self) -> Figure:
+        """Draw the trade, the controller with and without the filter, the loop with its margins.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed.
+        """
+        from deadtime.tuning._plots import plot_filter_choice
+
+        return plot_filter_choice(self)

@@ -7,18 +7,16 @@ import json
 import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
 
 from deadtime.roots.certificate._check import check
 from deadtime.roots.certificate._form import check_form
-from deadtime.roots.certificate._parts import Contour, Monotone, Segment
+from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Range, Segment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["Certificate"]
-
-Range: TypeAlias = tuple[float, float]
 
 _T = TypeVar("_T")
 
@@ -26,7 +24,7 @@ _FORMAT: Final = "deadtime certificate"
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(Proof):
     """The proved number of roots in a region, with all that is needed to prove it again.
 
     Made by `QuasiPolynomial.certify`. Complete in itself: function, region, number and proof.
@@ -73,17 +71,6 @@ class Certificate:
     >>> Certificate.from_json(proof.to_json()) == proof
     True
     """
-
-    coefficients: tuple[tuple[float, ...], ...]
-    delays: tuple[float, ...]
-    region: tuple[Range, Range]
-    count: int
-    scale: int
-    zeros: int
-    beyond: tuple[int, float] | None
-    closed: tuple[Range, Range]
-    contours: tuple[Contour, ...]
-    real: tuple[Segment | Monotone, ...]
 
     def __repr__(self) -> str:
         (a, b), (c, d) = self.region
@@ -147,7 +134,8 @@ class Certificate:
         -------
         matplotlib.axes.Axes
         """
-        from deadtime._base.drawing import plot_certificate, shown_axes
+        from deadtime._base.drawing import shown_axes
+        from deadtime.roots.certificate._plots import plot_certificate
 
         axes = shown_axes(ax)
         plot_certificate(axes, self)

@@ -21,7 +21,6 @@ import math
 from collections.abc import Iterable
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from deadtime._base.errors import CertificateError
 from deadtime.roots.certificate._enclosures import angle, pi
@@ -34,15 +33,12 @@ from deadtime.roots.certificate._function import (
     fail,
     pair,
 )
-from deadtime.roots.certificate._parts import Contour, Monotone, Segment
-
-if TYPE_CHECKING:
-    from deadtime.roots.certificate._certificate import Certificate
+from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Segment
 
 __all__ = ["check"]
 
 
-def check(certificate: Certificate) -> int:
+def check(certificate: Proof) -> int:
     """Verify everything a certificate claims; the count if it is true.
 
     Raises
@@ -62,7 +58,7 @@ def check(certificate: Certificate) -> int:
 class _Checker:
     """The function of a certificate as whole numbers, and the claims about it."""
 
-    def __init__(self, certificate: Certificate) -> None:
+    def __init__(self, certificate: Proof) -> None:
         self.certificate = certificate
         self.function = ExactFunction(
             certificate.coefficients, certificate.delays, certificate.scale, certificate.zeros

@@ -8,12 +8,9 @@ of more digits than a true certificate needs.
 from __future__ import annotations
 
 import reprlib
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from deadtime.roots.certificate._parts import Contour, Monotone, Segment
-
-if TYPE_CHECKING:
-    from deadtime.roots.certificate._certificate import Certificate
+from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Segment
 
 __all__ = ["check_form"]
 
@@ -50,7 +47,7 @@ _WORDS: Final = {
 }
 
 
-def check_form(certificate: Certificate) -> None:
+def check_form(certificate: Proof) -> None:
     """Check types and bounds of all parts.
 
     Raises

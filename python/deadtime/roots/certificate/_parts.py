@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
-__all__ = ["Contour", "Monotone", "Segment"]
+__all__ = ["Contour", "Monotone", "Proof", "Segment"]
+
+Range: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,3 +90,19 @@ class Contour:
     symmetric: bool
     count: int
     segments: tuple[Segment, ...]
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The claims of a `Certificate`, which says what each field is."""
+
+    coefficients: tuple[tuple[float, ...], ...]
+    delays: tuple[float, ...]
+    region: tuple[Range, Range]
+    count: int
+    scale: int
+    zeros: int
+    beyond: tuple[int, float] | None
+    closed: tuple[Range, Range]
+    contours: tuple[Contour, ...]
+    real: tuple[Segment | Monotone, ...]

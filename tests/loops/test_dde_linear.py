@@ -14,7 +14,7 @@ from scipy.linalg import expm
 PROBLEMS = {
     problem["id"]: problem
     for problem in json.loads(
-        (Path(__file__).parent / "reference" / "dde_problems.json").read_text()
+        (Path(__file__).parents[1] / "reference" / "dde_problems.json").read_text()
     )["problems"]
 }
 

@@ -19,7 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PAPER = ROOT / "python" / "deadtime" / "paper"
 LIST = json.loads((ROOT / "tests" / "reference" / "paper_numbers.json").read_text("utf-8"))
 

@@ -1,7 +1,7 @@
 """Counts, roots and rightmost roots of random troublesome functions against ball arithmetic.
 
-``python tests/ball_survey.py --cases 10000 --seed 1`` prints every case that is not equal and a
-table at the end; ``--only NUMBER`` repeats one case and prints the function.
+``python tests/support/ball_survey.py --cases 10000 --seed 1`` prints every case that is not
+equal and a table at the end; ``--only NUMBER`` repeats one case and prints the function.
 """
 
 import argparse

@@ -8,7 +8,7 @@ from deadtime import QuasiPolynomial
 CASES = {
     case["name"]: case
     for case in json.loads(
-        (Path(__file__).parent / "reference" / "root_cases.json").read_text(encoding="utf-8")
+        (Path(__file__).parents[1] / "reference" / "root_cases.json").read_text(encoding="utf-8")
     )["cases"]
 }
 

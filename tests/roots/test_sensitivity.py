@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 CASES = {
     case["name"]: case
     for case in json.loads(
-        (Path(__file__).parent / "reference" / "root_cases.json").read_text(encoding="utf-8")
+        (Path(__file__).parents[1] / "reference" / "root_cases.json").read_text(encoding="utf-8")
     )["cases"]
 }
 NAMES = ["armah_K2", "qpmr_ex3_neutral", "humphries_k3", "lambertw_yi", "peec", "tdscontrol_2.9"]

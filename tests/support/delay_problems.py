@@ -8,7 +8,7 @@ import numpy as np
 PROBLEMS = {
     problem["id"]: problem
     for problem in json.loads(
-        (Path(__file__).parent / "reference" / "dde_problems.json").read_text()
+        (Path(__file__).parents[1] / "reference" / "dde_problems.json").read_text()
     )["problems"]
 }
 

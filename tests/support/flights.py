@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).resolve().parent.parent.parent / "shared" / "data" / "flights"
+FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "flights"
 
 
 def flight_path(name):

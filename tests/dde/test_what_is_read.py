@@ -1,7 +1,7 @@
 """What an input, a history or the past of a solution holds is read, whatever the elements are.
 
 Every survey draws pulses of random place, width and height; the truth is the area under the pulse,
-in closed form. `DEADTIME_PULSES=1000 python -m pytest -n 0 tests/test_what_is_read.py` draws a
+in closed form. `DEADTIME_PULSES=1000 python -m pytest -n 0 tests/dde/test_what_is_read.py` draws a
 thousand of each.
 """
 

@@ -15,7 +15,7 @@ from trouble import KINDS, trouble
 CASES = {
     case["name"]: case
     for case in json.loads(
-        (Path(__file__).parent / "reference" / "root_cases.json").read_text(encoding="utf-8")
+        (Path(__file__).parents[1] / "reference" / "root_cases.json").read_text(encoding="utf-8")
     )["cases"]
 }
 
