@@ -9,23 +9,13 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::winding::Turn;
+use super::turn::{Turn, Walk};
 use crate::Error;
 
 /// Shares of a side at which a cut is tried, the next one where a root is in the way.
 const CUTS: [f64; 9] = [
     0.4871, 0.5417, 0.4393, 0.5823, 0.3911, 0.6307, 0.3301, 0.6907, 0.2703,
 ];
-
-/// Who knows how far arg h turns along a line parallel to an axis.
-pub(super) trait Walk {
-    /// Change of arg h from `from` to `to`.
-    ///
-    /// # Errors
-    /// [`Error::Contour`] where a root lies on the line or too close to it, [`Error::TooMuch`],
-    /// [`Error::Interrupted`].
-    fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error>;
-}
 
 /// A rectangle and the number of roots in it.
 #[derive(Debug, Clone, Copy)]

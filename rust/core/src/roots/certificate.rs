@@ -16,10 +16,13 @@ use num_complex::Complex64;
 
 use super::bounds::{self, Dominance};
 use super::cell::Cell;
-use super::count::{Prepared, close, closed_sides, upper_half};
+use super::closed::{close, closed_sides};
+use super::count::upper_half;
 use super::crowd::Crowd;
+use super::prepared::Prepared;
 use super::real::{RealPart, survey_real};
 use super::region::Region;
+use super::segment::{CROWDED, Segment, TRIFLE};
 use super::winding::{Walker, is_clear};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::{Error, Task};
@@ -30,33 +33,8 @@ const SHARE: f64 = 0.95;
 /// Covers the rounding of the sum that bounds the slope.
 const MARGIN: f64 = 1e-12;
 
-/// What a checker's digits must be good for, relative to the value.
-pub(super) const TRIFLE: f64 = 1e-20;
-
-/// Several roots may be near where the bound on g″ allows less than this share of what the slope would.
-pub(super) const CROWDED: f64 = 0.02;
-
 /// More than anyone wants to file.
 const MAX_SEGMENTS: usize = 1_000_000;
-
-/// A straight line on which g has no zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
-    /// Where it begins.
-    pub start: Complex64,
-    /// Where it ends.
-    pub end: Complex64,
-    /// The point where g was evaluated.
-    pub middle: Complex64,
-    /// Index of the delay τ_c with which g = h e^(s τ_c).
-    pub reference: usize,
-    /// g(middle), but for `error`.
-    pub value: Complex64,
-    /// Bound on the error of `value`.
-    pub error: f64,
-    /// Bound on |g′| in the disc about the middle that reaches to both ends.
-    pub slope: f64,
-}
 
 /// The closed path around a rectangle, anticlockwise.
 #[derive(Debug, Clone, PartialEq)]

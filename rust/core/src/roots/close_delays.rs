@@ -8,7 +8,7 @@
 //! differences cancel do not make the radius as large as 1/δ. With k + m ≤ n the bound stays one on
 //! powers up to the degree n, and of the terms with sⁿ themselves it takes the moduli.
 
-use super::bounds::{MARGIN, cauchy_radius};
+use super::cauchy::{MARGIN, cauchy_radius};
 use crate::elementary::exp_above;
 use crate::quasipoly::QuasiPolynomial;
 

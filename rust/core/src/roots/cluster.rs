@@ -10,7 +10,7 @@
 
 use num_complex::Complex64;
 
-use super::newton::Disc;
+use super::disc::Disc;
 use crate::quasipoly::{Expansion, Probe, expansion, modulus, remainder};
 
 /// Most roots in one disc.

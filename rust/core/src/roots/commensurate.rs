@@ -11,70 +11,21 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::bounds::{cauchy_radius, right_edge};
+use super::base_delay::{base_delay, difference_part};
+use super::bounds::right_edge;
+use super::cauchy::cauchy_radius;
 use super::cell::Cell;
-use super::lines::{between_lines, is_beside_chains};
 use super::neutral::chain_abscissa;
-use super::set::locate;
 use super::winding::Walker;
 use crate::elementary::exp_above;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
 use crate::{Error, Task};
-
-/// Ratios of delays are looked for among fractions with denominators up to this.
-const MAX_DENOMINATOR: u32 = 64;
 
 /// Most samples of a period.
 const MAX_SAMPLES: u32 = 1 << 20;
 
 /// Halvings of the interval that holds the abscissa of the chains.
 const HALVINGS: u32 = 200;
-
-/// Lines between the chains of exact delays and those of free ones, as shares of the distance.
-const LINES: [f64; 7] = [0.5, 0.2, 0.05, 0.02, 5e-3, 1e-3, 1e-4];
-
-/// The largest number of which all differences of delays are whole multiples, to rounding; `None` where
-/// there is none, or less than two delays.
-///
-/// ```
-/// use deadtime::{quasipoly::QuasiPolynomial, roots::base_delay};
-/// let h = |delays: [f64; 3]| QuasiPolynomial::new(vec![vec![1.0]; 3], delays.to_vec());
-/// assert_eq!(base_delay(&h([0.0, 1.0, 1.5])?), Some(0.5));
-/// assert_eq!(base_delay(&h([0.0, 1.0, 2f64.sqrt()])?), None);
-/// # Ok::<(), deadtime::Error>(())
-/// ```
-pub fn base_delay(h: &QuasiPolynomial) -> Option<f64> {
-    let first = h.delays().first().copied()?;
-    let gaps: Vec<f64> = h
-        .delays()
-        .iter()
-        .skip(1)
-        .map(|delay| delay - first)
-        .collect();
-    let least = gaps.first().copied()?;
-    // Differences carry the rounding of the delays themselves.
-    let size = h.delays().last().copied().unwrap_or(0.0);
-    (1..=MAX_DENOMINATOR)
-        .map(|q| least / f64::from(q))
-        .find(|base| {
-            gaps.iter().all(|gap| {
-                let multiple = gap / base;
-                (multiple - multiple.round()).abs() <= 8.0 * f64::EPSILON * (size / base)
-            })
-        })
-}
-
-/// The terms of the highest power of s, the smallest delay taken out.
-fn difference_part(h: &QuasiPolynomial) -> Result<QuasiPolynomial, Error> {
-    let degree = h.degree();
-    let leading = |row: &[f64]| row.get(degree).copied().filter(|c| *c != 0.0);
-    let chain = h
-        .terms()
-        .filter_map(|(row, delay)| Some((vec![leading(row)?], delay)));
-    let (rows, delays): (Vec<Vec<f64>>, Vec<f64>) = chain.unzip();
-    let first = delays.first().copied().unwrap_or(0.0);
-    QuasiPolynomial::new(rows, delays.iter().map(|delay| delay - first).collect())
-}
 
 /// Is the difference part, of period 2π/`base`, proved to have no zero with Re s ≥ `sigma`?
 fn is_free(
@@ -210,48 +161,4 @@ pub(super) fn cell_right_of(
     let height = 1.01 * height.max(1e-100);
     let right = right_edge(h, height).max(sigma + height);
     Cell::new(walker, (sigma, right), (0.0, height), true).map(Some)
-}
-
-/// The largest real part of a root, or of the chains if that is larger, for delays taken as exact multiples of
-/// their base; no root is known right of C_D. `None` where there is no base.
-///
-/// # Errors
-/// Those of counting and locating roots; [`Error::TooMuch`] where no line next to the chains can be counted.
-pub(super) fn exact_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<Option<f64>, Error> {
-    let Some(chain) = exact_chain_abscissa(h, task)? else {
-        return Ok(None);
-    };
-    if h.kind() == Kind::Difference {
-        return Ok(Some(chain));
-    }
-    let distance = chain_abscissa(h) - chain;
-    let delays = h.delays();
-    let span = delays.last().unwrap_or(&0.0) - delays.first().unwrap_or(&0.0);
-    // Right of it there is no root.
-    let mut clear = chain + distance;
-    for share in LINES {
-        let sigma = chain + share * distance;
-        let mut walker = Walker::new(h, task);
-        match cell_right_of(&mut walker, sigma, task) {
-            Ok(Some(cell)) if cell.count > 0 => {
-                let discs = locate(&mut walker, cell)?;
-                let right = discs
-                    .iter()
-                    .map(|disc| disc.center.re)
-                    .fold(chain, f64::max);
-                return Ok(Some(right));
-            }
-            Ok(Some(_)) => clear = sigma,
-            // A root on the line: the next one holds it.
-            Err(Error::Contour { .. }) => {}
-            // Too close to the chains to count.
-            Ok(None) | Err(Error::TooMuch { .. }) => break,
-            Err(error) => return Err(error),
-        }
-    }
-    if is_beside_chains(clear, chain, distance.max(1.0 / span)) {
-        Ok(Some(chain))
-    } else {
-        Err(between_lines(clear, chain))
-    }
 }

@@ -9,7 +9,8 @@
 
 use super::count::count;
 use super::region::Region;
-use super::set::{RootSet, roots};
+use super::root_set::RootSet;
+use super::set::roots;
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::{Error, Task};
 

@@ -10,16 +10,18 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::bounds::{self, Bound, Dominance};
+use super::bounds::{self, Dominance};
 use super::cell::Cell;
+use super::closed::{close, endless};
 use super::dominated::descend;
-use super::neutral::chain_abscissa;
+use super::prepared::Prepared;
 use super::real::survey_real;
 use super::region::Region;
+use super::turn::Turn;
 use super::unit::OwnTime;
-use super::winding::{Turn, Walker, is_clear};
+use super::winding::{Walker, is_clear};
 use crate::elementary::angle;
-use crate::quasipoly::{Jet, Kind, QuasiPolynomial, modulus};
+use crate::quasipoly::{Jet, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
 /// Evaluations spent on the real axis before the roots themselves are asked for.
@@ -28,208 +30,10 @@ const SURVEY_LIMIT: u64 = 10_000;
 /// Radii tried for the arc that closes a half plane, each eight times the one before.
 const FURTHER: u32 = 5;
 
-/// Coefficients are not scaled down to less than two to this power.
-const LOWEST_EXPONENT: i32 = -1000;
-
-/// A function made ready: h(s) = factor · sᵏ · `rest`(s) with k = `zeros`.
-///
-/// Common powers of s are exact roots at 0 and are taken out. Coefficients are scaled by a power
-/// of two, to a largest one between 1 and 2 unless that would make the smallest one underflow.
-/// Neither changes a root.
-#[derive(Debug, Clone)]
-pub(super) struct Prepared {
-    pub(super) rest: QuasiPolynomial,
-    pub(super) zeros: u32,
-    /// The power of two in the factor: `rest` = 2^`scale` h/sᵏ.
-    pub(super) scale: i32,
-}
-
-impl Prepared {
-    /// # Errors
-    /// [`Error::Argument`] for the zero function.
-    pub(super) fn new(h: &QuasiPolynomial) -> Result<Self, Error> {
-        let sizes = || {
-            h.coefficients()
-                .iter()
-                .flatten()
-                .map(|c| c.abs())
-                .filter(|c| *c > 0.0)
-        };
-        let (smallest, largest) = sizes().fold((f64::INFINITY, 0.0f64), |(low, high), c| {
-            (low.min(c), high.max(c))
-        });
-        if largest == 0.0 {
-            return Err(Error::argument(
-                "the zero function: every s is a root, there is nothing to count",
-            ));
-        }
-        // Exponents and powers of two are exact.
-        let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
-        // In two steps: 2^1074 itself overflows.
-        let half = shift / 2;
-        let (first, second) = (libm::ldexp(1.0, half), libm::ldexp(1.0, shift - half));
-        let lowest = |row: &Vec<f64>| row.iter().take_while(|c| **c == 0.0).count();
-        let common = h.coefficients().iter().map(lowest).min().unwrap_or(0);
-        let rows = h
-            .coefficients()
-            .iter()
-            .map(|row| {
-                row.iter()
-                    .skip(common)
-                    .map(|c| c * first * second)
-                    .collect()
-            })
-            .collect();
-        Ok(Self {
-            rest: QuasiPolynomial::new(rows, h.delays().to_vec())?,
-            zeros: u32::try_from(common).unwrap_or(u32::MAX),
-            scale: shift,
-        })
-    }
-
-    /// Exact roots at 0 in the region.
-    ///
-    /// # Errors
-    /// [`Error::Contour`] where 0 lies on an edge other than one on the real axis.
-    pub(super) fn zeros_in(&self, region: &Region) -> Result<u32, Error> {
-        let Region { re, im } = *region;
-        if self.zeros == 0 || re.0 > 0.0 || re.1 < 0.0 || im.0 > 0.0 || im.1 < 0.0 {
-            return Ok(0);
-        }
-        if re.0 == 0.0 || re.1 == 0.0 {
-            return Err(Error::Contour {
-                place: Complex64::ZERO,
-                distance: f64::MIN_POSITIVE,
-            });
-        }
-        Ok(self.zeros)
-    }
-}
-
-/// A region with its open sides closed by proved bounds, in the upper half plane as far as
-/// symmetry allows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Closed {
-    pub(super) re: (f64, f64),
-    /// Height of the part that is symmetric about the real axis, if any.
-    pub(super) symmetric: Option<f64>,
-    /// Imaginary parts of what lies above it, if anything.
-    pub(super) above: Option<(f64, f64)>,
-    /// Is the lower edge the real axis? Roots below it do not belong to the region then.
-    pub(super) half: bool,
-    /// Was the region mirrored at the real axis to bring it here?
-    pub(super) mirrored: bool,
-}
-
-impl Closed {
-    /// The ranges in parts; `None` when they are empty.
-    pub(super) fn of(re: (f64, f64), im: (f64, f64), mirrored: bool) -> Option<Self> {
-        if re.0 >= re.1 || im.0 >= im.1 {
-            return None;
-        }
-        let symmetric = (im.0 <= 0.0).then_some(if im.0 == 0.0 { im.1 } else { -im.0 });
-        let above = match symmetric {
-            None => Some(im),
-            Some(height) => (height < im.1).then_some((height, im.1)),
-        };
-        Some(Self {
-            re,
-            symmetric,
-            above,
-            half: im.0 == 0.0,
-            mirrored,
-        })
-    }
-}
-
-/// `region`, mirrored where it lies more below the real axis than above, with its open sides
-/// closed; it may turn out empty.
-///
-/// # Errors
-/// [`Error::Argument`] for a region that cannot be shown to hold finitely many roots.
-pub(super) fn closed_sides(
-    h: &QuasiPolynomial,
-    region: &Region,
-    bound: Bound,
-) -> Result<Region, Error> {
-    let Region { mut re, mut im } = if is_low(region) {
-        region.mirrored()
-    } else {
-        *region
-    };
-    if im.0.is_infinite() || im.1.is_infinite() {
-        let radius = bound(h, re)
-            .map(|d| d.radius)
-            .ok_or_else(|| endless(h, re))?;
-        // A little beyond, so that the edge itself is clear.
-        let radius = 1.01 * radius.max(1e-100);
-        im = (im.0.max(-radius), im.1.min(radius));
-        re = (re.0.max(-radius), re.1.min(radius));
-    }
-    let height = im.0.abs().max(im.1.abs());
-    if re.1.is_infinite() || region.re.1.is_infinite() {
-        // Mostly closer than the radius, which chains far up may make large.
-        re.1 = re.1.min(bounds::right_edge(h, height));
-    }
-    if re.0.is_infinite() {
-        re.0 = bounds::left_edge(h, height);
-    }
-    if !(re.0.is_finite() && re.1.is_finite()) {
-        return Err(Error::argument(
-            "no bound for the roots within the open side was found in double precision: close \
-             the region",
-        ));
-    }
-    Ok(Region { re, im })
-}
-
-/// Does the region lie more below the real axis than above it?
-fn is_low(region: &Region) -> bool {
-    region.im.1 + region.im.0 < 0.0
-}
-
-/// Close the open sides of `region`; `None` when it is empty of roots for sure.
-///
-/// # Errors
-/// As [`closed_sides`].
-pub(super) fn close(
-    h: &QuasiPolynomial,
-    region: &Region,
-    bound: Bound,
-) -> Result<Option<Closed>, Error> {
-    let Region { re, im } = closed_sides(h, region, bound)?;
-    Ok(Closed::of(re, im, is_low(region)))
-}
-
 /// Of `count` roots in a symmetric region, `real` of them real, those not below the axis: the
 /// others come in pairs.
 pub(super) fn upper_half(count: u64, real: u64) -> u64 {
     real + count.saturating_sub(real) / 2
-}
-
-fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
-    let reason = match h.kind() {
-        Kind::Polynomial => "its coefficients span more than double precision holds".to_owned(),
-        Kind::Retarded if re.0 >= 0.0 => {
-            "its coefficients span more than double precision holds".to_owned()
-        }
-        Kind::Retarded => format!(
-            "the real part is open to the left or reaches far left ({})",
-            re.0
-        ),
-        Kind::Neutral | Kind::Difference => {
-            format!(
-                "a chain of roots lies at or left of Re s = {:.6}",
-                chain_abscissa(h)
-            )
-        }
-        Kind::Advanced => "the equation is advanced".to_owned(),
-    };
-    Error::argument(format!(
-        "the region re=({}, {}) with an open imaginary part holds infinitely many roots, or cannot \
-         be shown to hold finitely many: {reason}; give both ends of im, or move re",
-        re.0, re.1
-    ))
 }
 
 /// The number of roots in a region, counted with their multiplicity.

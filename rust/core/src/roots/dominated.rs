@@ -11,7 +11,8 @@
 
 use num_complex::Complex64;
 
-use super::winding::{STEP_ERROR, Turn, Walker, is_clear};
+use super::turn::Turn;
+use super::winding::{STEP_ERROR, Walker, is_clear};
 use crate::elementary::{angle, exp_above};
 use crate::quasipoly::modulus;
 

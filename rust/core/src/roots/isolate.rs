@@ -11,9 +11,11 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::cell::{Cell, Walk};
+use super::cell::Cell;
 use super::cluster::cluster;
-use super::newton::{Disc, Outcome, newton};
+use super::disc::{Disc, RESOLVED};
+use super::newton::{Outcome, newton};
+use super::turn::Walk;
 use super::winding::Walker;
 use crate::Error;
 
@@ -22,9 +24,6 @@ const PATIENCE: u64 = 10;
 
 /// After so many cuts in a row that part nothing, a cluster is tried for.
 const CROWDED: u32 = 8;
-
-/// Relative radius of a disc whose roots are one point to twelve digits.
-pub(super) const RESOLVED: f64 = 1e-12;
 
 /// Fractional parts of multiples of these fill a square evenly: powers of the plastic number.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);

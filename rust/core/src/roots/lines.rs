@@ -11,9 +11,10 @@ use num_complex::Complex64;
 
 use super::bounds::dominance;
 use super::cell::Cell;
-use super::count::{close, half_plane};
+use super::closed::close;
+use super::count::half_plane;
+use super::disc::Disc;
 use super::isolate::{Search, Seek};
-use super::newton::Disc;
 use super::region::Region;
 use super::set::locate;
 use super::tropical::tropical_roots;

@@ -13,8 +13,9 @@
 use num_complex::Complex64;
 
 use super::cluster::single;
+use super::disc::Disc;
 use super::winding::newton_step;
-use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
+use crate::quasipoly::{Jet, Probe, modulus};
 
 const MAX_STEPS: u32 = 60;
 
@@ -27,49 +28,6 @@ const ARRIVED: f64 = 0.25;
 /// Squares of slopes outside these leave the range of double precision.
 const LEAST: f64 = 1e-150;
 const MOST: f64 = 1e150;
-
-/// A disc in which the number of roots is proved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Disc {
-    pub(super) center: Complex64,
-    /// All `multiplicity` roots are within this of the centre.
-    pub(super) radius: f64,
-    /// And no other root is within this.
-    pub(super) isolation: f64,
-    pub(super) multiplicity: u32,
-}
-
-impl Disc {
-    /// Does the disc meet the real axis? Its roots are then their own mirror images.
-    pub(super) fn is_on_axis(&self) -> bool {
-        self.center.im.abs() <= self.radius
-    }
-
-    /// Roots in the disc and its mirror image.
-    pub(super) fn weight(&self) -> u64 {
-        u64::from(self.multiplicity) * if self.is_on_axis() { 1 } else { 2 }
-    }
-
-    /// A disc about 0 shrinks to it where all its roots are exactly there.
-    pub(super) fn at_zero_if_exact(self, h: &QuasiPolynomial) -> Self {
-        let about_zero = modulus(self.center) <= self.radius;
-        if about_zero && h.order_at_zero(self.multiplicity) == self.multiplicity {
-            Self {
-                center: Complex64::ZERO,
-                radius: 0.0,
-                isolation: (self.isolation - modulus(self.center)).max(0.0),
-                ..self
-            }
-        } else {
-            self
-        }
-    }
-
-    pub(super) fn mirrored_up(mut self) -> Self {
-        self.center.im = self.center.im.abs();
-        self
-    }
-}
 
 /// How a Newton iteration ended.
 #[derive(Debug, Clone, Copy)]

@@ -8,8 +8,8 @@
 
 use num_complex::Complex64;
 
-use super::certificate::{CROWDED, Segment, TRIFLE};
 use super::crowd::Crowd;
+use super::segment::{CROWDED, Segment, TRIFLE};
 use super::winding::{Walker, is_clear, is_finite};
 use crate::Error;
 use crate::quasipoly::{Jet, modulus};

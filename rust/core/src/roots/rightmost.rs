@@ -7,13 +7,15 @@
 //! wanted, or none at all: the chains themselves then lead, and the set holds what there is. That there is
 //! none takes a line next to the chains: one further right, left of which nothing could be counted, is an error.
 
-use super::commensurate::exact_abscissa;
-use super::count::{Prepared, count_right_of, half_plane};
+use super::count::{count_right_of, half_plane};
+use super::disc::{Disc, with_mirror_image};
+use super::exact_abscissa::exact_abscissa;
 use super::lines::{Line, Lines, Spectrum, between_lines, half_plane_discs, is_beside_chains};
 use super::neutral::chain_abscissa;
-use super::newton::Disc;
+use super::prepared::Prepared;
 use super::region::Region;
-use super::set::{RootSet, add_zeros, with_mirror_image};
+use super::root_set::RootSet;
+use super::set::add_zeros;
 use super::unit::OwnTime;
 use super::winding::Walker;
 use crate::quasipoly::{Kind, QuasiPolynomial};

@@ -10,8 +10,9 @@
 use num_complex::Complex64;
 
 use super::cluster::cluster;
-use super::count::Prepared;
-use super::newton::{Disc, Outcome, newton};
+use super::disc::Disc;
+use super::newton::{Outcome, newton};
+use super::prepared::Prepared;
 use super::winding::Walker;
 use crate::quasipoly::{Probe, QuasiPolynomial, modulus, relative_turn};
 use crate::{Error, Task};

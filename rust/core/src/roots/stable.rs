@@ -7,8 +7,9 @@
 
 use super::bounds::dominance;
 use super::commensurate::cell_right_of;
-use super::count::{Prepared, half_plane};
+use super::count::half_plane;
 use super::neutral::chain_abscissa;
+use super::prepared::Prepared;
 use super::unstable::has_unstable_root;
 use super::winding::Walker;
 use crate::quasipoly::{Kind, QuasiPolynomial};

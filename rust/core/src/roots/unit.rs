@@ -6,7 +6,7 @@
 //! reasonable unit are left alone.
 
 use super::region::Region;
-use super::set::RootSet;
+use super::root_set::RootSet;
 use crate::Error;
 use crate::quasipoly::QuasiPolynomial;
 

@@ -19,8 +19,8 @@
 
 use num_complex::Complex64;
 
-use super::cell::Walk;
 use super::crowd::Crowd;
+use super::turn::{Turn, Walk};
 use crate::elementary::angle;
 use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
 use crate::{Error, Task};
@@ -64,44 +64,6 @@ const PATIENCE: u64 = 500;
 
 /// How many times further these may let a step go; there are no more hints on the way then.
 const CALM: f64 = 1e6;
-
-/// Change of arg h along a line, in rad, and a bound on its error.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Turn {
-    pub(super) angle: f64,
-    pub(super) slack: f64,
-}
-
-impl Turn {
-    /// The line walked backwards.
-    pub(super) fn reversed(self) -> Self {
-        Self {
-            angle: -self.angle,
-            slack: self.slack,
-        }
-    }
-
-    /// Both lines, one after the other.
-    pub(super) fn then(self, next: Self) -> Self {
-        Self {
-            angle: self.angle + next.angle,
-            slack: self.slack + next.slack,
-        }
-    }
-
-    /// What is left of this line when `part` of it is taken away.
-    pub(super) fn without(self, part: Self) -> Self {
-        self.then(part.reversed())
-    }
-
-    /// The whole number of `unit`s in a closed path; `None` where the slack leaves room for
-    /// another: the true one is within 1/4 + 1/4 of the sum (the sums of a few edges lose u each).
-    pub(super) fn revolutions(self, unit: f64) -> Option<u64> {
-        let number = (self.angle / unit).round();
-        let off = (self.angle - number * unit).abs();
-        (self.slack < 0.24 * unit && off <= 0.25 * unit && number >= 0.0).then_some(number as u64)
-    }
-}
 
 /// Walks along lines; keeps the probe, the budget and the hints of roots nearby.
 pub(super) struct Walker<'a> {

@@ -23,13 +23,15 @@ pub use system::CharacteristicMatrix;
 use num_complex::Complex64;
 
 use self::outer::Leading;
+use self::place::check_regular;
 use self::walker::{MAX_EVALUATIONS, MatrixWalker};
 use super::cell::Cell;
-use super::count::Closed;
+use super::closed::Closed;
 use super::lines::{Effort, Spectrum, half_plane_discs};
 use super::region::Region;
 use super::rightmost::{first, leading};
-use super::set::{RootSet, all_discs};
+use super::root_set::RootSet;
+use super::set::all_discs;
 use super::unstable::{balances, leads_right, rightmost_first};
 use crate::quasipoly::QuasiPolynomial;
 use crate::{Error, Task};
@@ -117,7 +119,7 @@ fn close(
     task: &Task,
 ) -> Result<Option<Closed>, Error> {
     region.check()?;
-    system.check_regular()?;
+    check_regular(system)?;
     let mirrored = region.im.1 + region.im.0 < 0.0;
     let Region { mut re, mut im } = if mirrored { region.mirrored() } else { *region };
     let open = [re.0, re.1, im.0, im.1].iter().any(|x| x.is_infinite());
@@ -229,7 +231,7 @@ pub fn rightmost(system: &CharacteristicMatrix, n: usize, task: &Task) -> Result
             "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots of a matrix"
         )));
     }
-    system.check_regular()?;
+    check_regular(system)?;
     let prepared = Prepared::new(system)?;
     if system.longest() == 0.0 {
         let everywhere = f64::NEG_INFINITY;

@@ -21,6 +21,7 @@ use num_complex::Complex64;
 use super::balance::{Balanced, balance, exponent};
 use super::factor::{Factored, ROUNDING, Rows, factor, norm};
 use super::system::{CharacteristicMatrix, Term};
+use crate::Error;
 use crate::elementary::{angle, exp, sin_cos};
 use crate::quasipoly::modulus;
 
@@ -484,4 +485,24 @@ fn add_multiple(row: &mut (Vec<f64>, Vec<f64>), factor: f64, (re, im): (&[f64], 
     for (sum, x) in row.1.iter_mut().zip(im) {
         *sum += factor * x;
     }
+}
+
+/// Points, in units of the rate, at one of which a matrix that is regular at all is so in double
+/// precision.
+const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
+
+/// # Errors
+/// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
+pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> {
+    let rate = system.rate();
+    let regular =
+        |(x, y): &(f64, f64)| Place::new(system, Complex64::new(x * rate, y * rate)).is_some();
+    if POINTS.iter().any(regular) {
+        return Ok(());
+    }
+    Err(Error::argument(
+        "the determinant of the characteristic matrix is zero for every s, or cannot be told \
+         from it: the equations do not determine the state, look for rows of E, N and A that \
+         depend on one another, or for entries that differ too much in size",
+    ))
 }

@@ -13,10 +13,12 @@ use num_complex::Complex64;
 use super::place::{Place, Reach};
 use super::system::CharacteristicMatrix;
 use crate::quasipoly::modulus;
-use crate::roots::cell::{Cell, Walk};
+use crate::roots::cell::Cell;
+use crate::roots::disc::Disc;
 use crate::roots::isolate::Seek;
-use crate::roots::newton::{Disc, Outcome};
-use crate::roots::winding::Turn;
+use crate::roots::newton::Outcome;
+use crate::roots::turn::Turn;
+use crate::roots::turn::Walk;
 use crate::{Error, Task};
 
 use std::f64::consts::{PI, TAU};
