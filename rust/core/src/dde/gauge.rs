@@ -6,9 +6,10 @@
 //! no figure depends on a grid of times. A polynomial whose range, bounded by its coefficients,
 //! can change nothing is passed over.
 
-use super::continuous::{Series, crossings};
 use super::figures::{Criteria, Figures, Levels, Record};
-use super::linear::slack;
+use super::level_crossings::crossings;
+use super::limits::slack;
+use super::series::Series;
 
 /// The measurements of one response between two times.
 #[derive(Debug, Clone)]

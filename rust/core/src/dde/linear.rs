@@ -11,14 +11,9 @@
 //! plant like the rest of the command and, where L ≠ 0, comes back with weight L.
 //! Time counts from the start of the run; every signal is scalar, x has any length.
 
-use crate::{Error, Task};
-
+use super::reference::finite;
 use super::scalar::Scalar;
-use super::wanted::Wanted;
-use super::{continuous, sampled};
-
-/// Largest magnitude of a state before a run is given up as diverging.
-pub const DIVERGED: f64 = 1e150;
+use crate::Error;
 
 /// The matrices of the loop, row-major; n is the length of `b`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -97,122 +92,6 @@ pub struct Start<S = f64> {
     pub command_history: Vec<f64>,
     /// Sampled loops: time of the first sample, in [0, Ts).
     pub sample_phase: f64,
-}
-
-/// A piecewise constant reference, each value holding from its time on.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Reference {
-    before: f64,
-    times: Vec<f64>,
-    values: Vec<f64>,
-}
-
-impl Reference {
-    /// `values[i]` holds from `times[i]` (increasing) on, `before` until the first of them.
-    pub fn new(before: f64, times: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
-        if times.len() != values.len() {
-            return Err(Error::argument(format!(
-                "{} reference values for {} reference times: give one value a time",
-                values.len(),
-                times.len()
-            )));
-        }
-        finite("reference before the start", &[before])?;
-        finite("reference", &values)?;
-        finite("reference time", &times)?;
-        if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
-            return Err(Error::argument(format!(
-                "reference time {} follows {}: sort the times and drop repeated ones",
-                pair[1], pair[0]
-            )));
-        }
-        // Only true jumps are kept: each one ends an element of time.
-        let mut last = before;
-        let (times, values) = times
-            .into_iter()
-            .zip(values)
-            .filter(|&(_, value)| value != std::mem::replace(&mut last, value))
-            .unzip();
-        Ok(Self {
-            before,
-            times,
-            values,
-        })
-    }
-
-    /// A step from `before` to `value` at time 0.
-    pub fn step(before: f64, value: f64) -> Result<Self, Error> {
-        Self::new(before, vec![0.0], vec![value])
-    }
-
-    /// The value that holds at `time`.
-    pub(crate) fn at(&self, time: f64) -> f64 {
-        match self.times.partition_point(|&jump| jump <= time) {
-            0 => self.before,
-            place => self.values[place - 1],
-        }
-    }
-
-    /// A reader that walks forward in time.
-    pub(crate) fn cursor(&self) -> Cursor<'_> {
-        Cursor {
-            reference: self,
-            next: 0,
-            value: self.before,
-        }
-    }
-}
-
-/// Reads a reference at times that do not decrease.
-#[derive(Debug)]
-pub(crate) struct Cursor<'a> {
-    reference: &'a Reference,
-    next: usize,
-    value: f64,
-}
-
-impl Cursor<'_> {
-    /// Move to time `t` (a jump closer than `slack` after it counts as reached); the value there.
-    pub(crate) fn advance(&mut self, t: f64, slack: f64) -> f64 {
-        while let (Some(&time), Some(&value)) = (
-            self.reference.times.get(self.next),
-            self.reference.values.get(self.next),
-        ) {
-            if time > t + slack {
-                break;
-            }
-            self.value = value;
-            self.next += 1;
-        }
-        self.value
-    }
-
-    /// The value at the time reached, `before` until the first move.
-    pub(crate) fn value(&self) -> f64 {
-        self.value
-    }
-
-    /// Time of the next jump, infinite if there is none.
-    pub(crate) fn next_jump(&self) -> f64 {
-        self.reference
-            .times
-            .get(self.next)
-            .copied()
-            .unwrap_or(f64::INFINITY)
-    }
-}
-
-/// What a run returns.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Trajectory<S = f64> {
-    /// y at the output times.
-    pub outputs: Vec<S>,
-    /// The command after the limit at the input times.
-    pub inputs: Vec<S>,
-    /// Times at which y or a low derivative of it jumps.
-    pub output_breaks: Vec<f64>,
-    /// Times at which the command or a low derivative of it jumps.
-    pub input_breaks: Vec<f64>,
 }
 
 impl<S: Scalar> LinearLoop<S> {
@@ -327,79 +206,6 @@ impl<S: Scalar> LinearLoop<S> {
     pub fn limit(&self) -> Option<S> {
         self.limit
     }
-
-    /// y at `output_times` and the limited command at `input_times` (both increasing, ≥ 0, s).
-    pub fn simulate(
-        &self,
-        start: &Start<S>,
-        reference: &Reference,
-        output_times: &[f64],
-        input_times: &[f64],
-        task: &Task,
-    ) -> Result<Trajectory<S>, Error> {
-        let wanted = Wanted::new(output_times, input_times, S::default())?;
-        self.serve(start, reference, wanted, task)
-    }
-
-    /// Run until everything wanted is served.
-    pub(crate) fn serve(
-        &self,
-        start: &Start<S>,
-        reference: &Reference,
-        wanted: Wanted<'_, S>,
-        task: &Task,
-    ) -> Result<Trajectory<S>, Error> {
-        self.check_start(start)?;
-        for times in wanted.times() {
-            finite("time", times)?;
-            if let Some(&first) = times.first()
-                && first < 0.0
-            {
-                return Err(Error::argument(format!(
-                    "time {first} lies before the start of the run: leave it out"
-                )));
-            }
-            if let Some(pair) = times.windows(2).find(|pair| pair[1] < pair[0]) {
-                return Err(Error::argument(format!(
-                    "time {} follows {}: sort the times",
-                    pair[1], pair[0]
-                )));
-            }
-        }
-        match self.sample_time {
-            Some(ts) => sampled::run(self, ts, start, reference, wanted, task),
-            None => continuous::run(self, start, reference, wanted, task),
-        }
-    }
-
-    fn check_start(&self, start: &Start<S>) -> Result<(), Error> {
-        let n = self.equations.states();
-        if start.state.len() != n {
-            return Err(Error::argument(format!(
-                "the initial state has {} elements, the loop has {n} states",
-                start.state.len()
-            )));
-        }
-        finite("initial state", &start.state)?;
-        finite("command before the start", &[start.command])?;
-        finite("command_history", &start.command_history)?;
-        match self.sample_time {
-            Some(ts) if !(0.0..ts.value()).contains(&start.sample_phase) => {
-                Err(Error::argument(format!(
-                    "sample_phase={}: the first sample lies in [0, {}) s after the start",
-                    start.sample_phase,
-                    ts.value()
-                )))
-            }
-            None if !start.command_history.is_empty() || start.sample_phase != 0.0 => {
-                Err(Error::argument(
-                    "command_history and sample_phase belong to sampled loops: give the loop a \
-                     sample_time or leave them out",
-                ))
-            }
-            _ => Ok(()),
-        }
-    }
 }
 
 /// Clip to [−limit, limit].
@@ -411,42 +217,10 @@ pub(crate) fn saturate<S: Scalar>(u: S, limit: Option<S>) -> S {
     }
 }
 
-/// Two times closer than this are one: rounding of sums of delays and samples.
-pub(crate) fn slack<S: Scalar>(t: S, delay: S) -> f64 {
-    16.0 * f64::EPSILON * (t.value().abs() + delay.value())
-}
-
-/// The error of a response that has grown out of bounds.
-pub(crate) fn check_growth<S: Scalar>(x: &[S], u: S, t: S) -> Result<(), Error> {
-    let sound = |v: &S| v.value().abs() <= DIVERGED;
-    if x.iter().all(sound) && sound(&u) {
-        Ok(())
-    } else {
-        Err(Error::Diverges {
-            bound: DIVERGED,
-            time: t.value(),
-        })
-    }
-}
-
 /// Σ a_i b_i.
 pub(crate) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     let products = a.iter().zip(b).map(|(&a, &b)| a * b);
     products
         .reduce(|sum, product| sum + product)
         .unwrap_or_default()
-}
-
-fn finite<S: Scalar>(name: &str, values: &[S]) -> Result<(), Error> {
-    match values.iter().find(|value| !value.is_finite()) {
-        Some(value) => Err(Error::argument(format!(
-            "{name} holds {}: give finite numbers",
-            if value.value().is_finite() {
-                value.slope()
-            } else {
-                value.value()
-            }
-        ))),
-        None => Ok(()),
-    }
 }

@@ -7,8 +7,9 @@
 use crate::memory::{append, collected, copied};
 use crate::{Error, Task};
 
-use super::linear::{LinearLoop, Reference, Start};
-use super::wanted::RESPONSE;
+use super::limits::RESPONSE;
+use super::linear::{LinearLoop, Start};
+use super::reference::Reference;
 
 /// Roundings of a time of the clock, in units of the last place.
 const CLOCK: f64 = 4.0 * f64::EPSILON;

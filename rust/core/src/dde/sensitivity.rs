@@ -2,7 +2,8 @@
 
 use crate::{Error, Task};
 
-use super::linear::{Reference, Start};
+use super::linear::Start;
+use super::reference::Reference;
 use super::row::{Row, width};
 use super::scalar::Dual;
 use super::wanted::Wanted;

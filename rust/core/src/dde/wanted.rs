@@ -1,14 +1,24 @@
 //! What a run is to deliver: outputs and inputs at given times, breaking points, measurements.
 
-use super::continuous::Series;
 use super::gauge::Gauge;
-use super::linear::Trajectory;
+use super::limits::RESPONSE;
 use super::scalar::Scalar;
+use super::series::Series;
 use crate::Error;
 use crate::memory::{push, reserved};
 
-/// What memory is asked for.
-pub(crate) const RESPONSE: &str = "the response";
+/// What a run returns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trajectory<S = f64> {
+    /// y at the output times.
+    pub outputs: Vec<S>,
+    /// The command after the limit at the input times.
+    pub inputs: Vec<S>,
+    /// Times at which y or a low derivative of it jumps.
+    pub output_breaks: Vec<f64>,
+    /// Times at which the command or a low derivative of it jumps.
+    pub input_breaks: Vec<f64>,
+}
 
 /// Output and input times of a run, and how many of each are served.
 #[derive(Debug)]

@@ -4,8 +4,9 @@
 //! Entries of tables are fetched lane by lane. Where an argument needs the longer way of these functions, all
 //! lanes are computed one by one, which gives the others the same bits again.
 
+use super::nearest::ROUNDER;
 use super::tables::{POWERS, SINES};
-use super::{ROUNDER, circular, exponential};
+use super::{circular, exponential};
 use crate::lanes::{Real, Simd};
 
 /// Up to here powers of two need no second factor.

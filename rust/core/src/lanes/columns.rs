@@ -5,7 +5,10 @@
 
 use pulp::WithSimd;
 
-use super::{Instructions, Real, Simd};
+use pulp::Simd;
+
+use super::dispatch::Instructions;
+use super::real::Real;
 
 /// Elements in two vectors of the widest instruction set: the shortest block.
 pub(crate) const SHORT: usize = 16;

@@ -7,8 +7,8 @@
 
 use num_complex::Complex64;
 
-use super::QuasiPolynomial;
-use super::probe::modulus;
+use super::jet::modulus;
+use super::quasi_polynomial::QuasiPolynomial;
 
 /// h(s) for finite s; infinite where it exceeds the range of double precision.
 pub(super) fn value(h: &QuasiPolynomial, s: Complex64) -> Complex64 {

@@ -11,8 +11,8 @@
 
 use num_complex::Complex64;
 
-use super::QuasiPolynomial;
-use super::probe::{FLOOR, Jet, TINY, modulus};
+use super::jet::{FLOOR, Jet, TINY, modulus};
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::DoubleDouble;
 use crate::elementary::precise::{self, LARGEST_EXPONENT};
 

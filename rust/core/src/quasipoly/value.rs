@@ -3,7 +3,10 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{Probe, QuasiPolynomial, beyond, modulus};
+use super::beyond;
+use super::jet::modulus;
+use super::probe::Probe;
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, sin_cos};
 use crate::memory::filled;
 use crate::{Error, Task};

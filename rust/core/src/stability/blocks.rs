@@ -6,10 +6,10 @@
 
 use rayon::prelude::*;
 
+use super::axes::{Axis, Map, put};
 use super::block::{Block, Grid};
 use super::chart::Chart;
 use super::crossing::Crossing;
-use super::grid::{Axis, Map, put};
 use super::reduced::Reduced;
 use crate::memory::in_parallel;
 use crate::status::CellStatus;

@@ -10,6 +10,7 @@
 
 use rayon::prelude::*;
 
+use super::axes::{Axis, Map, Proof, Question, put};
 use super::blocks;
 use super::cell::{Cell, judge};
 use super::chart::Chart;
@@ -22,36 +23,6 @@ use crate::{Error, Task, memory};
 
 /// More cells than anyone can look at.
 const MAX_CELLS: usize = 50_000_000;
-
-/// One axis of a map.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axis<'a> {
-    /// Index of the parameter.
-    pub parameter: usize,
-    /// Its values, increasing.
-    pub points: &'a [f64],
-}
-
-/// How the count of a cell is proved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Proof {
-    /// By all crossings of its row, or the proof that a block of cells has none, and one count for all in between.
-    #[default]
-    Curves,
-    /// By a count of its own.
-    Cells,
-}
-
-/// What is asked of a map.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Question {
-    /// Roots that offend against this are counted.
-    pub demand: Demand,
-    /// Is the spectral abscissa asked for too?
-    pub abscissa: bool,
-    /// How counts are proved.
-    pub proof: Proof,
-}
 
 /// Judge the members of `family` over two of its parameters; `values` holds the others.
 ///
@@ -164,14 +135,6 @@ pub fn chains(
     memory::in_parallel("the map", cells, || values.to_vec(), cell)
 }
 
-pub(super) struct Map<'a> {
-    pub(super) family: &'a Family,
-    pub(super) values: &'a [f64],
-    pub(super) axes: [Axis<'a>; 2],
-    pub(super) question: Question,
-    pub(super) task: &'a Task,
-}
-
 impl Map<'_> {
     fn cell_by_cell(&self) -> Result<Chart, Error> {
         let Question {
@@ -219,17 +182,6 @@ impl Map<'_> {
     }
 }
 
-pub(super) fn put(values: &mut [f64], axis: Axis<'_>, index: usize) {
-    if let Some(value) = axis.points.get(index) {
-        put_value(values, axis.parameter, *value);
-    }
-}
-
-pub(super) fn put_value(values: &mut [f64], parameter: usize, value: f64) {
-    if let Some(place) = values.get_mut(parameter) {
-        *place = value;
-    }
-}
 /// The number of cells, if the arguments make sense.
 fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, Error> {
     let count = family.names().len();

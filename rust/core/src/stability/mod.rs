@@ -16,6 +16,7 @@
 //! move, `robust` maps what holds over an interval.
 
 mod along;
+mod axes;
 mod block;
 mod blocks;
 mod boxes;
@@ -44,13 +45,14 @@ mod transect;
 mod value_set;
 
 pub use along::{Place, crossings_along};
+pub use axes::{Axis, Proof, Question};
 pub use boxes::{Boxes, Limits, Node, proved_boxes};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub use chart::Chart;
 pub use curves::Vertex;
 pub use demand::{Damping, Demand};
 pub use family::{Affine, Family, Term};
-pub use grid::{Axis, Boundaries, Proof, Question, boundaries, chains, map};
+pub use grid::{Boundaries, boundaries, chains, map};
 pub use largest::largest_stable_box;
 pub use radius::{Radius, stability_radius};
 pub use robust::robust_map;

@@ -4,11 +4,11 @@
 //! intervals is: proved by boxes of those others. It is not as soon as one member is found that is
 //! not stable; members at both ends and in the middle are tried first.
 
+use super::axes::Axis;
 use super::boxes::{check, reduce};
 use super::cell::{ENDLESS, UNKNOWN, judge};
 use super::demand::Demand;
 use super::family::Family;
-use super::grid::Axis;
 use super::local::Local;
 use super::prove::{Finding, find_unstable};
 use super::reduced::Reduced;

@@ -1,10 +1,10 @@
 //! All rows of a map: a gain in which the family is affine varies along each, the other parameter from one to
 //! the next.
 
+use super::axes::{Axis, Map, put, put_value};
 use super::chart::Chart;
 use super::crossing::Crossing;
 use super::family::Family;
-use super::grid::{Axis, Map, put, put_value};
 use super::row::{Members, Row};
 use crate::Error;
 use crate::memory::in_parallel;

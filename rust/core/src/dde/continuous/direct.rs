@@ -7,16 +7,18 @@
 //! v gets clear of the limit by more than that: else rounding alone could change the mode for
 //! ever, in steps of time too short to change the state.
 
-use crate::dde::linear::{
-    LinearLoop, Reference, Start, Trajectory, check_growth, dot, saturate, slack,
-};
+use crate::dde::limits::{check_growth, slack};
+use crate::dde::linear::{LinearLoop, Start, dot, saturate};
+use crate::dde::reference::Reference;
 use crate::dde::scalar::Scalar;
+use crate::dde::wanted::Trajectory;
 use crate::dde::wanted::Wanted;
 use crate::{Error, Task};
 
-use super::crossing::{Mode, Stretch, stretches};
-use super::series::{Expansion, Series};
-use super::watch;
+use super::effort::watch;
+use super::expansion::Expansion;
+use super::saturation::{Mode, Stretch, stretches};
+use crate::dde::series::Series;
 
 /// Changes of mode without progress in time after which the mode is kept: rounding at the limit.
 const MOST_CHANGES: u32 = 2;

@@ -11,63 +11,13 @@
 //! rounding. Not guaranteed: speed where the delay or a lag is tiny against the time simulated
 //! (elements are no longer than either allows), or where many breaks accumulate.
 
-mod crossing;
+mod delayed;
 mod direct;
+mod effort;
+mod expansion;
 mod impulses;
 mod pieces;
 mod run;
-mod series;
+mod saturation;
 
-pub(crate) use crossing::crossings;
-pub(crate) use series::{DEGREE, Series};
-
-use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory};
-use crate::dde::scalar::Scalar;
-use crate::dde::wanted::Wanted;
-use crate::{Error, Task};
-
-/// Elements between two looks at the task.
-const CHECK_EVERY: u64 = 1024;
-
-/// More elements than anyone waits for.
-const MOST_ELEMENTS: u64 = 20_000_000;
-
-pub(crate) fn run<S: Scalar>(
-    plant: &LinearLoop<S>,
-    start: &Start<S>,
-    reference: &Reference,
-    wanted: Wanted<'_, S>,
-    task: &Task,
-) -> Result<Trajectory<S>, Error> {
-    if plant.delay().value() > 0.0 {
-        // No element is longer than the delay: work without end is refused before it starts.
-        if wanted.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
-            return Err(endless());
-        }
-        run::run(plant, start, reference, wanted, task)
-    } else {
-        direct::run(plant, start, reference, wanted, task)
-    }
-}
-
-/// Look at the task now and then, and give up on endless work.
-fn watch(elements: u64, task: &Task) -> Result<(), Error> {
-    if elements.is_multiple_of(CHECK_EVERY) {
-        task.check()?;
-    }
-    if elements >= MOST_ELEMENTS {
-        return Err(endless());
-    }
-    Ok(())
-}
-
-fn endless() -> Error {
-    Error::TooMuch {
-        what: "the continuous response",
-        limit: MOST_ELEMENTS,
-        unit: "elements of time",
-        advice: "shorten the time simulated; a delay or a lag of almost nothing is better set to \
-                 zero"
-            .to_owned(),
-    }
-}
+pub(crate) use run::run;

@@ -8,11 +8,11 @@
 use std::collections::VecDeque;
 
 use crate::Error;
-use crate::dde::linear::slack;
+use crate::dde::limits::slack;
 use crate::dde::scalar::{Scalar, is_reached, part_ways};
 use crate::memory::push_back;
 
-use super::series::Series;
+use crate::dde::series::Series;
 
 /// Pieces in the queue beyond which the run is given up.
 const MOST_PIECES: usize = 1_000_000;

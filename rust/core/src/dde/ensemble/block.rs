@@ -6,7 +6,7 @@ use crate::dde::propagator::Propagator;
 use crate::dde::row::Row;
 use crate::dde::sampled::Timing;
 
-use super::Sets;
+use super::sets::Sets;
 
 /// Sets in a block: two vectors of the widest instruction set.
 pub(super) const SETS: usize = 16;

@@ -4,8 +4,8 @@ use crate::Error;
 use crate::lanes::{Real, Simd};
 use crate::memory::{collected, room};
 
-use super::Outcome;
 use super::block::{Block, Column, SETS};
+use super::sets::Outcome;
 use super::through::{Visitor, through};
 use super::walk::{Line, Sink, store};
 

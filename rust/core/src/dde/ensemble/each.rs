@@ -2,12 +2,14 @@
 
 use crate::dde::figures::{Criteria, Figures};
 use crate::dde::gauge::Gauge;
-use crate::dde::linear::{LinearLoop, Reference, Start, Trajectory};
+use crate::dde::linear::{LinearLoop, Start};
+use crate::dde::reference::Reference;
+use crate::dde::wanted::Trajectory;
 use crate::dde::wanted::Wanted;
 use crate::memory::collected;
 use crate::{Error, Task};
 
-use super::{Outcome, Sets};
+use super::sets::{Outcome, Sets};
 
 /// Figures of one set.
 pub(super) fn figures(

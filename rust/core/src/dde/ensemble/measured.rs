@@ -3,9 +3,9 @@
 use crate::dde::figures::{Criteria, Figures, Levels, Record};
 use crate::lanes::{Mask, Real, Simd};
 
-use super::Outcome;
 use super::block::{Block, Column, SETS};
 use super::each::judged;
+use super::sets::Outcome;
 use super::through::{Visitor, through};
 use super::walk::{Line, Sink, load, store};
 

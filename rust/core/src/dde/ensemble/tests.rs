@@ -1,7 +1,10 @@
 //! The lanes against the engine of a single loop.
 
 use super::*;
-use crate::dde::linear::{Reference, Start};
+use crate::Task;
+use crate::dde::figures::{Criteria, Figures};
+use crate::dde::linear::Start;
+use crate::dde::reference::Reference;
 use proptest::prelude::*;
 
 const CRITERIA: Criteria = Criteria {

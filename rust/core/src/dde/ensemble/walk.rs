@@ -3,7 +3,7 @@
 //! Between a sample and the arrival of a command, and from there to the next sample, every output
 //! of a block is a line; a [`Sink`] is shown each of them once.
 
-use crate::dde::linear::DIVERGED;
+use crate::dde::limits::DIVERGED;
 use crate::lanes::{Mask, Real, Simd};
 
 use super::block::{Block, Column, Hold};

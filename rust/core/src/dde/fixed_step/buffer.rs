@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::SLACK;
+/// Times within this part of a step of one another are one.
+pub(super) const SLACK: f64 = 1e-9;
 
 /// Values of a signal at whole steps, the latest last.
 #[derive(Debug)]

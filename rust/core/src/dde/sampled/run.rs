@@ -1,15 +1,17 @@
 //! Response of a sampled loop: sample by sample, exact, with output at any time.
 
-use crate::dde::linear::{
-    LinearLoop, Reference, Start, Trajectory, Update, check_growth, saturate, slack,
-};
+use crate::dde::limits::RESPONSE;
+use crate::dde::limits::{check_growth, slack};
+use crate::dde::linear::{LinearLoop, Start, Update, saturate};
 use crate::dde::propagator::Propagator;
+use crate::dde::reference::Reference;
 use crate::dde::scalar::Scalar;
-use crate::dde::wanted::{RESPONSE, Wanted};
+use crate::dde::wanted::Trajectory;
+use crate::dde::wanted::Wanted;
 use crate::memory::push;
 use crate::{Error, Task};
 
-use super::Timing;
+use super::timing::Timing;
 use super::window::{Window, Windows};
 
 /// Samples between two looks at the task.

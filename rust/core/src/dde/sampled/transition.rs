@@ -16,7 +16,7 @@ use crate::Error;
 use crate::dde::linear::{LinearLoop, Update};
 use crate::dde::propagator::{Propagator, balanced, multiply_add};
 
-use super::Timing;
+use super::timing::Timing;
 
 /// A dense eigenvalue problem beyond this size is refused.
 const MOST_STATES: usize = 2000;

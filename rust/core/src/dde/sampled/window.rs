@@ -7,10 +7,10 @@
 //! so that the coefficients are fixed rows times (x, w, r). A part is cut into equal steps on
 //! which the series ends below rounding well before its last term.
 
-use crate::dde::continuous::{DEGREE, Series};
 use crate::dde::linear::{Equations, dot};
 use crate::dde::propagator::{Propagator, balanced_norm};
 use crate::dde::scalar::Scalar;
+use crate::dde::series::{DEGREE, Series};
 use crate::dde::wanted::Wanted;
 
 /// Largest ‖A‖ h of a step: 1/19! is below rounding.

@@ -10,7 +10,7 @@ use super::delayed::{Delayed, Place};
 use super::dense::dot;
 use super::newton::Newton;
 use super::nodes::Nodes;
-use super::{Columns, Equation, Problem};
+use super::problem::{Columns, Equation, Problem};
 use crate::dde::chebyshev;
 use crate::{Error, Task};
 

@@ -13,7 +13,7 @@ use std::ops::Range;
 use super::super::history::Piece;
 use super::isolate::separators;
 use super::nodes::{Nodes, nodes};
-use super::{Equation, Event};
+use super::problem::{Equation, Event};
 use crate::Error;
 use crate::dde::chebyshev;
 

@@ -10,9 +10,9 @@
 //! are no points, it shows in values or slopes that differ there; it is found by bisection.
 
 use super::super::breaks::BreakingPoint;
-use super::Piece;
 use crate::Error;
 use crate::dde::chebyshev;
+use crate::dde::history::Piece;
 
 const POINTS: usize = 20;
 /// Coefficients at the end that must be small.

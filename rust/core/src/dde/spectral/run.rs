@@ -8,8 +8,8 @@ use super::events::Watch;
 use super::newton::Newton;
 use super::nodes::{Nodes, nodes};
 use super::output::Output;
+use super::problem::{Equation, Outcome, Problem, Solution};
 use super::unread::{Reading, Unread};
-use super::{Equation, Outcome, Problem, Solution};
 use crate::dde::chebyshev;
 use crate::{Error, Task};
 

@@ -9,9 +9,9 @@
 //! element at its start or, where it is the first one, at its end.
 
 use super::super::history::History;
-use super::Problem;
 use super::element::Element;
 use super::nodes::Nodes;
+use super::problem::Problem;
 use crate::dde::chebyshev;
 
 /// Tolerances that the polynomial may be off: stored pieces and nodes both err by a part of one.

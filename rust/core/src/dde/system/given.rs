@@ -1,11 +1,11 @@
 //! Breaks of what is given: those of history and inputs, and the one at the start.
 
-use super::Signal;
+use super::equations::Signal;
 use super::jumps::{Break, Jumps};
 use super::legendre::TERMS;
-use super::slack;
 use super::terms::Feed;
 use super::track::{Piece, Track};
+use crate::dde::limits::slack;
 
 /// The breaks a given signal has, with bounds from the pieces on both sides.
 pub(super) fn passed_breaks(signal: &Signal, unit: f64) -> Vec<Break> {
