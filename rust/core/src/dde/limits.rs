@@ -4,7 +4,7 @@ use super::scalar::Scalar;
 use crate::Error;
 
 /// Largest magnitude of a state before a run is given up as diverging.
-pub const DIVERGED: f64 = 1e150;
+pub(crate) const DIVERGED: f64 = 1e150;
 
 /// What memory is asked for.
 pub(crate) const RESPONSE: &str = "the response";

@@ -52,6 +52,7 @@
 
 pub mod block;
 mod branch_point;
+mod branch_sort;
 mod coefficients;
 mod delay;
 mod elementary;
@@ -61,11 +62,9 @@ mod kernel;
 mod log_form;
 mod real;
 mod refine;
-mod route;
 mod scalar;
 mod special_values;
 #[cfg(test)]
 mod tests;
-mod two_word;
 
 pub use scalar::{dde_root, lambertw, lambertw_log};

@@ -7,16 +7,17 @@
 //! rounding error, derived in `probe` down to the elementary functions.
 
 mod algebra;
-mod beyond;
+mod double_double;
 mod expansion;
 mod jet;
 mod kind;
 mod order;
+mod overflow;
 mod probe;
 mod quasi_polynomial;
-mod sharp;
 mod value;
 
+pub(crate) use double_double::relative_turn;
 pub use expansion::Expansion;
 pub(crate) use expansion::{expansion, remainder};
 pub use jet::Jet;
@@ -24,7 +25,6 @@ pub(crate) use jet::modulus;
 pub use kind::Kind;
 pub use probe::Probe;
 pub use quasi_polynomial::QuasiPolynomial;
-pub(crate) use sharp::relative_turn;
 pub use value::Scaled;
 
 #[cfg(test)]

@@ -14,9 +14,9 @@
 
 use num_complex::Complex64;
 
+use super::double_double;
 use super::jet::{FLOOR, Jet, TINY, modulus};
 use super::quasi_polynomial::QuasiPolynomial;
-use super::sharp;
 use crate::elementary::{exp, log, sin_cos};
 
 /// Half an ulp of 1, enlarged by what the bounds themselves lose in being computed.
@@ -262,7 +262,7 @@ impl<'a> Probe<'a> {
         self.evaluations += SHARP_COST;
         self.weigh(s.re);
         self.parts_at = None;
-        sharp::jet(self.h, self.reference, s)
+        double_double::jet(self.h, self.reference, s)
     }
 
     /// Bound on |g″| at every s with |s| ≤ `modulus` whose real part lies between x and

@@ -12,12 +12,15 @@
 //! past grow is the equation's affair.
 
 mod banded;
+pub mod breaks;
+mod chebyshev;
 mod control;
 mod delayed;
 mod dense;
 mod element;
 mod events;
 mod fit;
+pub mod history;
 mod isolate;
 mod jacobian;
 mod newton;

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
+use super::breaks::BreakingPoint;
+use super::history::History;
 use super::sparsity::Sparsity;
-use crate::dde::breaks::BreakingPoint;
-use crate::dde::history::History;
 use crate::{Error, Task};
 
 /// Arguments of the right-hand side at many nodes; the node runs fastest.

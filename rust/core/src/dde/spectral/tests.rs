@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 
-use super::super::breaks::BreakingPoint;
-use super::super::history::{History, Piece};
+use super::breaks::BreakingPoint;
+use super::history::{History, Piece};
 use super::*;
 use crate::{Error, Task};
 

@@ -2,7 +2,8 @@
 
 use super::legendre::TERMS;
 use super::terms::Term;
-use super::track::{self, Piece, Track};
+use super::track;
+use super::track::{Piece, Track};
 use crate::Error;
 use crate::memory::room;
 

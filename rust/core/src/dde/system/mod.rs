@@ -17,7 +17,7 @@
 
 mod element;
 mod equations;
-mod given;
+mod input_breaks;
 mod jumps;
 mod legendre;
 mod outputs;

@@ -5,11 +5,12 @@ use crate::{Error, Task};
 
 use super::element::Element;
 use super::equations::{Past, Signal, SystemEquations, SystemResponse};
-use super::given::{first_break, passed_breaks};
+use super::input_breaks::{first_break, passed_breaks};
 use super::jumps::{Jumps, Scale};
 use super::legendre::TERMS;
 use super::outputs::{Outputs, Signals};
-use super::terms::{self, Feed};
+use super::terms;
+use super::terms::Feed;
 use super::track::{KINDS, Piece, Track};
 use crate::dde::limits::slack;
 

@@ -2,19 +2,19 @@
 
 use num_complex::Complex64;
 
+use super::local_enclosure::check_regular;
 use super::outer::Leading;
-use super::place::check_regular;
 use super::system::CharacteristicMatrix;
 use super::walker::{MAX_EVALUATIONS, MatrixWalker};
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::cell::Cell;
-use crate::roots::closed::Closed;
-use crate::roots::lines::{Effort, Spectrum, half_plane_discs};
+use crate::roots::counting::Cell;
+use crate::roots::counting::Closed;
+use crate::roots::locating::all_discs;
+use crate::roots::locating::{Effort, Spectrum, half_plane_discs};
+use crate::roots::locating::{balances, leads_right, rightmost_first};
+use crate::roots::locating::{first, leading};
 use crate::roots::region::Region;
-use crate::roots::rightmost::{first, leading};
 use crate::roots::root_set::RootSet;
-use crate::roots::set::all_discs;
-use crate::roots::unstable::{balances, leads_right, rightmost_first};
 use crate::{Error, Task};
 
 /// Most roots that can be asked for.

@@ -12,8 +12,8 @@ mod balance;
 mod determinant;
 mod difference;
 mod factor;
+mod local_enclosure;
 mod outer;
-mod place;
 mod system;
 #[cfg(test)]
 mod tests;
