@@ -1,7 +1,7 @@
 """Signatures of the native part."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, final
+from typing import Any, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,12 @@ __all__ = [
     "Family",
     "LinearLoop",
     "LinearSystem",
+    "MapBoundary",
+    "MapCells",
+    "ProvedBoxes",
     "QuasiPolynomial",
     "Signal",
+    "StabilityRadius",
     "at_read",
     "at_write",
     "configuration_read",
@@ -66,6 +70,7 @@ _Listed: TypeAlias = tuple[
 ]
 
 _Pair: TypeAlias = tuple[float, float]
+_Axes: TypeAlias = dict[str, NDArray[np.float64]]
 # Start, end, middle, reference, value, error, slope.
 _Segment: TypeAlias = tuple[complex, complex, complex, int, complex, float, float]
 # Start, end, middle, reference, slope, error, bend.
@@ -152,88 +157,128 @@ def lambertw0_number(x: object) -> np.float64 | None: ...
 def lambertwm1_number(x: object) -> np.float64 | None: ...
 def dde_root_number(a0: object, a1: object, delay: object, k: object) -> np.complex128 | None: ...
 
+class _FamilyTerm(Protocol):
+    @property
+    def coefficient(self) -> float: ...
+    @property
+    def exponents(self) -> Sequence[tuple[str, int]]: ...
+    @property
+    def power(self) -> int: ...
+    @property
+    def constant(self) -> float: ...
+    @property
+    def slopes(self) -> Sequence[tuple[str, float]]: ...
+
+class _MapQuestion(Protocol):
+    @property
+    def decay(self) -> float: ...
+    @property
+    def damping(self) -> _Pair | None: ...
+    @property
+    def abscissa(self) -> bool: ...
+    @property
+    def proof(self) -> str: ...
+
+@final
+class MapCells:
+    @property
+    def unstable(self) -> NDArray[np.int32]: ...
+    @property
+    def abscissa(self) -> NDArray[np.float64] | None: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+@final
+class MapBoundary:
+    @property
+    def gain(self) -> NDArray[np.float64]: ...
+    @property
+    def row(self) -> NDArray[np.int64]: ...
+    @property
+    def omega(self) -> NDArray[np.float64]: ...
+    @property
+    def crossing(self) -> NDArray[np.int32]: ...
+    @property
+    def along(self) -> str: ...
+
 @final
 class Family:
-    def __new__(
-        cls, names: list[str], terms: list[tuple[float, list[int], int, float, list[float]]]
-    ) -> Family: ...
-    def at(self, values: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def __new__(cls, names: list[str], terms: Sequence[_FamilyTerm]) -> Family: ...
+    def at(self, values: list[float]) -> QuasiPolynomial: ...
     def map(
         self,
-        values: list[float],
-        parameters: tuple[int, int],
-        first: NDArray[np.float64],
-        second: NDArray[np.float64],
-        decay: float,
-        damping: tuple[float, float] | None,
-        abscissa: bool,
-        cells: bool,
+        axes: _Axes,
+        question: _MapQuestion,
+        *,
         threads: int | None = None,
         progress: Callable[[int], object] | None = None,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64] | None, NDArray[np.uint8]]: ...
-    def chains(
-        self,
-        values: list[float],
-        parameters: tuple[int, int],
-        first: NDArray[np.float64],
-        second: NDArray[np.float64],
-    ) -> NDArray[np.float64]: ...
+    ) -> MapCells: ...
+    def chains(self, axes: _Axes) -> NDArray[np.float64]: ...
     def boundaries(
-        self,
-        values: list[float],
-        parameters: tuple[int, int],
-        first: NDArray[np.float64],
-        second: NDArray[np.float64],
-        decay: float,
-        damping: tuple[float, float] | None,
-        threads: int | None = None,
-    ) -> (
-        tuple[
-            int,
-            list[
-                tuple[
-                    NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int32]
-                ]
-            ],
-        ]
-        | None
-    ): ...
+        self, axes: _Axes, *, decay: float, damping: _Pair | None
+    ) -> list[MapBoundary] | None: ...
     def crossings(
         self, values: list[float], parameter: int, ends: tuple[float, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]: ...
 
+@final
+class ProvedBoxes:
+    @property
+    def low(self) -> NDArray[np.float64]: ...
+    @property
+    def high(self) -> NDArray[np.float64]: ...
+    @property
+    def unstable(self) -> NDArray[np.int32]: ...
+    @property
+    def undecided(self) -> float: ...
+    @property
+    def parameter(self) -> NDArray[np.int8]: ...
+    @property
+    def at(self) -> NDArray[np.float64]: ...
+    @property
+    def link(self) -> NDArray[np.int64]: ...
+
+@final
+class StabilityRadius:
+    @property
+    def radius(self) -> float: ...
+    @property
+    def upper(self) -> float: ...
+    @property
+    def witness(self) -> dict[str, float] | None: ...
+
 def proved_boxes(
     family: Family,
-    ranges: list[_Pair],
-    undecided: float,
-    boxes: int,
+    ranges: dict[str, _Pair],
+    *,
+    tol: float,
+    max_boxes: int,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.int32],
-    tuple[NDArray[np.int8], NDArray[np.float64], NDArray[np.int64]],
-    float,
-]: ...
+) -> ProvedBoxes: ...
 def largest_stable_box(
     family: Family,
-    ranges: list[_Pair],
-    around: list[float] | None,
+    ranges: dict[str, _Pair],
+    *,
+    around: dict[str, float] | None,
     tol: float,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> list[_Pair] | None: ...
+) -> dict[str, _Pair] | None: ...
 def stability_radius(
-    family: Family, point: list[float], scales: list[float], tol: float, boxes: int
-) -> tuple[float, float, list[float] | None]: ...
+    family: Family,
+    point: dict[str, float],
+    scales: dict[str, float],
+    *,
+    tol: float,
+    max_boxes: int,
+) -> StabilityRadius: ...
 def robust_map(
     family: Family,
-    ranges: list[_Pair],
-    parameters: tuple[int, int],
-    first: NDArray[np.float64],
-    second: NDArray[np.float64],
-    boxes: int,
+    axes: _Axes,
+    over: dict[str, _Pair],
+    *,
+    max_boxes: int,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> NDArray[np.int32]: ...

@@ -16,7 +16,7 @@ import math
 import numbers
 from collections.abc import Mapping
 from functools import cached_property
-from typing import SupportsFloat, TypeAlias, cast
+from typing import NamedTuple, SupportsFloat, TypeAlias, cast
 
 from deadtime._deadtime import Family
 from deadtime._quasipolynomial import QuasiPolynomial, is_number
@@ -37,6 +37,16 @@ _Terms: TypeAlias = dict[_Monomial, float]
 
 _NO_DELAY: _Delay = (0.0, ())
 _ONE: _Monomial = ((), 0, _NO_DELAY)
+
+
+class FamilyTerm(NamedTuple):
+    """One term as the native core takes it."""
+
+    coefficient: float
+    exponents: _Powers
+    power: int
+    constant: float
+    slopes: tuple[tuple[str, float], ...]
 
 
 class ParametricQuasiPolynomial:
@@ -138,7 +148,7 @@ class ParametricQuasiPolynomial:
         if missing:
             raise ValueError(f"no value for {', '.join(missing)}: give {missing[0]}=...")
         point = [finite(name, values[name]) for name in self._names]
-        return QuasiPolynomial(*self._family.at(point))
+        return QuasiPolynomial._wrap(self._family.at(point))
 
     def sensitivity(self, root: complex, /, **values: SupportsFloat) -> dict[str, complex]:
         """Derivatives of a simple root by the parameters, at a point.
@@ -199,19 +209,11 @@ class ParametricQuasiPolynomial:
     @cached_property
     def _family(self) -> Family:
         """The same function as the native core holds it."""
-        rows = []
-        for (powers, power, (constant, slopes)), coefficient in self._terms.items():
-            exponent, slope = dict(powers), dict(slopes)
-            rows.append(
-                (
-                    coefficient,
-                    [exponent.get(name, 0) for name in self._names],
-                    power,
-                    constant,
-                    [slope.get(name, 0.0) for name in self._names],
-                )
-            )
-        return Family(list(self._names), rows)
+        terms = [
+            FamilyTerm(coefficient, exponents, power, constant, slopes)
+            for (exponents, power, (constant, slopes)), coefficient in self._terms.items()
+        ]
+        return Family(list(self._names), terms)
 
     def _exponential(self) -> ParametricQuasiPolynomial:
         """e^(-s T) with T this function: what `delay` gives for a parametric delay."""

@@ -86,7 +86,7 @@ pub(crate) struct QuasiPolynomial {
     core: Core,
 }
 
-fn wrapped(py: Python<'_>, result: Result<Core, Error>) -> PyResult<QuasiPolynomial> {
+pub(crate) fn wrapped(py: Python<'_>, result: Result<Core, Error>) -> PyResult<QuasiPolynomial> {
     result
         .map(|core| QuasiPolynomial { core })
         .map_err(|error| to_python(py, error))
