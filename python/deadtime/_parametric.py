@@ -189,12 +189,10 @@ class ParametricQuasiPolynomial:
             max(0.0, constant + sum(slope * point[name] for name, slope in slopes))
             for (_, _, (constant, slopes)), _ in terms
         ]
-        found, by_coefficient = h._native.sensitivity(
-            complex(root), times, [power for (_, power, _), _ in terms]
-        )
+        found = h._native.sensitivity(complex(root), times, [power for (_, power, _), _ in terms])
         moves = dict.fromkeys(self._names, 0j)
         for ((powers, _, (_, slopes)), number), slope in zip(
-            terms, by_coefficient.tolist(), strict=True
+            terms, found.coefficients.tolist(), strict=True
         ):
             factors = [point[name] ** exponent for name, exponent in powers]
             for index, (name, exponent) in enumerate(powers):
@@ -203,7 +201,7 @@ class ParametricQuasiPolynomial:
                 moves[name] += slope * change
             for name, rate in slopes:
                 # A delay changes its term by -s times the term.
-                moves[name] -= found * slope * number * math.prod(factors) * rate
+                moves[name] -= found.root * slope * number * math.prod(factors) * rate
         return moves
 
     @cached_property

@@ -9,6 +9,7 @@ mod fixed_step;
 mod matrix;
 mod pointers;
 mod quasipoly;
+mod roots;
 mod runtime;
 mod solver;
 mod special;
@@ -35,7 +36,9 @@ mod _deadtime {
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]
-    use super::quasipoly::QuasiPolynomial;
+    use super::quasipoly::{Expansion, QuasiPolynomial};
+    #[pymodule_export]
+    use super::roots::{Certificate, Contour, Monotone, RootSet, Segment, Sensitivity};
     #[pymodule_export]
     use super::runtime::{spin, thread_count};
     #[pymodule_export]
