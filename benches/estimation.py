@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import deadtime as dtm
 import numpy as np
-from deadtime._estimation.estimate import METHODS
+from deadtime.estimation._estimate import METHODS
 
 SAMPLE = 0.065
 REST = 16 * SAMPLE

@@ -10,13 +10,13 @@ import deadtime as dtm
 import matplotlib.pyplot as plt
 import numpy as np
 from deadtime import paper
+from deadtime._base.drawing import new_figure
 from deadtime._cli.fly import emulated_drone
-from deadtime._experiment import FlightPlan, fly_experiment
-from deadtime._experiment.flights import read_telemetry
-from deadtime._flight_plots import plot_checked, plot_learned, plot_told
-from deadtime._internet_loop import run_internet_loop
-from deadtime._internet_plots import plot_internet_loop
-from deadtime._plots import new_figure
+from deadtime.flights import FlightPlan, fly_experiment
+from deadtime.flights._plots import plot_checked, plot_learned, plot_told
+from deadtime.flights._runs import read_telemetry
+from deadtime.internet._loop import run_internet_loop
+from deadtime.internet._plots import plot_internet_loop
 from deadtime.links import udp, virtual_time
 from deadtime.links.ardrone2.emulator import Thruster, ThrustMotion
 from scipy.optimize import least_squares

@@ -15,6 +15,8 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import check_matplotlib, new_figure
+from deadtime._base.errors import DeadtimeError
 from deadtime._cli import options as opt
 from deadtime._cli.designs import design_gains
 from deadtime._cli.emulate import emulators
@@ -32,20 +34,14 @@ from deadtime._cli.show import (
     stages,
 )
 from deadtime._cli.verdicts import listed, verdict
-from deadtime._errors import DeadtimeError
-from deadtime._experiment import demo_flight, study
-from deadtime._loop import ControlLoop
-from deadtime._plots import (
-    check_matplotlib,
-    new_figure,
-    plot_certificate,
-    plot_responses,
-    plot_root_set,
-)
-from deadtime._readers import read_recording
-from deadtime._recording import Recording
-from deadtime._report import write_report
-from deadtime._rootset import RootSet
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording, read_recording
+from deadtime.reports import demo_flight, study
+from deadtime.reports._page import write_report
+from deadtime.roots import RootSet
+from deadtime.roots._plots import plot_root_set
+from deadtime.roots.certificate._plots import plot_certificate
+from deadtime.systems._plots import plot_responses
 
 __all__ = ["app", "run"]
 

@@ -6,13 +6,12 @@ from typing import Annotated, Literal
 
 import typer
 
+from deadtime._base.validation import finite
 from deadtime._cli import options as opt
 from deadtime._cli.show import console, print_json, save_figure, stages
-from deadtime._controllers import PD, PI, PID, PV, Controller, P
-from deadtime._derivative_filter import DerivativeFilter
-from deadtime._design import Design
-from deadtime._design import design as find_design
-from deadtime._validation import finite
+from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
+from deadtime.tuning import Design
+from deadtime.tuning import design as find_design
 
 __all__ = ["design_gains"]
 

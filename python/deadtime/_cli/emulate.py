@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from deadtime._base.validation import positive
 from deadtime._cli import options as opt
 from deadtime._cli.show import console
-from deadtime._validation import positive
 from deadtime.links import Journal
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase, Truth
 from deadtime.links.ardrone2.emulator.motion import PlantName

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -15,11 +16,10 @@ from deadtime._cli.show import (
     print_table,
     save_figure,
 )
-from deadtime._estimation import estimate_delay
-from deadtime._estimation.compare import Comparison, compare_methods
-from deadtime._estimation.estimate import JOINT, METHODS
-from deadtime._plots import new_figure, plot_estimate, plot_fits
-from deadtime._readers import read_recording
+from deadtime.estimation import Comparison, compare_methods, estimate_delay
+from deadtime.estimation._estimate import JOINT, METHODS
+from deadtime.estimation._plots import plot_estimate, plot_fits
+from deadtime.recordings import read_recording
 
 __all__ = ["estimate_delays"]
 

@@ -18,9 +18,9 @@ from deadtime._cli.show import (
     save_figure,
     stages,
 )
-from deadtime._internet_loop import GAINS, run_internet_loop
-from deadtime._internet_plots import plot_internet_loop
-from deadtime._internet_result import InternetLoop, InternetRun, Spread
+from deadtime.internet._loop import GAINS, run_internet_loop
+from deadtime.internet._plots import plot_internet_loop
+from deadtime.internet._result import InternetLoop, InternetRun, Spread
 from deadtime.links.udp import Trial, network_of, policy_of
 from deadtime.paper import PRINTED_OVERSHOOTS, delay_by_dominant_root
 

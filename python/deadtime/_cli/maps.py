@@ -10,6 +10,7 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -18,10 +19,9 @@ from deadtime._cli.show import (
     print_table,
     save_figure,
 )
-from deadtime._crossings import Crossings, crossings, delay_margin
-from deadtime._loop import ControlLoop
-from deadtime._plots import new_figure
-from deadtime._stability import stability_map
+from deadtime.loops import ControlLoop
+from deadtime.roots import Crossings, crossings, delay_margin
+from deadtime.stability import stability_map
 
 __all__ = ["map_gains"]
 

@@ -8,12 +8,9 @@ from typing import Annotated
 
 import typer
 
+from deadtime._base.validation import finite
 from deadtime._cli.show import check_picture
-from deadtime._controllers import PV, Controller, P
-from deadtime._derivative_filter import DerivativeFilter
-from deadtime._loop import ControlLoop
-from deadtime._plants import Integrator
-from deadtime._validation import finite
+from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter, Integrator, P
 
 __all__ = [
     "As_json",

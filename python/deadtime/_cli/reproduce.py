@@ -9,11 +9,11 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
 from deadtime._cli.show import console, print_json, print_table, save_figure, stages
-from deadtime._paper_page import write_reproduction
-from deadtime._plots import check_matplotlib
 from deadtime.paper import PARTS, TITLES, Grid, Part, Verdict, reproduce
+from deadtime.paper._page import write_reproduction
 
 __all__ = ["reproduce_paper"]
 

@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import Self, SupportsFloat
 
-from deadtime._errors import FlightAbortedError
-from deadtime._validation import finite, positive
+from deadtime._base.errors import FlightAbortedError
+from deadtime._base.validation import finite, positive
 from deadtime.links.vehicle import VehicleState
 
 __all__ = ["Limits", "UnitCommand", "Watch", "largest_gain"]
@@ -162,7 +162,7 @@ class Watch:
     >>> state = VehicleState(time=0.0, height=1.0, flying=True, landed=False, sequence=1, battery=9)
     >>> watch.check(state, now=0.0)
     Traceback (most recent call last):
-    deadtime._errors.FlightAbortedError: the battery is at 9 %, below 20 %
+    deadtime._base.errors.FlightAbortedError: the battery is at 9 %, below 20 %
     """
 
     def __init__(self, limits: Limits) -> None:

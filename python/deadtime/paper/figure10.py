@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 import deadtime as dtm
+from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid
 
-__all__ = ["PAPER_FILTER", "Curve", "Figure10", "figure10", "velocity_loop"]
+__all__ = ["Curve", "Figure10", "figure10", "velocity_loop"]
 
 #: Proportional gain of the design, 1/s.
 GAIN = 2.0
-
-#: The filter of the paper's velocity.
-PAPER_FILTER = dtm.DerivativeFilter(omega=38.0, damping=1.0)
 
 #: Velocity gains of the figure, and those of a curve.
 GRID, FINE = np.round(np.arange(0.1, 1.0, 0.1), 1), np.linspace(0.005, 1.0, 200)

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
-from deadtime._errors import FlightAbortedError, LinkError
-from deadtime._validation import finite
+from deadtime._base.errors import FlightAbortedError, LinkError
+from deadtime._base.validation import finite
 from deadtime.links.ardrone2.commands import FlatTrim
 from deadtime.links.ardrone2.connection import LOST, Connection
 from deadtime.links.ardrone2.limit_settings import LimitSettings
@@ -79,7 +79,7 @@ class ARDrone2:
     >>> drone = ARDrone2("192.168.1.1")
     >>> drone.command(0.3)
     Traceback (most recent call last):
-    deadtime._errors.LinkError: 192.168.1.1 is not in the air: take off before commanding it
+    deadtime._base.errors.LinkError: 192.168.1.1 is not in the air: take off before commanding it
     """
 
     def __init__(

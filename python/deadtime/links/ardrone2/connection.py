@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.ardrone2.commands import Command
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import NavdataReader

@@ -13,7 +13,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
-from deadtime._errors import PacketError
+from deadtime._base.errors import PacketError
 from deadtime.links.ardrone2.navdata import Navdata, State, parse_navdata
 from deadtime.links.vehicle import VehicleState
 

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from deadtime._errors import DeadtimeError
+from deadtime._base.errors import DeadtimeError
 from deadtime.links.addresses import Address
 from deadtime.links.lifeline import input_ends
 from deadtime.links.udp.controller import Controller, ControllerOptions

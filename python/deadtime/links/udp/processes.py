@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.addresses import Address
 from deadtime.links.udp.described import arguments_of
 from deadtime.links.udp.trial import ENDS, Trial

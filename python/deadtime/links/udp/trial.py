@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from deadtime._validation import positive
+from deadtime._base.validation import positive
 from deadtime.links.udp.controller import Controller, ControllerOptions, ControllerReport
 from deadtime.links.udp.network import Network
 from deadtime.links.udp.plant import run_plant

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deadtime._plants import FirstOrder, Integrator, RationalPlant
 from deadtime.links.ardrone2.emulator.clock import Micros
 from deadtime.links.ardrone2.emulator.motion import (
     GRAVITY,
@@ -18,6 +17,7 @@ from deadtime.links.ardrone2.emulator.motion import (
     linear_plant,
 )
 from deadtime.links.ardrone2.emulator.thrust import Thruster, ThrustMotion
+from deadtime.loops import FirstOrder, Integrator, RationalPlant
 
 __all__ = ["Airframe", "Pose"]
 

@@ -16,8 +16,9 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from deadtime._plants import Integrator, Plant, kit_plant, rest
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
+from deadtime.loops import Integrator, Plant, kit_plant
+from deadtime.loops._plants import rest
 
 __all__ = [
     "DELAYS",

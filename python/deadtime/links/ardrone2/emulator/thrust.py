@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from deadtime._validation import positive
+from deadtime._base.validation import positive
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
 from deadtime.links.ardrone2.emulator.motion import GRAVITY, Motion
 

@@ -1,0 +1,245 @@
+"""Several methods on one recording, and in words why they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._evidence import check_setpoint_active
+from deadtime.estimation.methods._decay import estimate_by_decay
+from deadtime.estimation.methods._decrement import estimate_by_decrement
+from deadtime.estimation.methods._output_error import estimate_by_output_error
+from deadtime.estimation.methods._overshoot import estimate_by_overshoot
+from deadtime.estimation.methods._waveform import estimate_by_waveform
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+
+__all__ = ["Comparison", "compare_methods"]
+
+#: Heads of the columns that `Comparison.rows` fills.
+COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
+
+#: Two delays closer than this share of their mean are called the same.
+AGREE = 0.03
+
+LABELS = {
+    "dominant": "paper's overshoot",
+    "exact": "exact overshoot",
+    "saturated": "overshoot as flown",
+    "decrement": "decrement",
+    "decay": "decay",
+    "waveform": "waveform",
+    "waveform with lag": "waveform with lag",
+    "output_error": "output error",
+    "output_error with lag": "output error with lag",
+}
+
+#: What the fits of all samples are called in a sentence.
+TOLD = {
+    "waveform": "the fit of the whole waveform",
+    "output_error": "the fit to the logged command",
+}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Estimates of one delay by several methods.
+
+    Attributes
+    ----------
+    estimates : dict of str to DelayEstimate
+        By name: ``dominant``, ``exact``, ``saturated``, ``waveform``, ``waveform with lag``; where
+        a command was logged ``output_error`` and ``output_error with lag``; ``decrement`` and
+        ``decay`` where they have an answer.
+    refusals : dict of str to str
+        The other methods that could not answer, and why.
+    """
+
+    estimates: Mapping[str, DelayEstimate]
+    refusals: Mapping[str, str]
+
+    @property
+    def trusted(self) -> str:
+        """Name of the method to go by: the command as logged tells more than the loop does."""
+        return "output_error" if "output_error" in self.estimates else "waveform"
+
+    @property
+    def best(self) -> DelayEstimate:
+        """The estimate to go on with.
+
+        The fit with a lag if the lag is above zero and the Bayesian information criterion
+        pays for it, on as many independent samples as the residuals' colour leaves; else the
+        fit of delay and gain.
+        """
+        plain, lagged = self._fits()
+        if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
+            return plain
+        rho = min(0.99, max(0.0, lagged.whiteness.autocorrelation))
+        effective = lagged.residuals.size * (1.0 - rho) / (1.0 + rho)
+        gain = 2.0 * effective * np.log(plain.rms / lagged.rms) if lagged.rms > 0 else np.inf
+        return lagged if gain > np.log(max(effective, 2.0)) else plain
+
+    def _fits(self) -> tuple[DelayEstimate, DelayEstimate | None]:
+        """The trusted fit of delay and gain, and the one with a lag, if there is one."""
+        return self.estimates[self.trusted], self.estimates.get(f"{self.trusted} with lag")
+
+    def pictured(self) -> dict[str, DelayEstimate]:
+        """The estimates that one picture has room for, by what stands in its legend."""
+        names = ("dominant", self.trusted, f"{self.trusted} with lag")
+        return {
+            f"{LABELS[name]}: {self.estimates[name].delay:.3f} s": self.estimates[name]
+            for name in names
+            if name in self.estimates
+        }
+
+    def rows(self) -> list[list[str]]:
+        """The estimates as cells of a table with the heads `COLUMNS`.
+
+        What was not fitted but taken as given stands in brackets. A method that refused has one
+        cell with its reason.
+        """
+        rows = []
+        for name, fit in self.estimates.items():
+            interval, total = "–", "–"
+            if fit.calibrated:
+                interval = "{:.3f} – {:.3f}".format(*fit.ci(0.95))
+                total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
+            rows.append(
+                [
+                    LABELS[name],
+                    f"{fit.delay:.3f}",
+                    interval,
+                    _number(fit.gain, "gain" in fit.free),
+                    _number(fit.lag, "lag" in fit.free),
+                    total,
+                    "yes" if fit.adequate else "no",
+                ]
+            )
+        rows += [[LABELS[name], f"refused: {why}"] for name, why in self.refusals.items()]
+        return rows
+
+    def explanation(self) -> list[str]:
+        """Why the methods differ, a sentence or two each."""
+        plain, lagged = self._fits()
+        dominant = self.estimates.get("dominant")
+        said = []
+        if dominant is None:
+            said.append(f"The overshoot method does not answer: {self.refusals['dominant']}.")
+        else:
+            said += _overshoot_against_fit(dominant, plain, TOLD[self.trusted])
+        if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
+            said.append(
+                f"The vehicle lags: with a lag fitted too the misfit falls from {plain.rms:.3g} to "
+                f"{lagged.rms:.3g} rms, at {lagged.delay:.3f} s of delay and {lagged.lag:.3f} s of "
+                f"lag. Part of what looks like dead time is the vehicle's own response; the sum, "
+                f"{lagged.delay_plus_lag:.3f} s, is what the recording determines well."
+            )
+        if not plain.adequate:
+            said.append(
+                "The residuals of the fit without lag are coloured: that model is an equivalent of "
+                "the vehicle rather than the vehicle, and its interval is the robust one."
+            )
+        return said
+
+
+def truth_row(numbers: Mapping[str, float]) -> list[str]:
+    """The true numbers of a simulated flight, as a row under those of `Comparison.rows`."""
+    return [
+        "the truth",
+        f"{numbers['delay']:.3f}",
+        "",
+        f"{numbers['gain']:.3f}",
+        f"{numbers['lag']:.3f}",
+        f"{numbers['delay+lag']:.3f}",
+        "",
+    ]
+
+
+def _number(value: float | None, fitted: bool) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.3f}" if fitted else f"({value:g})"
+
+
+def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: str) -> list[str]:
+    difference = plain.delay - dominant.delay
+    if abs(difference) <= AGREE * plain.delay:
+        return [
+            f"The paper's overshoot method ({dominant.delay:.3f} s) and {fit} "
+            f"({plain.delay:.3f} s) agree."
+        ]
+    said = [
+        f"The paper's overshoot method says {dominant.delay:.3f} s, {fit} {plain.delay:.3f} s: "
+        f"they differ by {abs(difference):.3f} s."
+    ]
+    assumed, gain = dominant.gain, plain.gain
+    if assumed is None or gain is None or "gain" not in plain.stderr:
+        return said
+    low, high = plain.ci(0.95, "gain")
+    if not low <= assumed <= high:
+        weaker = "weaker" if gain < assumed else "stronger"
+        less = "less" if gain < assumed else "more"
+        short = "too short" if gain < assumed else "too long"
+        said.append(
+            f"The gain is not {assumed:g}, as the overshoot method takes it to be, but {gain:.3f} "
+            f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the delay is read "
+            f"{short}. With this gain the same overshoot would mean "
+            f"{dominant.delay * assumed / gain:.3f} s."
+        )
+    return said
+
+
+def compare_methods(
+    recording: Recording,
+    loop: ControlLoop,
+    window: tuple[float | None, float | None] | None = None,
+) -> Comparison:
+    """Estimate the delay by every method that applies.
+
+    Parameters
+    ----------
+    recording, loop, window
+        As for `estimate_delay`.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    NotIdentifiableError
+        When no fit of delay and gain has an answer.
+    """
+    check_setpoint_active(recording.window(*(window or (None, None))))
+    estimates: dict[str, DelayEstimate] = {}
+    refusals: dict[str, str] = {}
+    named = [name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")]
+    plain = [name for name in named if name != "lag"]
+    for name in ("dominant", "exact", "saturated"):
+        try:
+            estimates[name] = estimate_by_overshoot(recording, loop, window, map=name)
+        except (NotIdentifiableError, ValueError) as error:
+            refusals[name] = str(error).rstrip(".")
+    # Each is for steps that the other is not for, most recordings for neither: nothing to explain.
+    with suppress(NotIdentifiableError, ValueError):
+        estimates["decrement"] = estimate_by_decrement(recording, loop, window, plain)
+    with suppress(NotIdentifiableError, ValueError):
+        estimates["decay"] = estimate_by_decay(recording, loop, window)
+    fits: dict[str, Callable[..., DelayEstimate]] = {"waveform": estimate_by_waveform}
+    if recording.command is not None:
+        fits["output_error"] = estimate_by_output_error
+    for method, fit in fits.items():
+        frees = {method: plain} if named == plain else {method: plain, f"{method} with lag": named}
+        for name, free in frees.items():
+            try:
+                estimates[name] = fit(recording, loop, window, free)
+            except NotIdentifiableError as error:
+                refusals[name] = str(error).rstrip(".")
+    if not fits.keys() & estimates.keys():
+        raise NotIdentifiableError(refusals["waveform"])
+    return Comparison(estimates, refusals)

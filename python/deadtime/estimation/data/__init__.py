@@ -1,0 +1,1 @@
+"""What estimators read from a recording, and what they refuse."""

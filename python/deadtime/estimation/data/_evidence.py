@@ -1,0 +1,152 @@
+"""What a fit can determine: which numbers are free, which the data part, how uncertain each is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+from deadtime.recordings._recording import MINIMUM_SAMPLES
+
+__all__ = [
+    "OF_THE_LOOP",
+    "OF_THE_VEHICLE",
+    "check_answers",
+    "check_distinguishable",
+    "check_setpoint_active",
+    "checked_names",
+    "embedded",
+    "excited",
+    "slow_name",
+    "standard_errors",
+]
+
+Array = NDArray[np.float64]
+
+#: Ratio of singular values of the scaled Jacobian below which data do not tell two numbers apart:
+#: rounding in difference quotients is at about 1e-8.
+INDISTINGUISHABLE = 1e-6
+
+#: What the vehicle answers with, in the order fits report; `start` is how much later than the
+#: reference the clock of the output runs. A sample time is not among them: whether a sample comes
+#: just before a step or after it makes the cost jump.
+OF_THE_VEHICLE = ("delay", "gain", "lag", "time_constant")
+OF_THE_LOOP = (*OF_THE_VEHICLE, "start", "limit")
+
+#: The response has to explain the output so much better than a constant does that noise, over all
+#: delays that are tried, would do so once in some hundred times.
+BY_CHANCE = 1e-4
+
+#: Share of the variance that is left over at most where most of it is explained.
+MOSTLY = 0.5
+
+
+def checked_names(
+    free: Sequence[str], loop: ControlLoop, known: tuple[str, ...] = OF_THE_VEHICLE
+) -> tuple[str, ...]:
+    """Return the names of what is to be fitted, or raise where this loop has no such number."""
+    if isinstance(free, str):
+        free = (free,)
+    unknown = [name for name in free if name not in known]
+    if unknown or not free:
+        raise ValueError(f"free={tuple(free)!r}: choose from {known}, at least one")
+    given = {"delay", "start"}
+    missing = [name for name in free if name not in given and name not in loop.parameters]
+    if missing:
+        raise ValueError(
+            f"this loop has no {missing[0]} to fit (its numbers are "
+            f"{', '.join(loop.parameters)}): give it one to start from, or leave it out of `free`"
+        )
+    if "delay" not in free and loop.delay is None:
+        raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
+    return tuple(name for name in known if name in free)
+
+
+def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
+    """Refuse numbers that the recording does not part, by name."""
+    norms = np.linalg.norm(jacobian, axis=0)
+    if not np.all(np.isfinite(norms)) or np.any(norms == 0.0):
+        blind = [name for name, norm in zip(names, norms, strict=True) if not norm > 0.0]
+        raise NotIdentifiableError(
+            f"the recording does not depend on the {' or '.join(blind) or 'parameters'}: the "
+            "window holds no response to a step, or the command is at its limit throughout"
+        )
+    # The thin factor: the full one has as many entries as samples squared.
+    _, singular, directions = np.linalg.svd(jacobian / norms, full_matrices=False)
+    if singular[-1] < INDISTINGUISHABLE * singular[0]:
+        weights = np.abs(directions[-1])
+        mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]
+        raise NotIdentifiableError(
+            f"{' and '.join(mixed)} cannot be told apart by this recording: fix one of them, or "
+            "record a step that is not at the limit throughout"
+        )
+
+
+def excited(recording: Recording) -> float:
+    """How far a recording was moved: by its reference, or else what its output did."""
+    return float(np.ptp(recording.reference)) or float(np.ptp(recording.output))
+
+
+def check_setpoint_active(recording: Recording) -> None:
+    """Refuse a reference that copies the output, as loggers write it while a mode is inactive."""
+    moving = np.flatnonzero(np.diff(recording.output)) + 1
+    copied = int(np.sum(recording.reference[moving] == recording.output[moving]))
+    if moving.size >= MINIMUM_SAMPLES and copied > 0.5 * moving.size:
+        raise NotIdentifiableError(
+            f"the reference equals the output in {copied} of the {moving.size} rows in which the "
+            "output moves: the setpoint is inactive there, or one column was read twice; choose a "
+            "window in which the controller follows a setpoint of its own"
+        )
+
+
+def check_answers(output: Array, misfit: Array, numbers: int, autocorrelation: float) -> None:
+    """Refuse an output that a constant explains about as well as the response does: noise alone.
+
+    The ratio is that of an F test. Coloured misfit leaves fewer independent samples, unless most
+    of the variance is explained: then it is the model that lacks something, not the answer.
+    """
+    centred = output - output.mean()
+    constant, fitted = float(centred @ centred), float(misfit @ misfit)
+    if fitted == 0.0:
+        return
+    samples = float(misfit.size)
+    if fitted > MOSTLY * constant:
+        rho = min(0.99, max(0.0, autocorrelation))
+        samples *= (1.0 - rho) / (1.0 + rho)
+    freedom = max(1.0, samples - numbers - 1)
+    ratio = (constant - fitted) / numbers * freedom / fitted
+    if not ratio > 0.0 or special.fdtrc(numbers, freedom, ratio) > BY_CHANCE:
+        explained = 100.0 * max(0.0, 1.0 - fitted / constant) if constant > 0.0 else 0.0
+        raise NotIdentifiableError(
+            f"the output is no answer to the excitation: the best response explains "
+            f"{explained:.0f} % of its variance, which noise alone would; check columns, signs and "
+            "gains, choose a window with a step, or record a larger one"
+        )
+
+
+def embedded(cov: Array, loose: list[int], size: int) -> Array:
+    """Covariance of all parameters: what stands at its bound has none of its own."""
+    full = np.zeros((size, size))
+    full[np.ix_(loose, loose)] = cov
+    return full
+
+
+def slow_name(names: Sequence[str]) -> str:
+    """Name of what delays beside the delay: the lag, or the time constant where that is fitted."""
+    return "time_constant" if "time_constant" in names else "lag"
+
+
+def standard_errors(names: tuple[str, ...], cov: Array) -> dict[str, float]:
+    """Standard errors of `names`, and of ``delay+lag`` where the delay is among them."""
+    errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
+    if "delay" in names:
+        slow = slow_name(names)
+        total = np.array([1.0 if name in ("delay", slow) else 0.0 for name in names])
+        count = len(names)
+        errors[f"delay+{slow}"] = float(np.sqrt(total @ cov[:count, :count] @ total))
+    return errors

@@ -1,0 +1,62 @@
+"""One recording or several, each with its loop and its window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+
+__all__ = ["Flights", "FlownOnce", "Window", "each_flight"]
+
+_Ends: TypeAlias = tuple[float | None, float | None] | None
+
+#: One recording, or several of the same vehicle.
+Flights: TypeAlias = Recording | Sequence[Recording]
+
+#: The part to use, s: one for all recordings, or a list with one for each.
+Window: TypeAlias = _Ends | list[_Ends]
+
+
+@dataclass(frozen=True)
+class FlownOnce:
+    """One recording, the loop that made it, and the part to use."""
+
+    recording: Recording
+    loop: ControlLoop
+    window: _Ends
+
+
+def each_flight(
+    recording: Flights, loop: ControlLoop | Sequence[ControlLoop], window: Window
+) -> list[FlownOnce]:
+    """Pair recordings with loops and windows; what is given once holds for all."""
+    recordings = list(recording) if isinstance(recording, (list, tuple)) else [recording]
+    if not recordings:
+        raise ValueError("no recording was given: give one, or a list of them")
+    number = len(recordings)
+    loops = list(loop) if isinstance(loop, (list, tuple)) else [loop] * number
+    windows = window if isinstance(window, list) else [window] * number
+    for name, given in (("loop", loops), ("window", windows)):
+        if len(given) != number:
+            raise ValueError(
+                f"{number} recordings and {len(given)} of `{name}`: give one for all, or one each"
+            )
+    flights = []
+    for index, (one, its_loop, ends) in enumerate(zip(recordings, loops, windows, strict=True)):
+        if not isinstance(one, Recording):
+            raise TypeError(f"recording {index} is a {type(one).__name__}, not a Recording")
+        if not isinstance(its_loop, ControlLoop):
+            raise TypeError(f"loop {index} is a {type(its_loop).__name__}, not a ControlLoop")
+        if ends is not None and not (isinstance(ends, (tuple, list)) and len(ends) == 2):
+            raise TypeError(f"window={ends!r}: give (start, stop) in s, None for an open end")
+        flights.append(FlownOnce(one, its_loop, ends))
+    plants = {type(flight.loop.plant).__name__ for flight in flights}
+    if len(plants) > 1:
+        raise ValueError(
+            f"the recordings are of different plants ({', '.join(sorted(plants))}): they are to be "
+            "of one vehicle"
+        )
+    return flights

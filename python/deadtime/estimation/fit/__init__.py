@@ -1,0 +1,1 @@
+"""Least squares, profiles of a parameter, and residuals."""

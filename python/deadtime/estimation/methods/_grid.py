@@ -1,0 +1,322 @@
+"""Cost of the simulated loop over a range of delays (Leva's way), its minimum refined.
+
+For each delay of a grid the loop is simulated with its hold and its limit, everything else that is
+free (gain, lag, output at the start) at its best for that delay, and the sum of squared misfits
+kept: a curve that shows every valley, which a search that descends into one does not. From the
+lowest point least squares over all free numbers gives the minimum and the curvature there, and
+with it the standard error, robust where the residuals are coloured.
+
+The model runs on the reference, so sensor noise that goes round the loop through the controller is
+not explained by it: the curvature then promises too much, without the residuals always showing it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.validation import increasing
+from deadtime.estimation._result import CramerRaoBound, DelayEstimate
+from deadtime.estimation.data._evidence import (
+    check_distinguishable,
+    checked_names,
+    embedded,
+    standard_errors,
+)
+from deadtime.estimation.data._excitation import (
+    ROUNDING,
+    check_excitation,
+    check_gain,
+    start_and_span,
+)
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+
+__all__ = ["estimate_by_grid"]
+
+Array = NDArray[np.float64]
+
+#: Points of the grid, and between which shares of the window they lie besides none.
+POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
+
+#: Delays and lags of a continuous loop below this share of the window, or of the time between two
+#: samples, take long to simulate and cannot be told from none.
+SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
+
+#: Valleys of the curve that are refined; the deepest wins.
+REFINED = 3
+
+#: A lag is none where none raises the cost by no more than this share: next to zero it delays
+#: like a delay, and the two cannot be told apart.
+VANISHING = 1e-6
+
+#: A misfit for simulations that leave all bounds, in units of the output's range.
+HOPELESS = 1e3
+
+#: Quantile of the normal distribution for 95 % between two sides.
+TWO_SIDED_95 = 1.96
+
+
+def estimate_by_grid(
+    recording: Recording,
+    loop: ControlLoop,
+    window: tuple[float | None, float | None] | None,
+    free: Sequence[str],
+    delays: ArrayLike | None = None,
+    initial_output: float | None = None,
+) -> DelayEstimate:
+    """Lowest point of the cost over `delays`, refined over all of `free`."""
+    names = checked_names(free, loop)
+    if "delay" not in names:
+        raise ValueError("the grid method goes over the delay: leave it among `free`")
+    simulated = SimulatedRecording(recording, loop, window)
+    data = simulated.recording
+    check_excitation(data, len(names))
+    problem = _Problem(simulated, names, initial_output)
+    grid = problem.grid() if delays is None else _checked(delays)
+    costs, points = problem.over(grid)
+    point = problem.refined(costs, points)
+    problem.check_ends(point)
+
+    misfit, jacobian = problem.misfit(point), problem.jacobian(point)
+    residuals = -misfit
+    held = [
+        i for i, name in enumerate(problem.labels) if name == "lag" and problem.at_least(point, i)
+    ]
+    loose = [i for i in range(len(problem.labels)) if i not in held]
+    check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
+    whiteness = whiteness_of(residuals, len(names))
+    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
+    adequate = whiteness.white or exact
+    size, count = len(problem.labels), len(names)
+    white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
+    spread = white
+    if not adequate:
+        spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
+    errors = standard_errors(names, spread)
+    check_gain(problem.values(point), errors)
+    noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
+    low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
+    return DelayEstimate(
+        method="grid",
+        loop=loop.replace(**problem.values(point)),
+        free=names,
+        stderr=errors,
+        cov=spread[:count, :count],
+        crb=CramerRaoBound(tuple(problem.labels), noise, standard_errors(names, white)),
+        recording=data,
+        residuals=residuals,
+        whiteness=whiteness,
+        adequate=adequate,
+        message=_message(names, grid, adequate),
+        uncalibrated=(
+            "the grid method fits the answer to the reference, and noise that goes round the loop "
+            "is no part of that: the curvature of the cost gives "
+            f"{max(0.0, point[0] + low):.4g} to {point[0] + high:.4g} s (95 %), which holds the "
+            "delay that often only where noise does not circulate; use method='output_error' or "
+            "'waveform' for an interval"
+        ),
+        details={
+            "delays": grid.tolist(),
+            "costs": costs.tolist(),
+            "valleys": [float(grid[i]) for i in _valleys(costs)],
+            "curvature_interval_95": [max(0.0, float(point[0] + low)), float(point[0] + high)],
+            "initial_output": problem.start_of(point),
+        },
+    )
+
+
+def _checked(delays: ArrayLike) -> Array:
+    """The delays of the caller, as a grid that a minimum can lie within."""
+    grid = increasing("delays", delays)
+    if grid.size < 3 or grid[0] < 0.0:
+        raise ValueError(
+            f"delays: {grid.size} from {grid[0] if grid.size else math.nan:g} s; give three at "
+            "least, none below zero"
+        )
+    return grid
+
+
+def _valleys(costs: Array) -> list[int]:
+    """Rows of the grid that are lower than both neighbours."""
+    middle = costs[1:-1]
+    return [int(i) + 1 for i in np.flatnonzero((middle < costs[:-2]) & (middle <= costs[2:]))]
+
+
+@dataclass(eq=False)
+class _Problem:
+    """The misfit as a function of `labels`: the delay, what else is free, the output at first."""
+
+    simulated: SimulatedRecording
+    names: tuple[str, ...]
+    initial_output: float | None
+
+    def __post_init__(self) -> None:
+        data = self.simulated.recording
+        self.start, self.span = start_and_span(data)
+        self.range = max(float(np.ptp(data.output)), float(np.ptp(data.reference)))
+        self.sample = data.sample_time
+        self.labels = [*self.names, *(["initial output"] if self.initial_output is None else [])]
+        gain = self.simulated.loop.parameters.get("gain", 1.0)
+        low, high = sorted((1e-3 * gain, 1e3 * gain))
+        least = self.shortest
+        ends = {"delay": (least, self.span), "gain": (low, high), "lag": (least, self.span)}
+        bounds = [ends.get(label, (-np.inf, np.inf)) for label in self.labels]
+        self.low, self.high = (np.array(side) for side in zip(*bounds, strict=True))
+        scales = {"delay": self.sample, "gain": abs(gain), "lag": self.sample}
+        self.scale = np.array([scales.get(label, self.range) for label in self.labels])
+        guesses = {"gain": gain, "lag": self.sample, "initial output": self.start}
+        self.guess = np.array([guesses.get(label, 0.0) for label in self.labels])
+
+    @property
+    def shortest(self) -> float:
+        """Shortest delay and lag: in continuous loops shorter ones take long to simulate."""
+        if self.simulated.loop.is_sampled:
+            return 0.0
+        return min(self.span * SHORTEST_OF_WINDOW, self.sample * SHORTEST_OF_SAMPLE)
+
+    def grid(self) -> Array:
+        """Delays from the shortest to most of the window, closer where they are short."""
+        points = np.geomspace(SHORTEST, LONGEST, POINTS) * self.span
+        return np.concatenate([[self.shortest], points[points > self.shortest]])
+
+    def values(self, point: Array) -> dict[str, float]:
+        return dict(zip(self.names, (float(value) for value in point), strict=False))
+
+    def start_of(self, point: Array) -> float:
+        return float(point[-1]) if self.initial_output is None else self.initial_output
+
+    def misfit(self, point: Array) -> Array:
+        """Simulated minus recorded output, bounded where the loop with these numbers is not."""
+        most = HOPELESS * self.range
+        try:
+            output = self.simulated.output(self.values(point), self.start_of(point))
+        except ValueError:  # the response with these numbers grows without bound
+            return np.full(len(self.simulated.recording), most)
+        return np.clip(output - self.simulated.recording.output, -most, most)
+
+    def cost(self, point: Array) -> float:
+        misfit = self.misfit(point)
+        return float(misfit @ misfit)
+
+    def jacobian(self, point: Array, first: int = 0) -> Array:
+        """Derivatives by the numbers from the `first` on; one-sided at an end."""
+        columns = []
+        for place in range(first, point.size):
+            step = 1e-5 * self.scale[place]
+            up, down = point.copy(), point.copy()
+            up[place] += step
+            down[place] = max(self.low[place], down[place] - step)
+            change = up[place] - down[place]
+            columns.append((self.misfit(up) - self.misfit(down)) / change)
+        return np.stack(columns, axis=1)
+
+    def over(self, grid: Array) -> tuple[Array, Array]:
+        """Least cost at each delay, and the numbers there."""
+        costs, points = np.empty(grid.size), np.empty((grid.size, self.guess.size))
+        point = self.guess
+        for row, delay in enumerate(grid):
+            starts = [np.concatenate([[delay], start[1:]]) for start in (self.guess, point)]
+            point = self._nearer(min(starts, key=self.cost))
+            costs[row], points[row] = self.cost(point), point
+        if int(np.argmin(costs)) == grid.size - 1:
+            raise NotIdentifiableError(
+                f"the cost falls up to a delay of {grid[-1]:g} s, the longest that is tried: the "
+                "output is no answer of such a loop to this reference; check columns, signs, "
+                "units and gains, or give other `delays`"
+            )
+        return costs, points
+
+    def _nearer(self, point: Array) -> Array:
+        """A Gauss-Newton step in all but the delay, where it helps."""
+        if point.size == 1:
+            return point
+        jacobian = self.jacobian(point, first=1)
+        change = np.linalg.lstsq(jacobian, -self.misfit(point), rcond=None)[0]
+        moved = point.copy()
+        moved[1:] = np.clip(point[1:] + change, self.low[1:], self.high[1:])
+        return min((point, moved), key=self.cost)
+
+    def refined(self, costs: Array, points: Array) -> Array:
+        """The deepest of the deepest valleys, all numbers at their best."""
+        valleys = sorted({int(np.argmin(costs)), *_valleys(costs)}, key=lambda row: costs[row])
+        found = [self._descended(points[row]) for row in valleys[:REFINED]]
+        return self._without_lag(min(found, key=self.cost))
+
+    def _without_lag(self, point: Array) -> Array:
+        """The shortest lag, the delay taking it over, where that fits as well."""
+        if "lag" not in self.labels:
+            return point
+        delay, lag = self.labels.index("delay"), self.labels.index("lag")
+        without = point.copy()
+        without[delay] += point[lag] - self.low[lag]
+        without[lag] = self.low[lag]
+        without = self._descended(without, held=lag)
+        rounding = len(self.simulated.recording) * (ROUNDING * self.range) ** 2
+        as_well = self.cost(without) <= self.cost(point) * (1.0 + VANISHING) + rounding
+        return without if as_well else point
+
+    def _descended(self, point: Array, held: int | None = None) -> Array:
+        """Least squares over all numbers, or all but one, from a point."""
+        loose = [place for place in range(point.size) if place != held]
+
+        def at(moved: Array) -> Array:
+            whole = point.copy()
+            whole[loose] = moved
+            return whole
+
+        def misfit(moved: Array) -> Array:
+            return self.misfit(at(moved))
+
+        def jacobian(moved: Array) -> Array:
+            return self.jacobian(at(moved))[:, loose]
+
+        found = least_squares(
+            misfit,
+            np.clip(point, self.low, self.high)[loose],
+            jac=jacobian,
+            bounds=(self.low[loose], self.high[loose]),
+            x_scale=self.scale[loose],
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+            max_nfev=60,
+        )
+        return at(np.asarray(found.x))
+
+    def at_least(self, point: Array, place: int) -> bool:
+        """Whether a delay or lag came out at the shortest there is."""
+        return bool(point[place] <= self.low[place] * (1.0 + 1e-6) + 1e-9)
+
+    def check_ends(self, point: Array) -> None:
+        """Refuse what ran to an end of its search; a delay or lag of zero is an answer."""
+        for label, value, low, high in zip(self.labels, point, self.low, self.high, strict=True):
+            ends = (high,) if label in ("delay", "lag") else (low, high)
+            for end in ends:
+                if math.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
+                    raise NotIdentifiableError(
+                        f"the fit runs away to a {label} of {end:g}, the end of its search: the "
+                        "output is no answer of such a loop to this reference; check columns, "
+                        "signs, units and gains, and choose a window around one step"
+                    )
+
+
+def _message(names: tuple[str, ...], grid: Array, adequate: bool) -> str:
+    others = [name for name in names if name != "delay"]
+    text = f"least cost over {grid.size} delays from {grid[0]:.3g} to {grid[-1]:.3g} s"
+    if others:
+        text += f", {' and '.join(others)} at their best for each"
+    if not adequate:
+        text += (
+            "; the residuals are not white, so the loop is only an equivalent of the vehicle and "
+            "the standard errors are robust ones"
+        )
+    return text

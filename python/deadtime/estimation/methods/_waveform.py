@@ -1,0 +1,254 @@
+"""Least squares of the simulated loop on the whole recording.
+
+The output of the loop, simulated with its hold and its limit at the recording's time stamps, is
+fitted to the recorded one; the output at the start of the window is fitted along, because one
+noisy sample is a poor initial condition. The cost has several valleys over the delay (a whole
+period of the loop's oscillation too much fits almost as well), so a grid over delay and gain comes
+first and the best few points of it are refined, by the loop's exact sensitivities.
+
+The residuals are white only if the model is the vehicle and the noise enters at the measurement
+but does not circulate through the controller. Where it does (`noise="loop"`), the controller of the
+model reads the recorded output in place of the simulated one: what is left over are the
+innovations, and they are white. Both are predictions with as many numbers, so the one that leaves
+less over is the likelier. What a controller read at its samples is what is in the rows, so the
+innovations are taken unless the other is likelier by far (`noise="auto"`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._evidence import OF_THE_LOOP, OF_THE_VEHICLE, checked_names, excited
+from deadtime.estimation.data._excitation import check_excitation, start_and_span
+from deadtime.estimation.data._several import Flights, FlownOnce, Window, each_flight
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.fit._joint import solve_jointly
+from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
+from deadtime.estimation.methods._conclusion import Fitted, concluded, without_vanishing
+from deadtime.estimation.methods._output_error import estimate_from_commands
+from deadtime.loops import ControlLoop
+
+__all__ = ["Noise", "estimate_by_waveform"]
+
+Array = NDArray[np.float64]
+
+#: Where sensor noise goes: into the recording alone, or through the controller as well.
+Noise = Literal["auto", "recording", "loop"]
+
+#: Points of the first grid over the delay, and factors of the first grid over the gain.
+DELAY_POINTS = 24
+GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
+
+#: Delays and lags of a continuous loop below this share of the window, or of the time between two
+#: samples, take long to simulate and cannot be told from none: they are taken for it.
+SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
+
+#: A lag of a sampled loop below this share of the time between two samples would overflow.
+LEAST_LAG = 1e-6
+
+#: A residual for simulations that leave all bounds, in units of the step.
+HOPELESS = 1e3
+
+#: A misfit below this part of the excitation is rounding.
+ROUNDING = 1e-9
+
+#: Noise is taken to be in the recording alone where that is likelier by this log likelihood, a
+#: factor of 20.
+LIKELIER = 3.0
+
+
+def estimate_by_waveform(
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
+    window: Window,
+    free: Sequence[str],
+    noise: Noise = "auto",
+    initial_output: float | None = None,
+) -> DelayEstimate:
+    """Fit `free` of the loop to the window of the recording."""
+    if noise not in get_args(Noise):
+        raise ValueError(f"noise={noise!r} is not one of {', '.join(map(repr, get_args(Noise)))}")
+    if noise == "loop":
+        return _by_innovations(recording, loop, window, free, initial_output)
+    simulated = _by_simulation(recording, loop, window, free, initial_output)
+    if noise == "recording" or not set(free) <= set(OF_THE_VEHICLE):
+        return simulated
+    try:
+        innovations = _by_innovations(recording, loop, window, free, initial_output)
+    except NotIdentifiableError:  # the command cannot be computed, or says less than the loop
+        return simulated
+    likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
+    return simulated if likelier > LIKELIER else innovations
+
+
+def _unlikelihood(fit: DelayEstimate) -> float:
+    """Minus log likelihood of Gaussian noise of unknown size in each recording, but for a constant.
+
+    Below rounding there is nothing to choose by.
+    """
+    total = 0.0
+    for one in fit.flights:
+        scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))
+        total += one.residuals.size * math.log(scatter)
+    return total
+
+
+def _by_innovations(
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
+    window: Window,
+    free: Sequence[str],
+    initial_output: float | None,
+) -> DelayEstimate:
+    return estimate_from_commands(
+        "waveform", recording, loop, window, free, initial_output, computed=True
+    )
+
+
+def _by_simulation(
+    recording: Flights,
+    loop: ControlLoop | Sequence[ControlLoop],
+    window: Window,
+    free: Sequence[str],
+    initial_output: float | None,
+) -> DelayEstimate:
+    flights = each_flight(recording, loop, window)
+    names = checked_names(free, flights[0].loop, OF_THE_LOOP)
+    models = [_model(flight, names, initial_output) for flight in flights]
+    model, found = solve_jointly(models)
+    found = without_vanishing(model, found)
+    _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
+    return concluded(
+        "waveform",
+        model,
+        found,
+        [
+            Fitted(one.simulated.recording, flight.loop)
+            for one, flight in zip(models, flights, strict=True)
+        ],
+        message=f"least squares over {', '.join(names)} on the response of the loop",
+        details={
+            "initial_output": float([*found.point, initial_output][len(names)]),
+            "noise": "recording",
+        },
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Model(ModelOfOne):
+    """Misfit of one recording; parameters are `names`, then the output at the start if free."""
+
+    simulated: SimulatedRecording
+    names: tuple[str, ...]
+    offset: float | None
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return (*self.names, *(["initial output"] if self.offset is None else []))
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return (len(self.simulated.recording),)
+
+    @cached_property
+    def span(self) -> float:
+        return start_and_span(self.simulated.recording)[1]
+
+    @cached_property
+    def size(self) -> float:
+        return excited(self.simulated.recording)
+
+    @cached_property
+    def _shortest(self) -> float:
+        if self.simulated.loop.is_sampled:
+            return LEAST_LAG * self.simulated.recording.sample_time
+        between = self.simulated.recording.sample_time
+        return min(SHORTEST_OF_WINDOW * self.span, SHORTEST_OF_SAMPLE * between)
+
+    def ends(self, label: str) -> Ends:
+        tenth, shortest = 0.1 * self.span, self._shortest
+        no_delay = 0.0 if self.simulated.loop.is_sampled else shortest
+        found = {
+            "delay": Ends(no_delay, self.span, tenth),
+            "lag": Ends(shortest, self.span, tenth),
+            "start": Ends(-0.25 * self.span, 0.25 * self.span, tenth),
+            "initial output": Ends(-np.inf, np.inf, self.size),
+        }.get(label)
+        if found is not None:
+            return found
+        value = self.simulated.loop.parameters[label]
+        low, high = sorted((1e-3 * value, 1e3 * value))
+        return Ends(low, high, abs(value))
+
+    def _values(self, point: Array) -> tuple[dict[str, float], float]:
+        """Numbers of the loop, and the output at the start."""
+        start = float(point[-1]) if self.offset is None else self.offset
+        return dict(zip(self.names, point.tolist(), strict=False)), start
+
+    def misfit(self, point: Array) -> Array:
+        """Simulated minus recorded output; bounded where the loop with these numbers is not."""
+        bound = HOPELESS * self.size
+        recorded = self.simulated.recording.output
+        try:
+            output = self.simulated.output(*self._values(point))
+        except ValueError:  # the response with these numbers grows without bound
+            return np.full(recorded.size, bound)
+        return np.clip(output - recorded, -bound, bound)
+
+    def jacobian(self, point: Array) -> Array:
+        """Derivatives of the misfit; none where it is at its bound."""
+        try:
+            slopes = self.simulated.slopes(*self._values(point))
+        except ValueError:
+            return np.zeros((sum(self.sizes), point.size))
+        columns = np.stack([slopes[label] for label in self.labels], axis=1)
+        bounded = np.abs(slopes["output"] - self.simulated.recording.output) < HOPELESS * self.size
+        return np.where(bounded[:, None], columns, 0.0)
+
+    def starts(self) -> list[Array]:
+        """The points of a grid over delay and gain, the best first."""
+        start, _ = start_and_span(self.simulated.recording)
+        along = [start] if self.offset is None else []
+        points = [np.array([*point, *along]) for point in itertools.product(*self._grid())]
+        costs = [float(np.sum(self.misfit(point) ** 2)) for point in points]
+        return [points[int(index)] for index in np.argsort(costs)]
+
+    def _grid(self) -> list[Array]:
+        known = self.simulated.loop.parameters
+        grids = {
+            "delay": np.geomspace(0.003, 0.6, DELAY_POINTS) * self.span,
+            "gain": np.array(GAIN_FACTORS) * known.get("gain", 1.0),
+            "lag": np.array([0.02]) * self.span,
+            "start": np.zeros(1),
+        }
+        return [grids[name] if name in grids else np.array([known[name]]) for name in self.names]
+
+
+def _model(flight: FlownOnce, names: tuple[str, ...], offset: float | None = None) -> _Model:
+    simulated = SimulatedRecording(flight.recording, flight.loop, flight.window)
+    in_flight = simulated.recording.time[0] > flight.recording.time[0]
+    check_excitation(simulated.recording, len(names), in_flight=in_flight)
+    return _Model(simulated, names, offset)
+
+
+def _check_ends(values: Mapping[str, float], low: Array, high: Array) -> None:
+    """Refuse a fit that ran to an end of its search; a delay or lag of zero is an answer."""
+    for (name, value), least, most in zip(values.items(), low, high, strict=False):
+        for end in (least, most):
+            inner = name in ("delay", "lag") and end == least
+            if not inner and abs(value - end) <= 1e-3 * abs(end):
+                raise NotIdentifiableError(
+                    f"the fit runs away to a {name} of {end:g}, the end of its search: the output "
+                    "is no answer of such a loop to this reference; check columns, signs, units "
+                    "and gains, and choose a window around one step"
+                )

@@ -1,0 +1,1 @@
+"""Models that predict an output from recorded commands."""

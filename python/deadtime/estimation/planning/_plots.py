@@ -1,0 +1,109 @@
+"""Drawing of planned experiments; matplotlib is imported when something is drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from deadtime._base.drawing import COLOURS, REFERENCE, empty_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from deadtime.estimation.planning._identifiability import Identifiability
+    from deadtime.estimation.planning._planned_bound import PlannedBound
+
+__all__ = ["plot_identifiability"]
+
+#: Half axis of the ellipse that holds 95 % of two Gaussian errors, in standard deviations.
+TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
+
+
+def plot_identifiability(plan: Identifiability) -> Figure:
+    """The expected flight over its sensitivities, and delay against lag where both are free."""
+    both = plan.correlation is not None
+    figure = empty_figure(10.0 if both else 7.0, 5.0)
+    layout: Any = (
+        [["flight", "ellipse"], ["slopes", "ellipse"]] if both else [["flight"], ["slopes"]]
+    )
+    axes = figure.subplot_mosaic(layout, width_ratios=[3.0, 2.0] if both else [1.0])
+    for one in axes.values():
+        one.spines[["top", "right"]].set_visible(False)
+        one.grid(alpha=0.25)
+    axes["slopes"].sharex(axes["flight"])
+    _draw_flight(axes["flight"], plan)
+    _draw_slopes(axes["slopes"], plan)
+    if both:
+        _draw_ellipse(axes["ellipse"], plan)
+    return figure
+
+
+def _draw_flight(ax: Axes, plan: Identifiability) -> None:
+    flight = plan.flight
+    assert flight.command is not None
+    ax.step(flight.time, flight.reference, where="post", label="reference", **REFERENCE)
+    ax.plot(flight.time, flight.output, color="0.15", lw=1.4, label="output")
+    held: Literal["post", "mid"] = "post" if plan.loop.is_sampled else "mid"
+    ax.step(flight.time, flight.command, where=held, color="0.6", lw=0.8, label="command")
+    _legend_above(ax, f"{plan.experiment.name}, noise {plan.noise:g}:")
+    ax.tick_params(labelbottom=False)
+
+
+def _draw_slopes(ax: Axes, plan: Identifiability) -> None:
+    """What an error as large as the bound does to the output: alike means hard to part."""
+    bound = plan.bound
+    for name, colour in zip(plan.free, COLOURS, strict=False):
+        moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise
+        ax.plot(plan.flight.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
+    ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the noise")
+    _legend_above(ax, "for one standard error of")
+
+
+def _legend_above(ax: Axes, title: str) -> None:
+    ax.legend(
+        title=title,
+        ncols=3,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        frameon=False,
+        fontsize="small",
+    )
+
+
+def _with_error(bound: PlannedBound, name: str) -> str:
+    error = bound.stderr[name]
+    return f"{name} ({error:.2g})" if name == "gain" else f"{name} ({1e3 * error:.2g} ms)"
+
+
+def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
+    """Where 95 % of the estimates of an efficient method lie; zero is an end for both."""
+    slow = next(name for name in plan.free if name not in ("delay", "gain"))
+    centre = np.array([plan.loop.parameters["delay"], plan.loop.parameters[slow]])
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    bounds = (("command logged", plan.command_logged), ("reference only", plan.reference_only))
+    for (label, bound), colour in zip(bounds, COLOURS, strict=False):
+        if bound is None:
+            continue
+        places = [bound.free.index("delay"), bound.free.index(slow)]
+        root = np.linalg.cholesky(bound.cov[np.ix_(places, places)])
+        x, y = 1e3 * (centre[:, None] + TWO_DIMENSIONS * root @ circle)
+        ax.plot(x, y, color=colour, lw=1.3, label=label)
+    low, high = ax.get_ylim()
+    if low < 0.0:
+        ax.axhspan(low, 0.0, color="0.9", zorder=0)
+        ax.set_ylim(low, high)
+    ax.plot(*(1e3 * centre), "k+")
+    name = slow.replace("_", " ")
+    ax.set(xlabel="delay (ms)", ylabel=f"{name} (ms)")
+    ax.set_title(
+        f"95 % of the estimates\ndelay + {name} ± {_sum_error(plan.bound, slow):.2g} ms",
+        fontsize="medium",
+    )
+    ax.legend(fontsize="small")
+
+
+def _sum_error(bound: PlannedBound, slow: str) -> float:
+    return 1e3 * bound.stderr[f"delay+{slow}"]

@@ -1,0 +1,115 @@
+"""References on samples: when they change, and what they are made of.
+
+A pseudo-random binary sequence is a maximum-length one of a shift register (Golomb 1967; SciPy's
+`max_len_seq`); a multisine is a sum of harmonics of one period with equal amplitudes and phases
+that are random or those of Schroeder (1970), which keep its peak low.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from deadtime._base.validation import positive, whole_number
+from deadtime.recordings._recording import MINIMUM_SAMPLES
+
+__all__ = [
+    "ON_A_SAMPLE",
+    "binary_sequence",
+    "excited_lines",
+    "hold_numbers",
+    "multisine",
+    "sample_times",
+    "whole_period",
+]
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+#: Times are multiples of the sample time if they miss one by this share of it.
+ON_A_SAMPLE = 1e-6
+
+#: Nobody flies more samples than this.
+MOST_SAMPLES = 10_000_000
+
+#: Longest register whose sequence is known to `max_len_seq`.
+MOST_BITS = 32
+
+
+def sample_times(duration: float, sample_time: float) -> Array:
+    """Samples from zero on, the last before `duration`."""
+    sample = positive("sample_time", sample_time)
+    count = positive("duration", duration) / sample
+    if count < MINIMUM_SAMPLES:
+        raise ValueError(
+            f"duration={duration} s is less than {MINIMUM_SAMPLES} samples of {sample} s: give a "
+            "longer one"
+        )
+    if count > MOST_SAMPLES:
+        raise ValueError(
+            f"duration={duration} s is {count:.3g} samples of {sample} s, beyond {MOST_SAMPLES}: "
+            "give a shorter one, and check that it is in seconds"
+        )
+    return np.arange(np.ceil(count - ON_A_SAMPLE), dtype=np.float64) * sample
+
+
+def hold_numbers(time: Array, hold: float, sample_time: float) -> Whole:
+    """Number of the hold that each sample lies in."""
+    if positive("hold", hold) < sample_time * (1.0 - ON_A_SAMPLE):
+        raise ValueError(f"hold={hold} s is shorter than a sample of {sample_time} s")
+    return np.floor((time + ON_A_SAMPLE * sample_time) / hold).astype(np.int64)
+
+
+def whole_period(period: float, sample_time: float) -> float | None:
+    """The period where it is a whole number of samples."""
+    count = period / sample_time
+    return period if count >= 1.0 and abs(count - round(count)) <= ON_A_SAMPLE else None
+
+
+def excited_lines(lines: int | Sequence[int], count: int, odd: bool) -> Whole:
+    """Harmonics to excite of a period of `count` samples, checked."""
+    if np.ndim(lines) == 0:
+        lines = range(1, whole_number("lines", cast(int, lines)) + 1)
+    found = np.unique(np.asarray(lines))
+    if found.size and found.dtype.kind not in "iu":
+        raise TypeError(f"lines={lines!r}: give whole numbers")
+    if found.size and (found[0] < 1 or 2 * found[-1] >= count):
+        raise ValueError(
+            f"lines={lines!r}: give harmonics from 1 to {(count - 1) // 2}, below half of the "
+            f"{count} samples of a period"
+        )
+    if odd:
+        found = found[found % 2 == 1]
+    if found.size == 0:
+        raise ValueError(f"lines={lines!r} leaves no {'odd ' if odd else ''}harmonic: give one")
+    return found.astype(np.int64)
+
+
+def binary_sequence(needed: int, seed: int) -> tuple[Array, int]:
+    """Signs of a maximum-length sequence from a random place on, and how many it has in all."""
+    bits = max(2, needed.bit_length())
+    if bits > MOST_BITS:
+        raise ValueError(f"{needed} changes of sign are too many: give a longer hold")
+    # Any state of the register but all zeros is a place in the sequence.
+    start = np.random.default_rng(seed).integers(1, 2**bits)
+    register = (start >> np.arange(bits)) & 1
+    sequence, _ = signal.max_len_seq(bits, state=register, length=needed)
+    return np.where(sequence, 1.0, -1.0), 2**bits - 1
+
+
+def multisine(lines: Whole, count: int, phases: str, seed: int) -> Array:
+    """One period of `count` samples with the largest value 1."""
+    if phases == "random":
+        shifts = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, lines.size)
+    elif phases == "schroeder":
+        place = np.arange(lines.size)
+        shifts = -np.pi * place * (place + 1) / lines.size
+    else:
+        raise ValueError(f"phases={phases!r}: give 'random' or 'schroeder'")
+    turns = np.outer(lines, np.arange(count)) / count
+    wave = np.cos(2.0 * np.pi * turns + shifts[:, None]).sum(axis=0)
+    return np.asarray(wave / np.abs(wave).max(), dtype=np.float64)

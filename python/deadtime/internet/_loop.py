@@ -1,0 +1,184 @@
+"""The paper's Internet loop from end to end: run it for several gains, estimate, compare."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from errno import EEXIST
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from deadtime._base.errors import DeadtimeError
+from deadtime._base.validation import positive
+from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.internet._replay import age_error, answer_times, replayed_errors
+from deadtime.internet._result import METHODS, InternetLoop, InternetRun
+from deadtime.links import virtual_time
+from deadtime.links.udp import ENDS, Trial, run_processes, run_trial
+from deadtime.loops import ControlLoop, Integrator, P
+from deadtime.recordings import Recording, read_recording
+
+__all__ = ["GAINS", "run_internet_loop"]
+
+#: The gains of the paper's Table 1 with an overshoot.
+GAINS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0)
+
+#: Steps that are replayed for each gain.
+REPLAYS = 200
+
+Mode = Literal["virtual", "real", "processes"]
+
+
+def run_internet_loop(
+    trial: Trial,
+    gains: Sequence[float] = GAINS,
+    *,
+    mode: Mode = "virtual",
+    folder: Path | None = None,
+    methods: Sequence[str] = tuple(METHODS),
+    progress: Callable[[str], None] = lambda stage: None,
+) -> InternetLoop:
+    """Run the loop once for each gain, and estimate its delay from every run.
+
+    Parameters
+    ----------
+    trial : Trial
+        The loop and its network; the gain is replaced. Each run has a seed of its own, counted
+        on from that of the trial.
+    gains : sequence of float
+        Gains of the controller, 1/s.
+    mode : str
+        ``"virtual"``: in virtual time, the same for the same seed; ``"real"``: over UDP, in this
+        process; ``"processes"``: over UDP, plant, relay and controller in a process each.
+    folder : Path, optional
+        Where both ends write what they record.
+    methods : sequence of str
+        What the delay is estimated by: ``"dominant"`` (the paper's overshoot), ``"exact"``,
+        ``"waveform"``, ``"output_error"``.
+    progress : callable, optional
+        Called with the name of each stage as it begins.
+
+    Returns
+    -------
+    InternetLoop
+
+    Raises
+    ------
+    LinkError
+        When a process does not start, or ends before its time.
+    FileExistsError
+        When the folder holds recordings of that name already, or is a file.
+    OSError
+        When the folder cannot be made.
+    """
+    if not len(gains):
+        raise ValueError("gains is empty: give one or more")
+    trials = [
+        replace(trial, gain=positive("gain", gain), seed=trial.seed + index)
+        for index, gain in enumerate(gains)
+    ]
+    if mode not in get_args(Mode):
+        raise ValueError(f"mode={mode!r} is not one of {', '.join(get_args(Mode))}")
+    unknown = set(methods) - set(METHODS)
+    if unknown:
+        raise ValueError(f"methods {sorted(unknown)} are none of {', '.join(METHODS)}")
+    stems = [f"{index + 1:02d}-gain-{one.gain:g}-" for index, one in enumerate(trials)]
+    for file in [] if folder is None else [folder / f"{a}{b}.csv" for a in stems for b in ENDS]:
+        if file.exists():  # said before the first of them runs
+            raise FileExistsError(EEXIST, "there already; choose another folder", str(file))
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    runs = []
+    for one, stem in zip(trials, stems, strict=True):
+        progress(f"K = {one.gain:g}: running")
+        reports, recordings = _run(one, mode, folder, stem)
+        progress(f"K = {one.gain:g}: estimating")
+        estimates, refusals = _estimate(one, recordings, methods)
+        runs.append(
+            InternetRun(
+                one, reports["plant"], reports["controller"], recordings, estimates, refusals
+            )
+        )
+    progress("replaying the steps")
+    times = np.concatenate([answer_times(run.plant["arrivals"]) for run in runs])
+    age = float(np.mean([run.age for run in runs]))
+    if not (np.isfinite(times).any() and math.isfinite(age)):
+        return InternetLoop(tuple(runs))
+    errors = [replayed_errors(run.trial, times, age, REPLAYS, run.trial.seed) for run in runs]
+    return InternetLoop(tuple(runs), tuple(errors), age_error(times, trial.sample_time))
+
+
+def _run(
+    trial: Trial, mode: Mode, folder: Path | None, stem: str
+) -> tuple[dict[str, dict[str, Any]], dict[str, Recording]]:
+    """What happened at each end, and what it recorded."""
+    if mode != "processes":
+        start = virtual_time.run if mode == "virtual" else asyncio.run
+        report = start(run_trial(trial, folder, stem=stem))
+        kept = {"plant": report.plant.recording, "controller": report.controller.recording}
+        return report.to_dict(), {name: one for name, one in kept.items() if one is not None}
+    with tempfile.TemporaryDirectory() as spare:
+        place = Path(spare) if folder is None else folder
+        reports = run_processes(trial, place, stem=stem)
+        recordings = {
+            end: read_recording(place / f"{stem}{end}.csv", time="time_s", command="command")
+            for end in ENDS
+        }
+    return reports, recordings
+
+
+def _estimate(
+    trial: Trial, recordings: Mapping[str, Recording], methods: Sequence[str]
+) -> tuple[dict[str, DelayEstimate], dict[str, str]]:
+    """The delay by every method, and why some have no answer."""
+    known = ControlLoop(
+        Integrator(gain=trial.plant_gain),
+        P(Kp=trial.gain),
+        sample_time=trial.sample_time,
+        limit=trial.limit,
+    )
+    estimates: dict[str, DelayEstimate] = {}
+    refusals: dict[str, str] = {}
+    free = ("delay", "gain") if trial.lag == 0.0 else ("delay", "gain", "lag")
+    options: dict[str, dict[str, Any]] = {
+        "dominant": {"method": "overshoot", "map": "dominant"},
+        "exact": {"method": "overshoot", "map": "exact"},
+        "waveform": {"method": "waveform", "free": free},
+        "output_error": {"method": "output_error", "free": free},
+    }
+    for name in methods:
+        end = "controller" if name == "output_error" else "plant"
+        if end not in recordings:
+            refusals[name] = f"the recording of the {end} is too short"
+            continue
+        data = recordings[end]
+        if end == "plant":
+            data = _as_sampled(data, trial.sample_time)
+        try:
+            estimates[name] = estimate_delay(data, known, **options[name])
+        except DeadtimeError as error:
+            refusals[name] = str(error).rstrip(".")
+    return estimates, refusals
+
+
+def _as_sampled(recording: Recording, sample_time: float) -> Recording:
+    """Reference and output of the plant on the grid of times at which it was to sample.
+
+    A process wakes up a little late, by less than a sample time; the simulated loop samples
+    on the grid, and would take a step of the reference just after a sample for one before the
+    next. The mean lateness, which all rows have, stays where it was.
+    """
+    late = recording.time - sample_time * np.round(recording.time / sample_time)
+    time = recording.time - late + float(np.mean(late))
+    keep = np.r_[True, np.diff(np.round(time / sample_time)) > 0.5]
+    return Recording(
+        (time - time[0])[keep],
+        recording.reference[keep],
+        recording.output[keep],
+        source=recording.source,
+    )
