@@ -1,4 +1,4 @@
-"""Loops, results and errors go through pickle and copy, and stay read-only on the way."""
+"""Loops, results and errors survive pickle and copy, and stay read-only."""
 
 import copy
 import pickle
@@ -105,7 +105,7 @@ def test_a_copied_response_is_still_measured_between_its_output_times():
         dtm.RecordingError("no file"),
     ],
 )
-def test_errors_come_back_whole(error):
+def test_errors_survive_pickling(error):
     # An error that does not survive this breaks the pool it is raised in.
     for way in WAYS.values():
         other = way(error)

@@ -1,4 +1,4 @@
-"""Without an extra, what needs it says which line installs it, and everything else works."""
+"""Without an extra, functions that need it name the line that installs it; the others work."""
 
 import json
 import subprocess
@@ -66,7 +66,7 @@ def drawing_methods():
                     yield f"{kind.__name__}.{name}"
 
 
-def test_the_list_of_drawings_is_whole():
+def test_the_list_of_drawings_is_complete():
     assert set(drawing_methods()) == DRAWN.keys()
 
 

@@ -1,4 +1,4 @@
-"""Every result goes through pickle and copy, can be compared, and does not change."""
+"""Every result survives pickle and copy, can be compared, and is read-only."""
 
 import copy
 import dataclasses
@@ -110,7 +110,7 @@ def public_types():
             yield kind
 
 
-def test_the_list_of_types_is_whole():
+def test_the_list_of_types_is_complete():
     # Bases that are never made, and tuples of arrays.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW",

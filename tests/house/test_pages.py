@@ -1,4 +1,4 @@
-"""The pages: their Python runs with the results that are printed, every public name is listed."""
+"""The pages: their Python gives the printed results, every public name is listed."""
 
 import doctest
 import inspect

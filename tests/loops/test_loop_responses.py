@@ -1,4 +1,4 @@
-"""Responses of control loops: their figures, and truths for hard ones."""
+"""Responses of control loops: their metrics, and reference solutions for hard ones."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_plot_draws_output_reference_and_command():
 
 
 def test_many_jumps_are_the_sum_of_their_steps():
-    """Breaks that have faded are forgotten, without a trace in the response."""
+    """Breaking points that are ignored after their decay have no effect on the response."""
     rng = np.random.default_rng(1)
     loop = dtm.ControlLoop(dtm.Integrator(lag=0.05), dtm.P(1.5), delay=0.36)
     jumps = np.sort(rng.uniform(0.0, 40.0, 150))
@@ -125,7 +125,7 @@ def test_a_jump_before_the_start_is_no_impulse():
     np.testing.assert_array_equal(found.outputs, pv.outputs)
 
 
-def test_limit_and_hold_do_not_see_the_impulse():
+def test_limit_and_hold_suppress_the_impulse():
     pd = dtm.ControlLoop(INTEGRATOR, dtm.PD(1.6, 0.2), delay=0.36)
     pv = pd.replace(controller=dtm.PV(1.6, 0.2))
     for fields in ({"limit": 1.0}, {"sample_time": 0.065}):
@@ -136,7 +136,7 @@ def test_limit_and_hold_do_not_see_the_impulse():
     assert np.abs(pd.simulate(TIMES).outputs - pv.simulate(TIMES).outputs).max() > 0.1
 
 
-def test_a_slow_crossing_of_the_limit_is_passed():
+def test_a_slow_crossing_of_the_limit_is_simulated():
     # The integral takes the command through its limit again and again, rounding made each of
     # these crossings look like many, in steps too short to change the state.
     plant, limit = dtm.RationalPlant([1.0], [1.0, 0.4, 4.0]), 1.0

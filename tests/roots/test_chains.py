@@ -1,4 +1,4 @@
-"""The laws of chains of roots, against the roots themselves."""
+"""The asymptotic laws of chains of roots, against the roots themselves."""
 
 import math
 
@@ -102,7 +102,7 @@ def test_the_neutral_chain_runs_along_its_line():
     assert np.abs(chain.real_part(0.0) - chain.offset) == 0
 
 
-def test_a_double_chain_is_told_once_with_its_multiplicity():
+def test_a_double_chain_is_listed_once_with_its_multiplicity():
     chains = ((s + delay(1.0)) ** 2).chains()
     assert [chain.multiplicity for chain in chains] == [2]
     chains = (s * (1.0 + 0.5 * delay(1.0)) ** 2 + 1.0).chains()

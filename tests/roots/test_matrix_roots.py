@@ -1,4 +1,4 @@
-"""Roots of det M without its expansion, against truths that know nothing of it."""
+"""Roots of det M without its expansion, against independent results."""
 
 import itertools
 import math
@@ -38,7 +38,7 @@ def unimodular(rng, n):
 
 
 def assert_holds(found, wanted, room=0.0):
-    """Every disc holds as many wanted roots as it claims, and none is left over."""
+    """Every disc contains as many expected roots as it claims; each of them is in a disc."""
     wanted = list(wanted)
     assert found.counted == len(wanted)
     left = np.ones(len(wanted), bool)
@@ -184,7 +184,7 @@ def test_ball_arithmetic_counts_the_same(n):
 
 @settings(max_examples=12)
 @given(st.integers(0, 10**6), st.integers(2, 7), st.floats(-1.5, 1.0), st.floats(1.0, 9.0))
-def test_a_whole_is_the_sum_of_its_parts(seed, n, x, y):
+def test_the_count_of_a_region_is_the_sum_over_its_parts(seed, n, x, y):
     matrix = matrix_of(random_system(seed, n))
     re, im = (-3.0, 4.0), (-12.0, 12.0)
     try:
@@ -307,7 +307,7 @@ def test_neutral_systems_of_many_states():
 # Which path answers
 
 
-def test_lightly_damped_modes_that_no_expansion_tells_apart():
+def test_lightly_damped_modes_that_no_expansion_separates():
     modes = np.zeros((10, 10))
     omegas = (1.0, 1.01, 1.02, 1.03, 1.04)
     for i, omega in enumerate(omegas):
@@ -387,7 +387,7 @@ def test_what_cannot_be_answered_is_refused(make, ask, message):
         asked[ask]()
 
 
-def test_a_root_on_the_edge_is_told():
+def test_a_root_on_the_edge_is_reported():
     system = DelaySystem(np.diag(np.arange(1.0, 13.0)))
     with pytest.raises(dtm.ContourError, match="on the contour near 3"):
         system.count(re=(3, 5.5), im=(-1, 1.5))

@@ -1,4 +1,4 @@
-"""Design: the best gains by closed forms and brute force, within exact margins, for all delays."""
+"""Design: the best gains against closed forms and brute force; margins; all delays."""
 
 import itertools
 import math
@@ -249,7 +249,7 @@ def test_the_damping_is_that_of_the_dominant_poles():
     assert best.value > calm.damping + 0.1
 
 
-def test_full_damping_is_broken_by_the_abscissa():
+def test_equal_damping_is_decided_by_the_abscissa():
     best = dtm.design(LOOP, controller=dtm.P, objective="damping")
     assert best.value == pytest.approx(1.0, abs=1e-6)
     assert best.gains["Kp"] == pytest.approx(1.0 / (math.e * 0.36), rel=1e-3)
@@ -321,7 +321,7 @@ def test_the_fastest_step_without_overshoot_over_an_interval():
     assert best.value < 0.3
 
 
-def test_figures_are_those_of_the_worst_scenario():
+def test_metrics_are_those_of_the_worst_scenario():
     best = dtm.design(
         SAMPLED, objective="settling_time", delay=(0.2, 0.3), controller=SMOOTH, gain_margin=3.0
     )
@@ -376,7 +376,7 @@ def test_a_design_without_delay_could_not_be_drawn():
     assert best.gains["Kp"] * 0.065 == pytest.approx(1.0, abs=0.01)
 
 
-def test_a_design_tells_and_draws_itself():
+def test_a_design_has_a_summary_and_a_plot():
     pyplot = pytest.importorskip("matplotlib.pyplot")
     best = dtm.design(
         SAMPLED, controller=SMOOTH, fixed={"Kp": 1.5}, delay=(0.2, 0.3), gain_margin=3.0

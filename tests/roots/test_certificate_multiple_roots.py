@@ -38,7 +38,7 @@ def test_the_real_axis_beside_a_multiple_root(m, distance):
 
 
 @pytest.mark.parametrize(("m", "distance"), [(4, 1e-8), (6, 1e-6), (9, 1e-5)])
-def test_closer_than_two_words_can_tell_is_refused_with_the_place(m, distance):
+def test_an_edge_too_close_for_double_double_is_refused_with_the_place(m, distance):
     with pytest.raises(ContourError, match=r"a root lies on the contour near -0\.99"):
         real_root(m).certify(re=(-1 + distance, 1), im=(-3, 3))
 
