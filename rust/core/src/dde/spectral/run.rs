@@ -1,8 +1,6 @@
 //! A run from the start to the end: elements one after the other.
 
 use super::breaks::{BreakingPoint, Breaks};
-use super::chebyshev;
-use super::control;
 use super::control::Verdict;
 use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
@@ -12,6 +10,7 @@ use super::nodes::{Nodes, nodes};
 use super::output::Output;
 use super::problem::{Equation, Outcome, Problem, Solution};
 use super::unread::{Reading, Unread};
+use super::{chebyshev, control};
 use crate::{Error, Task};
 
 /// Elements shorter than this part of their time are rounding.

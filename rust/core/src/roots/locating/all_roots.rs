@@ -4,12 +4,7 @@ use num_complex::Complex64;
 
 use super::isolate::{Search, Seek};
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::counting::Cell;
-use crate::roots::counting::OwnTime;
-use crate::roots::counting::Prepared;
-use crate::roots::counting::Walker;
-use crate::roots::counting::dominance;
-use crate::roots::counting::{Closed, close};
+use crate::roots::counting::{Cell, Closed, OwnTime, Prepared, Walker, close, dominance};
 use crate::roots::disc::{Disc, with_mirror_image};
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;

@@ -14,9 +14,7 @@ use num_complex::Complex64;
 use super::clusters::cluster;
 use super::newton::{Outcome, newton};
 use crate::Error;
-use crate::roots::counting::Cell;
-use crate::roots::counting::Walk;
-use crate::roots::counting::Walker;
+use crate::roots::counting::{Cell, Walk, Walker};
 use crate::roots::disc::{Disc, RESOLVED};
 
 /// Cells with more roots missing are cut before anything is tried.

@@ -12,8 +12,7 @@ use num_complex::Complex64;
 use super::clusters::cluster;
 use super::newton::{Outcome, newton};
 use crate::quasipoly::{Probe, QuasiPolynomial, modulus, relative_turn};
-use crate::roots::counting::Prepared;
-use crate::roots::counting::Walker;
+use crate::roots::counting::{Prepared, Walker};
 use crate::roots::disc::Disc;
 use crate::{Error, Task};
 

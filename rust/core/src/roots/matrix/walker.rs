@@ -13,12 +13,9 @@ use num_complex::Complex64;
 use super::local_enclosure::{Place, Reach};
 use super::system::CharacteristicMatrix;
 use crate::quasipoly::modulus;
-use crate::roots::counting::Cell;
-use crate::roots::counting::Turn;
-use crate::roots::counting::Walk;
+use crate::roots::counting::{Cell, Turn, Walk};
 use crate::roots::disc::Disc;
-use crate::roots::locating::Outcome;
-use crate::roots::locating::Seek;
+use crate::roots::locating::{Outcome, Seek};
 use crate::{Error, Task};
 
 use std::f64::consts::{PI, TAU};
@@ -48,11 +45,11 @@ const MOST_UNCLEAR: u32 = 5;
 const STRETCH: f64 = 1.9;
 
 /// Walks along lines; keeps the budget, the hints of roots and the discs already proved.
-pub(in crate::roots) struct MatrixWalker<'a> {
+pub(super) struct MatrixWalker<'a> {
     system: &'a CharacteristicMatrix,
     task: &'a Task,
     /// Where Newton's step from the points closest to a root leads to.
-    pub(in crate::roots) hints: Vec<Complex64>,
+    pub(super) hints: Vec<Complex64>,
     known: Vec<Disc>,
     /// Where no single root could be proved.
     stalled: Vec<Complex64>,

@@ -8,9 +8,7 @@ use num_complex::Complex64;
 use super::certify::{ARGUMENTS, Settle, VALUES};
 use super::plane::{Around, Plane};
 use crate::quasipoly::modulus;
-use crate::simd::Columns;
-use crate::simd::SHORT;
-use crate::simd::sweep;
+use crate::simd::{Columns, SHORT, sweep};
 
 /// Roots that are followed at most.
 const FOLLOWED: usize = 4;

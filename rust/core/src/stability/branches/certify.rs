@@ -9,10 +9,7 @@
 //! What is found, and whether, depends on nothing but the lane's own start.
 
 use super::plane::Plane;
-use crate::simd::Complex;
-use crate::simd::Kernel;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Complex, Kernel, Real, Simd};
 
 /// A radius as wide as this, relative to the root, is worth another step.
 const SHARP: f64 = 1e-13;

@@ -7,9 +7,7 @@
 //! single cells along the boundaries, is judged alone. A cell that is counted by its part lies half the distance to its neighbour away from
 //! a boundary, except at an end of an axis.
 
-use crate::stability::boxes::Reduced;
-use crate::stability::boxes::{Claim, Examined, Stretch, examine};
-use crate::stability::boxes::{Local, Range};
+use crate::stability::boxes::{Claim, Examined, Local, Range, Reduced, Stretch, examine};
 use crate::stability::cell::{Cell, ENDLESS, judge};
 use crate::status::CellStatus;
 use crate::{Error, Task};

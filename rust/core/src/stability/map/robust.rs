@@ -5,10 +5,7 @@
 //! not stable; members at both ends and in the middle are tried first.
 
 use super::axes::Axis;
-use crate::stability::boxes::Local;
-use crate::stability::boxes::Reduced;
-use crate::stability::boxes::{Finding, find_unstable};
-use crate::stability::boxes::{check, reduce};
+use crate::stability::boxes::{Finding, Local, Reduced, check, find_unstable, reduce};
 use crate::stability::cell::{ENDLESS, UNKNOWN, judge};
 use crate::stability::family::Family;
 use crate::stability::specification::Demand;

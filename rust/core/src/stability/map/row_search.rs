@@ -9,9 +9,7 @@
 //! are those of the zero found, which is within the gap.
 
 use super::block::{Block, Finding, Grid};
-use crate::stability::boxes::tangent;
-use crate::stability::boxes::{Claim, Examined, Stretch, examine};
-use crate::stability::boxes::{Local, Range};
+use crate::stability::boxes::{Claim, Examined, Local, Range, Stretch, examine, tangent};
 use crate::stability::crossings::Crossing;
 use crate::status::CellStatus;
 use crate::{Error, Task};

@@ -5,8 +5,7 @@ use super::axes::{Axis, Map, put, put_value};
 use super::chart::Chart;
 use crate::Error;
 use crate::memory::in_parallel;
-use crate::stability::crossings::Crossing;
-use crate::stability::crossings::{Members, Row};
+use crate::stability::crossings::{Crossing, Members, Row};
 use crate::stability::family::Family;
 
 /// A map whose family is affine in the parameter along its rows.

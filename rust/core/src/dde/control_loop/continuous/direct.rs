@@ -9,8 +9,7 @@
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, dot, saturate};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::control_loop::requested_output::Trajectory;
-use crate::dde::control_loop::requested_output::Wanted;
+use crate::dde::control_loop::requested_output::{Trajectory, Wanted};
 use crate::dde::limits::{check_growth, slack};
 use crate::dde::scalar::Scalar;
 use crate::{Error, Task};

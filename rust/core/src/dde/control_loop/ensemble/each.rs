@@ -3,8 +3,7 @@
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::metrics::{Criteria, Figures};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::control_loop::requested_output::Trajectory;
-use crate::dde::control_loop::requested_output::Wanted;
+use crate::dde::control_loop::requested_output::{Trajectory, Wanted};
 use crate::dde::control_loop::step_metrics::Gauge;
 use crate::memory::collected;
 use crate::{Error, Task};

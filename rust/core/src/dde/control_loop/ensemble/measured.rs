@@ -1,9 +1,7 @@
 //! Figures of the sets of a block, from the lines that their responses consist of.
 
 use crate::dde::control_loop::metrics::{Criteria, Figures, Levels, Record};
-use crate::simd::Mask;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Mask, Real, Simd};
 
 use super::block::{Block, Column, SETS};
 use super::each::judged;

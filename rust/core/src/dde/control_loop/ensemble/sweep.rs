@@ -2,10 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::block;
 use super::block::Block;
 use super::sets::{Outcome, Sets};
-use super::{corners, each, measured};
+use super::{block, corners, each, measured};
 use crate::dde::control_loop::metrics::{Criteria, Figures};
 use crate::memory::{filled, push, reserved, room};
 use crate::{Error, Task};
@@ -38,13 +37,13 @@ impl Sets<'_> {
         Ok((fit, left))
     }
 
-    /// Work on all sets, `in_lanes` on blocks and `alone` on single ones; `keep` is given every
+    /// Work on all sets, `side_by_side` on blocks and `alone` on single ones; `keep` is given every
     /// set with its result, after at most `at_once` of them were held.
     fn each<T: Send>(
         &self,
         (span, at_once): (f64, usize),
         task: &Task,
-        in_lanes: impl Fn(&Block, &[usize]) -> Result<Vec<T>, Error> + Sync,
+        side_by_side: impl Fn(&Block, &[usize]) -> Result<Vec<T>, Error> + Sync,
         alone: impl Fn(usize) -> Result<T, Error> + Sync,
         mut keep: impl FnMut(usize, T),
     ) -> Result<(), Error> {
@@ -56,7 +55,7 @@ impl Sets<'_> {
             let work = |members: &&[Alike]| {
                 task.check()?;
                 let sets: Vec<usize> = members.iter().map(|&(_, set)| set).collect();
-                let found = in_lanes(&Block::new(self, &sets)?, &sets)?;
+                let found = side_by_side(&Block::new(self, &sets)?, &sets)?;
                 task.advance(sets.len() as u64);
                 Ok(found)
             };

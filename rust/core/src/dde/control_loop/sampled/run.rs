@@ -2,10 +2,8 @@
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, Update, saturate};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::control_loop::requested_output::Trajectory;
-use crate::dde::control_loop::requested_output::Wanted;
-use crate::dde::limits::RESPONSE;
-use crate::dde::limits::{check_growth, slack};
+use crate::dde::control_loop::requested_output::{Trajectory, Wanted};
+use crate::dde::limits::{RESPONSE, check_growth, slack};
 use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
 use crate::memory::push;
