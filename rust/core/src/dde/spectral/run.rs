@@ -33,7 +33,7 @@ const RETREAT: f64 = 0.3;
 /// to be worth them.
 const OVERLAP: f64 = 12.0;
 /// Elements to wait after one of that kind failed, at most.
-const PATIENCE: u32 = 4096;
+const LONGEST_WAIT: u32 = 4096;
 /// Orders of a jump that matter beside one for each digit of the tolerance.
 const UNSEEN: u32 = 2;
 /// A jump of a neutral slope below this part of the tolerance is none.
@@ -211,8 +211,8 @@ impl<'a> Run<'a> {
                 }
             }
             if self.solution.refused > before && end - start > self.shortest_delay {
-                let patience = (2 * self.wait.1).min(PATIENCE);
-                self.wait = (patience, patience);
+                let wait = (2 * self.wait.1).min(LONGEST_WAIT);
+                self.wait = (wait, wait);
             }
         }
     }
