@@ -17,13 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays, read_only
+from deadtime._base.ranges import Range
 from deadtime._base.validation import finite, positive, real_array, thread_number, whole_number
 from deadtime.stability._intervals import (
     Floats,
     Given,
     Progress,
-    Range,
     System,
+    Values,
     inverse,
     native_family,
     placed,
@@ -173,6 +174,7 @@ def proved_boxes(
     ranges: Given,
     tol: float = 1e-3,
     *,
+    at: Values | None = None,
     max_boxes: int = 1_000_000,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -182,12 +184,14 @@ def proved_boxes(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
-    ranges : mapping of str to (low, high) or float
-        One to three ranges; further parameters have a value.
+        What to judge.
+    ranges : mapping of str to (low, high)
+        One to three ranges.
     tol : float
         Share of the ranges that may stay undecided, from 0 to 1. The number of boxes grows like
         1/tol for two parameters and 1/tol**2 for three.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     max_boxes : int
         The division ends with this many boxes (some hundred bytes each), whatever is undecided
         then; `ProvedBoxes.undecided` says how much.
@@ -241,7 +245,7 @@ def proved_boxes(
     share = finite("tol", tol)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
-    native, places = native_family(family, names)
+    native, places = native_family(family, names, at)
     low, high, unstable, tree, undecided = _deadtime.proved_boxes(
         native,
         placed(ends, places),
@@ -268,6 +272,7 @@ def largest_stable_box(
     family: System,
     ranges: Given,
     *,
+    at: Values | None = None,
     around: Mapping[str, SupportsFloat] | None = None,
     tol: float = 1e-3,
     threads: int | None = None,
@@ -278,9 +283,11 @@ def largest_stable_box(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
-    ranges : mapping of str to (low, high) or float
+        What to judge.
+    ranges : mapping of str to (low, high)
         As in `proved_boxes`. Volumes are measured relative to them.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     around : mapping of str to float, optional
         A point that the box is to hold.
     tol : float
@@ -311,7 +318,7 @@ def largest_stable_box(
     """
     names, ends = ranges_of(ranges)
     step = positive("tol", tol)
-    native, places = native_family(family, names)
+    native, places = native_family(family, names, at)
     point = None
     if around is not None:
         given = _named("around", around, names, dict(zip(names, ends, strict=True)))

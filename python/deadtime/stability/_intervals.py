@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import SupportsFloat, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime import _deadtime
-from deadtime._base.validation import finite
+from deadtime._base.ranges import Range, interval
 from deadtime.loops import ControlLoop
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.roots._family import family_of
@@ -22,6 +21,7 @@ __all__ = [
     "Progress",
     "Range",
     "System",
+    "Values",
     "inverse",
     "native_family",
     "placed",
@@ -31,9 +31,9 @@ __all__ = [
 
 Floats: TypeAlias = NDArray[np.float64]
 Progress: TypeAlias = Callable[[int], object]
-Range: TypeAlias = tuple[float, float]
 System: TypeAlias = ParametricQuasiPolynomial | ControlLoop
-Given: TypeAlias = Mapping[str, tuple[SupportsFloat, SupportsFloat] | SupportsFloat]
+Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
+Values: TypeAlias = Mapping[str, SupportsFloat]
 
 #: Boxes are made of up to this many parameters.
 MOST_MOVING = 3
@@ -45,37 +45,25 @@ def side(name: str, low: float, high: float) -> str:
 
 
 def ranges_of(given: Given) -> tuple[tuple[str, ...], list[Range]]:
-    """Names and ends of ranges and values."""
+    """Names and ends of ranges."""
     if not isinstance(given, Mapping):
         raise TypeError(f"ranges={given!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
     if not given:
         raise ValueError("ranges of no parameter: give one to three")
-    ends = []
-    for name, value in given.items():
-        if isinstance(value, (tuple, list, np.ndarray)):
-            if len(value) != 2:
-                raise ValueError(f"{name}={value!r}: a range is (low, high)")
-            low, high = (finite(name, end) for end in value)
-            if low > high:
-                raise ValueError(
-                    f"{name}={value!r}: the low end of a range is not above its high end"
-                )
-            if math.isinf(high - low):
-                raise ValueError(f"{name}={value!r}: the range is wider than 1e308")
-        else:
-            low = high = finite(name, value)
-        ends.append((low, high))
+    ends = [interval(name, value, may_be_point=True) for name, value in given.items()]
     if sum(low < high for low, high in ends) > MOST_MOVING:
         raise ValueError(
             f"ranges for more than {MOST_MOVING} parameters ({', '.join(given)}): "
-            "give the others values"
+            "give the others values in at={...}"
         )
     return tuple(given), ends
 
 
-def native_family(system: System, names: tuple[str, ...]) -> tuple[_deadtime.Family, list[int]]:
+def native_family(
+    system: System, names: tuple[str, ...], at: Values | None
+) -> tuple[_deadtime.Family, list[int]]:
     """The family in the core, and where it holds each parameter."""
-    family = family_of(system, names)
+    family = family_of(system, names, at)
     return family._family, [family.names.index(name) for name in names]
 
 
