@@ -4,9 +4,11 @@
 //! Entries of tables are fetched lane by lane. Where an argument needs the longer way of these functions, all
 //! lanes are computed one by one, which gives the others the same bits again.
 
+use super::nearest::ROUNDER;
 use super::tables::{POWERS, SINES};
-use super::{ROUNDER, circular, exponential};
-use crate::lanes::{Real, Simd};
+use super::{circular, exponential};
+use crate::simd::Real;
+use crate::simd::Simd;
 
 /// Up to here powers of two need no second factor.
 const LARGEST_EXPONENT: f64 = 700.0;
@@ -91,7 +93,10 @@ fn sin_cos_one_by_one(y: &[f64], sines: &mut [f64], cosines: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{Columns, Instructions, Kernel, sweep_on};
+    use crate::simd::Columns;
+    use crate::simd::Instructions;
+    use crate::simd::Kernel;
+    use crate::simd::sweep_on;
 
     struct Both;
 

@@ -21,6 +21,7 @@ mod double_double;
 mod exponential;
 pub(crate) mod in_lanes;
 mod logarithm;
+mod nearest;
 pub mod precise;
 mod tables;
 
@@ -29,14 +30,6 @@ pub use circular::sin_cos;
 pub use double_double::DoubleDouble;
 pub use exponential::{exp, exp_above};
 pub use logarithm::log;
-
-/// Adding and subtracting 1.5 · 2⁵² rounds to the nearest integer, for |x| < 2⁵¹.
-const ROUNDER: f64 = 6_755_399_441_055_744.0;
-
-#[inline(always)]
-fn nearest(x: f64) -> f64 {
-    (x + ROUNDER) - ROUNDER
-}
 
 #[cfg(test)]
 mod tests;

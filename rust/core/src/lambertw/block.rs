@@ -5,10 +5,17 @@
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
+use crate::simd::Complex;
+use crate::simd::Kernel;
+use crate::simd::Mask;
+use crate::simd::Real;
+use crate::simd::SHORT;
+use crate::simd::Simd;
+use crate::simd::sweep;
 
-use super::kernel::{self, Point};
-use super::route::Order;
+use super::branch_sort::Order;
+use super::kernel;
+use super::kernel::Point;
 use super::{delay, huge_branch, log_form, real, special_values};
 
 /// Elements in a block.

@@ -14,56 +14,19 @@
 
 use num_complex::Complex64;
 
-use super::{QuasiPolynomial, sharp};
+use super::double_double;
+use super::jet::{FLOOR, Jet, TINY, modulus};
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, log, sin_cos};
 
 /// Half an ulp of 1, enlarged by what the bounds themselves lose in being computed.
 const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
-
-/// 2⁻¹⁰¹⁰: u times this is still far above what an underflow loses.
-pub(super) const TINY: f64 = f64::MIN_POSITIVE * 4096.0;
-
-/// Above all that underflow can do to a sum of terms.
-pub(super) const FLOOR: f64 = 1e-290;
 
 /// No phase is wrong by more than a half turn: 2.5 of the exponential, in units of u.
 const OPPOSITE: f64 = 5.0 / f64::EPSILON;
 
 /// What an evaluation in two words counts for.
 const SHARP_COST: u64 = 20;
-
-/// |s| within 4u, wherever it is a normal number: two squares and their sum lose 2 u, of which the
-/// root, correctly rounded, keeps half. Where squares leave the range, of the quotient by the larger
-/// part.
-pub(crate) fn modulus(s: Complex64) -> f64 {
-    let square = s.norm_sqr();
-    if square > 1e-280 && square < 1e300 {
-        return square.sqrt();
-    }
-    let large = s.re.abs().max(s.im.abs());
-    if square.is_nan() {
-        f64::NAN
-    } else if large == 0.0 || large.is_infinite() {
-        large
-    } else {
-        (s / large).norm_sqr().sqrt() * large
-    }
-}
-
-/// Value and slope of g at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jet {
-    /// g(s).
-    pub value: Complex64,
-    /// g′(s).
-    pub slope: Complex64,
-    /// Bound on the error of `value`.
-    pub value_error: f64,
-    /// Bound on the error of `slope`.
-    pub slope_error: f64,
-    /// Index of the largest term, where it exceeds the reference term fourfold.
-    pub overtaken_by: Option<usize>,
-}
 
 /// Evaluates one quasi-polynomial at many points, relative to a reference term c.
 #[derive(Debug, Clone)]
@@ -299,7 +262,7 @@ impl<'a> Probe<'a> {
         self.evaluations += SHARP_COST;
         self.weigh(s.re);
         self.parts_at = None;
-        sharp::jet(self.h, self.reference, s)
+        double_double::jet(self.h, self.reference, s)
     }
 
     /// Bound on |g″| at every s with |s| ≤ `modulus` whose real part lies between x and

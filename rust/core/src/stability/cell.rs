@@ -8,7 +8,7 @@
 
 use num_complex::Complex64;
 
-use super::demand::Demand;
+use super::specification::Demand;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{
     Region, chain_abscissa, count_right_of, rightmost, roots, unstable_and_rightmost,

@@ -1,16 +1,17 @@
 //! A run from the start to the end: elements one after the other.
 
-use super::super::breaks::{BreakingPoint, Breaks};
-use super::super::history::Piece;
-use super::control::{self, Verdict};
+use super::breaks::{BreakingPoint, Breaks};
+use super::chebyshev;
+use super::control;
+use super::control::Verdict;
 use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
+use super::history::Piece;
 use super::newton::Newton;
 use super::nodes::{Nodes, nodes};
 use super::output::Output;
+use super::problem::{Equation, Outcome, Problem, Solution};
 use super::unread::{Reading, Unread};
-use super::{Equation, Outcome, Problem, Solution};
-use crate::dde::chebyshev;
 use crate::{Error, Task};
 
 /// Elements shorter than this part of their time are rounding.

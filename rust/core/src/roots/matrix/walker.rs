@@ -10,13 +10,15 @@
 
 use num_complex::Complex64;
 
-use super::place::{Place, Reach};
+use super::local_enclosure::{Place, Reach};
 use super::system::CharacteristicMatrix;
 use crate::quasipoly::modulus;
-use crate::roots::cell::{Cell, Walk};
-use crate::roots::isolate::Seek;
-use crate::roots::newton::{Disc, Outcome};
-use crate::roots::winding::Turn;
+use crate::roots::counting::Cell;
+use crate::roots::counting::Turn;
+use crate::roots::counting::Walk;
+use crate::roots::disc::Disc;
+use crate::roots::locating::Outcome;
+use crate::roots::locating::Seek;
 use crate::{Error, Task};
 
 use std::f64::consts::{PI, TAU};
