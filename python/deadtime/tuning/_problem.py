@@ -11,10 +11,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.ranges import Range, interval
 from deadtime._base.validation import finite, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.loops._sweep import require_loop
-from deadtime.tuning._stabilising import Range, candidate_ranges
+from deadtime.tuning._stabilising import candidate_ranges
 
 __all__ = [
     "Problem",
@@ -140,7 +141,7 @@ def pose(
         given = _mapping("ranges", ranges)
         if set(given) != set(free):
             raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
-        spans = ({name: _range(name, given[name]) for name in free},)
+        spans = ({name: interval(f"the range of {name}", given[name]) for name in free},)
     height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
@@ -179,17 +180,6 @@ def _mapping(name: str, given: Any) -> dict[str, Any]:
     return dict(given)
 
 
-def _range(name: str, given: Range) -> Range:
-    try:
-        low, high = given
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"the range of {name} is {given!r}: give (low, high)") from error
-    low, high = finite(name, low), finite(name, high)
-    if not low < high:
-        raise ValueError(f"the range of {name} is {given}: give (low, high) with low < high")
-    return low, high
-
-
 def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
     if delay is None:
         if loop.delay is None:
@@ -197,15 +187,16 @@ def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
         return loop.delay, loop.delay
     if not isinstance(delay, (tuple, list, np.ndarray)):
         return non_negative("delay", delay), float(delay)
-    low, high = (float(end) for end in delay)
-    if not 0.0 <= low <= high < np.inf:
+    low, high = interval("delay", delay, may_be_point=True)
+    if low < 0.0:
         raise ValueError(f"delay={delay!r} is not an interval (low, high) of times >= 0")
     return low, high
 
 
 def _gain_interval(gain: float | Range) -> Range:
-    low, high = gain if isinstance(gain, (tuple, list, np.ndarray)) else (gain, gain)
-    low, high = finite("gain", low), finite("gain", high)
-    if not low <= high or low * high <= 0.0:
+    if not isinstance(gain, (tuple, list, np.ndarray)):
+        gain = (gain, gain)
+    low, high = interval("gain", gain, may_be_point=True)
+    if low * high <= 0.0:
         raise ValueError(f"gain={gain!r} is not an interval (low, high) on one side of zero")
     return low, high
