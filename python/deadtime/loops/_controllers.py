@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from deadtime._base.validation import finite
 from deadtime.loops._batched_matrices import matrix, vector
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
+from deadtime.loops._polynomials import Polynomial, multiplied, scaled, summed
 from deadtime.systems import TransferFunction
 
 __all__ = ["PD", "PI", "PID", "PV", "Controller", "DerivativeFilter", "P"]
 
 Vector = NDArray[np.float64]
-Polynomial = list[Any]
 
 
 class ControllerEquations(NamedTuple):
@@ -162,12 +162,12 @@ class Controller(ABC):
             omega, damping = values["omega"], values["damping"]
             rolled_off = [1.0, 2.0 * (damping * omega), omega * omega]
             slope = [omega * omega * d, 0.0]
-        num = _scaled(p, _product(integral, rolled_off))
+        num = scaled(p, multiplied(integral, rolled_off))
         if terms.differentiates:
-            num = _sum(num, _product(integral, slope))
+            num = summed(num, multiplied(integral, slope))
         if terms.integrates:
-            num = _sum(num, _scaled(i, rolled_off))
-        return num, _product(integral, rolled_off)
+            num = summed(num, scaled(i, rolled_off))
+        return num, multiplied(integral, rolled_off)
 
     def _equations(self, values: Mapping[str, Any]) -> ControllerEquations:
         """Equations of the states: integral of the error first, filter after it."""
@@ -430,22 +430,3 @@ class PID(Controller):
             differentiates=True,
             derivative_of_error=True,
         )
-
-
-def _product(p: Polynomial, q: Polynomial) -> Polynomial:
-    out: Polynomial = [0.0] * (len(p) + len(q) - 1)
-    for i, a in enumerate(p):
-        for j, b in enumerate(q):
-            out[i + j] = out[i + j] + a * b
-    return out
-
-
-def _sum(p: Polynomial, q: Polynomial) -> Polynomial:
-    if len(p) < len(q):
-        p, q = q, p
-    head = len(p) - len(q)
-    return p[:head] + [a + b for a, b in zip(p[head:], q, strict=True)]
-
-
-def _scaled(factor: Any, p: Polynomial) -> Polynomial:
-    return [factor * a for a in p]

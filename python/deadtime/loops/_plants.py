@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.validation import finite, non_negative, non_zero, unmasked
 from deadtime.loops._batched_matrices import matrix, number, vector
+from deadtime.loops._polynomials import in_s
 from deadtime.systems import TransferFunction
 
 __all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
@@ -57,6 +58,11 @@ class Plant(ABC):
     @abstractmethod
     def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
         """Numerator and denominator, descending, in numbers, arrays or symbols of `values`."""
+
+    def _fraction(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Numerator and denominator as quasi-polynomials, or families of them."""
+        num, den = self._polynomials(values)
+        return in_s(num), in_s(den)
 
     def polynomials(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Numerator and denominator of the transfer function.
