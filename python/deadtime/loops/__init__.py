@@ -10,6 +10,7 @@ from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._controllers import PD, PI, PID, PV, Controller, P
 from deadtime.loops._derivative_filter import DerivativeFilter
 from deadtime.loops._fixed_step import simulate_fixed_step
+from deadtime.loops._given_plants import PlantWithDelays
 from deadtime.loops._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
 from deadtime.loops._simulate import simulate
 from deadtime.loops._sweep import Sweep, SweepStatus, sweep
@@ -26,6 +27,7 @@ __all__ = [
     "Integrator",
     "P",
     "Plant",
+    "PlantWithDelays",
     "RationalPlant",
     "Sweep",
     "SweepStatus",

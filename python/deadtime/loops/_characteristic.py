@@ -15,7 +15,7 @@ from deadtime.loops._polynomials import in_s
 from deadtime.roots import delay
 from deadtime.systems import TransferFunction
 
-__all__ = ["characteristic", "closed_loop", "open_loop"]
+__all__ = ["characteristic", "closed_loop", "open_loop", "reference_to_command"]
 
 
 def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
@@ -42,4 +42,13 @@ def closed_loop(
     num = b * in_s(controller._reference(values)[0])
     if delay_path == "command":
         num = num * delay(values["delay"])
+    return TransferFunction(num, characteristic(plant, controller, values))
+
+
+def reference_to_command(
+    plant: Plant, controller: Controller, values: Mapping[str, float]
+) -> TransferFunction:
+    """Build a r / (a g + b f e^(-s delay))."""
+    _, a = plant._fraction(values)
+    num = a * in_s(controller._reference(values)[0])
     return TransferFunction(num, characteristic(plant, controller, values))

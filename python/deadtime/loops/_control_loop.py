@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
+from deadtime._base.validation import non_negative
 from deadtime.loops._controllers import Controller
 from deadtime.loops._gain import LoopGain
+from deadtime.loops._given_plants import plant_and_delay
 from deadtime.loops._in_time import LoopInTime
 from deadtime.loops._plants import Plant
 from deadtime.loops._poles import LoopPoles
@@ -15,7 +17,7 @@ from deadtime.loops._specification import LoopSpecification
 __all__ = ["ControlLoop"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class ControlLoop(LoopInTime, LoopPoles, LoopGain):
     """A plant under feedback with one delay in the loop.
 
@@ -25,8 +27,11 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain):
 
     Parameters
     ----------
-    plant : Plant
-        `Integrator`, `FirstOrder` or `RationalPlant`.
+    plant : Plant, TransferFunction, DelaySystem or a system of python-control or scipy.signal
+        `Integrator`, `FirstOrder` or `RationalPlant`; or a continuous system with one input and
+        one output. A delay in series with it is added to `delay`, and is not part of the `plant`
+        of the loop. With delays inside it becomes a `deadtime.loops.PlantWithDelays`, which takes
+        no `sample_time` and no `limit`.
     controller : Controller
         `P`, `PV`, `PD`, `PI` or `PID`.
     delay : float, optional
@@ -37,12 +42,16 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain):
         Bound of the command, abs(u) <= limit; None for no bound.
     delay_path : {"command", "measurement"}
         Where the delay sits. Between command and plant, the output starts to move `delay` after a
-        step; in the measurement, the output itself is the same function `delay` earlier.
+        step; in the measurement, the output itself is the same function `delay` earlier. A plant
+        with a delay in series has it between command and output, and takes "command" only.
 
     Raises
     ------
     ValueError
-        If a number is negative, not finite or zero where it must not be; the message names it.
+        If a number is negative, not finite or zero where it must not be; the message names it. If
+        the plant is sampled, has several inputs or outputs, or is not proper and causal.
+    TypeError
+        If `plant` or `controller` is none.
 
     Examples
     --------
@@ -53,22 +62,44 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain):
     >>> info = loop.step_response().info()
     >>> round(info["overshoot"], 1), round(info["settling_time"], 2)
     (44.0, 4.31)
+
+    A plant as a transfer function, its delay with it:
+
+    >>> G = 0.9 / (dtm.s * (0.1 * dtm.s + 1)) * dtm.delay(0.36)
+    >>> dtm.ControlLoop(G, dtm.P(Kp=1.5)).margin()
+    <Margins: gain 2.697 at 3.442 rad/s, phase 54.78° at 1.338 rad/s, delay 0.7145 s at ...>
     """
 
     plant: Plant
     controller: Controller
-    _: KW_ONLY
     delay: float | None = None
     sample_time: float | None = None
     limit: float | None = None
     delay_path: Literal["command", "measurement"] = "command"
 
-    def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in _NAMES}
+    def __init__(
+        self,
+        plant: object,
+        controller: Controller,
+        *,
+        delay: float | None = None,
+        sample_time: float | None = None,
+        limit: float | None = None,
+        delay_path: Literal["command", "measurement"] = "command",
+    ) -> None:
+        own, in_series = plant_and_delay(plant)
+        if in_series > 0.0:
+            if delay_path == "measurement":
+                raise ValueError(
+                    f"delay_path='measurement': the plant has a delay of {in_series:g} s between "
+                    "command and output; leave delay_path out, or give the plant without its delay"
+                )
+            delay = in_series + (0.0 if delay is None else non_negative("delay", delay))
+        specification = LoopSpecification(own, controller, delay, sample_time, limit, delay_path)
         put = object.__setattr__
-        put(self, "specification", LoopSpecification(**given))
+        put(self, "specification", specification)
         for name in _NAMES:
-            put(self, name, getattr(self.specification, name))
+            put(self, name, getattr(specification, name))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Without what is kept for speed.

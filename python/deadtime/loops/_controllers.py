@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from deadtime._base.validation import finite
 from deadtime.loops._batched_matrices import matrix, vector
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
+from deadtime.loops._given_plants import transfer_function_of
 from deadtime.loops._polynomials import Polynomial, multiplied, scaled, summed
 from deadtime.systems import TransferFunction
 
@@ -78,6 +79,9 @@ def _sampled(
 class Controller(ABC):
     """Base of all controllers: gains, and a filter where there is a derivative."""
 
+    # NumPy and packages built on it leave `G * controller` to this class.
+    __array_ufunc__ = None
+
     def __post_init__(self) -> None:
         for name in self._gains():
             object.__setattr__(self, name, finite(name, getattr(self, name)))
@@ -121,8 +125,20 @@ class Controller(ABC):
         >>> import deadtime as dtm
         >>> dtm.PI(Kp=2.0, Ki=0.5).transfer_function()
         (0.5 + 2 s) / s
+
+        A product with a plant is the loop gain:
+
+        >>> 0.9 / dtm.s * dtm.delay(0.36) * dtm.PV(Kp=2.0, Kv=0.3)
+        (1.8 + 0.27 s) exp(-0.36 s) / s
         """
         return TransferFunction(*self._feedback(self.parameters))
+
+    def __mul__(self, other: object) -> TransferFunction:
+        """Loop gain of this feedback and a plant, a transfer function or a system."""
+        G = transfer_function_of(other)
+        return NotImplemented if G is None else G * self.transfer_function()
+
+    __rmul__ = __mul__
 
     def _replace(self, numbers: Mapping[str, float]) -> Controller:
         """Return the same controller with other numbers."""

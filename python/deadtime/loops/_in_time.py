@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from deadtime._base.validation import finite
 from deadtime.loops._run import settled_step, simulate_loop
+from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
 
@@ -81,6 +82,9 @@ class LoopInTime:
         response jumps, the derivative is that of what follows the jump; where the delay is a
         whole number of samples, that for a longer delay.
 
+        A loop whose plant has delays inside is simulated by its transfer functions; it starts at
+        rest under `reference_before`, and has no sensitivities.
+
         Examples
         --------
         >>> import deadtime as dtm
@@ -96,7 +100,8 @@ class LoopInTime:
         >>> print(response.sensitivities["delay"])       # before 2 delays: y = Kp (t - delay)
         [ 0.         -1.31       -0.348984]
         """
-        return simulate_loop(
+        run = simulate_loop if self.specification.plant.is_rational else simulate_with_delays
+        return run(
             self.specification,
             time,
             reference,
@@ -132,4 +137,6 @@ class LoopInTime:
         """
         if time is not None:
             return self.simulate(time, amplitude)
-        return settled_step(self.specification, finite("amplitude", amplitude))
+        rational = self.specification.plant.is_rational
+        run = settled_step if rational else settled_step_with_delays
+        return run(self.specification, finite("amplitude", amplitude))

@@ -1,6 +1,7 @@
 r"""Plants: what the delayed command acts on.
 
-Every plant is a proper rational transfer function b(s)/a(s) in floats. Its state space is the
+A plant is a proper rational transfer function b(s)/a(s) in floats (those with delays inside:
+`_given_plants`). Its state space is the
 observable canonical form: with a monic of degree n and D = b\ :sub:`0`,
 
     x_i' = -a_i x_1 + x_{i+1} + (b_i - a_i D) w,   y = x_1 + D w,
@@ -44,7 +45,12 @@ class StateSpace(NamedTuple):
 
 
 class Plant(ABC):
-    """A proper rational transfer function from the delayed command w to the output y."""
+    """A proper transfer function from the delayed command w to the output y."""
+
+    @property
+    def is_rational(self) -> bool:
+        """Whether it is a ratio of polynomials; else it has delays inside."""
+        return True
 
     @property
     @abstractmethod

@@ -55,8 +55,16 @@ class LoopSpecification:
             raise ValueError(
                 f"delay_path={self.delay_path!r}: give one of {', '.join(map(repr, DELAY_PATHS))}"
             )
-        # Building the model checks that its parts fit.
-        _ = self.model
+        if self.plant.is_rational:
+            # Building the model checks that its parts fit.
+            _ = self.model
+            return
+        for name, value in (("sample_time", self.sample_time), ("limit", self.limit)):
+            if value is not None:
+                raise ValueError(
+                    f"{name}={value}: a hold or a limit needs a plant that is rational but for one "
+                    f"delay in series, and this one has delays inside; leave {name} out"
+                )
 
     def __getstate__(self) -> dict[str, Any]:
         # The cached native loop does not pickle, and is quickly built again.

@@ -33,6 +33,8 @@ class ProvedStep(NamedTuple):
 
 def proved_step(loop: ControlLoop, amplitude: float) -> ProvedStep | None:
     """Simulate a step until its tail is proved to stay at rest; None where that fails."""
+    if not loop.plant.is_rational:
+        return None
     late = {"delay": loop.specification.known_delay}
     found = sweep(loop, late, amplitude=amplitude, settling=BAND)
     rest, end = loop.specification.steady_state(amplitude), float(found.time[-1])
