@@ -80,9 +80,7 @@ def test_a_pure_delay_is_a_plant():
 
 def test_a_plant_with_its_delay_between_command_and_output_has_none_in_its_measurement():
     G = delay(0.25) / (s + 1.0)
-    with pytest.raises(
-        ValueError, match=r"delay_path='measurement': .* delay of 0\.25"
-    ):
+    with pytest.raises(ValueError, match=r"delay_path='measurement': .* delay of 0\.25"):
         dtm.ControlLoop(G, dtm.P(1.0), delay_path="measurement")
     loop = dtm.ControlLoop(1.0 / (s + 1.0), dtm.P(1.0), delay=0.25, delay_path="measurement")
     assert loop.delay_path == "measurement"
