@@ -253,7 +253,7 @@ def test_a_sweep_without_a_delay_is_refused():
 
 
 def test_the_page_of_the_manual_runs():
-    page = Path(__file__).resolve().parents[2] / "docs" / "sweeps-and-sensitivities.md"
+    page = Path(__file__).resolve().parents[2] / "docs" / "guide/sweeps-and-sensitivities.md"
     blocks = re.findall(r"```pycon\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 5
     examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "page", None, 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,7 @@ from deadtime.roots._chains import Chain, chains_of
 from deadtime.roots._root_set import Range, RootSet, ends, root_set
 from deadtime.roots._sensitivity import Sensitivity
 from deadtime.roots.certificate._certificate import Certificate
-
-if TYPE_CHECKING:
-    pass
+from deadtime.roots.certificate._proof import proved
 
 __all__ = ["Characteristic", "Edge"]
 
@@ -105,9 +103,8 @@ class Characteristic:
         >>> proof.count, proof.verify()
         (16, 16)
         """
-        region = ends("re", re), ends("im", im)
-        rows, delays = self._coefficients.tolist(), self._delays.tolist()
-        return Certificate._made(rows, delays, region, self._native.certify(*region))
+        proof = self._native.certify(ends("re", re), ends("im", im))
+        return proved(self._coefficients.tolist(), self._delays.tolist(), proof)
 
     def roots(
         self, re: Range | None = None, im: Range | None = None, *, edge: Edge = "error"
@@ -376,10 +373,10 @@ class Characteristic:
         """
         place = complex(root)
         rows, width = self._coefficients.shape
-        found, slopes = self._native.sensitivity(
+        found = self._native.sensitivity(
             place, np.repeat(self._delays, width).tolist(), list(range(width)) * rows
         )
-        coefficients = slopes.reshape(rows, width)
+        coefficients = found.coefficients.reshape(rows, width)
         # h depends on a delay through its row alone, d/dtau of which is -s times the row.
-        delays = -found * (coefficients * self._coefficients).sum(axis=1)
-        return Sensitivity(found, coefficients, delays)
+        delays = -found.root * (coefficients * self._coefficients).sum(axis=1)
+        return Sensitivity(found.root, coefficients, delays)

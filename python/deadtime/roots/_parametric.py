@@ -16,7 +16,7 @@ import math
 import numbers
 from collections.abc import Collection, Mapping
 from functools import cached_property
-from typing import SupportsFloat, TypeAlias, cast
+from typing import NamedTuple, SupportsFloat, TypeAlias, cast
 
 from deadtime._base.validation import finite
 from deadtime._deadtime import Family
@@ -37,6 +37,16 @@ _Terms: TypeAlias = dict[_Monomial, float]
 
 _NO_DELAY: _Delay = (0.0, ())
 _ONE: _Monomial = ((), 0, _NO_DELAY)
+
+
+class FamilyTerm(NamedTuple):
+    """One term as the native core takes it."""
+
+    coefficient: float
+    exponents: _Powers
+    power: int
+    constant: float
+    slopes: tuple[tuple[str, float], ...]
 
 
 class ParametricQuasiPolynomial:
@@ -138,7 +148,7 @@ class ParametricQuasiPolynomial:
         if missing:
             raise ValueError(f"no value for {', '.join(missing)}: give {missing[0]}=...")
         point = [finite(name, values[name]) for name in self._names]
-        return QuasiPolynomial(*self._family.at(point))
+        return QuasiPolynomial._wrap(self._family.at(point))
 
     def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
         """Return this expression, whose parameters must be those in `names`."""
@@ -195,12 +205,10 @@ class ParametricQuasiPolynomial:
             max(0.0, constant + sum(slope * point[name] for name, slope in slopes))
             for (_, _, (constant, slopes)), _ in terms
         ]
-        found, by_coefficient = h._native.sensitivity(
-            complex(root), times, [power for (_, power, _), _ in terms]
-        )
+        found = h._native.sensitivity(complex(root), times, [power for (_, power, _), _ in terms])
         moves = dict.fromkeys(self._names, 0j)
         for ((powers, _, (_, slopes)), number), slope in zip(
-            terms, by_coefficient.tolist(), strict=True
+            terms, found.coefficients.tolist(), strict=True
         ):
             factors = [point[name] ** exponent for name, exponent in powers]
             for index, (name, exponent) in enumerate(powers):
@@ -209,25 +217,17 @@ class ParametricQuasiPolynomial:
                 moves[name] += slope * change
             for name, rate in slopes:
                 # A delay changes its term by -s times the term.
-                moves[name] -= found * slope * number * math.prod(factors) * rate
+                moves[name] -= found.root * slope * number * math.prod(factors) * rate
         return moves
 
     @cached_property
     def _family(self) -> Family:
         """The same function as the native core holds it."""
-        rows = []
-        for (powers, power, (constant, slopes)), coefficient in self._terms.items():
-            exponent, slope = dict(powers), dict(slopes)
-            rows.append(
-                (
-                    coefficient,
-                    [exponent.get(name, 0) for name in self._names],
-                    power,
-                    constant,
-                    [slope.get(name, 0.0) for name in self._names],
-                )
-            )
-        return Family(list(self._names), rows)
+        terms = [
+            FamilyTerm(coefficient, exponents, power, constant, slopes)
+            for (exponents, power, (constant, slopes)), coefficient in self._terms.items()
+        ]
+        return Family(list(self._names), terms)
 
     def _exponential(self) -> ParametricQuasiPolynomial:
         """e^(-s T) with T this function: what `delay` gives for a parametric delay."""

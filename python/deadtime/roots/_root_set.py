@@ -155,7 +155,13 @@ def ends(name: str, given: Range | None) -> tuple[float, float]:
     return pair
 
 
-def root_set(listed: _deadtime._Listed) -> RootSet:
-    """Roots as the native part lists them."""
-    roots, multiplicities, radii, resolved, counted, re, im = listed
-    return RootSet(roots, multiplicities, radii, resolved, counted, (re, im))
+def root_set(found: _deadtime.RootSet) -> RootSet:
+    """The roots that the native part found."""
+    return RootSet(
+        roots=found.roots,
+        multiplicities=found.multiplicities,
+        radii=found.radii,
+        resolved=found.resolved,
+        counted=found.counted,
+        region=found.region,
+    )

@@ -1,4 +1,4 @@
-"""Intervals of gains and delays as arguments, and the order in which the core holds them."""
+"""Intervals of gains and delays as arguments."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from typing import SupportsFloat, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
 from deadtime._base.validation import finite
 from deadtime.loops import ControlLoop
 from deadtime.roots import ParametricQuasiPolynomial
-from deadtime.roots._family import family_of
 
 __all__ = [
     "MOST_MOVING",
@@ -22,9 +20,6 @@ __all__ = [
     "Progress",
     "Range",
     "System",
-    "inverse",
-    "native_family",
-    "placed",
     "ranges_of",
     "side",
 ]
@@ -44,13 +39,13 @@ def side(name: str, low: float, high: float) -> str:
     return f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}"
 
 
-def ranges_of(given: Given) -> tuple[tuple[str, ...], list[Range]]:
-    """Names and ends of ranges and values."""
+def ranges_of(given: Given) -> dict[str, Range]:
+    """Ends of ranges and values."""
     if not isinstance(given, Mapping):
         raise TypeError(f"ranges={given!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
     if not given:
         raise ValueError("ranges of no parameter: give one to three")
-    ends = []
+    ends = {}
     for name, value in given.items():
         if isinstance(value, (tuple, list, np.ndarray)):
             if len(value) != 2:
@@ -64,26 +59,10 @@ def ranges_of(given: Given) -> tuple[tuple[str, ...], list[Range]]:
                 raise ValueError(f"{name}={value!r}: the range is wider than 1e308")
         else:
             low = high = finite(name, value)
-        ends.append((low, high))
-    if sum(low < high for low, high in ends) > MOST_MOVING:
+        ends[name] = (low, high)
+    if sum(low < high for low, high in ends.values()) > MOST_MOVING:
         raise ValueError(
             f"ranges for more than {MOST_MOVING} parameters ({', '.join(given)}): "
             "give the others values"
         )
-    return tuple(given), ends
-
-
-def native_family(system: System, names: tuple[str, ...]) -> tuple[_deadtime.Family, list[int]]:
-    """The family in the core, and where it holds each parameter."""
-    family = family_of(system, names)
-    return family._family, [family.names.index(name) for name in names]
-
-
-def inverse(places: list[int]) -> list[int]:
-    """The place among the names of each parameter of the family."""
-    return [places.index(index) for index in range(len(places))]
-
-
-def placed(ends: list[Range], places: list[int]) -> list[Range]:
-    """The ranges in the order of the family."""
-    return [ends[index] for index in inverse(places)]
+    return ends

@@ -370,13 +370,10 @@ def stability_map(
             progress,
         )
     else:
-        found = _map_family(family_of(family, names), names, axes, question, threads, progress)
+        found = _map_family(family_of(family, names), axes, question, threads, progress)
     if progress is not None:
         progress(cells)
     unstable, alpha, status, judged = found
-    arrays: list[NDArray[Any]] = [*axes.values(), unstable, alpha, status]
-    for array in arrays:
-        read_only(array)
     return StabilityMap(
         names, axes, unstable, alpha, status, question.decay, question.damping, judged
     )
@@ -399,30 +396,17 @@ _Found: TypeAlias = tuple[
 
 def _map_family(
     family: ParametricQuasiPolynomial,
-    names: tuple[str, str],
     axes: dict[str, _Floats],
     question: _Question,
     threads: int | None,
     progress: _Progress | None,
 ) -> _Found:
     """Judge the members of a family."""
-    places = (family.names.index(names[0]), family.names.index(names[1]))
-    first, second = axes[names[0]], axes[names[1]]
-    unstable, alpha, status = family._family.map(
-        [0.0] * len(family.names),
-        places,
-        first,
-        second,
-        question.decay,
-        question.damping,
-        question.abscissa,
-        question.proof == "cells",
-        threads,
-        progress,
-    )
+    cells = family._family.map(axes, question, threads=threads, progress=progress)
+    unstable, alpha = cells.unstable, cells.abscissa
     if alpha is None:
         alpha = np.broadcast_to(np.float64(np.nan), unstable.shape)
-    return unstable, alpha, status, family
+    return unstable, alpha, cells.status, family
 
 
 def _map_sampled(

@@ -11,7 +11,7 @@ from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import finite, non_negative, positive
 from deadtime.roots._family import family_of
-from deadtime.stability._intervals import MOST_MOVING, Range, System, inverse, native_family
+from deadtime.stability._intervals import MOST_MOVING, Range, System
 
 __all__ = ["StabilityRadius", "stability_radius"]
 
@@ -100,30 +100,17 @@ def stability_radius(
             raise ValueError(f"{name}=0 has no scale of its own: give scales={{{name!r}: ...}}")
     if sum(unit > 0.0 for unit in units.values()) > MOST_MOVING:
         raise ValueError(f"more than {MOST_MOVING} parameters move: give the others a scale of 0")
-    native, places = native_family(family, names)
-    order = [names[place] for place in inverse(places)]
-    radius, upper, witness = _deadtime.stability_radius(
-        native,
-        [values[name] for name in order],
-        [units[name] for name in order],
-        positive("tol", tol),
-        _RADIUS_BOXES,
+    known = family_of(family, names)
+    found = _deadtime.stability_radius(
+        known._family, values, units, tol=positive("tol", tol), max_boxes=_RADIUS_BOXES
     )
-    delays = _delay_names(family, names)
+    # Parameters that a delay depends on.
+    delays = {name for _, _, (_, slopes) in known._terms for name, _ in slopes}
     ranges = {}
     for name, value in values.items():
-        reach = radius * units[name]
+        reach = found.radius * units[name]
         # Inwards: a sum may round to a place just outside.
         low = min(math.nextafter(value - reach, math.inf), value)
         high = max(math.nextafter(value + reach, -math.inf), value)
         ranges[name] = (min(max(low, 0.0), value) if name in delays else low, high)
-    found = None if witness is None else dict(zip(order, witness, strict=True))
-    if found is not None:
-        found = {name: found[name] for name in names}
-    return StabilityRadius(radius, upper, found, ranges)
-
-
-def _delay_names(system: System, names: tuple[str, ...]) -> set[str]:
-    """Parameters that a delay depends on."""
-    family = family_of(system, names)
-    return {name for _, _, (_, slopes) in family._terms for name, _ in slopes}
+    return StabilityRadius(found.radius, found.upper, found.witness, ranges)

@@ -256,7 +256,7 @@ class DelaySystem:
 
         Returns
         -------
-        ndarray of complex, shape (*s.shape, n, n)
+        ndarray of complex, shape ``(*s.shape, n, n)``
 
         Examples
         --------
