@@ -35,7 +35,7 @@ LOOPS = [
 
 def cut(loop):
     """Transition matrix with the loop opened at the command, and its input and output vectors."""
-    model = loop._model
+    model = loop.specification.model
     matrices = [
         replace(model, K=np.zeros_like(model.K), L=direct)
         .native(loop.delay, loop.sample_time)
