@@ -10,7 +10,7 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.loops._model import LoopModel, rest_of
+from deadtime.loops._model import rest_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from loops import loops
@@ -195,7 +195,7 @@ def test_instruction_sets_agree_to_the_bit():
 @settings(max_examples=60, deadline=None)
 @given(loop=loops())
 def test_the_rest_of_many_loops_is_that_of_each(loop):
-    gains = LoopModel.build(loop.plant, loop.controller, loop.parameters).rest_gains
+    gains = loop.specification.model.rest_gains
     output, command = rest_of(loop.plant, loop.controller, loop.parameters)
     assume(gains is not None)
     np.testing.assert_allclose([output, command], gains, atol=1e-12)

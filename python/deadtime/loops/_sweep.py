@@ -20,7 +20,7 @@ from deadtime._base.ranges import given_points, is_range
 from deadtime._base.validation import finite, increasing, positive, real_array, thread_number
 from deadtime._deadtime import sweep_figures, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._model import LoopModel, refuse_discretised, rest_of
+from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._run import LEAST, SHORTEST
 from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
 
@@ -295,7 +295,7 @@ class _Sets:
         loop, done = self.loop, 0
         for place, part in _blocks(loop, flat, math.prod(self.shape)):
             numbers: dict[str, Any] = loop.parameters | part
-            model = LoopModel.build(loop.plant, loop.controller, numbers)
+            model = loop.specification.model_at(numbers)
             row = model.row(*(numbers.get(name) for name in ("delay", "sample_time", "limit")))
             rows = np.ascontiguousarray(np.broadcast_to(row, (len(place), row.shape[-1])))
             ahead = loop.delay_path == "measurement"
@@ -349,7 +349,11 @@ class _Sets:
         loop = self.loop
         numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
         waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
-        slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
+        slowest = [
+            1.0 / abs(pole)
+            for pole in np.linalg.eigvals(loop.specification.model.A)
+            if abs(pole) > 0.0
+        ]
         span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
         found = self.measured(np.array([0.0, span]), progress)
         metrics = {name: figures.flatten() for name, figures in found.metrics.items()}
@@ -453,7 +457,7 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
         if flat.size and name not in gains:
             for place in {int(flat.argmin()), int(flat.argmax()), int(np.abs(flat).argmin())}:
                 loop = loop.replace(**{name: float(flat[place])})
-    loop._known_delay()
+    _ = loop.specification.known_delay
     sizes = [np.abs(arrays.get(name, gain)) for name, gain in gains.items()]
     if np.any(sum(sizes) == 0.0):
         raise ValueError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, cast
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,9 @@ from deadtime.roots._chains import Chain, chains_of
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots.certificate._certificate import Certificate
-from deadtime.roots.certificate._parts import Contour, Monotone, Segment
-
-if TYPE_CHECKING:
-    pass
+from deadtime.roots.certificate._proof import proved
 
 __all__ = ["Characteristic", "Edge"]
-
-_T = TypeVar("_T")
 
 #: What becomes of roots on the edge of a region.
 Edge: TypeAlias = Literal["error", "inside", "outside"]
@@ -110,7 +105,7 @@ class Characteristic:
         (16, 16)
         """
         proof = self._native.certify(open_interval("re", re), open_interval("im", im))
-        return _certificate(self._coefficients.tolist(), self._delays.tolist(), proof)
+        return proved(self._coefficients.tolist(), self._delays.tolist(), proof)
 
     def roots(
         self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: Edge = "error"
@@ -386,32 +381,3 @@ class Characteristic:
         # h depends on a delay through its row alone, d/dtau of which is -s times the row.
         delays = -found.root * (coefficients * self._coefficients).sum(axis=1)
         return RootSensitivity(found.root, coefficients, delays)
-
-
-def _certificate(
-    coefficients: list[list[float]], delays: list[float], proof: _deadtime.Certificate
-) -> Certificate:
-    """What the native part proved of a function."""
-    return _copied(
-        Certificate,
-        proof,
-        coefficients=tuple(map(tuple, coefficients)),
-        delays=tuple(delays),
-        contours=tuple(
-            _copied(Contour, contour, segments=tuple(map(_copied_part, contour.segments)))
-            for contour in proof.contours
-        ),
-        real=tuple(map(_copied_part, proof.real)),
-    )
-
-
-def _copied(kind: type[_T], native: Any, **made: Any) -> _T:
-    """Build a dataclass from an object with the same names, but for those that are given."""
-    names: tuple[str, ...] = kind.__match_args__  # type: ignore[attr-defined]
-    return kind(**{name: made[name] if name in made else getattr(native, name) for name in names})
-
-
-def _copied_part(part: _deadtime.Segment | _deadtime.Monotone) -> Segment | Monotone:
-    if isinstance(part, _deadtime.Monotone):
-        return _copied(Monotone, part)
-    return _copied(Segment, part)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from deadtime._base.ranges import Range, interval
 from deadtime._base.validation import finite, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.loops._sweep import require_loop
 from deadtime.tuning._stabilising import candidate_ranges
 
 __all__ = [
@@ -98,7 +97,7 @@ class Problem:
 
 
 def pose(
-    loop: ControlLoop,
+    loop: object,
     controller: type[Controller] | Controller,
     delay: float | Range | None,
     gain: float | Range | None,
@@ -108,8 +107,9 @@ def pose(
     threads: int | None,
 ) -> Problem:
     """Check what a design was asked for."""
-    require_loop(loop)
     template = controller_template(controller)
+    if not isinstance(loop, ControlLoop):
+        loop, delay = _around(loop, template, delay)
     held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
     unknown = [name for name in held if name not in template.gains]
     if unknown:
@@ -135,6 +135,11 @@ def pose(
     whole = loop.replace(controller=template, **middle)
     if held:
         whole = whole.replace(**held)
+    if ranges is None and not whole.plant.is_rational:
+        raise ValueError(
+            "ranges: where to look for gains is known for plants that are rational but for one "
+            "delay in series; give ranges= for this one"
+        )
     if ranges is None:
         spans = candidate_ranges(whole, free)
     else:
@@ -146,6 +151,17 @@ def pose(
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
     return Problem(whole, free, spans, intervals, height, threads)
+
+
+def _around(
+    plant: object, template: Controller, delay: float | Range | None
+) -> tuple[ControlLoop, float | Range | None]:
+    """A loop around a plant, and its delay: the plant's own and what comes on top of it."""
+    loop = ControlLoop(plant, template)
+    if delay is None or loop.delay is None:
+        return loop, delay
+    more = _interval("delay", delay)
+    return loop, (loop.delay + more[0], loop.delay + more[1])
 
 
 def controller_template(controller: type[Controller] | Controller) -> Controller:
@@ -185,11 +201,16 @@ def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
         if loop.delay is None:
             raise ValueError("the delay of the loop is not known: give delay=, or estimate it")
         return loop.delay, loop.delay
-    if not isinstance(delay, (tuple, list, np.ndarray)):
-        return non_negative("delay", delay), float(delay)
-    low, high = interval("delay", delay, may_be_point=True)
+    return _interval("delay", delay)
+
+
+def _interval(name: str, given: float | Range) -> Range:
+    """One time or an interval of times, s."""
+    if not isinstance(given, (tuple, list, np.ndarray)):
+        return non_negative(name, given), float(given)
+    low, high = interval(name, given, may_be_point=True)
     if low < 0.0:
-        raise ValueError(f"delay={delay!r} is not an interval (low, high) of times >= 0")
+        raise ValueError(f"{name}={given!r} is not an interval (low, high) of times >= 0")
     return low, high
 
 

@@ -16,7 +16,7 @@ pub mod spectral;
 pub mod system;
 
 pub use control_loop::{
-    Criteria, Equations, Figures, LinearLoop, Reference, Request, Response, Start, Trajectory,
+    Criteria, Equations, LinearLoop, Metrics, Reference, Request, Response, Start, Trajectory,
     Update, ensemble, fixed_step, on_sample, sampled, sensitivity,
 };
 pub use scalar::{Dual, Scalar};

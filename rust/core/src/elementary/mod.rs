@@ -13,16 +13,16 @@
 //! | [`precise::exp`], [`precise::sin_cos`] of a [`DoubleDouble`] | 8 u² |
 //!
 //! No library function and no fused operation is used: the bits are the same on every machine.
-//! `in_lanes` has the same bits of several elements at once.
+//! `simd` has the same bits of several elements at once.
 
 mod angle;
 mod circular;
 mod double_double;
 mod exponential;
-pub(crate) mod in_lanes;
 mod logarithm;
 mod nearest;
 pub mod precise;
+pub(crate) mod simd;
 mod tables;
 
 pub use angle::angle;

@@ -5,18 +5,11 @@
 
 use num_complex::Complex64;
 
-use crate::simd::Complex;
-use crate::simd::Kernel;
-use crate::simd::Mask;
-use crate::simd::Real;
-use crate::simd::SHORT;
-use crate::simd::Simd;
-use crate::simd::sweep;
+use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
 use super::branch_sort::Order;
-use super::kernel;
 use super::kernel::Point;
-use super::{delay, huge_branch, log_form, real, special_values};
+use super::{delay, huge_branch, kernel, log_form, real, special_values};
 
 /// Elements in a block.
 const BLOCK: usize = 256;

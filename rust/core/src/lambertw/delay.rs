@@ -12,10 +12,7 @@
 
 use num_complex::Complex64;
 
-use crate::simd::Complex;
-use crate::simd::Mask;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{INVERSE_E, one_plus_w};
 use super::elementary::{Reduced, cos_sin, exp, rough_log};

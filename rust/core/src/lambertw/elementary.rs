@@ -6,9 +6,7 @@
 //! Valid for |a| < 5000 (exponential) and |b| < 2^23 (sine and cosine). Errors are meant beside 1:
 //! a sine next to a multiple of pi (other than 0) is good to 2^-61, not to 2^-61 of itself.
 
-use crate::simd::Complex;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Complex, Real, Simd};
 
 use crate::simd::double_double::{Constant, DoubleDouble, ordered_sum, product, sum};
 

@@ -1,9 +1,6 @@
 //! The element: which starting value, which last step.
 
-use crate::simd::Complex;
-use crate::simd::Mask;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{
     INVERSE_E, INVERSE_E_LOW, branch_root, deep_branch_root, offset,

@@ -11,13 +11,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use crate::simd::Complex;
-use crate::simd::Kernel;
-use crate::simd::Mask;
-use crate::simd::Real;
-use crate::simd::SHORT;
-use crate::simd::Simd;
-use crate::simd::sweep;
+use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
 use super::branch_point::one_plus_w as near_branch_point;
 use super::guess::{behind, logarithmic_step, principal};

@@ -5,8 +5,7 @@
 //! lies 1.2e-17 below it; it is taken for -1/e, where both are -1, and NaN begins one ulp further.
 //! Error: 0.54 ulp.
 
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Real, Simd};
 
 use super::branch_point::{INVERSE_E, INVERSE_E_LOW, SERIES};
 use super::coefficients::{

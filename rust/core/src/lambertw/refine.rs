@@ -5,9 +5,7 @@
 //! the fourth power it leaves less than 1e-17 |w| for the starting values of `guess`; what remains
 //! is the rounding of the result and 2^-61 / |1 + w|.
 
-use crate::simd::Complex;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Complex, Real, Simd};
 
 use super::elementary::{Reduced, cos_sin, exp, turned_back};
 use crate::simd::double_double::DoubleDouble;

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 const OPPOSITE: f64 = 5.0 / f64::EPSILON;
 
 /// What an evaluation in two words counts for.
-const SHARP_COST: u64 = 20;
+const DOUBLE_DOUBLE_COST: u64 = 20;
 
 /// Evaluates one quasi-polynomial at many points, relative to a reference term c.
 #[derive(Debug, Clone)]
@@ -56,13 +56,13 @@ struct Part {
 
 /// How fast g can change from a point on, terms that are small and fast being counted by their size.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Calm {
+pub(crate) struct DominatedTerms {
     /// Slope of the other terms.
     pub(crate) slope: Complex64,
     /// Bound on their second derivative nearby.
     pub(crate) bend: f64,
     /// What the small ones can change g by, at most.
-    pub(crate) ripple: f64,
+    pub(crate) perturbation: f64,
 }
 
 impl<'a> Probe<'a> {
@@ -258,8 +258,8 @@ impl<'a> Probe<'a> {
 
     /// As [`jet`](Self::jet), in two words: some twenty times the work, for places where rounding
     /// hides what double precision could say.
-    pub fn sharp_jet(&mut self, s: Complex64) -> Jet {
-        self.evaluations += SHARP_COST;
+    pub fn double_double_jet(&mut self, s: Complex64) -> Jet {
+        self.evaluations += DOUBLE_DOUBLE_COST;
         self.weigh(s.re);
         self.parts_at = None;
         double_double::jet(self.h, self.reference, s)
@@ -308,18 +308,18 @@ impl<'a> Probe<'a> {
     /// What [`curvature`](Self::curvature) says, without the terms that together can change g by no more
     /// than `most` on the way to Re s = x + `shift`; `None` where there are none or nothing else, or the
     /// last jet was not taken at `s`.
-    pub(crate) fn calm(
+    pub(crate) fn dominated_terms(
         &self,
         s: Complex64,
         (modulus, shift): (f64, f64),
         most: f64,
-    ) -> Option<Calm> {
+    ) -> Option<DominatedTerms> {
         if self.parts_at != Some(s) {
             return None;
         }
         let far = self.x + shift;
         let share = most / self.parts.len() as f64;
-        let (mut slope, mut bend, mut ripple) = (Complex64::ZERO, FLOOR, 0.0);
+        let (mut slope, mut bend, mut perturbation) = (Complex64::ZERO, FLOOR, 0.0);
         let (mut small, mut other) = (false, false);
         for (((row, &gap), &weight), part) in self.terms().zip(&self.parts) {
             let (p, dp, ddp) = sizes(row, modulus);
@@ -327,7 +327,7 @@ impl<'a> Probe<'a> {
             let change = part.size + p * heaviest;
             if gap != 0.0 && change < share {
                 small = true;
-                ripple += change;
+                perturbation += change;
             } else {
                 other = true;
                 let gap = gap.abs();
@@ -335,10 +335,10 @@ impl<'a> Probe<'a> {
                 bend += (2.0 * ddp + gap * (2.0 * dp + gap * p)) * heaviest;
             }
         }
-        (small && other).then_some(Calm {
+        (small && other).then_some(DominatedTerms {
             slope,
             bend: bend * (1.0 + 1e-9),
-            ripple: (ripple + FLOOR) * (1.0 + 1e-9),
+            perturbation: (perturbation + FLOOR) * (1.0 + 1e-9),
         })
     }
 }

@@ -91,7 +91,7 @@ impl QuasiPolynomial {
         let mut jet = probe.jet(s);
         let drowned = |value, error| modulus(value) < DROWNED * error;
         if drowned(jet.value, jet.value_error) || drowned(jet.slope, jet.slope_error) {
-            jet = probe.sharp_jet(s);
+            jet = probe.double_double_jet(s);
         }
         let size = modulus(jet.value);
         (jet.slope / size) * (jet.value.conj() / size) - probe.delay()

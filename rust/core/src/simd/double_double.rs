@@ -6,8 +6,9 @@
 //! relative error of an operation is a few 2^-104 then, and some 2^-100 in a short chain.
 //! Provided nothing underflows and nothing overflows.
 
-use crate::simd::Real;
-use crate::simd::Simd;
+use pulp::Simd;
+
+use super::real::Real;
 
 /// An unevaluated sum `hi + lo` in each lane.
 #[derive(Debug, Clone, Copy)]

@@ -22,7 +22,7 @@ pub use family::{Affine, Family, Term};
 pub use map::{
     Axis, Boundaries, Chart, Proof, Question, Vertex, boundaries, chains, map, robust_map,
 };
-pub use specification::{Damping, Demand};
+pub use specification::{Damping, Specification};
 
 #[cfg(test)]
 mod tests;

@@ -22,7 +22,7 @@ pub struct Damping {
 
 /// What is demanded of every root.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Demand {
+pub struct Specification {
     /// σ: real parts below −σ, 1/s.
     pub decay: f64,
     /// And damping, if asked for.
@@ -50,7 +50,7 @@ impl Piece {
     }
 }
 
-impl Demand {
+impl Specification {
     /// Re s < `line` alone.
     pub(super) fn left_of(line: f64) -> Self {
         Self {
@@ -169,7 +169,7 @@ mod tests {
             horizon: 3.0,
         });
         for decay in [0.0, 1.5] {
-            let pieces = Demand { decay, damping }.pieces();
+            let pieces = Specification { decay, damping }.pieces();
             for pair in pieces.windows(2) {
                 let end = pair[0].from + pair[0].along * pair[0].length;
                 assert!((end - pair[1].from).norm() < 1e-14);
@@ -186,7 +186,7 @@ mod tests {
             horizon: 3.0,
         });
         for radius in [2.0, 4.5, 6.0, 20.0] {
-            for piece in (Demand {
+            for piece in (Specification {
                 decay: 1.5,
                 damping,
             })
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn demands_that_make_no_sense_are_refused() {
-        let with = |decay, ratio, horizon| Demand {
+        let with = |decay, ratio, horizon| Specification {
             decay,
             damping: Some(Damping { ratio, horizon }),
         };

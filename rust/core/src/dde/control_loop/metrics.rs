@@ -1,8 +1,8 @@
-//! Figures of a step response, and the record of a response from which they follow.
+//! Metrics of a step response, and the record of a response from which they follow.
 
-/// Figures of a step response, measured between its first output and its steady state.
+/// Metrics of a step response, measured between its first output and its steady state.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figures {
+pub struct Metrics {
     /// Time from the lower to the upper part of the step, s; NaN where it does not get there.
     pub rise_time: f64,
     /// Time from the start after which the output stays in the band, s; NaN where it does not.
@@ -23,7 +23,7 @@ pub struct Figures {
     pub steady_state: f64,
 }
 
-impl Figures {
+impl Metrics {
     /// Where nothing is known.
     pub const UNKNOWN: Self = Self {
         rise_time: f64::NAN,
@@ -55,12 +55,12 @@ impl Figures {
 
 /// What is left of the band after three time constants: an output that keeps to so narrow a band
 /// has died down.
-const CALM: f64 = 0.05;
+const QUIET_SHARE: f64 = 0.05;
 
 /// An output has been in the narrow band for this part of the time it took to get there from the
 /// other; a slow oscillation that passes through both lasts a tenth. And for so many delays.
-const CALM_FOR: f64 = 0.2;
-const CALM_WAITS: f64 = 3.0;
+const QUIET_FOR: f64 = 0.2;
+const QUIET_WAITS: f64 = 3.0;
 
 /// What counts as risen and as settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +84,7 @@ pub(crate) struct Levels {
     /// Half width of the band.
     pub(crate) band: f64,
     /// Half width of the band of what has died down.
-    pub(crate) calm: f64,
+    pub(crate) quiet_band: f64,
 }
 
 impl Levels {
@@ -98,12 +98,12 @@ impl Levels {
             sign,
             rise: (at(criteria.rise.0), at(criteria.rise.1)),
             band: criteria.settling * span.abs(),
-            calm: CALM * criteria.settling * span.abs(),
+            quiet_band: QUIET_SHARE * criteria.settling * span.abs(),
         }
     }
 }
 
-/// What a response did, from which its figures follow. Times count from its start.
+/// What a response did, from which its metrics follow. Times count from its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Record {
     /// Greatest output and its time.
@@ -117,28 +117,29 @@ pub(crate) struct Record {
     /// Since when the output is in the band; NaN where it is outside at the end.
     pub(crate) inside_since: f64,
     /// Until when the output has left the narrow band now and then.
-    pub(crate) restless_until: f64,
+    pub(crate) unsettled_until: f64,
 }
 
 impl Record {
     /// Does the response itself show at `end` that it stays in the band? `wait` is the time after
     /// which the loop answers to itself.
-    pub(crate) fn is_calm(&self, end: f64, wait: f64) -> bool {
-        let quiet = end - self.restless_until;
-        quiet >= CALM_FOR * (self.restless_until - self.inside_since) && quiet >= CALM_WAITS * wait
+    pub(crate) fn stays_settled(&self, end: f64, wait: f64) -> bool {
+        let quiet = end - self.unsettled_until;
+        quiet >= QUIET_FOR * (self.unsettled_until - self.inside_since)
+            && quiet >= QUIET_WAITS * wait
     }
 
-    pub(crate) fn figures(&self, levels: &Levels) -> Figures {
+    pub(crate) fn metrics(&self, levels: &Levels) -> Metrics {
         let (top, bottom) = (self.top, self.bottom);
         let upper =
             top.0.abs() > bottom.0.abs() || (top.0.abs() == bottom.0.abs() && top.1 <= bottom.1);
         let peak = if upper { top } else { bottom };
         let span = levels.steady - levels.first;
-        let known = Figures {
+        let known = Metrics {
             peak: peak.0.abs(),
             peak_time: peak.1,
             steady_state: levels.steady,
-            ..Figures::UNKNOWN
+            ..Metrics::UNKNOWN
         };
         if span == 0.0 {
             return known;
@@ -150,7 +151,7 @@ impl Record {
             (progress(bottom.0), progress(top.0))
         };
         let has_risen = self.risen.1.is_finite();
-        Figures {
+        Metrics {
             rise_time: self.risen.1 - self.risen.0,
             settling_time: self.inside_since,
             overshoot: 100.0 * (most - 1.0).max(0.0),

@@ -26,7 +26,7 @@ mod simulate;
 mod step_metrics;
 
 pub use linear_loop::{Equations, LinearLoop, Start, Update};
-pub use metrics::{Criteria, Figures};
+pub use metrics::{Criteria, Metrics};
 pub use reference::Reference;
 pub use requested_output::Trajectory;
 pub use response::{Request, Response, on_sample};

@@ -1,7 +1,7 @@
 //! What a run is to deliver: outputs and inputs at given times, breaking points, measurements.
 
 use super::series::Series;
-use super::step_metrics::Gauge;
+use super::step_metrics::StepMetrics;
 use crate::Error;
 use crate::dde::limits::RESPONSE;
 use crate::dde::scalar::Scalar;
@@ -22,17 +22,17 @@ pub struct Trajectory<S = f64> {
 
 /// Output and input times of a run, and how many of each are served.
 #[derive(Debug)]
-pub(crate) struct Wanted<'a, S = f64> {
+pub(crate) struct RequestedOutput<'a, S = f64> {
     output_times: &'a [f64],
     input_times: &'a [f64],
     /// Speed at which the output times move.
     ahead: S,
     pub(crate) trajectory: Trajectory<S>,
     /// Who measures the output on its way, if anyone does.
-    gauge: Option<&'a mut Gauge>,
+    metrics: Option<&'a mut StepMetrics>,
 }
 
-impl<'a, S: Scalar> Wanted<'a, S> {
+impl<'a, S: Scalar> RequestedOutput<'a, S> {
     /// Times to be served; the output times move with the slope of `ahead`.
     pub(crate) fn new(
         output_times: &'a [f64],
@@ -48,25 +48,25 @@ impl<'a, S: Scalar> Wanted<'a, S> {
                 inputs: reserved(RESPONSE, input_times.len())?,
                 ..Trajectory::default()
             },
-            gauge: None,
+            metrics: None,
         })
     }
 
     /// Have the output measured as well, at least up to the last of the times.
-    pub(crate) fn measured_by(mut self, gauge: &'a mut Gauge) -> Self {
-        self.gauge = Some(gauge);
+    pub(crate) fn measured_by(mut self, metrics: &'a mut StepMetrics) -> Self {
+        self.metrics = Some(metrics);
         self
     }
 
     /// Does anyone measure the output?
     pub(crate) fn is_measured(&self) -> bool {
-        self.gauge.is_some()
+        self.metrics.is_some()
     }
 
     /// The output is `y` of (t − `start`)/`length`, from 0 to `end`.
     pub(crate) fn measure(&mut self, start: f64, length: f64, end: f64, y: &Series) {
-        if let Some(gauge) = &mut self.gauge {
-            gauge.segment(start, length, end, y);
+        if let Some(metrics) = &mut self.metrics {
+            metrics.segment(start, length, end, y);
         }
     }
 

@@ -4,7 +4,7 @@ use crate::{Error, Task};
 
 use super::linear_loop::Start;
 use super::reference::Reference;
-use super::requested_output::Wanted;
+use super::requested_output::RequestedOutput;
 use super::row::{Row, width};
 use crate::dde::scalar::Dual;
 
@@ -65,8 +65,8 @@ pub fn sensitivities(
             sample_phase,
         };
         let plant = Row::new(n, &row)?.checked()?;
-        let wanted = Wanted::new(output_times, input_times, Dual::new(0.0, ahead))?;
-        let found = plant.serve(&start, reference, wanted, task)?;
+        let requested = RequestedOutput::new(output_times, input_times, Dual::new(0.0, ahead))?;
+        let found = plant.serve(&start, reference, requested, task)?;
         outputs.extend(found.outputs.iter().map(|y| y.slope));
         inputs.extend(found.inputs.iter().map(|u| u.slope));
     }

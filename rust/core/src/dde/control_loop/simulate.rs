@@ -2,7 +2,7 @@
 
 use super::linear_loop::{LinearLoop, Start};
 use super::reference::{Reference, finite};
-use super::requested_output::{Trajectory, Wanted};
+use super::requested_output::{RequestedOutput, Trajectory};
 use super::{continuous, sampled};
 use crate::dde::scalar::Scalar;
 use crate::{Error, Task};
@@ -17,20 +17,20 @@ impl<S: Scalar> LinearLoop<S> {
         input_times: &[f64],
         task: &Task,
     ) -> Result<Trajectory<S>, Error> {
-        let wanted = Wanted::new(output_times, input_times, S::default())?;
-        self.serve(start, reference, wanted, task)
+        let requested = RequestedOutput::new(output_times, input_times, S::default())?;
+        self.serve(start, reference, requested, task)
     }
 
-    /// Run until everything wanted is served.
+    /// Run until everything requested is served.
     pub(crate) fn serve(
         &self,
         start: &Start<S>,
         reference: &Reference,
-        wanted: Wanted<'_, S>,
+        requested: RequestedOutput<'_, S>,
         task: &Task,
     ) -> Result<Trajectory<S>, Error> {
         self.check_start(start)?;
-        for times in wanted.times() {
+        for times in requested.times() {
             finite("time", times)?;
             if let Some(&first) = times.first()
                 && first < 0.0
@@ -47,8 +47,8 @@ impl<S: Scalar> LinearLoop<S> {
             }
         }
         match self.sample_time() {
-            Some(ts) => sampled::run(self, ts, start, reference, wanted, task),
-            None => continuous::run(self, start, reference, wanted, task),
+            Some(ts) => sampled::run(self, ts, start, reference, requested, task),
+            None => continuous::run(self, start, reference, requested, task),
         }
     }
 

@@ -7,13 +7,13 @@
 //! can change nothing is passed over.
 
 use super::level_crossings::crossings;
-use super::metrics::{Criteria, Figures, Levels, Record};
+use super::metrics::{Criteria, Levels, Metrics, Record};
 use super::series::Series;
 use crate::dde::limits::slack;
 
 /// The measurements of one response between two times.
 #[derive(Debug, Clone)]
-pub(crate) struct Gauge {
+pub(crate) struct StepMetrics {
     start: f64,
     end: f64,
     criteria: Criteria,
@@ -24,7 +24,7 @@ pub(crate) struct Gauge {
     zeros: Vec<f64>,
 }
 
-impl Gauge {
+impl StepMetrics {
     /// Of a response from `start` to `end` whose steady state is `steady`.
     pub(crate) fn new(start: f64, end: f64, steady: f64, criteria: Criteria) -> Self {
         let unknown = (f64::NAN, f64::NAN);
@@ -40,20 +40,20 @@ impl Gauge {
                 risen: unknown,
                 after: unknown,
                 inside_since: f64::NAN,
-                restless_until: 0.0,
+                unsettled_until: 0.0,
             },
             zeros: Vec::new(),
         }
     }
 
-    pub(crate) fn figures(&self) -> Figures {
+    pub(crate) fn metrics(&self) -> Metrics {
         self.levels
-            .map_or(Figures::UNKNOWN, |levels| self.record.figures(&levels))
+            .map_or(Metrics::UNKNOWN, |levels| self.record.metrics(&levels))
     }
 
     /// Does the response show that it has settled for good?
-    pub(crate) fn is_calm(&self, wait: f64) -> bool {
-        self.record.is_calm(self.end - self.start, wait)
+    pub(crate) fn stays_settled(&self, wait: f64) -> bool {
+        self.record.stays_settled(self.end - self.start, wait)
     }
 
     /// The response is `y` of (t − `start`)/`length`, from 0 to `end`.
@@ -124,8 +124,8 @@ impl Gauge {
                 self.record.inside_since = time(entry).min(ends_at);
             }
         }
-        if (high - levels.steady).max(levels.steady - low) > levels.calm {
-            self.record.restless_until = ends_at;
+        if (high - levels.steady).max(levels.steady - low) > levels.quiet_band {
+            self.record.unsettled_until = ends_at;
         }
         self.zeros = zeros;
     }
@@ -219,10 +219,10 @@ mod tests {
     fn a_parabola_and_a_line_are_measured_exactly() {
         // y = 4 t (1 − t/2) to t = 2 … back at zero, then up to one in a line.
         for sign in [1.0, -1.0] {
-            let mut gauge = Gauge::new(0.0, 3.0, sign, CRITERIA);
-            gauge.segment(0.0, 2.0, 1.0, &series(&[0.0, 8.0 * sign, -8.0 * sign]));
-            gauge.segment(2.0, 1.0, 1.0, &series(&[0.0, sign]));
-            let found = gauge.figures();
+            let mut metrics = StepMetrics::new(0.0, 3.0, sign, CRITERIA);
+            metrics.segment(0.0, 2.0, 1.0, &series(&[0.0, 8.0 * sign, -8.0 * sign]));
+            metrics.segment(2.0, 1.0, 1.0, &series(&[0.0, sign]));
+            let found = metrics.metrics();
             let close = |a: f64, b: f64| (a - b).abs() < 1e-14;
             assert!(close(found.peak, 2.0) && close(found.peak_time, 1.0));
             assert!(close(found.overshoot, 100.0) && close(found.undershoot, 0.0));
@@ -237,10 +237,10 @@ mod tests {
 
     #[test]
     fn what_lies_outside_the_window_does_not_count() {
-        let mut gauge = Gauge::new(1.0, 2.0, 1.0, CRITERIA);
-        gauge.segment(0.0, 4.0, 1.0, &series(&[5.0, -8.0, 4.0]));
+        let mut metrics = StepMetrics::new(1.0, 2.0, 1.0, CRITERIA);
+        metrics.segment(0.0, 4.0, 1.0, &series(&[5.0, -8.0, 4.0]));
         // 5 − 2 t + t²/4 on [1, 2]: from 3.25 down to 2.
-        let found = gauge.figures();
+        let found = metrics.metrics();
         assert_eq!((found.peak, found.peak_time), (3.25, 0.0));
         assert!(found.settling_time.is_nan() && found.rise_time.is_nan());
     }

@@ -4,8 +4,7 @@ use super::equations::{SystemEquations, SystemResponse};
 use super::terms::Feed;
 use super::track::Track;
 use crate::Error;
-use crate::dde::limits::RESPONSE;
-use crate::dde::limits::slack;
+use crate::dde::limits::{RESPONSE, slack};
 use crate::memory::{push, reserved};
 
 /// The signals of a run, as far as they are known.

@@ -7,7 +7,7 @@
 //! half turn each time, and by −τ_c Im s how arg h turns: the winding number.
 //! D is |g′(m)| + e′ + B r with B the bound of `curvature_around` on |g″|, and a trifle of |v|/r more,
 //! so that a checker that works to so many digits of v can confirm it where g is almost constant. Next to
-//! several roots D is the bound of `crowd`.
+//! several roots D is the bound of `taylor`.
 //!
 //! The segments are longer or shorter than the steps of `winding`, which proves the same number
 //! from both ends of each step; that number stands in the certificate.
@@ -21,8 +21,8 @@ use super::closed_region::{close, closed_sides};
 use super::count::upper_half;
 use super::prepared::Prepared;
 use super::real_axis::{RealPart, survey_real};
-use super::segment::{CROWDED, Segment, TRIFLE};
-use super::taylor_bound::Crowd;
+use super::segment::{CLUSTER_SUSPECTED, Segment, TRIFLE};
+use super::taylor_bound::TaylorBound;
 use super::winding::{Walker, is_clear};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::region::Region;
@@ -220,10 +220,10 @@ fn segment(
     let mut slope = (flat + bend * radius) * (1.0 + MARGIN) + trifle;
     let mut reach = 2.0 * room / (flat + (flat * flat + 4.0 * bend * room).sqrt());
     let clear = is_clear(&jet);
-    if clear && slope * radius >= room && reach < CROWDED * room / flat {
-        let crowd = Crowd::new(&walker.probe, middle);
-        slope = crowd.slope(radius) + trifle;
-        reach = reach.max(crowd.steady_reach(SHARE, radius));
+    if clear && slope * radius >= room && reach < CLUSTER_SUSPECTED * room / flat {
+        let taylor = TaylorBound::new(&walker.probe, middle);
+        slope = taylor.slope(radius) + trifle;
+        reach = reach.max(taylor.steady_reach(SHARE, radius));
     }
     if clear && slope * radius < room {
         return Ok(Segment {

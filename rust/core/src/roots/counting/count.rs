@@ -17,7 +17,7 @@ use super::closed_region::{close, endless};
 use super::dominated::descend;
 use super::prepared::Prepared;
 use super::real_axis::survey_real;
-use super::time_scaling::OwnTime;
+use super::time_scaling::TimeScaling;
 use super::turn::Turn;
 use super::winding::{Walker, is_clear};
 use crate::elementary::angle;
@@ -55,11 +55,10 @@ pub(crate) fn upper_half(count: u64, real: u64) -> u64 {
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn count(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u64, Error> {
-    match OwnTime::within(h, region) {
+    match TimeScaling::within(h, region) {
         None => count_as_given(h, region, task),
-        Some(own) => {
-            count_as_given(&own.h, &own.region(region), task).map_err(|error| own.explained(error))
-        }
+        Some(scaling) => count_as_given(&scaling.h, &scaling.region(region), task)
+            .map_err(|error| scaling.explained(error)),
     }
 }
 
@@ -106,10 +105,10 @@ fn count_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<u
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn count_right_of(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Result<u64, Error> {
-    match OwnTime::within(h, &Region::right_of(sigma)) {
+    match TimeScaling::within(h, &Region::right_of(sigma)) {
         None => count_right_of_as_given(h, sigma, task),
-        Some(own) => count_right_of_as_given(&own.h, own.scaled(sigma), task)
-            .map_err(|error| own.explained(error)),
+        Some(scaling) => count_right_of_as_given(&scaling.h, scaling.scaled(sigma), task)
+            .map_err(|error| scaling.explained(error)),
     }
 }
 

@@ -17,8 +17,7 @@ use super::cell::Cell;
 use super::winding::Walker;
 use crate::elementary::exp_above;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
-use crate::roots::chains::chain_abscissa;
-use crate::roots::chains::{base_delay, difference_part};
+use crate::roots::chains::{base_delay, chain_abscissa, difference_part};
 use crate::{Error, Task};
 
 /// Most samples of a period.

@@ -39,6 +39,6 @@ pub use exact_delays::exact_chain_abscissa;
 pub(crate) use prepared::Prepared;
 pub use real_axis::RealPart;
 pub use segment::Segment;
-pub(crate) use time_scaling::OwnTime;
+pub(crate) use time_scaling::TimeScaling;
 pub(crate) use turn::{Turn, Walk};
 pub(crate) use winding::{MAX_EVALUATIONS, Walker, newton_step};

@@ -8,8 +8,8 @@
 
 use num_complex::Complex64;
 
-use super::segment::{CROWDED, Segment, TRIFLE};
-use super::taylor_bound::Crowd;
+use super::segment::{CLUSTER_SUSPECTED, Segment, TRIFLE};
+use super::taylor_bound::TaylorBound;
 use super::winding::{Walker, is_clear, is_finite};
 use crate::Error;
 use crate::quasipoly::{Jet, modulus};
@@ -75,9 +75,10 @@ pub(crate) fn survey_real(
         let mut steepest = (flat + curved * bend * r) * (1.0 + 1e-12) + trifle;
         let room = SHARE * modulus(jet.value) - jet.value_error;
         // Without parts to state, other means end the survey sooner.
-        let crowded = curved == 1.0 && bend * r > flat / CROWDED && is_clear(&jet);
-        if crowded && steepest * r >= room {
-            steepest = Crowd::new(&walker.probe, middle).slope(r) + trifle;
+        let cluster_suspected =
+            curved == 1.0 && bend * r > flat / CLUSTER_SUSPECTED && is_clear(&jet);
+        if cluster_suspected && steepest * r >= room {
+            steepest = TaylorBound::new(&walker.probe, middle).slope(r) + trifle;
         }
         if steepest * r < room {
             visit(RealPart::Empty(Segment {

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 pub(crate) const TRIFLE: f64 = 1e-20;
 
 /// Several roots may be near where the bound on g″ allows less than this share of what the slope would.
-pub(crate) const CROWDED: f64 = 0.02;
+pub(crate) const CLUSTER_SUSPECTED: f64 = 0.02;
 
 /// A straight line on which g has no zero.
 #[derive(Debug, Clone, Copy, PartialEq)]

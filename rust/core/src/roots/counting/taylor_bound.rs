@@ -18,7 +18,7 @@ const ORDER: usize = 8;
 const MARGIN: f64 = 1e-12;
 
 /// The Taylor polynomial about a point, by moduli.
-pub(crate) struct Crowd<'a> {
+pub(crate) struct TaylorBound<'a> {
     h: &'a QuasiPolynomial,
     reference: usize,
     place: Complex64,
@@ -28,7 +28,7 @@ pub(crate) struct Crowd<'a> {
     sizes: Vec<f64>,
 }
 
-impl<'a> Crowd<'a> {
+impl<'a> TaylorBound<'a> {
     pub(crate) fn new(probe: &Probe<'a>, place: Complex64) -> Self {
         let (h, reference) = (probe.function(), probe.reference());
         let near = expansion(h, reference, place, ORDER);
@@ -59,13 +59,13 @@ impl<'a> Crowd<'a> {
     /// How far for sure, up to `most`, g moves by less than `share` of its value and that is known.
     pub(crate) fn reach(&self, share: f64, most: f64) -> f64 {
         let room = share * self.value - self.error;
-        self.largest(room, most, |crowd, r| crowd.change(r))
+        self.largest(room, most, |taylor, r| taylor.change(r))
     }
 
     /// The same for the bound on |g′| times the radius.
     pub(crate) fn steady_reach(&self, share: f64, most: f64) -> f64 {
         let room = share * self.value - self.error;
-        self.largest(room, most, |crowd, r| crowd.slope(r) * r)
+        self.largest(room, most, |taylor, r| taylor.slope(r) * r)
     }
 
     fn change(&self, r: f64) -> f64 {
@@ -110,14 +110,14 @@ mod tests {
             let place = Complex64::new(-1.0 + distance, 0.0);
             let mut probe = Probe::new(&h);
             probe.refer_to_dominant(place);
-            let crowd = Crowd::new(&probe, place);
+            let taylor = TaylorBound::new(&probe, place);
             for share in [0.1, 0.5, 1.0] {
                 let radius = share * distance;
-                let bound = crowd.slope(radius);
+                let bound = taylor.slope(radius);
                 let mut steepest = 0.0f64;
                 for k in 0..16 {
                     let rim = place + Complex64::from_polar(radius, f64::from(k) * FRAC_PI_8);
-                    steepest = steepest.max(modulus(probe.sharp_jet(rim).slope));
+                    steepest = steepest.max(modulus(probe.double_double_jet(rim).slope));
                 }
                 // Along the line away from the root it is attained, but for the rest of the terms.
                 assert!(steepest <= bound && bound < 1.2 * steepest);
@@ -133,12 +133,12 @@ mod tests {
             let place = Complex64::new(-1.0 + distance, 0.0);
             let mut probe = Probe::new(&h);
             probe.refer_to_dominant(place);
-            let crowd = Crowd::new(&probe, place);
+            let taylor = TaylorBound::new(&probe, place);
             // (1 + x)³ − 1 = 0.95 and 3 x (1 + x)² = 0.95, found in steps of 0.7.
-            let (far, steady) = (crowd.reach(0.95, 1.0), crowd.steady_reach(0.95, 1.0));
+            let (far, steady) = (taylor.reach(0.95, 1.0), taylor.steady_reach(0.95, 1.0));
             assert!((0.17..0.25).contains(&(far / distance)));
             assert!((0.14..0.21).contains(&(steady / distance)));
-            assert!(crowd.reach(0.95, 0.01 * distance) > 0.0099 * distance);
+            assert!(taylor.reach(0.95, 0.01 * distance) > 0.0099 * distance);
         }
         Ok(())
     }

@@ -21,13 +21,13 @@ const MODERATE: std::ops::Range<f64> = 1e-60..1e60;
 
 /// An equation in its own unit of time.
 #[derive(Debug, Clone)]
-pub(crate) struct OwnTime {
+pub(crate) struct TimeScaling {
     pub(crate) h: QuasiPolynomial,
     /// T in seconds, a power of two.
     unit: f64,
 }
 
-impl OwnTime {
+impl TimeScaling {
     /// `None` where the unit that h comes in is good enough, or no other is better.
     pub(crate) fn of(h: &QuasiPolynomial) -> Option<Self> {
         let power = unit_of_time(h)?;

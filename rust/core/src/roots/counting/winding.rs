@@ -19,7 +19,7 @@
 
 use num_complex::Complex64;
 
-use super::taylor_bound::Crowd;
+use super::taylor_bound::TaylorBound;
 use super::turn::{Turn, Walk};
 use crate::elementary::angle;
 use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
@@ -33,7 +33,7 @@ const CHECK_EVERY: u64 = 1024;
 
 /// Evaluations in two words that a walker spends before it takes a place for a root: past a multiple one
 /// the steps become as short as a power of its distance.
-const MAX_SHARP: u32 = 500;
+const MAX_DOUBLE_DOUBLE: u32 = 500;
 
 /// Evaluations after which a computation is given up.
 pub(crate) const MAX_EVALUATIONS: u64 = 20_000_000;
@@ -57,13 +57,13 @@ const LEAST_SLOPE: f64 = 1e-100;
 const TIGHT: f64 = 1e-3;
 
 /// Share of the value that terms may have which are counted by their size alone.
-const RIPPLE: f64 = 0.3;
+const PERTURBATION_SHARE: f64 = 0.3;
 
 /// Evaluations along a line before such terms are looked for: short steps find the hints.
-const PATIENCE: u64 = 500;
+const EAGER_LIMIT: u64 = 500;
 
 /// How many times further these may let a step go; there are no more hints on the way then.
-const CALM: f64 = 1e6;
+const LONGEST_GAIN: f64 = 1e6;
 
 /// Walks along lines; keeps the probe, the budget and the hints of roots nearby.
 pub(crate) struct Walker<'a> {
@@ -75,11 +75,11 @@ pub(crate) struct Walker<'a> {
     limit: u64,
     /// The largest delay less the smallest, in s.
     span: f64,
-    sharp: u32,
+    double_doubles: u32,
     /// The last place where that was needed.
-    sharp_at: Option<Complex64>,
+    double_double_at: Option<Complex64>,
     /// Evaluations from which on a line is walked in the longest steps that can be proved.
-    patient_until: u64,
+    eager_until: u64,
 }
 
 impl<'a> Walker<'a> {
@@ -96,15 +96,15 @@ impl<'a> Walker<'a> {
             checked: 0,
             limit,
             span: h.delays().last().unwrap_or(&0.0) - h.delays().first().unwrap_or(&0.0),
-            sharp: 0,
-            sharp_at: None,
-            patient_until: PATIENCE,
+            double_doubles: 0,
+            double_double_at: None,
+            eager_until: EAGER_LIMIT,
         }
     }
 
     /// Take places where double precision does not tell a root from none for roots.
     pub(crate) fn keep_to_doubles(&mut self) {
-        self.sharp = MAX_SHARP;
+        self.double_doubles = MAX_DOUBLE_DOUBLE;
     }
 
     /// Look at the task and at the budget now and then.
@@ -140,14 +140,14 @@ impl<'a> Walker<'a> {
     /// The jet at `s`, in two words unless it is `good` in one.
     fn jet_unless(&mut self, s: Complex64, good: impl Fn(&Jet) -> bool) -> Jet {
         let jet = self.probe.jet(s);
-        if good(&jet) || !is_finite(&jet) || self.sharp >= MAX_SHARP {
+        if good(&jet) || !is_finite(&jet) || self.double_doubles >= MAX_DOUBLE_DOUBLE {
             return jet;
         }
-        self.sharp += 1;
-        self.sharp_at = Some(s);
+        self.double_doubles += 1;
+        self.double_double_at = Some(s);
         Jet {
             overtaken_by: jet.overtaken_by,
-            ..self.probe.sharp_jet(s)
+            ..self.probe.double_double_jet(s)
         }
     }
 
@@ -215,33 +215,42 @@ impl<'a> Walker<'a> {
         }
         // Not where the slope is all that is in the way.
         let farthest = room / slope;
-        let crowded = if self.sharp_at == Some(s) {
+        let cluster_suspected = if self.double_double_at == Some(s) {
             best < 0.5 * most.min(farthest)
         } else {
             best * self.span < TIGHT && best < 0.02 * farthest
         };
-        if crowded {
-            best = best.max(Crowd::new(&self.probe, s).reach(SHARE, most));
+        if cluster_suspected {
+            best = best.max(TaylorBound::new(&self.probe, s).reach(SHARE, most));
         }
-        if self.probe.evaluations() < self.patient_until {
+        if self.probe.evaluations() < self.eager_until {
             return best;
         }
-        best.max(self.calm_reach(jet, s, along, most.min(CALM * best)))
+        best.max(self.reach_by_dominated_terms(jet, s, along, most.min(LONGEST_GAIN * best)))
     }
 
     /// The same where fast terms are so small that their size is bound enough.
-    fn calm_reach(&self, jet: &Jet, s: Complex64, along: Complex64, most: f64) -> f64 {
+    fn reach_by_dominated_terms(
+        &self,
+        jet: &Jet,
+        s: Complex64,
+        along: Complex64,
+        most: f64,
+    ) -> f64 {
         let unit = modulus(jet.value);
         let size = modulus(s);
         let mut span = most;
         for _ in 0..4 {
             let place = (size + span, along.re * span);
-            let Some(calm) = self.probe.calm(s, place, RIPPLE * unit) else {
+            let Some(dominated) = self
+                .probe
+                .dominated_terms(s, place, PERTURBATION_SHARE * unit)
+            else {
                 return 0.0;
             };
-            let room = SHARE - (jet.value_error + calm.ripple) / unit;
-            let slope = ((modulus(calm.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
-            let r = within(room, slope, calm.bend / unit);
+            let room = SHARE - (jet.value_error + dominated.perturbation) / unit;
+            let slope = ((modulus(dominated.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
+            let r = within(room, slope, dominated.bend / unit);
             if r >= 0.25 * span {
                 return r.min(span) * (1.0 - 1e-12);
             }
@@ -261,7 +270,7 @@ impl<'a> Walker<'a> {
             return Ok(Turn::default());
         }
         let along = (to - from) / whole;
-        self.patient_until = self.probe.evaluations() + PATIENCE;
+        self.eager_until = self.probe.evaluations() + EAGER_LIMIT;
         self.probe.refer_to_dominant(from);
         let mut here = from;
         let mut jet = self.clear_jet(here)?;

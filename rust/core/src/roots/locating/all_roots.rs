@@ -4,12 +4,7 @@ use num_complex::Complex64;
 
 use super::isolate::{Search, Seek};
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::counting::Cell;
-use crate::roots::counting::OwnTime;
-use crate::roots::counting::Prepared;
-use crate::roots::counting::Walker;
-use crate::roots::counting::dominance;
-use crate::roots::counting::{Closed, close};
+use crate::roots::counting::{Cell, Closed, Prepared, TimeScaling, Walker, close, dominance};
 use crate::roots::disc::{Disc, with_mirror_image};
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
@@ -56,11 +51,11 @@ pub(crate) fn add_zeros(discs: &mut Vec<Disc>, zeros: u32) {
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn roots(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<RootSet, Error> {
-    match OwnTime::within(h, region) {
+    match TimeScaling::within(h, region) {
         None => roots_as_given(h, region, task),
-        Some(own) => roots_as_given(&own.h, &own.region(region), task)
-            .map(|set| own.returned(set, Some(*region)))
-            .map_err(|error| own.explained(error)),
+        Some(scaling) => roots_as_given(&scaling.h, &scaling.region(region), task)
+            .map(|set| scaling.returned(set, Some(*region)))
+            .map_err(|error| scaling.explained(error)),
     }
 }
 

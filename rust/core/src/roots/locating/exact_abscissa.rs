@@ -4,8 +4,7 @@ use super::all_roots::locate;
 use super::lines::{between_lines, is_beside_chains};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::chains::chain_abscissa;
-use crate::roots::counting::Walker;
-use crate::roots::counting::{cell_right_of, exact_chain_abscissa};
+use crate::roots::counting::{Walker, cell_right_of, exact_chain_abscissa};
 use crate::{Error, Task};
 
 /// Lines between the chains of exact delays and those of free ones, as shares of the distance.

@@ -14,16 +14,14 @@ use num_complex::Complex64;
 use super::clusters::cluster;
 use super::newton::{Outcome, newton};
 use crate::Error;
-use crate::roots::counting::Cell;
-use crate::roots::counting::Walk;
-use crate::roots::counting::Walker;
+use crate::roots::counting::{Cell, Walk, Walker};
 use crate::roots::disc::{Disc, RESOLVED};
 
 /// Cells with more roots missing are cut before anything is tried.
-const PATIENCE: u64 = 10;
+const MOST_MISSING: u64 = 10;
 
 /// After so many cuts in a row that part nothing, a cluster is tried for.
-const CROWDED: u32 = 8;
+const IDLE_CUTS: u32 = 8;
 
 /// Fractional parts of multiples of these fill a square evenly: powers of the plastic number.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
@@ -205,11 +203,11 @@ impl<'w, W: Seek> Search<'w, W> {
             if missing == 0 {
                 continue;
             }
-            if (missing <= PATIENCE || idle >= CROWDED) && self.try_here(&cell)? {
+            if (missing <= MOST_MISSING || idle >= IDLE_CUTS) && self.try_here(&cell)? {
                 continue;
             }
             let tall = cell.height() > cell.width();
-            let parts = if cell.count > PATIENCE && tall {
+            let parts = if cell.count > MOST_MISSING && tall {
                 cell.slice(self.walker, 4.0 / cell.count as f64)
             } else if self.is_divisible(&cell) {
                 cell.halves(self.walker)
@@ -338,9 +336,9 @@ impl<'w, W: Seek> Search<'w, W> {
             .iter()
             .skip(start)
             .take_while(|disc| disc.center.im < bottom);
-        let rows = (cell.height() / self.spacing).min(PATIENCE as f64) as u32 + 1;
+        let rows = (cell.height() / self.spacing).min(MOST_MISSING as f64) as u32 + 1;
         below
-            .take(4 * PATIENCE as usize)
+            .take(4 * MOST_MISSING as usize)
             .flat_map(|disc| {
                 let center = disc.center;
                 (1..=rows).map(move |k| center + Complex64::I * (f64::from(k) * self.spacing))

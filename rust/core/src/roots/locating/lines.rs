@@ -13,11 +13,7 @@ use super::all_roots::locate;
 use super::isolate::{Search, Seek};
 use super::starts::tropical_roots;
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::counting::Cell;
-use crate::roots::counting::close;
-use crate::roots::counting::dominance;
-use crate::roots::counting::half_plane;
-use crate::roots::counting::{MAX_EVALUATIONS, Walker};
+use crate::roots::counting::{Cell, MAX_EVALUATIONS, Walker, close, dominance, half_plane};
 use crate::roots::disc::Disc;
 use crate::roots::region::Region;
 use crate::{Error, Task};
@@ -105,7 +101,7 @@ pub(crate) struct Effort {
     pub(crate) limit: u64,
     /// Are places evaluated in two words where doubles do not tell a root from none? A line meets such
     /// places next to roots only, and there is mostly another line to take.
-    pub(crate) sharp: bool,
+    pub(crate) double_double: bool,
 }
 
 /// What the search for rightmost roots has to know of a function.
@@ -147,7 +143,7 @@ impl Spectrum for QuasiPolynomial {
         task: &Task,
     ) -> Result<(u64, Vec<Complex64>), Error> {
         let mut walker = self.walker(task, effort.limit);
-        if !effort.sharp {
+        if !effort.double_double {
             walker.keep_to_doubles();
         }
         let count = half_plane(&mut walker, sigma)?;
@@ -478,7 +474,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         loop {
             let effort = Effort {
                 limit: self.limit,
-                sharp: !free || attempt >= IN_DOUBLES,
+                double_double: !free || attempt >= IN_DOUBLES,
             };
             match self.spectrum.line(at, effort, self.task) {
                 Ok((count, hints)) => {

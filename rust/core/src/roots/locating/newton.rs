@@ -20,7 +20,7 @@ use crate::roots::disc::Disc;
 const MAX_STEPS: u32 = 60;
 
 /// Relative radius above which a disc is worth evaluations in two words.
-const SHARP_ENOUGH: f64 = 1e-12;
+const PRECISE_ENOUGH: f64 = 1e-12;
 
 /// A value of less than this share of its error leaves nothing for another step to win.
 const ARRIVED: f64 = 0.25;
@@ -58,7 +58,7 @@ pub(crate) fn newton(
         let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
         if modulus(jet.value) <= ARRIVED * jet.value_error
             && let Some(disc) = disc_from(probe, z, &jet)
-            && disc.radius <= SHARP_ENOUGH * modulus(z)
+            && disc.radius <= PRECISE_ENOUGH * modulus(z)
             && !disc.is_on_axis()
         {
             return Outcome::Simple(disc.mirrored_up());
@@ -71,7 +71,7 @@ pub(crate) fn newton(
             let end = if ahead { next } else { z };
             let disc = simple_disc(probe, end, Probe::jet);
             return match disc {
-                Some(disc) if disc.radius <= SHARP_ENOUGH * modulus(end) => Outcome::Simple(disc),
+                Some(disc) if disc.radius <= PRECISE_ENOUGH * modulus(end) => Outcome::Simple(disc),
                 // A root at 0 has no digits to win.
                 Some(disc)
                     if disc.center.norm() <= disc.radius
@@ -79,7 +79,7 @@ pub(crate) fn newton(
                 {
                     Outcome::Simple(disc)
                 }
-                other => sharpened(probe, z, window, other),
+                other => newton_in_double_double(probe, z, window, other),
             };
         }
         if !ahead {
@@ -92,7 +92,7 @@ pub(crate) fn newton(
 
 /// Newton's iteration in two words, from where double precision no longer leads anywhere; `known` is
 /// what it could prove.
-fn sharpened(
+fn newton_in_double_double(
     probe: &mut Probe<'_>,
     start: Complex64,
     window: impl Fn(Complex64) -> bool,
@@ -101,7 +101,7 @@ fn sharpened(
     let mut z = start;
     let mut before = Complex64::ZERO;
     for _ in 0..MAX_STEPS {
-        let jet = probe.sharp_jet(z);
+        let jet = probe.double_double_jet(z);
         let step = newton_step(&jet);
         let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
         let small = modulus(step) <= 2.0 * f64::EPSILON * modulus(z);
@@ -116,7 +116,7 @@ fn sharpened(
         before = step;
         z = next;
     }
-    simple_disc(probe, z, Probe::sharp_jet)
+    simple_disc(probe, z, Probe::double_double_jet)
         .or(known)
         .or_else(|| single(probe, z))
         .map_or(Outcome::Stalled(z), Outcome::Simple)

@@ -12,10 +12,7 @@ use super::exact_abscissa::exact_abscissa;
 use super::lines::{Line, Lines, Spectrum, between_lines, half_plane_discs, is_beside_chains};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::chains::chain_abscissa;
-use crate::roots::counting::OwnTime;
-use crate::roots::counting::Prepared;
-use crate::roots::counting::Walker;
-use crate::roots::counting::{count_right_of, half_plane};
+use crate::roots::counting::{Prepared, TimeScaling, Walker, count_right_of, half_plane};
 use crate::roots::disc::{Disc, with_mirror_image};
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
@@ -54,11 +51,11 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
              rightmost; the term with the highest power of s must not be delayed more than others",
         ));
     }
-    match OwnTime::of(h) {
+    match TimeScaling::of(h) {
         None => search(&Prepared::new(h)?, n, None, task),
-        Some(own) => search(&Prepared::new(&own.h)?, n, None, task)
-            .map(|set| own.returned(set, None))
-            .map_err(|error| own.explained(error)),
+        Some(scaling) => search(&Prepared::new(&scaling.h)?, n, None, task)
+            .map(|set| scaling.returned(set, None))
+            .map_err(|error| scaling.explained(error)),
     }
 }
 
@@ -76,7 +73,9 @@ pub fn unstable_and_rightmost(
 ) -> (Result<u64, Error>, Result<RootSet, Error>) {
     let prepared = match Prepared::new(h) {
         Ok(prepared)
-            if prepared.zeros == 0 && h.kind() != Kind::Advanced && OwnTime::of(h).is_none() =>
+            if prepared.zeros == 0
+                && h.kind() != Kind::Advanced
+                && TimeScaling::of(h).is_none() =>
         {
             prepared
         }

@@ -12,8 +12,7 @@ use num_complex::Complex64;
 use super::clusters::cluster;
 use super::newton::{Outcome, newton};
 use crate::quasipoly::{Probe, QuasiPolynomial, modulus, relative_turn};
-use crate::roots::counting::Prepared;
-use crate::roots::counting::Walker;
+use crate::roots::counting::{Prepared, Walker};
 use crate::roots::disc::Disc;
 use crate::{Error, Task};
 
@@ -52,7 +51,7 @@ pub fn sensitivity(
     let mut probe = Probe::new(h);
     probe.refer_to_dominant(root);
     // Near another root the slope is small, and its terms are not.
-    let slope = probe.sharp_jet(root).slope;
+    let slope = probe.double_double_jet(root).slope;
     let size = modulus(slope);
     let per_slope = |value: Complex64| -(value / size) * (slope.conj() / size);
     let slopes = terms.iter().map(|(delay, power)| {

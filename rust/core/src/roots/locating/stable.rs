@@ -8,11 +8,7 @@
 use super::unstable::has_unstable_root;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::chains::chain_abscissa;
-use crate::roots::counting::Prepared;
-use crate::roots::counting::Walker;
-use crate::roots::counting::cell_right_of;
-use crate::roots::counting::dominance;
-use crate::roots::counting::half_plane;
+use crate::roots::counting::{Prepared, Walker, cell_right_of, dominance, half_plane};
 use crate::{Error, Task};
 
 /// Evaluations along the axis before a root right of it is looked for.

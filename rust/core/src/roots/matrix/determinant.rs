@@ -7,12 +7,11 @@ use super::outer::Leading;
 use super::system::CharacteristicMatrix;
 use super::walker::{MAX_EVALUATIONS, MatrixWalker};
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::counting::Cell;
-use crate::roots::counting::Closed;
-use crate::roots::locating::all_discs;
-use crate::roots::locating::{Effort, Spectrum, half_plane_discs};
-use crate::roots::locating::{balances, leads_right, rightmost_first};
-use crate::roots::locating::{first, leading};
+use crate::roots::counting::{Cell, Closed};
+use crate::roots::locating::{
+    Effort, Spectrum, all_discs, balances, first, half_plane_discs, leading, leads_right,
+    rightmost_first,
+};
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
 use crate::{Error, Task};

@@ -71,7 +71,7 @@ struct Expansion {
 
 /// A point and what is known around it.
 #[derive(Debug, Clone)]
-pub(super) struct Place {
+pub(super) struct LocalEnclosure {
     pub(super) s: Complex64,
     /// arg det G in (−π, π], within `error`.
     pub(super) angle: f64,
@@ -93,7 +93,7 @@ pub(super) struct Reach {
     expansion: usize,
 }
 
-impl Place {
+impl LocalEnclosure {
     /// What is proved around `s`; `None` where M(s) is too close to a singular matrix.
     pub(super) fn new(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
         Self::tried(system, s).filter(Self::is_clear)
@@ -495,8 +495,9 @@ const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (
 /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
 pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> {
     let rate = system.rate();
-    let regular =
-        |(x, y): &(f64, f64)| Place::new(system, Complex64::new(x * rate, y * rate)).is_some();
+    let regular = |(x, y): &(f64, f64)| {
+        LocalEnclosure::new(system, Complex64::new(x * rate, y * rate)).is_some()
+    };
     if POINTS.iter().any(regular) {
         return Ok(());
     }

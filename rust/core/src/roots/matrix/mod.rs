@@ -1,6 +1,6 @@
 //! Roots of det M(s), M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), without expanding the determinant.
 //!
-//! `system` holds the matrices, `balance` scales them at a point, `factor` their factors and inverses with rounding bounds, `place`
+//! `system` holds the matrices, `balance` scales them at a point, `factor` their factors and inverses with rounding bounds, `local_enclosure`
 //! what is proved about det M around a point; `walker` makes walks and Newton's iteration of that,
 //! with which rectangles are counted, divided and searched as for one function (`roots::cell`,
 //! `roots::isolate`). `outer` bounds roots of half planes by norms, `difference` knows the chains of

@@ -113,7 +113,7 @@ fn product<const D: usize>(
 
 /// A row over the box.
 #[derive(Debug, Clone)]
-pub(crate) struct LocalRow<const D: usize> {
+pub(crate) struct ExpansionRow<const D: usize> {
     /// d_j at the centre.
     pub(crate) delay: f64,
     pub(crate) slopes: [f64; D],
@@ -133,23 +133,23 @@ pub(crate) struct LocalRow<const D: usize> {
 
 /// A family on a box.
 #[derive(Debug, Clone)]
-pub(crate) struct Local<const D: usize> {
-    pub(crate) rows: Vec<LocalRow<D>>,
+pub(crate) struct BoxExpansion<const D: usize> {
+    pub(crate) rows: Vec<ExpansionRow<D>>,
     pub(crate) half: [f64; D],
     /// Roundings to count for each value, besides those of the delays: see `value_set`.
     pub(crate) roundings: f64,
 }
 
-impl<const D: usize> Local<D> {
+impl<const D: usize> BoxExpansion<D> {
     /// Room for what boxes of `reduced` know.
     pub(crate) fn new(reduced: &Reduced<'_, D>) -> Self {
-        let rows: Vec<LocalRow<D>> = reduced
+        let rows: Vec<ExpansionRow<D>> = reduced
             .rows
             .iter()
             .map(|row| {
                 let degree = row.monomials.iter().map(|m| m.power).max().unwrap_or(0);
                 let fixed = |m: &Monomial<D>| m.exponents.iter().all(|e| *e == 0);
-                LocalRow {
+                ExpansionRow {
                     delay: 0.0,
                     slopes: row.slopes,
                     rates: row.slopes.map(f64::abs),

@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-use super::box_expansion::{Local, Range};
+use super::box_expansion::{BoxExpansion, Range};
 use super::prove::{Claim, Verdict, judge_box};
 use super::reduced::Reduced;
 use crate::stability::cell::UNKNOWN;
@@ -222,9 +222,9 @@ impl<'a, const D: usize> Tree<'a, D> {
         group
             .par_iter()
             .map_init(
-                || Local::new(&self.reduced),
-                |local, one| {
-                    let verdict = judge_box(&self.reduced, &one.claim, local, task);
+                || BoxExpansion::new(&self.reduced),
+                |expansion, one| {
+                    let verdict = judge_box(&self.reduced, &one.claim, expansion, task);
                     task.advance(1);
                     verdict
                 },
@@ -289,7 +289,7 @@ impl<'a, const D: usize> Tree<'a, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stability::Demand;
+    use crate::stability::Specification;
     use crate::stability::{Affine, Term, judge, largest_stable_box, stability_radius};
 
     /// s + (Kp + Kv s) e^(−s T)
@@ -333,7 +333,7 @@ mod tests {
                     .collect();
                 let h = family.at(&values).unwrap();
                 assert_eq!(
-                    judge(&h, Demand::default(), false, &Task::new())
+                    judge(&h, Specification::default(), false, &Task::new())
                         .unwrap()
                         .unstable,
                     *unstable

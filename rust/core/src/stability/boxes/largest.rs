@@ -8,13 +8,13 @@
 
 use std::ops::Range as Indices;
 
-use super::box_expansion::{Local, Range};
+use super::box_expansion::{BoxExpansion, Range};
 use super::division::{Boxes, Limits, check, proved_boxes, reduce};
 use super::prove::{Finding, find_unstable};
 use super::reduced::Reduced;
 use crate::stability::cell::judge;
 use crate::stability::family::Family;
-use crate::stability::specification::Demand;
+use crate::stability::specification::Specification;
 use crate::{Error, Task};
 
 /// Cells along each axis and share of the ranges left undecided, for one, two and three parameters.
@@ -80,7 +80,7 @@ fn search<const D: usize>(
         place
     };
     let point = around.map(place);
-    let mut local = Local::new(&reduced);
+    let mut expansion = BoxExpansion::new(&reduced);
     let full = drawn(&boxes, family.names().len(), &whole, side, place);
     let unit = |x: f64, i: usize| {
         let width = whole.high[i] - whole.low[i];
@@ -110,7 +110,7 @@ fn search<const D: usize>(
         }
     });
     if let Some(range) = start
-        && find_unstable(&reduced, range, WHOLE, &mut local, task)? != Finding::Stable
+        && find_unstable(&reduced, range, WHOLE, &mut expansion, task)? != Finding::Stable
     {
         start = None;
     }
@@ -120,7 +120,7 @@ fn search<const D: usize>(
             // Nothing on the grid: grow the point itself.
             if judge(
                 &family.at(&reduced.values_at(&point))?,
-                Demand::default(),
+                Specification::default(),
                 false,
                 task,
             )?
@@ -137,7 +137,7 @@ fn search<const D: usize>(
         (None, None) => return Ok(None),
     };
     let steps = std::array::from_fn(|i| 2.0 * (whole.high[i] - whole.low[i]) / side as f64);
-    let grown = grow(&reduced, start, &whole, steps, tol, &mut local, task)?;
+    let grown = grow(&reduced, start, &whole, steps, tol, &mut expansion, task)?;
     let (low, high) = (
         reduced.values_at(&grown.low),
         reduced.values_at(&grown.high),
@@ -252,7 +252,7 @@ fn grow<const D: usize>(
     whole: &Range<D>,
     steps: [f64; D],
     tol: f64,
-    local: &mut Local<D>,
+    expansion: &mut BoxExpansion<D>,
     task: &Task,
 ) -> Result<Range<D>, Error> {
     let mut faces: Vec<(usize, bool, f64)> = steps
@@ -276,7 +276,7 @@ fn grow<const D: usize>(
             if slab.low[i] >= slab.high[i] {
                 continue;
             }
-            let stable = find_unstable(reduced, slab, SLAB, local, task)? == Finding::Stable;
+            let stable = find_unstable(reduced, slab, SLAB, expansion, task)? == Finding::Stable;
             if stable && upper {
                 range.high[i] = next;
             } else if stable {

@@ -15,7 +15,7 @@ mod reduced;
 mod unbounded_frequency;
 mod value_set;
 
-pub(crate) use box_expansion::{Local, Range};
+pub(crate) use box_expansion::{BoxExpansion, Range};
 pub use division::{Boxes, Limits, Node, proved_boxes};
 pub(crate) use division::{check, reduce};
 pub use largest::largest_stable_box;

@@ -1,7 +1,7 @@
 //! One box of parameters: has every member the same number of offending roots?
 //!
 //! If no member has a root on the edge of what is demanded and none comes from infinity, the number of roots
-//! right of it is that at the centre, where it is counted. The edge up to the radius W of `tail`
+//! right of it is that at the centre, where it is counted. The edge up to the radius W of `unbounded_frequency`
 //! is divided into stretches, each in halves until `value_set` proves it clear of roots or the box is
 //! too large for that. What a box has proved holds for its parts: a part looks only at the stretches
 //! that are left.
@@ -10,9 +10,9 @@ use std::collections::VecDeque;
 
 use num_complex::Complex64;
 
-use super::box_expansion::{Local, Range};
+use super::box_expansion::{BoxExpansion, Range};
 use super::reduced::Reduced;
-use super::unbounded_frequency::{Tail, tail};
+use super::unbounded_frequency::{UnboundedFrequency, unbounded_frequency};
 use super::value_set::{Look, look};
 use crate::stability::cell::{ENDLESS, judge};
 use crate::stability::specification::Piece;
@@ -72,26 +72,26 @@ impl<const D: usize> Claim<D> {
     }
 }
 
-/// Judge a box; `local` is room for what it knows.
+/// Judge a box; `expansion` is room for what it knows.
 pub(crate) fn judge_box<const D: usize>(
     reduced: &Reduced<'_, D>,
     claim: &Claim<D>,
-    local: &mut Local<D>,
+    expansion: &mut BoxExpansion<D>,
     task: &Task,
 ) -> Result<Verdict, Error> {
-    let (parameter, left) = match examine(reduced, claim, local, task)? {
+    let (parameter, left) = match examine(reduced, claim, expansion, task)? {
         Examined::Endless => return Ok(Verdict::Proved(ENDLESS)),
         Examined::Open(parameter, left) => (parameter, left),
         Examined::Clear => {
             let centre = reduced.values_at(&claim.range.centre());
             if let Ok(h) = reduced.family.at(&centre) {
-                let cell = judge(&h, reduced.demand, false, task)?;
+                let cell = judge(&h, reduced.specification, false, task)?;
                 if cell.status == CellStatus::Ok {
                     return Ok(Verdict::Proved(cell.unstable));
                 }
             }
             // The centre is beyond double precision.
-            (largest(&local.half), Some(Vec::new()))
+            (largest(&expansion.half), Some(Vec::new()))
         }
     };
     Ok(parameter.map_or(Verdict::Stuck, |i| Verdict::Halve(i, left)))
@@ -101,18 +101,22 @@ pub(crate) fn judge_box<const D: usize>(
 pub(crate) fn examine<const D: usize>(
     reduced: &Reduced<'_, D>,
     claim: &Claim<D>,
-    local: &mut Local<D>,
+    expansion: &mut BoxExpansion<D>,
     task: &Task,
 ) -> Result<Examined, Error> {
     task.check()?;
-    local.adopt(reduced, &claim.range);
+    expansion.adopt(reduced, &claim.range);
     let mut left = match &claim.stretches {
         Some(stretches) => stretches.clone(),
-        None => match tail(local, reduced.degree, reduced.demand.leftmost()) {
-            Tail::Endless => return Ok(Examined::Endless),
-            Tail::Bounded(radius) => stretches_within(&reduced.edge, radius),
-            Tail::Open(shares) => return Ok(Examined::Open(largest(&shares), None)),
-        },
+        None => {
+            match unbounded_frequency(expansion, reduced.degree, reduced.specification.leftmost()) {
+                UnboundedFrequency::Endless => return Ok(Examined::Endless),
+                UnboundedFrequency::Bounded(radius) => stretches_within(&reduced.edge, radius),
+                UnboundedFrequency::Open(shares) => {
+                    return Ok(Examined::Open(largest(&shares), None));
+                }
+            }
+        }
     };
     let mut failed: Vec<Stretch> = Vec::new();
     let mut shares = None;
@@ -127,7 +131,7 @@ pub(crate) fn examine<const D: usize>(
         if step % 256 == 255 {
             task.check()?;
         }
-        match look(local, along, from, to) {
+        match look(expansion, along, from, to) {
             Look::Clear => {}
             Look::Wide(parts) => {
                 shares.get_or_insert(parts);
@@ -155,7 +159,7 @@ pub(crate) fn examine<const D: usize>(
     left.extend(failed);
     // Where nothing failed, the work was too much.
     Ok(Examined::Open(
-        largest(&shares.unwrap_or(local.half)),
+        largest(&shares.unwrap_or(expansion.half)),
         Some(left),
     ))
 }
@@ -205,7 +209,7 @@ pub(crate) fn find_unstable<const D: usize>(
     reduced: &Reduced<'_, D>,
     range: Range<D>,
     boxes: usize,
-    local: &mut Local<D>,
+    expansion: &mut BoxExpansion<D>,
     task: &Task,
 ) -> Result<Finding, Error> {
     let mut waiting = VecDeque::from([Claim::new(range)]);
@@ -216,7 +220,7 @@ pub(crate) fn find_unstable<const D: usize>(
         if judged > boxes {
             return Ok(Finding::Unknown);
         }
-        match judge_box(reduced, &claim, local, task)? {
+        match judge_box(reduced, &claim, expansion, task)? {
             Verdict::Proved(0) => {}
             Verdict::Proved(count) => return Ok(Finding::Unstable(count)),
             Verdict::Stuck => finding = Finding::Unknown,

@@ -10,13 +10,13 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::box_expansion::{Local, Range};
+use super::box_expansion::{BoxExpansion, Range};
 use super::division::{check, reduce};
 use super::prove::{Claim, Verdict, judge_box};
 use super::reduced::Reduced;
 use crate::stability::cell::{UNKNOWN, judge};
 use crate::stability::family::Family;
-use crate::stability::specification::Demand;
+use crate::stability::specification::Specification;
 use crate::{Error, Task};
 
 /// The first radius looked at, the factor to the next, and their number.
@@ -95,7 +95,7 @@ pub fn stability_radius(
             "scale {scale}: scales must be finite and not negative"
         )));
     }
-    let cell = judge(&family.at(point)?, Demand::default(), false, task)?;
+    let cell = judge(&family.at(point)?, Specification::default(), false, task)?;
     if cell.unstable != 0 {
         return Err(Error::argument(
             "the member at this point is not stable, or too close to the edge of stability to \
@@ -238,7 +238,7 @@ impl Place<'_> {
         task: &Task,
     ) -> Result<Radius, Error> {
         let (reduced, whole): (Reduced<'_, D>, _) = reduce(family, ranges, self.varying)?;
-        let mut local = Local::new(&reduced);
+        let mut expansion = BoxExpansion::new(&reduced);
         let mut heap = BinaryHeap::from([Near {
             distance: 0.0,
             order: 0,
@@ -263,7 +263,7 @@ impl Place<'_> {
                 let values = reduced.values_at(&self.beyond(&claim.range));
                 let known = family
                     .at(&values)
-                    .map(|h| judge(&h, Demand::default(), false, task));
+                    .map(|h| judge(&h, Specification::default(), false, task));
                 if let Ok(cell) = known
                     && !matches!(cell?.unstable, 0 | UNKNOWN)
                 {
@@ -273,7 +273,7 @@ impl Place<'_> {
                     }
                 }
             }
-            let (parameter, stretches) = match judge_box(&reduced, &claim, &mut local, task)? {
+            let (parameter, stretches) = match judge_box(&reduced, &claim, &mut expansion, task)? {
                 Verdict::Proved(0) => continue,
                 Verdict::Proved(_) => {
                     let (place, distance) = self.nearest(&claim.range);

@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::stability::family::{Affine, Family};
-use crate::stability::specification::{Demand, Piece};
+use crate::stability::specification::{Piece, Specification};
 
 /// A family over `D` parameters.
 #[derive(Debug, Clone)]
@@ -21,7 +21,7 @@ pub(crate) struct Reduced<'a, const D: usize> {
     /// The highest power of s.
     pub(crate) degree: usize,
     /// What is demanded of its roots, and the edge of that.
-    pub(crate) demand: Demand,
+    pub(crate) specification: Specification,
     pub(crate) edge: Vec<Piece>,
     /// Roundings that a coefficient may have seen.
     pub(crate) digits: f64,
@@ -98,8 +98,8 @@ impl<'a, const D: usize> Reduced<'a, D> {
             places: own,
             rows,
             degree,
-            demand: Demand::default(),
-            edge: Demand::default().pieces(),
+            specification: Specification::default(),
+            edge: Specification::default().pieces(),
             digits,
         };
         reduced.merge();
@@ -107,10 +107,10 @@ impl<'a, const D: usize> Reduced<'a, D> {
     }
 
     /// The same family, this being demanded of its roots.
-    pub(crate) fn demanding(self, demand: Demand) -> Self {
+    pub(crate) fn with_specification(self, specification: Specification) -> Self {
         Self {
-            demand,
-            edge: demand.pieces(),
+            specification,
+            edge: specification.pieces(),
             ..self
         }
     }

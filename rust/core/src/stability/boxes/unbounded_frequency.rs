@@ -17,14 +17,14 @@
 //!
 //! Inequalities are tested with a relative margin of 1e-9, far above the rounding of such sums.
 
-use super::box_expansion::{Local, LocalRow};
+use super::box_expansion::{BoxExpansion, ExpansionRow};
 use crate::elementary::exp;
 
 const MARGIN: f64 = 1e-9;
 
 /// What the largest terms say of a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Tail<const D: usize> {
+pub(crate) enum UnboundedFrequency<const D: usize> {
     /// All members have infinitely many unstable roots.
     Endless,
     /// No member has a root on the edge beyond this |s|, nor one from infinity.
@@ -34,7 +34,11 @@ pub(crate) enum Tail<const D: usize> {
 }
 
 /// Least and largest value of d_j − d_i over the box, rounding included.
-fn gap<const D: usize>(from: &LocalRow<D>, to: &LocalRow<D>, half: &[f64; D]) -> (f64, f64) {
+fn gap<const D: usize>(
+    from: &ExpansionRow<D>,
+    to: &ExpansionRow<D>,
+    half: &[f64; D],
+) -> (f64, f64) {
     let centre = to.delay - from.delay;
     let mut spread = 0.0;
     let mut least = centre;
@@ -50,7 +54,7 @@ fn gap<const D: usize>(from: &LocalRow<D>, to: &LocalRow<D>, half: &[f64; D]) ->
     (least, centre + spread + rounding)
 }
 
-impl<const D: usize> LocalRow<D> {
+impl<const D: usize> ExpansionRow<D> {
     /// Zero, or a positive multiple of one parameter.
     fn is_plain(&self) -> bool {
         let moving = self.slopes.iter().filter(|slope| **slope != 0.0).count();
@@ -71,17 +75,21 @@ fn weights(line: f64, gap: (f64, f64)) -> (f64, f64) {
 }
 
 /// Judge the tail of a box, roots right of Re s = `line` being looked for.
-pub(crate) fn tail<const D: usize>(local: &Local<D>, degree: usize, line: f64) -> Tail<D> {
-    let half = &local.half;
-    let smallest = local
+pub(crate) fn unbounded_frequency<const D: usize>(
+    expansion: &BoxExpansion<D>,
+    degree: usize,
+    line: f64,
+) -> UnboundedFrequency<D> {
+    let half = &expansion.half;
+    let smallest = expansion
         .rows
         .iter()
         .enumerate()
         .min_by(|a, b| a.1.delay.total_cmp(&b.1.delay));
     let Some((own, first)) = smallest else {
-        return Tail::Open([0.0; D]);
+        return UnboundedFrequency::Open([0.0; D]);
     };
-    let leading = |row: &LocalRow<D>| {
+    let leading = |row: &ExpansionRow<D>| {
         let found = row.coefficients.get(degree);
         found.map_or((0.0, 0.0), |c| c.modulus(half))
     };
@@ -89,9 +97,9 @@ pub(crate) fn tail<const D: usize>(local: &Local<D>, degree: usize, line: f64) -
     let (mut others_least, mut others_most) = (0.0, 0.0);
     let mut ordered = true;
     let mut apart = true;
-    let mut chains: Vec<&LocalRow<D>> = Vec::new();
-    let mut heaviest = vec![1.0; local.rows.len()];
-    for (index, row) in local.rows.iter().enumerate() {
+    let mut chains: Vec<&ExpansionRow<D>> = Vec::new();
+    let mut heaviest = vec![1.0; expansion.rows.len()];
+    for (index, row) in expansion.rows.iter().enumerate() {
         if index == own {
             continue;
         }
@@ -110,9 +118,9 @@ pub(crate) fn tail<const D: usize>(local: &Local<D>, degree: usize, line: f64) -
         }
     }
     if least * (1.0 - MARGIN) > others_most * (1.0 + MARGIN) && ordered {
-        return match radius(local, own, degree, &heaviest, line == 0.0) {
-            Some(radius) => Tail::Bounded(radius),
-            None => Tail::Open(shares(local, degree)),
+        return match radius(expansion, own, degree, &heaviest, line == 0.0) {
+            Some(radius) => UnboundedFrequency::Bounded(radius),
+            None => UnboundedFrequency::Open(shares(expansion, degree)),
         };
     }
     if ordered && apart && others_least * (1.0 - MARGIN) > most * (1.0 + MARGIN) {
@@ -123,32 +131,34 @@ pub(crate) fn tail<const D: usize>(local: &Local<D>, degree: usize, line: f64) -
             })
         });
         if separate {
-            return Tail::Endless;
+            return UnboundedFrequency::Endless;
         }
     }
-    Tail::Open(shares(local, degree))
+    UnboundedFrequency::Open(shares(expansion, degree))
 }
 
 /// What each parameter adds to the uncertainty of the leading terms, or of the order of the delays.
-fn shares<const D: usize>(local: &Local<D>, degree: usize) -> [f64; D] {
+fn shares<const D: usize>(expansion: &BoxExpansion<D>, degree: usize) -> [f64; D] {
     let leading = |i: usize| {
-        let slope = |row: &LocalRow<D>| {
+        let slope = |row: &ExpansionRow<D>| {
             row.coefficients
                 .get(degree)
                 .map_or(0.0, |c| c.most_slopes[i])
         };
-        local.rows.iter().map(slope).sum::<f64>() * local.half[i]
+        expansion.rows.iter().map(slope).sum::<f64>() * expansion.half[i]
     };
     let shares = std::array::from_fn(leading);
     if shares.iter().any(|share| *share > 0.0) {
         return shares;
     }
-    std::array::from_fn(|i| local.rows.iter().map(|row| row.rates[i]).sum::<f64>() * local.half[i])
+    std::array::from_fn(|i| {
+        expansion.rows.iter().map(|row| row.rates[i]).sum::<f64>() * expansion.half[i]
+    })
 }
 
 /// The radius W, on the `axis` that of 2., within some percent of the least one.
 fn radius<const D: usize>(
-    local: &Local<D>,
+    expansion: &BoxExpansion<D>,
     own: usize,
     degree: usize,
     heaviest: &[f64],
@@ -156,11 +166,11 @@ fn radius<const D: usize>(
 ) -> Option<f64> {
     let holds = |w: f64| {
         let (mut first, mut others) = (0.0, 0.0);
-        for (index, (row, weight)) in local.rows.iter().zip(heaviest).enumerate() {
+        for (index, (row, weight)) in expansion.rows.iter().zip(heaviest).enumerate() {
             // Sums over the powers that are collinear, and over those perpendicular to them.
             let (mut same, mut other) = (0.0, 0.0);
             for (k, c) in row.coefficients.iter().enumerate() {
-                let (low, high) = c.modulus(&local.half);
+                let (low, high) = c.modulus(&expansion.half);
                 let power = (k..degree).fold(1.0, |power, _| power / w);
                 let collinear = !axis || (degree - k).is_multiple_of(2);
                 let part = match (index == own, collinear) {

@@ -17,7 +17,7 @@
 
 use num_complex::Complex64;
 
-use super::box_expansion::{Local, LocalRow};
+use super::box_expansion::{BoxExpansion, ExpansionRow};
 use crate::elementary::{exp, sin_cos};
 use crate::quasipoly::modulus;
 use crate::stability::specification::Piece;
@@ -117,7 +117,7 @@ struct Expansion<const D: usize> {
 
 /// Majorants of a polynomial over the box up to one |s|: P, P′, P″.
 #[inline(always)]
-fn majorants<const D: usize>(row: &LocalRow<D>, w: f64) -> (f64, f64, f64) {
+fn majorants<const D: usize>(row: &ExpansionRow<D>, w: f64) -> (f64, f64, f64) {
     let (mut p, mut dp, mut ddp) = (0.0, 0.0, 0.0);
     for c in row.coefficients.iter().rev() {
         ddp = ddp * w + dp;
@@ -128,16 +128,16 @@ fn majorants<const D: usize>(row: &LocalRow<D>, w: f64) -> (f64, f64, f64) {
 }
 
 impl<const D: usize> Expansion<D> {
-    fn new(local: &Local<D>, stretch: &Stretch) -> Self {
+    fn new(expansion: &BoxExpansion<D>, stretch: &Stretch) -> Self {
         if stretch.is_on_axis() {
-            Self::at::<true>(local, stretch)
+            Self::at::<true>(expansion, stretch)
         } else {
-            Self::at::<false>(local, stretch)
+            Self::at::<false>(expansion, stretch)
         }
     }
 
-    fn at<const AXIS: bool>(local: &Local<D>, stretch: &Stretch) -> Self {
-        let half = &local.half;
+    fn at<const AXIS: bool>(expansion: &BoxExpansion<D>, stretch: &Stretch) -> Self {
+        let half = &expansion.half;
         let (s, top, rho) = (stretch.middle, stretch.far, stretch.rho);
         let lean = stretch.along.re.abs();
         let leftmost = stretch.reals.0.abs().max(stretch.reals.1.abs());
@@ -152,7 +152,7 @@ impl<const D: usize> Expansion<D> {
             rounding: FLOOR,
         };
         let (mut largest, mut all) = (0.0f64, 0.0);
-        for row in &local.rows {
+        for row in &expansion.rows {
             let (mut p, mut dp) = (Complex64::ZERO, Complex64::ZERO);
             for c in row.coefficients.iter().rev() {
                 dp = times::<AXIS>(s, dp) + p;
@@ -214,7 +214,7 @@ impl<const D: usize> Expansion<D> {
             }
             all += size + heaviest * moved;
             own.rounding +=
-                2.0 * ROUNDING * (local.roundings + 16.0 * top * row.size) * heaviest * sizes;
+                2.0 * ROUNDING * (expansion.roundings + 16.0 * top * row.size) * heaviest * sizes;
         }
         own.excess = 2.0 * largest - all * ROOM;
         own
@@ -254,11 +254,16 @@ impl<const D: usize> Expansion<D> {
 }
 
 /// Look at the stretch of a piece of the edge from `from` to `to`.
-pub(crate) fn look<const D: usize>(local: &Local<D>, piece: &Piece, from: f64, to: f64) -> Look<D> {
+pub(crate) fn look<const D: usize>(
+    expansion: &BoxExpansion<D>,
+    piece: &Piece,
+    from: f64,
+    to: f64,
+) -> Look<D> {
     let stretch = Stretch::new(piece, from, to);
     let rho = stretch.rho;
-    let own = Expansion::new(local, &stretch);
-    let half = &local.half;
+    let own = Expansion::new(expansion, &stretch);
+    let half = &expansion.half;
     let remainder = own.remainder(half);
     let rest: f64 = remainder.iter().sum();
     if own.is_clear(half, rho, rest) || own.excess > own.rounding {
@@ -291,11 +296,11 @@ pub(crate) fn look<const D: usize>(local: &Local<D>, piece: &Piece, from: f64, t
 
 /// h, its slopes along the parameters and along the edge, at one place of a piece.
 pub(crate) fn tangent<const D: usize>(
-    local: &Local<D>,
+    expansion: &BoxExpansion<D>,
     piece: &Piece,
     t: f64,
 ) -> (Complex64, [Complex64; D], Complex64) {
-    let own = Expansion::new(local, &Stretch::new(piece, t, t));
+    let own = Expansion::new(expansion, &Stretch::new(piece, t, t));
     (own.value, own.slopes, own.turn)
 }
 

@@ -5,12 +5,10 @@
 
 use num_complex::Complex64;
 
-use super::certify::{ARGUMENTS, Settle, VALUES};
+use super::certify::{ARGUMENTS, Certify, VALUES};
 use super::plane::{Around, Plane};
 use crate::quasipoly::modulus;
-use crate::simd::Columns;
-use crate::simd::SHORT;
-use crate::simd::sweep;
+use crate::simd::{Columns, SHORT, sweep};
 
 /// Roots that are followed at most.
 const FOLLOWED: usize = 4;
@@ -241,7 +239,7 @@ impl Branches {
         // What fills the last vectors is nowhere near.
         let filled = elements.next_multiple_of(SHORT).min(ELEMENTS);
         within[elements..filled].fill(-1.0);
-        sweep(&Settle(plane), &self.arguments, &mut self.values, elements);
+        sweep(&Certify(plane), &self.arguments, &mut self.values, elements);
         let found = (0..self.all.len()).fold(points.len(), |found, place| {
             self.proved(plane, place, found)
         });

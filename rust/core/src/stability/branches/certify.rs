@@ -9,13 +9,10 @@
 //! What is found, and whether, depends on nothing but the lane's own start.
 
 use super::plane::Plane;
-use crate::simd::Complex;
-use crate::simd::Kernel;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Complex, Kernel, Real, Simd};
 
 /// A radius as wide as this, relative to the root, is worth another step.
-const SHARP: f64 = 1e-13;
+const PRECISE_ENOUGH: f64 = 1e-13;
 
 /// A radius that rounding keeps wider is taken up to this, relative to the root or to one over the longest delay.
 const WIDEST: f64 = 1e-11;
@@ -33,7 +30,7 @@ const SQUARES: std::ops::Range<f64> = 1e-280..1e300;
 const TINY: f64 = 1e-300;
 
 /// The discs of the roots next to starting values.
-pub(crate) struct Settle<'a>(pub(crate) &'a Plane);
+pub(crate) struct Certify<'a>(pub(crate) &'a Plane);
 
 /// Start, k, the three bounds there, the centre of these and how far starts may be from it.
 pub(crate) const ARGUMENTS: usize = 9;
@@ -41,7 +38,7 @@ pub(crate) const ARGUMENTS: usize = 9;
 /// Root, radius, ds/dk; the radius is infinite where nothing is proved.
 pub(crate) const VALUES: usize = 5;
 
-impl Kernel<ARGUMENTS, VALUES> for Settle<'_> {
+impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
     #[inline(always)]
     fn lanes<S: Simd>(&self, arguments: [Real<S>; ARGUMENTS]) -> [Real<S>; VALUES] {
         let [re, im, k, error, slope_error, bend, x, y, within] = arguments;
@@ -76,13 +73,13 @@ impl Kernel<ARGUMENTS, VALUES> for Settle<'_> {
             let size = next.re.abs().larger(next.im.abs());
             let unit = if pace > 0.0 { size.larger(pace) } else { size };
             let rounded = wide.le(error * inverse * 4.0) & wide.le(unit * WIDEST);
-            let sharp = proved & (wide.le(size * SHARP) | rounded);
-            let done = open & sharp;
+            let precise = proved & (wide.le(size * PRECISE_ENOUGH) | rounded);
+            let done = open & precise;
             root = done.choose(next, root);
             radius = done.select(wide, radius);
             along = done.choose(-over(b, dh, inverse_slope), along);
             // Comparisons with NaN are false.
-            open = open & !sharp & usable & distance(next, center).le(within);
+            open = open & !precise & usable & distance(next, center).le(within);
             s = open.choose(next, s);
         }
         [root.re, root.im, radius, along.re, along.im]
@@ -155,7 +152,7 @@ mod tests {
         let mut first: Option<Columns<VALUES, 64>> = None;
         for instructions in Instructions::available() {
             let mut values: Columns<VALUES, 64> = [[0.0; 64]; VALUES];
-            sweep_on(instructions, &Settle(&plane), &arguments, &mut values, 64);
+            sweep_on(instructions, &Certify(&plane), &arguments, &mut values, 64);
             let mut proved = 0;
             for (column, root) in roots.iter().enumerate() {
                 let [re, im, radius, ..] = values.map(|row| row[column]);

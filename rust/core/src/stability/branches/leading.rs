@@ -96,7 +96,7 @@ impl Members<'_> {
                 Known::Isolated(abscissa) => with_abscissa(cell, abscissa, chain),
                 Known::Chains => with_abscissa(cell, f64::NEG_INFINITY, chain),
                 Known::Nothing => match (self.member)(index) {
-                    Some(h) => judge(&h, self.demand, true, task)?,
+                    Some(h) => judge(&h, self.specification, true, task)?,
                     None => Cell::UNDECIDED,
                 },
             });

@@ -7,10 +7,9 @@
 
 use num_complex::Complex64;
 
-use crate::elementary::{exp, in_lanes};
+use crate::elementary::{exp, simd};
 use crate::quasipoly::{QuasiPolynomial, modulus};
-use crate::simd::Complex;
-use crate::simd::Simd;
+use crate::simd::{Complex, Simd};
 use crate::stability::crossings::{sizes, united};
 
 /// Bounds hold at least as far as this around the place they were made for, in units of one over the longest delay
@@ -134,8 +133,8 @@ impl Around {
 /// e^(−s d).
 #[inline(always)]
 fn turned<S: Simd>(s: Complex<S>, delay: f64) -> Complex<S> {
-    let (sine, cosine) = in_lanes::sin_cos(s.im * delay);
-    let weight = in_lanes::exp(s.re * -delay);
+    let (sine, cosine) = simd::sin_cos(s.im * delay);
+    let weight = simd::exp(s.re * -delay);
     Complex::new(weight * cosine, -(weight * sine))
 }
 

@@ -1,4 +1,4 @@
-//! Where roots of A + k B cross the edge of what is demanded (`demand`) as k varies: all of them, proved.
+//! Where roots of A + k B cross the edge of what is demanded (`specification`) as k varies: all of them, proved.
 //!
 //! They are the zeros of F (`pencil`) on its pieces, up to where no root lies. From a point on, Taylor's
 //! formula with the bound on F‴ proves over some length that F keeps its sign ("clear"), that F′ does

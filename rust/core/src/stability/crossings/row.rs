@@ -13,7 +13,7 @@ use super::pencil::{Pencil, united};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{chain_abscissa, radius_right_of};
 use crate::stability::cell::{Cell, UNKNOWN, by_chain, judge};
-use crate::stability::specification::Demand;
+use crate::stability::specification::Specification;
 use crate::status::CellStatus;
 use crate::{Error, Task, memory};
 
@@ -84,7 +84,7 @@ pub(crate) struct Members<'a> {
     /// The member of a cell; `None` where it cannot be formed.
     pub(crate) member: &'a dyn Fn(usize) -> Option<QuasiPolynomial>,
     /// Roots that offend against it are counted.
-    pub(crate) demand: Demand,
+    pub(crate) specification: Specification,
     /// A cell whose count is known already, and its index.
     pub(crate) anchor: Option<(usize, Cell)>,
 }
@@ -127,7 +127,8 @@ impl Members<'_> {
 
     /// Every member has the chains of the hull, whose leading terms are theirs: if these decide, for all.
     fn led_by_chains(&self, hull: &QuasiPolynomial) -> Option<Cell> {
-        let (unstable, status) = by_chain(hull, chain_abscissa(hull), self.demand.leftmost())?;
+        let (unstable, status) =
+            by_chain(hull, chain_abscissa(hull), self.specification.leftmost())?;
         Some(Cell {
             unstable,
             abscissa: f64::NAN,
@@ -138,7 +139,7 @@ impl Members<'_> {
     /// The same members, roots right of `line` being counted.
     pub(crate) fn right_of(self, line: f64) -> Self {
         Self {
-            demand: Demand::left_of(line),
+            specification: Specification::left_of(line),
             anchor: None,
             ..self
         }
@@ -196,7 +197,7 @@ impl Members<'_> {
             return Ok(None);
         };
         // Where chains lead, or may, every cell says so by itself.
-        let leftmost = self.demand.leftmost();
+        let leftmost = self.specification.leftmost();
         if chain_abscissa(&hull) >= leftmost {
             return Ok(None);
         }
@@ -204,7 +205,7 @@ impl Members<'_> {
             return Ok(None);
         };
         let mut all = Vec::new();
-        for (index, piece) in self.demand.pieces().into_iter().enumerate() {
+        for (index, piece) in self.specification.pieces().into_iter().enumerate() {
             let length = piece.length.min(piece.within(radius));
             if length <= 0.0 {
                 break;
@@ -363,7 +364,7 @@ impl Members<'_> {
 
     fn judge(&self, index: usize, task: &Task) -> Result<Cell, Error> {
         match (self.member)(index) {
-            Some(h) => judge(&h, self.demand, false, task),
+            Some(h) => judge(&h, self.specification, false, task),
             None => Ok(Cell::UNDECIDED),
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::Task;
 use crate::stability::family::Family;
-use crate::stability::specification::Demand;
+use crate::stability::specification::Specification;
 
 /// One axis of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ pub enum Proof {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Roots that offend against this are counted.
-    pub demand: Demand,
+    pub specification: Specification,
     /// Is the spectral abscissa asked for too?
     pub abscissa: bool,
     /// How counts are proved.

@@ -7,9 +7,7 @@
 //! single cells along the boundaries, is judged alone. A cell that is counted by its part lies half the distance to its neighbour away from
 //! a boundary, except at an end of an axis.
 
-use crate::stability::boxes::Reduced;
-use crate::stability::boxes::{Claim, Examined, Stretch, examine};
-use crate::stability::boxes::{Local, Range};
+use crate::stability::boxes::{BoxExpansion, Claim, Examined, Range, Reduced, Stretch, examine};
 use crate::stability::cell::{Cell, ENDLESS, judge};
 use crate::status::CellStatus;
 use crate::{Error, Task};
@@ -134,7 +132,7 @@ impl<const D: usize> Grid<'_, D> {
         task.check()?;
         let values = self.reduced.values_at(&point);
         match self.reduced.family.at(&values) {
-            Ok(h) => judge(&h, self.reduced.demand, false, task),
+            Ok(h) => judge(&h, self.reduced.specification, false, task),
             Err(_) => Ok(Cell::UNDECIDED),
         }
     }
@@ -144,7 +142,7 @@ impl<const D: usize> Grid<'_, D> {
     /// # Errors
     /// [`Error::Interrupted`] alone.
     pub(crate) fn divide(&self, whole: Block<D>, task: &Task) -> Result<Vec<Part<D>>, Error> {
-        let mut local = Local::new(&self.reduced);
+        let mut expansion = BoxExpansion::new(&self.reduced);
         let mut parts = Vec::new();
         let mut waiting = vec![(whole, None)];
         while let Some((block, stretches)) = waiting.pop() {
@@ -152,7 +150,7 @@ impl<const D: usize> Grid<'_, D> {
                 range: self.range(&block),
                 stretches,
             };
-            let finding = match examine(&self.reduced, &claim, &mut local, task)? {
+            let finding = match examine(&self.reduced, &claim, &mut expansion, task)? {
                 Examined::Clear => Finding::Clear,
                 Examined::Endless => Finding::Endless,
                 Examined::Open(direction, left) => {

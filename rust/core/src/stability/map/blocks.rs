@@ -1,8 +1,8 @@
 //! Counts and boundaries of a map whose family is affine in neither of its parameters.
 //!
 //! The map is cut into blocks of a fixed size, so that results do not depend on the number of threads; each is
-//! divided as far as its boundaries demand (`block`). The cost grows with the length of the boundaries and with the
-//! number of blocks, not of cells. Boundaries are the crossings of its rows (`transect`), joined as those of any map.
+//! divided as far as its boundaries require (`block`). The cost grows with the length of the boundaries and with the
+//! number of blocks, not of cells. Boundaries are the crossings of its rows (`row_search`), joined as those of any map.
 
 use rayon::prelude::*;
 
@@ -22,9 +22,9 @@ const SIDE: usize = 64;
 pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
     let [first, second] = map.axes;
     let places = [first.parameter, second.parameter];
-    let demand = map.question.demand;
-    let reduced = Reduced::new(map.family, map.values, &places).demanding(demand);
-    let stays = demand.decay == 0.0 && reduced.refuse_root_at_zero().is_err();
+    let specification = map.question.specification;
+    let reduced = Reduced::new(map.family, map.values, &places).with_specification(specification);
+    let stays = specification.decay == 0.0 && reduced.refuse_root_at_zero().is_err();
     let sorted = |axis: Axis<'_>| axis.points.is_sorted();
     (sorted(first) && sorted(second) && !stays).then_some(Grid {
         reduced,
@@ -59,7 +59,7 @@ pub(crate) fn crossings(map: &Map<'_>) -> Result<Option<Crossed>, Error> {
             put(&mut values, across, index);
             let reduced = Reduced::new(map.family, &values, &[axis.parameter]);
             let mut row = Grid {
-                reduced: reduced.demanding(map.question.demand),
+                reduced: reduced.with_specification(map.question.specification),
                 points: [axis.points],
             };
             row.refer_to_middle(&Block {

@@ -18,7 +18,7 @@ use super::rows::Rows;
 use crate::roots::chain_abscissa;
 use crate::stability::cell::{Cell, judge};
 use crate::stability::family::Family;
-use crate::stability::specification::Demand;
+use crate::stability::specification::Specification;
 use crate::{Error, Task, memory};
 
 /// More cells than anyone can look at.
@@ -36,7 +36,7 @@ pub fn map(
     question: Question,
     task: &Task,
 ) -> Result<Chart, Error> {
-    question.demand.check()?;
+    question.specification.check()?;
     let cells = check(family, values, axes)?;
     let map = Map {
         family,
@@ -81,17 +81,17 @@ pub fn boundaries(
     family: &Family,
     values: &[f64],
     axes: [Axis<'_>; 2],
-    demand: Demand,
+    specification: Specification,
     task: &Task,
 ) -> Result<Option<Boundaries>, Error> {
-    demand.check()?;
+    specification.check()?;
     check(family, values, axes)?;
     let map = Map {
         family,
         values,
         axes,
         question: Question {
-            demand,
+            specification,
             ..Question::default()
         },
         task,
@@ -138,7 +138,9 @@ pub fn chains(
 impl Map<'_> {
     fn cell_by_cell(&self) -> Result<Chart, Error> {
         let Question {
-            demand, abscissa, ..
+            specification,
+            abscissa,
+            ..
         } = self.question;
         let [first, second] = self.axes;
         let width = second.points.len();
@@ -150,7 +152,7 @@ impl Map<'_> {
             put(values, first, index / width);
             put(values, second, index % width);
             let cell = match self.family.at(values) {
-                Ok(h) => judge(&h, demand, abscissa, self.task)?,
+                Ok(h) => judge(&h, specification, abscissa, self.task)?,
                 Err(_) => Cell::UNDECIDED,
             };
             self.task.advance(1);

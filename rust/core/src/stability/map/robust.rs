@@ -5,13 +5,10 @@
 //! not stable; members at both ends and in the middle are tried first.
 
 use super::axes::Axis;
-use crate::stability::boxes::Local;
-use crate::stability::boxes::Reduced;
-use crate::stability::boxes::{Finding, find_unstable};
-use crate::stability::boxes::{check, reduce};
+use crate::stability::boxes::{BoxExpansion, Finding, Reduced, check, find_unstable, reduce};
 use crate::stability::cell::{ENDLESS, UNKNOWN, judge};
 use crate::stability::family::Family;
-use crate::stability::specification::Demand;
+use crate::stability::specification::Specification;
 use crate::{Error, Task, memory};
 
 /// Judge the cells over `axes`: 0 where all members are stable, the largest number of unstable roots
@@ -91,7 +88,7 @@ fn judge_cell(
     for end in ends {
         let values: Vec<f64> = ranges.iter().map(end).collect();
         let count = match family.at(&values) {
-            Ok(h) => judge(&h, Demand::default(), false, task)?.unstable,
+            Ok(h) => judge(&h, Specification::default(), false, task)?.unstable,
             Err(_) => UNKNOWN,
         };
         match count {
@@ -126,5 +123,11 @@ fn search<const D: usize>(
     task: &Task,
 ) -> Result<Finding, Error> {
     let (reduced, whole): (Reduced<'_, D>, _) = reduce(family, ranges, varying)?;
-    find_unstable(&reduced, whole, boxes, &mut Local::new(&reduced), task)
+    find_unstable(
+        &reduced,
+        whole,
+        boxes,
+        &mut BoxExpansion::new(&reduced),
+        task,
+    )
 }

@@ -9,9 +9,7 @@
 //! are those of the zero found, which is within the gap.
 
 use super::block::{Block, Finding, Grid};
-use crate::stability::boxes::tangent;
-use crate::stability::boxes::{Claim, Examined, Stretch, examine};
-use crate::stability::boxes::{Local, Range};
+use crate::stability::boxes::{BoxExpansion, Claim, Examined, Range, Stretch, examine, tangent};
 use crate::stability::crossings::Crossing;
 use crate::status::CellStatus;
 use crate::{Error, Task};
@@ -69,7 +67,7 @@ impl Grid<'_, 1> {
             start: [0],
             end: [self.points[0].len()],
         };
-        let mut local = Local::new(&self.reduced);
+        let mut expansion = BoxExpansion::new(&self.reduced);
         let mut intervals = Vec::new();
         for part in self.divide(whole, task)? {
             let range = self.range(&part.block);
@@ -79,7 +77,7 @@ impl Grid<'_, 1> {
                 Finding::Endless => Known::Endless,
                 Finding::Open(stretches) => {
                     let claim = Claim { range, stretches };
-                    self.isolate(claim, &mut local, &mut intervals, task)?;
+                    self.isolate(claim, &mut expansion, &mut intervals, task)?;
                     continue;
                 }
             };
@@ -92,7 +90,7 @@ impl Grid<'_, 1> {
     fn isolate(
         &self,
         claim: Claim<1>,
-        local: &mut Local<1>,
+        expansion: &mut BoxExpansion<1>,
         intervals: &mut Vec<Interval>,
         task: &Task,
     ) -> Result<(), Error> {
@@ -108,7 +106,7 @@ impl Grid<'_, 1> {
             };
             let (low, high) = (claim.range.low[0], claim.range.high[0]);
             let keep = |low, high, known| Interval { low, high, known };
-            let stretches = match examine(&self.reduced, &claim, local, task)? {
+            let stretches = match examine(&self.reduced, &claim, expansion, task)? {
                 Examined::Clear => {
                     intervals.push(keep(low, high, Known::Clear));
                     continue;
@@ -121,7 +119,7 @@ impl Grid<'_, 1> {
             };
             let zero = stretches
                 .as_ref()
-                .and_then(|stretches| self.zero(&claim.range, stretches, near, local));
+                .and_then(|stretches| self.zero(&claim.range, stretches, near, expansion));
             // Numbers too close to each other cannot be parted.
             let parts =
                 high - low > 2.0 * near && near > 4.0 * f64::EPSILON * low.abs().max(high.abs());
@@ -165,7 +163,7 @@ impl Grid<'_, 1> {
         range: &Range<1>,
         stretches: &[Stretch],
         near: f64,
-        local: &mut Local<1>,
+        expansion: &mut BoxExpansion<1>,
     ) -> Option<Zero> {
         let (low, high) = (range.low[0], range.high[0]);
         stretches.iter().rev().take(STARTS).find_map(|stretch| {
@@ -178,8 +176,8 @@ impl Grid<'_, 1> {
                     low: place,
                     high: place,
                 };
-                local.adopt(&self.reduced, &at);
-                let (value, slopes, turn) = tangent(local, piece, t);
+                expansion.adopt(&self.reduced, &at);
+                let (value, slopes, turn) = tangent(expansion, piece, t);
                 let slope = slopes[0];
                 let area = turn.re * slope.im - turn.im * slope.re;
                 let dt = (slope.re * value.im - slope.im * value.re) / area;
@@ -296,7 +294,7 @@ mod tests {
     use super::*;
     use crate::stability::boxes::Reduced;
     use crate::stability::family::{Affine, Family, Term};
-    use crate::stability::specification::Demand;
+    use crate::stability::specification::Specification;
 
     /// s + K² e^(−0.5 s)
     fn square() -> Family {
@@ -313,13 +311,13 @@ mod tests {
     }
 
     fn along(points: &[f64], decay: f64) -> Vec<Crossing> {
-        let demand = Demand {
+        let specification = Specification {
             decay,
             damping: None,
         };
         let family = square();
         let grid = Grid {
-            reduced: Reduced::new(&family, &[0.0], &[0]).demanding(demand),
+            reduced: Reduced::new(&family, &[0.0], &[0]).with_specification(specification),
             points: [points],
         };
         grid.crossings(&Task::new()).unwrap()

@@ -5,8 +5,7 @@ use super::axes::{Axis, Map, put, put_value};
 use super::chart::Chart;
 use crate::Error;
 use crate::memory::in_parallel;
-use crate::stability::crossings::Crossing;
-use crate::stability::crossings::{Members, Row};
+use crate::stability::crossings::{Crossing, Members, Row};
 use crate::stability::family::Family;
 
 /// A map whose family is affine in the parameter along its rows.
@@ -61,10 +60,10 @@ impl<'a> Rows<'a> {
     }
 
     fn rows(&self) -> Result<Vec<Row>, Error> {
-        let transect = self.transect()?;
+        let middle = self.middle_column()?;
         self.each(|index, members| {
             let members = Members {
-                anchor: transect
+                anchor: middle
                     .as_ref()
                     .and_then(|(column, row)| Some((*column, row.cell(index)?))),
                 ..members
@@ -86,7 +85,7 @@ impl<'a> Rows<'a> {
 
     /// The counts along one column, the middle one, where the family is affine in the other parameter as well: they
     /// anchor all rows.
-    fn transect(&self) -> Result<Option<(usize, Row)>, Error> {
+    fn middle_column(&self) -> Result<Option<(usize, Row)>, Error> {
         let (axis, across) = (self.axis(), self.across());
         let column = axis.points.len() / 2;
         let Some((constant, slope)) = self.map.family.split(across.parameter) else {
@@ -106,7 +105,7 @@ impl<'a> Rows<'a> {
             parts: parts.as_ref().filter(|(_, b)| !b.is_zero()),
             points: across.points,
             member: &member,
-            demand: self.map.question.demand,
+            specification: self.map.question.specification,
             anchor: None,
         };
         let sorted = across.points.is_sorted();
@@ -145,7 +144,7 @@ impl<'a> Rows<'a> {
                     parts: parts.as_ref(),
                     points: axis.points,
                     member: &member,
-                    demand: self.map.question.demand,
+                    specification: self.map.question.specification,
                     anchor: None,
                 };
                 work(index, members)

@@ -2,8 +2,7 @@
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, saturate};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::control_loop::requested_output::Trajectory;
-use crate::dde::control_loop::requested_output::Wanted;
+use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::limits::{check_growth, slack};
 use crate::dde::scalar::{Scalar, is_reached};
 use crate::{Error, Task};
@@ -22,7 +21,7 @@ pub(super) fn run<S: Scalar>(
     plant: &LinearLoop<S>,
     start: &Start<S>,
     reference: &Reference,
-    mut wanted: Wanted<'_, S>,
+    mut requested: RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
     let equations = plant.equations();
@@ -39,7 +38,7 @@ pub(super) fn run<S: Scalar>(
     let mut mode = Mode::Free;
     let mut t = S::default();
     let mut elements = 0;
-    while !wanted.is_done() {
+    while !requested.is_done() {
         watch(elements, task)?;
         let tolerance = slack(t, delay);
         let arriving = pieces.reach(t);
@@ -92,16 +91,16 @@ pub(super) fn run<S: Scalar>(
             (u, scale) = (Series::constant(u.coefficients[0]), S::from(1.0));
         }
         if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
-            wanted.output_break(t)?;
+            requested.output_break(t)?;
         }
-        if wanted.is_measured() {
+        if requested.is_measured() {
             let y = expansion.output(equations, &w);
-            wanted.measure(t.value(), h.value(), 1.0, &y.values());
+            requested.measure(t.value(), h.value(), 1.0, &y.values());
         }
-        wanted.outputs_before(next.value() - tolerance, |time| {
+        requested.outputs_before(next.value() - tolerance, |time| {
             expansion.output_at(equations, &w, (time - t) / h)
         });
-        wanted.inputs_before(next.value() - tolerance, |time| {
+        requested.inputs_before(next.value() - tolerance, |time| {
             saturate(u.at((time - t) / h), limit)
         });
 
@@ -125,7 +124,7 @@ pub(super) fn run<S: Scalar>(
                 mode = stretch.mode;
             }
             if order <= REPORTED {
-                wanted.input_break(t + S::from(stretch.start) * h)?;
+                requested.input_break(t + S::from(stretch.start) * h)?;
             }
             let last = stretch.end >= 1.0;
             pieces.push(Piece {
@@ -147,7 +146,7 @@ pub(super) fn run<S: Scalar>(
         t = next;
         elements += 1;
     }
-    Ok(wanted.trajectory)
+    Ok(requested.trajectory)
 }
 
 /// The command after the limit.

@@ -9,8 +9,7 @@
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, dot, saturate};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::control_loop::requested_output::Trajectory;
-use crate::dde::control_loop::requested_output::Wanted;
+use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::limits::{check_growth, slack};
 use crate::dde::scalar::Scalar;
 use crate::{Error, Task};
@@ -53,13 +52,13 @@ pub(super) fn run<S: Scalar>(
     plant: &LinearLoop<S>,
     start: &Start<S>,
     reference: &Reference,
-    mut wanted: Wanted<'_, S>,
+    mut requested: RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
     let closed = Closed::new(plant)?;
     let equations = plant.equations();
     let limit = plant.limit();
-    let horizon = 1.0 + 2.0 * wanted.last();
+    let horizon = 1.0 + 2.0 * requested.last();
     let nothing = Series::constant(S::default());
     let n = equations.states();
     let mut free = Expansion::new(&closed.a, n);
@@ -73,7 +72,7 @@ pub(super) fn run<S: Scalar>(
     let mut changes = 0;
     let mut t = S::default();
     let mut elements = 0;
-    while !wanted.is_done() {
+    while !requested.is_done() {
         watch(elements, task)?;
         elements += 1;
         let tolerance = slack(t, S::default());
@@ -81,10 +80,10 @@ pub(super) fn run<S: Scalar>(
         let before = cursor.value();
         let r = cursor.advance(t.value(), tolerance);
         if jumps {
-            wanted.input_break(t)?;
+            requested.input_break(t)?;
             let struck = closed.impulse * S::from(r - before);
             if !struck.is_nothing() {
-                wanted.output_break(t)?;
+                requested.output_break(t)?;
                 for (x, &b) in x.iter_mut().zip(&equations.b) {
                     *x += b * struck;
                 }
@@ -149,22 +148,22 @@ pub(super) fn run<S: Scalar>(
             None => expansion.combine(&closed.c, S::default(), &nothing, closed.d * S::from(r)),
             Some(w) => expansion.combine(&equations.c, S::default(), &nothing, equations.d * w),
         };
-        if wanted.is_measured() {
-            wanted.measure(t.value(), h.value(), end, &y.values());
+        if requested.is_measured() {
+            requested.measure(t.value(), h.value(), end, &y.values());
         }
-        wanted.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
-        wanted.inputs_before(next.value() - tolerance, |time| {
+        requested.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
+        requested.inputs_before(next.value() - tolerance, |time| {
             held.unwrap_or_else(|| saturate(v.at((time - t) / h), limit))
         });
         if end < 1.0 {
-            wanted.input_break(next)?;
-            wanted.output_break(next)?;
+            requested.input_break(next)?;
+            requested.output_break(next)?;
         }
         expansion.end(S::from(end), &mut x);
         check_growth(&x, S::default(), next)?;
         t = next;
     }
-    Ok(wanted.trajectory)
+    Ok(requested.trajectory)
 }
 
 /// The loop with w = v substituted.

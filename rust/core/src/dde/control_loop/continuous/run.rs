@@ -4,7 +4,7 @@ use super::effort::{MOST_ELEMENTS, endless};
 use super::{delayed, direct};
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::control_loop::requested_output::{Trajectory, Wanted};
+use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::scalar::Scalar;
 use crate::{Error, Task};
 
@@ -12,16 +12,16 @@ pub(crate) fn run<S: Scalar>(
     plant: &LinearLoop<S>,
     start: &Start<S>,
     reference: &Reference,
-    wanted: Wanted<'_, S>,
+    requested: RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
     if plant.delay().value() > 0.0 {
         // No element is longer than the delay: work without end is refused before it starts.
-        if wanted.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
+        if requested.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
             return Err(endless());
         }
-        delayed::run(plant, start, reference, wanted, task)
+        delayed::run(plant, start, reference, requested, task)
     } else {
-        direct::run(plant, start, reference, wanted, task)
+        direct::run(plant, start, reference, requested, task)
     }
 }

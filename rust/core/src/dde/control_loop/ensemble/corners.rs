@@ -2,8 +2,7 @@
 
 use crate::Error;
 use crate::memory::{collected, room};
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Real, Simd};
 
 use super::block::{Block, Column, SETS};
 use super::sets::Outcome;

@@ -1,9 +1,7 @@
-//! Figures of the sets of a block, from the lines that their responses consist of.
+//! Metrics of the sets of a block, from the lines that their responses consist of.
 
-use crate::dde::control_loop::metrics::{Criteria, Figures, Levels, Record};
-use crate::simd::Mask;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics, Record};
+use crate::simd::{Mask, Real, Simd};
 
 use super::block::{Block, Column, SETS};
 use super::each::judged;
@@ -11,13 +9,13 @@ use super::sets::Outcome;
 use super::through::{Visitor, through};
 use super::walk::{Line, Sink, load, store};
 
-/// Figures of the first `goals.len()` sets; a goal is the steady state, NaN for the last output.
-pub(super) fn figures(
+/// Metrics of the first `goals.len()` sets; a goal is the steady state, NaN for the last output.
+pub(super) fn metrics(
     block: &Block,
     goals: &[f64],
     span: f64,
     criteria: &Criteria,
-) -> Vec<(Figures, Outcome)> {
+) -> Vec<(Metrics, Outcome)> {
     let mut steady = [0.0; SETS];
     let mut is_known = true;
     for (place, goal) in steady.iter_mut().zip(goals) {
@@ -39,7 +37,7 @@ pub(super) fn figures(
         let ahead = block.ahead[lane];
         let at = |[value, time]: [&Column; 2]| (value[lane], (time[lane] - ahead).max(0.0));
         if found.lost[lane] != 0.0 {
-            return (Figures::UNKNOWN, Outcome::Diverged);
+            return (Metrics::UNKNOWN, Outcome::Diverged);
         }
         let [
             top,
@@ -51,7 +49,7 @@ pub(super) fn figures(
             least,
             most,
             since,
-            restless,
+            unsettled,
         ] = &found.parts;
         let record = Record {
             top: at([top, top_time]),
@@ -63,10 +61,10 @@ pub(super) fn figures(
             } else {
                 0.0 * since[lane]
             },
-            restless_until: restless[lane] - ahead,
+            unsettled_until: unsettled[lane] - ahead,
         };
         let wait = block.sample_time[lane] * (block.samples + 2) as f64;
-        judged(record.figures(levels), record.is_calm(span, wait))
+        judged(record.metrics(levels), record.stays_settled(span, wait))
     })
     .collect()
 }
@@ -117,9 +115,9 @@ struct Measured {
     begun: Column,
     risen: Column,
     band: Column,
-    calm: Column,
+    quiet_band: Column,
     /// Top, bottom, each with its time; begin and end of the rise; extremes after it; since when
-    /// inside; until when restless.
+    /// inside; until when unsettled.
     parts: [Column; 10],
     lost: Column,
 }
@@ -132,7 +130,7 @@ impl Measured {
             begun: levels.map(|level| level.rise.0),
             risen: levels.map(|level| level.rise.1),
             band: levels.map(|level| level.band),
-            calm: levels.map(|level| level.calm),
+            quiet_band: levels.map(|level| level.quiet_band),
             parts: [[0.0; SETS]; 10],
             lost: [0.0; SETS],
         }
@@ -145,7 +143,7 @@ struct Growing<S: Simd> {
     sign: Real<S>,
     steady: Real<S>,
     band: Real<S>,
-    calm: Real<S>,
+    quiet_band: Real<S>,
     level: [Real<S>; 2],
     top: [Real<S>; 2],
     bottom: [Real<S>; 2],
@@ -155,7 +153,7 @@ struct Growing<S: Simd> {
     after: [Real<S>; 2],
     since: Real<S>,
     outside: Mask<S>,
-    restless: Real<S>,
+    unsettled: Real<S>,
 }
 
 impl<S: Simd> Sink<S> for Growing<S> {
@@ -217,8 +215,8 @@ impl<S: Simd> Sink<S> for Growing<S> {
             self.since = enters.select(up.time_of(edge), self.since);
         }
         self.outside = (running & !inside) | (!running & self.outside);
-        let restless = running & away.gt(self.calm);
-        self.restless = restless.select(end, self.restless);
+        let unsettled = running & away.gt(self.quiet_band);
+        self.unsettled = unsettled.select(end, self.unsettled);
     }
 }
 
@@ -239,7 +237,7 @@ impl Visitor for Measured {
             sign: load(simd, &self.sign, pair),
             steady,
             band,
-            calm: load(simd, &self.calm, pair),
+            quiet_band: load(simd, &self.quiet_band, pair),
             level: [load(simd, &self.begun, pair), load(simd, &self.risen, pair)],
             top: [zero; 2],
             bottom: [zero; 2],
@@ -248,7 +246,7 @@ impl Visitor for Measured {
             after: [unknown; 2],
             since: zero,
             outside: !steady.abs().le(band),
-            restless: zero,
+            unsettled: zero,
         }
     }
 
@@ -265,7 +263,7 @@ impl Visitor for Measured {
             sink.after[0],
             sink.after[1],
             sink.outside.select(unknown, sink.since),
-            sink.restless,
+            sink.unsettled,
         ];
         for (column, value) in self.parts.iter_mut().zip(values) {
             store(column, pair, value);

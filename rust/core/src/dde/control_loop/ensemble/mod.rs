@@ -1,4 +1,4 @@
-//! Many loops at once: step responses from rest, or their figures, one loop a set of numbers.
+//! Many loops at once: step responses from rest, or their metrics, one loop a set of numbers.
 //!
 //! Sampled loops whose output is a line between events (an integrator under any controller) run
 //! in lanes, one set in each (`walk`); sets whose delays hold the same number of whole samples
@@ -19,4 +19,4 @@ mod walk;
 mod tests;
 
 pub use sets::{Outcome, Sets};
-pub use sweep::{figures, responses};
+pub use sweep::{metrics, responses};

@@ -7,7 +7,7 @@ use crate::dde::control_loop::row::{Row, width};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Outcome {
-    /// Simulated, and settled where figures were asked for.
+    /// Simulated, and settled where metrics were asked for.
     Ok = 0,
     /// Outside its settling band at the end of the time simulated.
     Unsettled = 1,

@@ -1,12 +1,11 @@
-//! Figures and responses of all sets.
+//! Metrics and responses of all sets.
 
 use rayon::prelude::*;
 
-use super::block;
 use super::block::Block;
 use super::sets::{Outcome, Sets};
-use super::{corners, each, measured};
-use crate::dde::control_loop::metrics::{Criteria, Figures};
+use super::{block, corners, each, measured};
+use crate::dde::control_loop::metrics::{Criteria, Metrics};
 use crate::memory::{filled, push, reserved, room};
 use crate::{Error, Task};
 
@@ -38,13 +37,13 @@ impl Sets<'_> {
         Ok((fit, left))
     }
 
-    /// Work on all sets, `in_lanes` on blocks and `alone` on single ones; `keep` is given every
+    /// Work on all sets, `side_by_side` on blocks and `alone` on single ones; `keep` is given every
     /// set with its result, after at most `at_once` of them were held.
     fn each<T: Send>(
         &self,
         (span, at_once): (f64, usize),
         task: &Task,
-        in_lanes: impl Fn(&Block, &[usize]) -> Result<Vec<T>, Error> + Sync,
+        side_by_side: impl Fn(&Block, &[usize]) -> Result<Vec<T>, Error> + Sync,
         alone: impl Fn(usize) -> Result<T, Error> + Sync,
         mut keep: impl FnMut(usize, T),
     ) -> Result<(), Error> {
@@ -56,7 +55,7 @@ impl Sets<'_> {
             let work = |members: &&[Alike]| {
                 task.check()?;
                 let sets: Vec<usize> = members.iter().map(|&(_, set)| set).collect();
-                let found = in_lanes(&Block::new(self, &sets)?, &sets)?;
+                let found = side_by_side(&Block::new(self, &sets)?, &sets)?;
                 task.advance(sets.len() as u64);
                 Ok(found)
             };
@@ -84,27 +83,27 @@ impl Sets<'_> {
     }
 }
 
-/// Figures of every response from its start to `span` seconds after it.
+/// Metrics of every response from its start to `span` seconds after it.
 ///
 /// `steady` holds the steady state of each set, NaN where its last output is to count as that.
-pub fn figures(
+pub fn metrics(
     sets: &Sets<'_>,
     steady: &[f64],
     span: f64,
     criteria: &Criteria,
     task: &Task,
-) -> Result<Vec<(Figures, Outcome)>, Error> {
+) -> Result<Vec<(Metrics, Outcome)>, Error> {
     let goal = |set: usize| steady.get(set).copied().unwrap_or(f64::NAN);
-    let mut found = filled(SWEEP, (Figures::UNKNOWN, Outcome::Refused), sets.len())?;
+    let mut found = filled(SWEEP, (Metrics::UNKNOWN, Outcome::Refused), sets.len())?;
     sets.each(
         (span, AT_ONCE),
         task,
         |block, members| {
             let goals: Vec<f64> = members.iter().map(|&set| goal(set)).collect();
             room::<block::Column>(SWEEP, block.samples)?;
-            Ok(measured::figures(block, &goals, span, criteria))
+            Ok(measured::metrics(block, &goals, span, criteria))
         },
-        |set| each::figures(sets, set, goal(set), span, criteria, task),
+        |set| each::metrics(sets, set, goal(set), span, criteria, task),
         |set, result| {
             if let Some(place) = found.get_mut(set) {
                 *place = result;

@@ -3,7 +3,7 @@
 use super::*;
 use crate::Task;
 use crate::dde::control_loop::linear_loop::Start;
-use crate::dde::control_loop::metrics::{Criteria, Figures};
+use crate::dde::control_loop::metrics::{Criteria, Metrics};
 use crate::dde::control_loop::reference::Reference;
 use proptest::prelude::*;
 
@@ -22,10 +22,10 @@ fn row(kp: f64, ki: Option<f64>, delay: f64, limit: f64) -> Vec<f64> {
     states.into_iter().chain(numbers).collect()
 }
 
-/// Figures of a set by the engine of a single loop.
-fn alone(sets: &Sets<'_>, set: usize, span: f64) -> Figures {
-    let found = each::figures(sets, set, f64::NAN, span, &CRITERIA, &Task::new());
-    found.map_or(Figures::UNKNOWN, |(figures, _)| figures)
+/// Metrics of a set by the engine of a single loop.
+fn alone(sets: &Sets<'_>, set: usize, span: f64) -> Metrics {
+    let found = each::metrics(sets, set, f64::NAN, span, &CRITERIA, &Task::new());
+    found.map_or(Metrics::UNKNOWN, |(metrics, _)| metrics)
 }
 
 proptest! {
@@ -48,11 +48,11 @@ proptest! {
             is_ahead,
         };
         let goals = vec![f64::NAN; gains.len()];
-        let found = figures(&sets, &goals, span, &CRITERIA, &Task::new());
+        let found = metrics(&sets, &goals, span, &CRITERIA, &Task::new());
         prop_assert!(found.is_ok());
         for (set, (found, _)) in found.into_iter().flatten().enumerate() {
             // A response that has settled is farthest from zero where rounding says so.
-            let truth = Figures { peak_time: found.peak_time, ..alone(&sets, set, span) };
+            let truth = Metrics { peak_time: found.peak_time, ..alone(&sets, set, span) };
             for (found, truth) in found.to_array().into_iter().zip(truth.to_array()) {
                 prop_assert!(
                     (found - truth).abs() < 1e-9 || (found.is_nan() && truth.is_nan()),
@@ -97,7 +97,7 @@ fn a_set_is_refused_or_diverges_alone() {
         amplitude: 1.0,
         is_ahead: false,
     };
-    let found = figures(&sets, &[1.0; 3], 100.0, &CRITERIA, &Task::new());
+    let found = metrics(&sets, &[1.0; 3], 100.0, &CRITERIA, &Task::new());
     let outcomes: Vec<Outcome> = found.into_iter().flatten().map(|(_, o)| o).collect();
     assert_eq!(outcomes, [Outcome::Ok, Outcome::Refused, Outcome::Diverged]);
 }

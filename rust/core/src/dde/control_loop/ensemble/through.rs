@@ -2,9 +2,7 @@
 
 use pulp::WithSimd;
 
-use crate::simd::Instructions;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Instructions, Real, Simd};
 
 use super::block::{Block, SETS};
 use super::walk::{Sink, load, walk};

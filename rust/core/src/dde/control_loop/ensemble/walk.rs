@@ -4,9 +4,7 @@
 //! of a block is a line; a [`Sink`] is shown each of them once.
 
 use crate::dde::limits::DIVERGED;
-use crate::simd::Mask;
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Mask, Real, Simd};
 
 use super::block::{Block, Column, Hold};
 

@@ -2,8 +2,7 @@
 
 use crate::dde::control_loop::linear_loop::{dot, saturate};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::limits::RESPONSE;
-use crate::dde::limits::check_growth;
+use crate::dde::limits::{RESPONSE, check_growth};
 use crate::memory::{reserved, room};
 use crate::{Error, Task};
 

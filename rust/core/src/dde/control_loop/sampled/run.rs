@@ -2,10 +2,8 @@
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, Update, saturate};
 use crate::dde::control_loop::reference::Reference;
-use crate::dde::control_loop::requested_output::Trajectory;
-use crate::dde::control_loop::requested_output::Wanted;
-use crate::dde::limits::RESPONSE;
-use crate::dde::limits::{check_growth, slack};
+use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
+use crate::dde::limits::{RESPONSE, check_growth, slack};
 use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
 use crate::memory::push;
@@ -25,7 +23,7 @@ pub(crate) fn run<S: Scalar>(
     sample_time: S,
     start: &Start<S>,
     reference: &Reference,
-    wanted: Wanted<'_, S>,
+    requested: RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
     let equations = plant.equations();
@@ -41,10 +39,10 @@ pub(crate) fn run<S: Scalar>(
         x: start.state.clone(),
         scratch: start.state.clone(),
         held: S::default(),
-        windows: wanted
+        windows: requested
             .is_measured()
             .then(|| Windows::new(equations, timing.early, timing.late)),
-        wanted,
+        requested,
     };
     let phase = start.sample_phase;
     let mut cursor = reference.cursor();
@@ -54,7 +52,7 @@ pub(crate) fn run<S: Scalar>(
         walk.partial(-1, sample_time - S::from(phase), S::default())?;
     }
     let mut k = 0_u64;
-    while !walk.wanted.is_done() {
+    while !walk.requested.is_done() {
         if k.is_multiple_of(CHECK_EVERY) {
             task.check()?;
         }
@@ -76,11 +74,11 @@ pub(crate) fn run<S: Scalar>(
         if let Some(update) = plant.update() {
             walk.update(update, arrived);
         }
-        walk.wanted.input_break(now)?;
+        walk.requested.input_break(now)?;
         walk.interval(index, now)?;
         k += 1;
     }
-    Ok(walk.wanted.trajectory)
+    Ok(walk.requested.trajectory)
 }
 
 /// The commands issued, by sample number; negative numbers are those before the start.
@@ -127,7 +125,7 @@ struct Walk<'a, S> {
     held: S,
     /// For measurements, which begin with the first sample.
     windows: Option<Windows>,
-    wanted: Wanted<'a, S>,
+    requested: RequestedOutput<'a, S>,
 }
 
 impl<S: Scalar> Walk<'_, S> {
@@ -145,7 +143,7 @@ impl<S: Scalar> Walk<'_, S> {
             self.commands.at(k - self.lag()),
         );
         let u = self.commands.at(k);
-        self.wanted
+        self.requested
             .inputs_before((now + early + late).value() - tolerance, |_| u);
         // An instant that grows with the parameter counts as well.
         if !early.is_nothing() {
@@ -156,7 +154,7 @@ impl<S: Scalar> Walk<'_, S> {
             std::mem::swap(&mut self.x, &mut self.scratch);
         }
         if before != after {
-            self.wanted.output_break(now + early)?;
+            self.requested.output_break(now + early)?;
         }
         self.measure(after, now + early, |windows| &windows.late);
         self.serve(after, now + early, (now + early + late).value() - tolerance);
@@ -189,13 +187,13 @@ impl<S: Scalar> Walk<'_, S> {
         );
         let u = self.commands.at(k);
         let end = now + (early + late - into);
-        self.wanted.inputs_before(end.value() - tolerance, |_| u);
+        self.requested.inputs_before(end.value() - tolerance, |_| u);
         let mut at = now;
         if into.value() < early.value() - tolerance {
             let switch = now + (early - into);
             self.serve(before, at, switch.value() - tolerance);
             self.jump(switch - at, before);
-            self.wanted.output_break(switch)?;
+            self.requested.output_break(switch)?;
             at = switch;
         }
         self.serve(after, at, end.value() - tolerance);
@@ -219,7 +217,13 @@ impl<S: Scalar> Walk<'_, S> {
         if let Some(windows) = &self.windows {
             let inputs = [w.value(), self.held.value()];
             let equations = windows.equations();
-            part(windows).measure(equations, &self.x, inputs, from.value(), &mut self.wanted);
+            part(windows).measure(
+                equations,
+                &self.x,
+                inputs,
+                from.value(),
+                &mut self.requested,
+            );
         }
     }
 
@@ -227,7 +231,7 @@ impl<S: Scalar> Walk<'_, S> {
     fn serve(&mut self, w: S, from: S, end: f64) {
         let equations = self.plant.equations();
         let (x, scratch, held) = (&self.x, &mut self.scratch, self.held);
-        self.wanted.outputs_before(end, |t| {
+        self.requested.outputs_before(end, |t| {
             let h = t - from;
             let h = h.pinned(h.value().max(0.0));
             if h.is_nothing() {

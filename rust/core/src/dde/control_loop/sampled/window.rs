@@ -8,7 +8,7 @@
 //! which the series ends below rounding well before its last term.
 
 use crate::dde::control_loop::linear_loop::{Equations, dot};
-use crate::dde::control_loop::requested_output::Wanted;
+use crate::dde::control_loop::requested_output::RequestedOutput;
 use crate::dde::control_loop::series::{DEGREE, Series};
 use crate::dde::propagator::{Propagator, balanced_norm};
 use crate::dde::scalar::Scalar;
@@ -74,7 +74,7 @@ impl Window {
         x: &[S],
         inputs: [f64; 2],
         start: f64,
-        wanted: &mut Wanted<'_, S>,
+        requested: &mut RequestedOutput<'_, S>,
     ) {
         let n = equations.states();
         let mut x: Vec<f64> = x.iter().map(|x| x.value()).collect();
@@ -88,7 +88,7 @@ impl Window {
                 let (states, forced) = row.split_at(n);
                 *c = dot(states, &x) + dot(forced, &inputs);
             }
-            wanted.measure(start + number as f64 * self.step, self.step, 1.0, &y);
+            requested.measure(start + number as f64 * self.step, self.step, 1.0, &y);
             if number + 1 < self.steps {
                 self.over_step.apply(&x, &inputs, &mut scratch);
                 std::mem::swap(&mut x, &mut scratch);

@@ -7,8 +7,7 @@
 use super::nearest::ROUNDER;
 use super::tables::{POWERS, SINES};
 use super::{circular, exponential};
-use crate::simd::Real;
-use crate::simd::Simd;
+use crate::simd::{Real, Simd};
 
 /// Up to here powers of two need no second factor.
 const LARGEST_EXPONENT: f64 = 700.0;
@@ -54,7 +53,7 @@ pub(crate) fn exp<S: Simd>(x: Real<S>) -> Real<S> {
 #[cold]
 fn exp_one_by_one(x: &[f64], power: &mut [f64]) {
     for (x, power) in x.iter().zip(power) {
-        *power = super::exp(*x);
+        *power = exponential::exp(*x);
     }
 }
 
@@ -86,7 +85,7 @@ pub(crate) fn sin_cos<S: Simd>(y: Real<S>) -> (Real<S>, Real<S>) {
 #[cold]
 fn sin_cos_one_by_one(y: &[f64], sines: &mut [f64], cosines: &mut [f64]) {
     for ((y, sine), cosine) in y.iter().zip(sines).zip(cosines) {
-        (*sine, *cosine) = super::sin_cos(*y);
+        (*sine, *cosine) = circular::sin_cos(*y);
     }
 }
 
@@ -138,8 +137,8 @@ mod tests {
                 let mut values: Columns<3, 64> = [[0.0; 64]; 3];
                 sweep_on(instructions, &Both, &arguments, &mut values, block.len());
                 for (place, x) in block.iter().enumerate() {
-                    let (sine, cosine) = super::super::sin_cos(*x);
-                    let expected = [super::super::exp(*x), sine, cosine];
+                    let (sine, cosine) = circular::sin_cos(*x);
+                    let expected = [exponential::exp(*x), sine, cosine];
                     let got = values.map(|column| column[place]);
                     assert_eq!(
                         got.map(f64::to_bits),
