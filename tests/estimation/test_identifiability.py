@@ -53,7 +53,7 @@ def test_slopes_of_any_plant_are_difference_quotients():
 
     def answer(delay=0.2, gain=1.4, time_constant=0.7):
         system = dtm.FirstOrder(gain, time_constant).transfer_function() * dtm.delay(delay)
-        return dtm.simulate(system, flight.time, flight.command, input_time=flight.time).outputs
+        return system.simulate(flight.time, flight.command, input_time=flight.time).outputs
 
     step = 1e-6
     # The delay is a whole number of samples: only longer ones have a slope.

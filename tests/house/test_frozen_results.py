@@ -83,7 +83,7 @@ MADE = {
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
     "Sweep": lambda: dtm.sweep(LOOP, {"Kp": np.array([1.0, 2.0])}),
-    "SystemResponse": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
+    "Response of a system": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
     "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
     "TransferFunction": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)),
     "Whiteness": lambda: dtm.estimation.Whiteness(1.0, 0.5, 3, 0.1),

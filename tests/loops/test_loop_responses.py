@@ -68,7 +68,7 @@ def test_plot_draws_output_reference_and_command():
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("agg")
     response = dtm.ControlLoop(INTEGRATOR, dtm.P(1.0), delay=0.1).simulate(TIMES)
-    axes = response.plot(command=True)
+    axes = response.plot(inputs=True)
     assert len(axes.lines) == 3
     matplotlib.pyplot.close(axes.figure)
 

@@ -394,7 +394,7 @@ def test_a_root_on_the_edge_is_reported():
     for re, im in [((1, 0), None), ((math.nan, 1), None), (None, (2, 2))]:
         with pytest.raises(ValueError, match="range"):
             system.count(re, im)
-    with pytest.raises(TypeError, match="give a pair"):
+    with pytest.raises(TypeError, match="give a range"):
         system.count(re=3)
     with pytest.raises(ValueError, match="at least 1"):
         system.rightmost(0)
