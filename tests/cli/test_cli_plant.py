@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from command_line import found, one_clear_line, run
 from deadtime import TransferFunction, delay, s
 from deadtime._cli.plants import plant_from
-from command_line import found, one_clear_line, run
 
 LAGGING = "0.9/(s*(0.1*s+1))"
 
