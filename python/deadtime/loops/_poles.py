@@ -9,6 +9,7 @@ from typing import SupportsFloat, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.ranges import OpenRange
 from deadtime.loops._family import family_of_loop
 from deadtime.loops._sampled_regions import sampled_poles_in
 from deadtime.loops._specification import LoopSpecification
@@ -26,7 +27,6 @@ from deadtime.roots import (
     RootSet,
     crossings,
 )
-from deadtime.roots._root_set import Range
 from deadtime.roots.certificate import Certificate
 
 __all__ = ["LoopPoles"]
@@ -66,7 +66,7 @@ class LoopPoles:
         _ = loop.known_delay
         return cast("QuasiPolynomial", loop.characteristic_at(loop.parameters))
 
-    def count(self, re: Range | None = None, im: Range | None = None) -> int:
+    def count(self, re: OpenRange | None = None, im: OpenRange | None = None) -> int:
         """Count the poles in a region, with multiplicity.
 
         Parameters
@@ -95,7 +95,7 @@ class LoopPoles:
             return self.characteristic().count(re, im)
         return self.poles(re, im).counted
 
-    def poles(self, re: Range | None = None, im: Range | None = None) -> RootSet:
+    def poles(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
         """Locate every pole in a region.
 
         Parameters
@@ -127,7 +127,7 @@ class LoopPoles:
             return self.characteristic().roots(re, im)
         return sampled_poles_in(loop.native.balanced_matrix(), loop.sample_time, re, im)
 
-    def certify(self, re: Range | None = None, im: Range | None = None) -> Certificate:
+    def certify(self, re: OpenRange | None = None, im: OpenRange | None = None) -> Certificate:
         """Count the poles of a continuous loop in a region and write the proof down.
 
         Parameters

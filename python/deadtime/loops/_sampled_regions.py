@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import ContourError
+from deadtime._base.ranges import OpenRange, open_interval
 from deadtime.loops._stability import sampled_roots
 from deadtime.roots import RootSet
-from deadtime.roots._root_set import Range, ends
 
 __all__ = ["sampled_poles_in"]
 
 
 def sampled_poles_in(
-    matrix: NDArray[np.float64], sample_time: float, re: Range | None, im: Range | None
+    matrix: NDArray[np.float64], sample_time: float, re: OpenRange | None, im: OpenRange | None
 ) -> RootSet:
     """Return the poles s = ln(z)/sample_time of a transition matrix in a region.
 
@@ -29,7 +29,7 @@ def sampled_poles_in(
         If a range is not increasing.
     """
     every = sampled_roots(matrix, sample_time, len(matrix))
-    region = ends("re", re), ends("im", im)
+    region = open_interval("re", re), open_interval("im", im)
     for name, (low, high) in zip(("re", "im"), region, strict=True):
         if not low < high:
             raise ValueError(f"{name}=({low:g}, {high:g}): give (low, high) with low < high")
