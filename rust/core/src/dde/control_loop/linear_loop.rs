@@ -56,7 +56,7 @@ impl<S: Scalar> Equations<S> {
     }
 }
 
-/// What a sample does to the states, once the command is computed: x becomes J x + G w + H r.
+/// Change of the states at a sample, after the command is computed: x becomes J x + G w + H r.
 ///
 /// The states of a controller that runs in samples, such as a discretised filter, change in this
 /// way and are constant in between; the rows of J of all other states are those of the identity.
