@@ -12,6 +12,7 @@ import numpy as np
 from deadtime import paper
 from deadtime._base.drawing import new_figure
 from deadtime._cli.fly import emulated_drone
+from deadtime.estimation import Waveform
 from deadtime.flights import FlightPlan, fly_experiment
 from deadtime.flights._plots import plot_checked, plot_learned, plot_told
 from deadtime.flights._runs import read_telemetry
@@ -164,13 +165,13 @@ def estimating() -> None:
     )
     known = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), sample_time=0.065, limit=1.0)
     step, free = dtm.Experiment.step(8.0, rest=1.04), ("delay", "gain", "lag")
-    flight = step.fly(vehicle, noise=0.002, seed=2)
+    flight = step.run(vehicle, noise=0.002, seed=2)
     fit = dtm.estimate_delay(flight, known, free=free)
     fit.plot().savefig(IMAGES / "estimate-lag.png", dpi=80)
     dtm.estimate_delay(flight, known).plot().savefig(IMAGES / "estimate-lagless.png", dpi=80)
 
     gains = (0.8, 1.6, 2.4)
-    flights = [step.fly(vehicle.replace(Kp=Kp), 0.002, seed) for seed, Kp in enumerate(gains)]
+    flights = [step.run(vehicle.replace(Kp=Kp), 0.002, seed) for seed, Kp in enumerate(gains)]
     joint = dtm.estimate_delay(flights, [known.replace(Kp=Kp) for Kp in gains], free=free)
     joint.plot().savefig(IMAGES / "estimate-joint.png", dpi=65)
 
@@ -314,7 +315,7 @@ def thrust() -> None:
     for number, step in enumerate((0.1, 0.4, 0.8, 1.6)):
         flown, noisy = (thrust_flight(gain, step, noise) for noise in (0.0, 0.002))
         fit = dtm.estimate_delay(
-            noisy, known, free=("delay", "gain", "lag"), method="waveform", initial_output=0.0
+            noisy, known, free=("delay", "gain", "lag"), method=Waveform(initial_output=0.0)
         )
         margin = fit.loop.replace(limit=None).margin()
         fitted = fit.loop.simulate(np.arange(144) * TS, step).outputs

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._evidence import check_setpoint_active
-from deadtime.estimation.methods._decay import estimate_by_decay
-from deadtime.estimation.methods._decrement import estimate_by_decrement
-from deadtime.estimation.methods._output_error import estimate_by_output_error
-from deadtime.estimation.methods._overshoot import estimate_by_overshoot
-from deadtime.estimation.methods._waveform import estimate_by_waveform
+from deadtime.estimation.data._runs import paired_runs
+from deadtime.estimation.methods._decay import Decay
+from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
+from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
+from deadtime.recordings import Recording, Window
 
 __all__ = ["Comparison", "compare_methods"]
 
@@ -197,7 +200,7 @@ def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: s
 def compare_methods(
     recording: Recording,
     loop: ControlLoop,
-    window: tuple[float | None, float | None] | None = None,
+    window: Window | None = None,
 ) -> Comparison:
     """Estimate the delay by every method that applies.
 
@@ -215,31 +218,36 @@ def compare_methods(
     NotIdentifiableError
         When no fit of delay and gain has an answer.
     """
-    check_setpoint_active(recording.window(*(window or (None, None))))
+    runs = paired_runs(recording, loop, window)
+    check_setpoint_active(recording.window(*runs[0].window))
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
-    named = [name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")]
+    named: list[str] = [
+        name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")
+    ]
     plain = [name for name in named if name != "lag"]
-    for name in ("dominant", "exact", "saturated"):
+    for name in get_args(OvershootMap):
         try:
-            estimates[name] = estimate_by_overshoot(recording, loop, window, map=name)
+            estimates[name] = Overshoot(map=name).estimate(runs, plain)
         except (NotIdentifiableError, ValueError) as error:
             refusals[name] = str(error).rstrip(".")
     # Each is for steps that the other is not for, most recordings for neither: nothing to explain.
-    with suppress(NotIdentifiableError, ValueError):
-        estimates["decrement"] = estimate_by_decrement(recording, loop, window, plain)
-    with suppress(NotIdentifiableError, ValueError):
-        estimates["decay"] = estimate_by_decay(recording, loop, window)
-    fits: dict[str, Callable[..., DelayEstimate]] = {"waveform": estimate_by_waveform}
+    readings: list[Method] = [Decrement(), Decay()]
+    for method in readings:
+        with suppress(NotIdentifiableError, ValueError):
+            estimates[method.name] = method.estimate(runs, plain)
+    fits: list[Method] = [Waveform()]
     if recording.command is not None:
-        fits["output_error"] = estimate_by_output_error
-    for method, fit in fits.items():
-        frees = {method: plain} if named == plain else {method: plain, f"{method} with lag": named}
+        fits.append(OutputError())
+    for method in fits:
+        frees = {method.name: plain}
+        if named != plain:
+            frees[f"{method.name} with lag"] = named
         for name, free in frees.items():
             try:
-                estimates[name] = fit(recording, loop, window, free)
+                estimates[name] = method.estimate(runs, free)
             except NotIdentifiableError as error:
                 refusals[name] = str(error).rstrip(".")
-    if not fits.keys() & estimates.keys():
+    if not any(method.name in estimates for method in fits):
         raise NotIdentifiableError(refusals["waveform"])
     return Comparison(estimates, refusals)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from deadtime._base.drawing import COLOURS, DATA, REFERENCE, bare_axes, empty_figure
-from deadtime.estimation._result import DelayEstimate, Flight
+from deadtime.estimation._result import DelayEstimate, FittedRun
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
@@ -32,17 +32,17 @@ def plot_fits(
 
 def plot_estimate(fit: DelayEstimate) -> Figure:
     """Fit over data, below it the residuals, beside it the profile of the delay if it has one."""
-    flights = fit.flights
+    runs = fit.runs
     profiled = fit.has_profile and "delay" in fit.stderr
-    width = max(7.0, 3.5 * len(flights)) + 2.6 * profiled
+    width = max(7.0, 3.5 * len(runs)) + 2.6 * profiled
     figure = empty_figure(width, 4.6)
-    across = len(flights) + int(profiled)
-    ratios = [2.2] * len(flights) + [1.5] * int(profiled)
+    across = len(runs) + int(profiled)
+    ratios = [2.2] * len(runs) + [1.5] * int(profiled)
     grid = figure.add_gridspec(2, across, height_ratios=[3.0, 1.0], width_ratios=ratios)
-    for column, flight in enumerate(flights):
+    for column, run in enumerate(runs):
         upper = bare_axes(figure.add_subplot(grid[0, column]))
         lower = bare_axes(figure.add_subplot(grid[1, column], sharex=upper))
-        _plot_flight(upper, lower, flight, f"{fit.method}, delay {fit.delay:.3f} s")
+        _plot_run(upper, lower, run, f"{fit.method}, delay {fit.delay:.3f} s")
         if column == 0:
             upper.legend(frameon=False, fontsize="small")
         upper.tick_params(labelbottom=False)
@@ -54,13 +54,13 @@ def plot_estimate(fit: DelayEstimate) -> Figure:
     return figure
 
 
-def _plot_flight(upper: Axes, lower: Axes, flight: Flight, label: str) -> None:
-    recording = flight.recording
+def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
+    recording = run.recording
     upper.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
     upper.plot(recording.time, recording.output, label="recorded", **DATA)
-    fitted = recording.output - flight.residuals
+    fitted = recording.output - run.residuals
     upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
-    lower.plot(recording.time, flight.residuals, **DATA)
+    lower.plot(recording.time, run.residuals, **DATA)
     lower.axhline(0.0, color="0.6", lw=0.8)
     lower.set(xlabel="time / s")
 

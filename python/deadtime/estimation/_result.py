@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array
@@ -21,7 +20,7 @@ from deadtime.recordings import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["CramerRaoBound", "DelayEstimate", "Flight"]
+__all__ = ["CramerRaoBound", "DelayEstimate", "FittedRun"]
 
 Array = NDArray[np.float64]
 
@@ -49,7 +48,7 @@ class CramerRaoBound(ReadOnlyArrays):
 
 
 @dataclass(frozen=True, eq=False)
-class Flight(ReadOnlyArrays):
+class FittedRun(ReadOnlyArrays):
     """One of the recordings of a fit.
 
     Attributes
@@ -57,7 +56,7 @@ class Flight(ReadOnlyArrays):
     recording : Recording
         The window of it that was fitted.
     loop : ControlLoop
-        The loop that flew it, with the fitted numbers put in.
+        The loop that made it, with the fitted numbers put in.
     residuals : ndarray, shape (n,)
         Recorded minus simulated output.
     """
@@ -102,7 +101,7 @@ class DelayEstimate(ReadOnlyArrays):
         Why there is no interval; empty where there is one.
     details : dict
         Quantities of the method alone, such as the overshoot.
-    others : tuple of Flight
+    others : tuple of FittedRun
         The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
         the first.
     """
@@ -120,13 +119,13 @@ class DelayEstimate(ReadOnlyArrays):
     message: str
     uncalibrated: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
-    others: tuple[Flight, ...] = ()
+    others: tuple[FittedRun, ...] = ()
     _profile: Profile | None = None
 
     @property
-    def flights(self) -> tuple[Flight, ...]:
+    def runs(self) -> tuple[FittedRun, ...]:
         """All recordings that were fitted together, the first one included."""
-        return (Flight(self.recording, self.loop, self.residuals), *self.others)
+        return (FittedRun(self.recording, self.loop, self.residuals), *self.others)
 
     @property
     def delay(self) -> float:
@@ -161,7 +160,7 @@ class DelayEstimate(ReadOnlyArrays):
     @property
     def rms(self) -> float:
         """Root mean square of the residuals of all recordings, in the unit of the output."""
-        squares = [flight.residuals**2 for flight in self.flights]
+        squares = [run.residuals**2 for run in self.runs]
         return float(np.sqrt(np.mean(np.concatenate(squares))))
 
     def ci(self, level: float = 0.95, name: str = "delay") -> tuple[float, float]:
@@ -185,6 +184,8 @@ class DelayEstimate(ReadOnlyArrays):
             When the method cannot give an interval (the message says why), the level is not
             between 0 and 1, or the quantity was not fitted.
         """
+        from scipy import special
+
         if not 0.0 < level < 1.0:
             raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
         if not self.calibrated:
@@ -196,7 +197,7 @@ class DelayEstimate(ReadOnlyArrays):
         value = self._value(name)
         if self._profile is not None and self._profile.preferred:
             return self._profile.interval(name, value, self._reach(name), level)
-        freedom = max(1, sum(one.residuals.size for one in self.flights) - len(self.free))
+        freedom = max(1, sum(one.residuals.size for one in self.runs) - len(self.free))
         reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
         low = value - reach
         return (max(low, floor_of(name)), value + reach)
@@ -278,8 +279,8 @@ class DelayEstimate(ReadOnlyArrays):
         """The result as a few lines of text."""
         lines = [f"{self.method}: {self.message}"]
         if self.others:
-            rows = " + ".join(str(len(flight.recording)) for flight in self.flights)
-            lines.append(f"  {len(self.flights)} recordings together, {rows} samples")
+            rows = " + ".join(str(len(run.recording)) for run in self.runs)
+            lines.append(f"  {len(self.runs)} recordings together, {rows} samples")
         width = max((len(name) for name in self.stderr), default=0) + 1
         for name, stderr in self.stderr.items():
             unit = "" if name in UNITLESS else "s"

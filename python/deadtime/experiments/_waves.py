@@ -12,7 +12,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from deadtime._base.validation import positive, whole_number
 from deadtime.recordings._recording import MINIMUM_SAMPLES
@@ -91,6 +90,8 @@ def excited_lines(lines: int | Sequence[int], count: int, odd: bool) -> Whole:
 
 def binary_sequence(needed: int, seed: int) -> tuple[Array, int]:
     """Signs of a maximum-length sequence from a random place on, and how many it has in all."""
+    from scipy import signal
+
     bits = max(2, needed.bit_length())
     if bits > MOST_BITS:
         raise ValueError(f"{needed} changes of sign are too many: give a longer hold")

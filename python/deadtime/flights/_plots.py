@@ -23,7 +23,7 @@ BEFORE, AFTER = 0.5, 4.5
 
 def plot_learned(axes: Sequence[Axes], flights: Sequence[FlownSteps], fit: DelayEstimate) -> None:
     """Each flight that was learnt from, the fit to its commands over it."""
-    for ax, flight, fitted in zip(axes, flights, fit.flights, strict=True):
+    for ax, flight, fitted in zip(axes, flights, fit.runs, strict=True):
         shown, window = flight.recording, fitted.recording
         ax.step(shown.time, shown.reference, where="post", label="reference", **REFERENCE)
         ax.plot(shown.time, shown.output, label="height as flown", **DATA)

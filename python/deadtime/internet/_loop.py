@@ -15,7 +15,14 @@ import numpy as np
 
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.validation import positive
-from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.estimation import (
+    DelayEstimate,
+    Method,
+    OutputError,
+    Overshoot,
+    Waveform,
+    estimate_delay,
+)
 from deadtime.internet._replay import age_error, answer_times, replayed_errors
 from deadtime.internet._result import METHODS, InternetLoop, InternetRun
 from deadtime.links import virtual_time
@@ -145,11 +152,11 @@ def _estimate(
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
     free = ("delay", "gain") if trial.lag == 0.0 else ("delay", "gain", "lag")
-    options: dict[str, dict[str, Any]] = {
-        "dominant": {"method": "overshoot", "map": "dominant"},
-        "exact": {"method": "overshoot", "map": "exact"},
-        "waveform": {"method": "waveform", "free": free},
-        "output_error": {"method": "output_error", "free": free},
+    by_name: dict[str, Method] = {
+        "dominant": Overshoot(map="dominant"),
+        "exact": Overshoot(map="exact"),
+        "waveform": Waveform(),
+        "output_error": OutputError(),
     }
     for name in methods:
         end = "controller" if name == "output_error" else "plant"
@@ -160,7 +167,7 @@ def _estimate(
         if end == "plant":
             data = _as_sampled(data, trial.sample_time)
         try:
-            estimates[name] = estimate_delay(data, known, **options[name])
+            estimates[name] = estimate_delay(data, known, method=by_name[name], free=free)
         except DeadtimeError as error:
             refusals[name] = str(error).rstrip(".")
     return estimates, refusals

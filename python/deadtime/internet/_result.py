@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from deadtime.estimation import DelayEstimate
 from deadtime.internet._replay import MAPS, interval_of_mean
@@ -74,6 +73,8 @@ class Spread:
     @staticmethod
     def of(values: Sequence[float]) -> Spread:
         """That of these delays."""
+        from scipy import special
+
         count = len(values)
         if count == 0:
             return Spread(0, math.nan, math.nan, math.nan)

@@ -1,6 +1,6 @@
 """Recordings of control loops, and their readers, one file a format."""
 
 from deadtime.recordings._csv import read_recording
-from deadtime.recordings._recording import Recording, Step
+from deadtime.recordings._recording import Recording, Step, Window
 
-__all__ = ["Recording", "Step", "read_recording"]
+__all__ = ["Recording", "Step", "Window", "read_recording"]

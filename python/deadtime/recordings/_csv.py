@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from deadtime._base.errors import RecordingError
-from deadtime.recordings._recording import Recording
+from deadtime.recordings._recording import Recording, Window, window_ends
 
 __all__ = ["read_recording"]
 
@@ -25,7 +25,7 @@ def read_recording(
     reference: str = "reference",
     output: str = "output",
     command: str | None = None,
-    window: tuple[float | None, float | None] | None = None,
+    window: Window | None = None,
     delimiter: str | None = None,
 ) -> Recording:
     r"""Read a recording from a CSV file with a header line.
@@ -39,8 +39,8 @@ def read_recording(
         Names of the columns that hold the time stamps (s), the reference and the measurement.
     command : str, optional
         Name of the column that holds the command sent to the plant.
-    window : (float or None, float or None), optional
-        Keep only the rows between these times, s.
+    window : (low, high), optional
+        Keep only the rows between these times, s; None leaves an end open.
     delimiter : str, optional
         What separates the columns; told from the header line if not given.
 
@@ -109,9 +109,9 @@ def read_recording(
     return recording
 
 
-def _ends(window: tuple[float | None, float | None] | None) -> tuple[float, float]:
+def _ends(window: Window | None) -> tuple[float, float]:
     """Ends of the window, open where None, with room for a last printed digit."""
-    low, high = (None, None) if window is None else window
+    low, high = window_ends(window)
     start = -math.inf if low is None else low - 1e-9 * max(1.0, abs(low))
     stop = math.inf if high is None else high + 1e-9 * max(1.0, abs(high))
     return start, stop

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.loops import ControlLoop
@@ -110,6 +109,8 @@ def check_answers(output: Array, misfit: Array, numbers: int, autocorrelation: f
     The ratio is that of an F test. Coloured misfit leaves fewer independent samples, unless most
     of the variance is explained: then it is the model that lacks something, not the answer.
     """
+    from scipy import special
+
     centred = output - output.mean()
     constant, fitted = float(centred @ centred), float(misfit @ misfit)
     if fitted == 0.0:

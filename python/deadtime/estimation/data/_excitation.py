@@ -39,17 +39,17 @@ def check_moves(output: Array, command: Array | None = None) -> None:
         )
 
 
-def check_excitation(data: Recording, numbers: int, *, in_flight: bool = False) -> None:
+def check_excitation(data: Recording, numbers: int, *, in_motion: bool = False) -> None:
     """Refuse a window in which nothing is asked of the loop or nothing moves.
 
-    A window that begins `in_flight`, after rows before it, has to hold a step; a recording may
+    A window that begins `in_motion`, after rows before it, has to hold a step; a recording may
     begin with one.
     """
     steps = data.steps()
     noise = float(np.median(np.abs(np.diff(data.output)))) / 0.6745 / math.sqrt(2.0)
     away = abs(float(data.reference[0] - data.output[0]))
     there = away <= max(CLEARANCE * noise, ROUNDING * float(np.ptp(data.output)))
-    if not steps and (in_flight or there):
+    if not steps and (in_motion or there):
         raise NotIdentifiableError(
             f"the reference is {data.reference[0]:g} throughout the window: nothing excites the "
             "loop; choose a window with a step"

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from deadtime.recordings import Recording
 
@@ -29,6 +28,8 @@ def feedback_p_value(recording: Recording) -> float:
     An F test of Granger's (1969) kind: does the output, to `PAST` samples back, help to predict the
     command beyond what reference and past commands do?
     """
+    from scipy import special
+
     command = recording.command
     if command is None:  # computed from the output, then
         return 0.0

@@ -45,7 +45,7 @@ class SimulatedRecording:
         The whole recording.
     loop : ControlLoop
         What is known of the loop; its delay may be None.
-    window : (float or None, float or None) or None
+    window : (float or None, float or None)
         The part to be simulated, s.
     """
 
@@ -53,12 +53,12 @@ class SimulatedRecording:
         self,
         recording: Recording,
         loop: ControlLoop,
-        window: tuple[float | None, float | None] | None,
+        window: tuple[float | None, float | None] = (None, None),
     ) -> None:
-        rows = recording.rows(*(window or (None, None)))
+        rows = recording.rows(*window)
         # The recorded output is what came back to the controller, wherever the delay is.
         self.loop = loop.replace(delay_path="command")
-        self.recording = recording.window(*(window or (None, None)))
+        self.recording = recording.window(*window)
         _check_work(self.recording, loop)
         self._past = _past_commands(recording, loop, rows.start)
 

@@ -16,7 +16,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 __all__ = ["Ends", "Minimum", "Model", "ModelOfOne", "ProfileCost", "minimise", "solve"]
 
@@ -152,6 +151,8 @@ def minimise(
     tolerance : float
         Relative change of cost and parameters at which the search ends.
     """
+    from scipy.optimize import least_squares
+
     base = np.zeros(start.size) if base is None else base
     free = np.eye(start.size) if free is None else free
     moving = np.argmax(free > 0.0, axis=0)

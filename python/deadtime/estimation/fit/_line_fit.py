@@ -13,7 +13,6 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from deadtime._base.errors import NotIdentifiableError
 
@@ -73,6 +72,7 @@ def fit_lines(lines: Lines, names: tuple[str, ...], known: Values) -> tuple[Valu
 
 def _descend(lines: Lines, names: tuple[str, ...], start: Values) -> tuple[Values, Array]:
     """Least squares over `names` from a start."""
+    from scipy.optimize import least_squares
 
     def misfit(point: Array) -> Array:
         return lines.misfit(start | dict(zip(names, (float(x) for x in point), strict=True)))

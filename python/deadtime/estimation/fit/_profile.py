@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
-from scipy.optimize import brentq
 
 __all__ = ["Profile", "floor_of"]
 
@@ -68,6 +66,8 @@ class Profile:
 
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
         """Ends of the interval around the fitted `value`, no lower than it can be."""
+        from scipy import special
+
         quantile = float(special.stdtrit(self.freedom, 0.5 + level / 2))
         floor = floor_of(name)
         reach = max(stderr, 1e-9 * abs(value), 1e-12)
@@ -77,6 +77,8 @@ class Profile:
 
     def _end(self, name: str, value: float, reach: float, quantile: float, floor: float) -> float:
         # In t itself, which is nearly a line, so that secants find the end.
+        from scipy.optimize import brentq
+
         def excess(offset: float) -> float:
             return float(np.sqrt(self.statistic(name, value + offset)) - quantile)
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 __all__ = ["Whiteness", "pieces_of", "robust_covariance", "white_covariance", "whiteness_of"]
 
@@ -60,6 +59,8 @@ def whiteness_of(
     Residuals of several recordings, of these `sizes`, are tested one recording at a time, and
     their statistics added. Residuals that vanish to rounding pass: there is nothing left in them.
     """
+    from scipy import special
+
     statistic, freedom, first, weight = 0.0, -parameters, 0.0, 0.0
     longest = 1
     for piece in pieces_of(residuals, sizes):

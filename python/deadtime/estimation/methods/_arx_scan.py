@@ -16,10 +16,11 @@ the command follows it. There is no interval; the method is here to compare with
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, special
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
@@ -27,12 +28,12 @@ from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._extremes import check_dies_out, read_ringing
 from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
 from deadtime.estimation.data._input_output import InputOutput, read_input_output
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_arx_scan"]
+__all__ = ["ARXScan"]
 
 Array = NDArray[np.float64]
 
@@ -43,62 +44,82 @@ CHANCE = 1e-4
 REFINED = 100
 
 
-def estimate_by_arx_scan(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),
-    na: int = 2,
-    nb: int = 2,
-    fractional: bool = False,
-) -> DelayEstimate:
-    """Delay of the ARX model with the least loss."""
-    check_delay_alone("arx_scan", free)
-    simulated = SimulatedRecording(recording, loop, window)
-    data = simulated.recording
-    read = read_input_output(recording, loop, simulated, "arx_scan")
-    # Noise that comes back within the same sample is taken for an answer at no delay.
-    feedback = feedback_p_value(data) < FEEDBACK
-    least = 1 if feedback else 0
-    if feedback:
-        check_dies_out(read_ringing(data), "arx_scan")
-    if fractional:
-        if read.remark:
-            raise ValueError(
-                f"fractional=True is for an Integrator or a FirstOrder, which can be undone, the "
-                f"loop has a {type(loop.plant).__name__}: leave it out"
-            )
-        gain = float(loop.parameters["gain"])
-        samples, losses, none = _held_scan(read, float(np.sign(gain)), least)
-        numbers, best = 2, float(losses[least:].min())
-    else:
-        poles, zeros = whole_number("na", na, least=0), whole_number("nb", nb, least=1)
-        numbers = poles + zeros
-        losses, best, none = _scan(data.output - data.output[0], read, poles, zeros, least)
-        samples = float(least + np.argmin(losses[least:]))
-    _check_answer(best, none, data.output.size, numbers)
-    delay = max(0.0, samples * read.sample_time - (read.late if fractional else 0.0))
-    order = "the plant undone" if fractional else f"na={na}, nb={nb}"
-    return read_off_estimate(
-        "arx_scan",
-        simulated,
-        {"delay": delay},
-        None,
-        float(data.output[0]),
-        message=(
-            f"ARX models, {order}: least loss at {samples:.4g} samples of {read.sample_time:g} s"
-        ),
-        uncalibrated=(
-            "an ARX scan compares losses: the error of the delay is no coefficient's, a whole "
-            "number of samples has none, and sensor noise biases the coefficients; use "
-            "method='output_error' for an interval"
-        ),
-        details={
-            "samples": samples,
-            "delays": [read.sample_time * late for late in range(losses.size)],
-            "losses": losses.tolist(),
-        },
-    )
+@dataclass(frozen=True)
+class ARXScan(Method):
+    """Delay of the ARX model with the least loss, as MATLAB's `delayest` finds it.
+
+    Parameters
+    ----------
+    na, nb : int
+        Number of coefficients of past outputs, and of past commands.
+    fractional : bool
+        Invert the known plant, and find the delay between samples too; `na` and `nb` are not used.
+
+    Raises
+    ------
+    ValueError
+        When `na` is negative or `nb` below 1.
+    """
+
+    na: int = 2
+    nb: int = 2
+    fractional: bool = False
+
+    name: ClassVar[str] = "arx_scan"
+
+    def __post_init__(self) -> None:
+        whole_number("na", self.na, least=0)
+        whole_number("nb", self.nb)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("arx_scan", free)
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        read = read_input_output(recording, loop, simulated, "arx_scan")
+        # Noise that comes back within the same sample is taken for an answer at no delay.
+        feedback = feedback_p_value(data) < FEEDBACK
+        least = 1 if feedback else 0
+        if feedback:
+            check_dies_out(read_ringing(data), "arx_scan")
+        if self.fractional:
+            if read.remark:
+                raise ValueError(
+                    "fractional=True is for an Integrator or a FirstOrder, which can be undone, "
+                    f"the loop has a {type(loop.plant).__name__}: leave it out"
+                )
+            gain = float(loop.parameters["gain"])
+            samples, losses, none = _held_scan(read, float(np.sign(gain)), least)
+            numbers, best = 2, float(losses[least:].min())
+        else:
+            numbers = self.na + self.nb
+            losses, best, none = _scan(data.output - data.output[0], read, self.na, self.nb, least)
+            samples = float(least + np.argmin(losses[least:]))
+        _check_answer(best, none, data.output.size, numbers)
+        delay = max(0.0, samples * read.sample_time - (read.late if self.fractional else 0.0))
+        order = "the plant undone" if self.fractional else f"na={self.na}, nb={self.nb}"
+        return read_off_estimate(
+            "arx_scan",
+            simulated,
+            {"delay": delay},
+            None,
+            float(data.output[0]),
+            message=(
+                f"ARX models, {order}: least loss at {samples:.4g} samples of {read.sample_time:g} "
+                "s"
+            ),
+            uncalibrated=(
+                "an ARX scan compares losses: the error of the delay is no coefficient's, a whole "
+                "number of samples has none, and sensor noise biases the coefficients; use "
+                "method='output_error' for an interval"
+            ),
+            details={
+                "samples": samples,
+                "delays": [read.sample_time * late for late in range(losses.size)],
+                "losses": losses.tolist(),
+            },
+        )
 
 
 def _delayed(values: Array, samples: int, size: int) -> Array:
@@ -123,6 +144,8 @@ class _Delayed:
 
     def with_target(self, target: Array, lags: int) -> Array:
         """Sum of its products with `target`, for lag 0, 1 and so on."""
+        from scipy import signal
+
         products = signal.correlate(target, self.command, method="fft")
         return np.asarray(products[self.command.size - 1 :][:lags])
 
@@ -245,6 +268,8 @@ def _cramer(matrix: Array, seen: Array) -> NDArray[np.bool_]:
 
 def _check_answer(least: float, none: float, samples: int, numbers: int) -> None:
     """Refuse where the command improves the model no more than chance does."""
+    from scipy import special
+
     freedom = max(1, samples - numbers)
     ratio = (none - least) / 2.0 / max(least / freedom, 1e-300)
     if float(special.fdtrc(2, freedom, max(ratio, 0.0))) > CHANCE:

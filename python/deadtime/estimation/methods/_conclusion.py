@@ -10,27 +10,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.estimation._result import CramerRaoBound, DelayEstimate, Flight
+from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._evidence import (
     check_answers,
     check_distinguishable,
     embedded,
     standard_errors,
 )
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.fit._joint import JointModel
 from deadtime.estimation.fit._least_squares import Minimum, Model, ProfileCost, minimise
 from deadtime.estimation.fit._profile import Profile
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 
-__all__ = ["Fitted", "concluded", "without_vanishing"]
+__all__ = ["concluded", "without_vanishing"]
 
 Array = NDArray[np.float64]
 
@@ -54,14 +53,6 @@ AT_BOUND = 1e-4
 
 #: Residuals below this part of the output's range are rounding.
 EXACT = 1e-9
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """One recording that was fitted: the window, and the loop that was flown."""
-
-    recording: Recording
-    loop: ControlLoop
 
 
 def without_vanishing(model: Model, found: Minimum) -> Minimum:
@@ -96,7 +87,7 @@ def concluded(
     method: str,
     model: Model,
     found: Minimum,
-    fitted: Sequence[Fitted],
+    fitted: Sequence[Run],
     *,
     message: str,
     details: Mapping[str, Any],
@@ -108,7 +99,7 @@ def concluded(
     method : str
     model : Model
     found : Minimum
-    fitted : sequence of Fitted
+    fitted : sequence of Run
         The recordings, in the order of the model.
     message : str
         What was done, in words.
@@ -145,26 +136,26 @@ def concluded(
     freedom = residuals.size - len(loose)
     reason = _why_not_gauss(values, residuals.size, count)
     adequate = whiteness.white or exact
-    flights = tuple(
-        Flight(part.recording, _with(part.loop, values), piece / weight)
+    runs = tuple(
+        FittedRun(part.recording, _with(part.loop, values), piece / weight)
         for part, piece, weight in zip(fitted, pieces, _weights(model), strict=True)
     )
     return DelayEstimate(
         method=method,
-        loop=flights[0].loop,
+        loop=runs[0].loop,
         free=names,
         stderr=errors,
         cov=spread[:count, :count],
         crb=CramerRaoBound(labels, math.sqrt(found.cost / freedom), plain),
-        recording=flights[0].recording,
-        residuals=flights[0].residuals,
+        recording=runs[0].recording,
+        residuals=runs[0].residuals,
         whiteness=whiteness,
         adequate=adequate,
-        message=_message(message, held, reason, adequate, _advice(names, flights[0].loop)),
+        message=_message(message, held, reason, adequate, _advice(names, runs[0].loop)),
         details={**details, **{name: values[name] for name in ("start",) if name in values}},
-        others=flights[1:],
+        others=runs[1:],
         _profile=Profile(
-            cost=ProfileCost(model, found, flights[0].loop.parameters),
+            cost=ProfileCost(model, found, runs[0].loop.parameters),
             best=found.cost,
             freedom=freedom,
             widening=_widening(values, errors, plain),

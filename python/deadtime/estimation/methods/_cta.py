@@ -17,24 +17,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._evidence import check_distinguishable, checked_names, standard_errors
 from deadtime.estimation.data._excitation import check_excitation, check_gain, start_and_span
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import stiffness_of
 from deadtime.estimation.fit._residuals import robust_covariance
+from deadtime.estimation.methods._method import Method, check_initial_output
 from deadtime.estimation.methods._read_off import read_off_estimate
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = ["chebyshev_differentiation", "estimate_by_cta"]
+__all__ = ["CTA", "chebyshev_differentiation"]
 
 Array = NDArray[np.float64]
 
@@ -48,54 +51,77 @@ MOST_NODES = 24
 LARGEST_EXPONENT = 50.0
 
 
-def estimate_by_cta(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str],
-    intervals: int = 8,
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Least squares on the loop with its delay line in so many Chebyshev intervals."""
-    names = checked_names(free, loop)
-    if "delay" not in names:
-        raise ValueError("the cta method is there for the delay: leave it among `free`")
-    stiffness_of(loop, "cta")
-    order = whole_number("intervals", intervals, limit=MOST_NODES + 1)
-    if loop.is_sampled or loop.limit is not None:
-        what = "a hold" if loop.is_sampled else "a limit"
-        raise ValueError(
-            f"the cta method is for continuous loops without a limit, this one has {what}: use "
-            "method='waveform' or 'grid', or loop.continuous() to leave a hold out on purpose"
+@dataclass(frozen=True)
+class CTA(Method):
+    """The waveform, with Chebyshev's approximation in the place of the delay.
+
+    Parameters
+    ----------
+    intervals : int
+        Degree of the polynomial that stands for the output over one delay, from 1 to 24.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        When the number of intervals is out of its range.
+    """
+
+    intervals: int = 8
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "cta"
+
+    def __post_init__(self) -> None:
+        whole_number("intervals", self.intervals, limit=MOST_NODES + 1)
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        names = checked_names(free, loop)
+        if "delay" not in names:
+            raise ValueError("the cta method is there for the delay: leave it among `free`")
+        stiffness_of(loop, "cta")
+        if loop.is_sampled or loop.limit is not None:
+            what = "a hold" if loop.is_sampled else "a limit"
+            raise ValueError(
+                f"the cta method is for continuous loops without a limit, this one has {what}: use "
+                "method='waveform' or 'grid', or loop.continuous() to leave a hold out on purpose"
+            )
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        check_excitation(data, len(names))
+        fit = _Fit(data, loop, names, self.intervals, self.initial_output)
+        point, jacobian = fit.solve()
+        misfit = fit.misfit(point)
+        check_distinguishable(jacobian, fit.labels)
+        cov = robust_covariance(jacobian, -misfit)[: len(names), : len(names)]
+        values = dict(zip(names, (float(value) for value in point), strict=False))
+        check_gain(values, standard_errors(names, cov))
+        return read_off_estimate(
+            "cta",
+            simulated,
+            values,
+            cov,
+            fit.start_of(point),
+            message=(
+                f"least squares over {', '.join(names)}, the delay line in {self.intervals} "
+                "intervals"
+            ),
+            uncalibrated=(
+                f"the cta method puts a polynomial of degree {self.intervals} in the place of the "
+                "delay, which biases it; noise alone makes the delay uncertain by "
+                f"{math.sqrt(cov[0, 0]):.2g} s where it does not circulate in the loop; use "
+                "method='waveform' for an interval"
+            ),
+            details={
+                "intervals": self.intervals,
+                "rms_of_approximation": float(np.sqrt(np.mean(misfit**2))),
+                "initial_output": fit.start_of(point),
+            },
         )
-    simulated = SimulatedRecording(recording, loop, window)
-    data = simulated.recording
-    check_excitation(data, len(names))
-    fit = _Fit(data, loop, names, order, initial_output)
-    point, jacobian = fit.solve()
-    misfit = fit.misfit(point)
-    check_distinguishable(jacobian, fit.labels)
-    cov = robust_covariance(jacobian, -misfit)[: len(names), : len(names)]
-    values = dict(zip(names, (float(value) for value in point), strict=False))
-    check_gain(values, standard_errors(names, cov))
-    return read_off_estimate(
-        "cta",
-        simulated,
-        values,
-        cov,
-        fit.start_of(point),
-        message=f"least squares over {', '.join(names)}, the delay line in {order} intervals",
-        uncalibrated=(
-            f"the cta method puts a polynomial of degree {order} in the place of the delay, which "
-            f"biases it; noise alone makes the delay uncertain by {math.sqrt(cov[0, 0]):.2g} s "
-            "where it does not circulate in the loop; use method='waveform' for an interval"
-        ),
-        details={
-            "intervals": order,
-            "rms_of_approximation": float(np.sqrt(np.mean(misfit**2))),
-            "initial_output": fit.start_of(point),
-        },
-    )
 
 
 def chebyshev_differentiation(order: int) -> Array:
@@ -172,6 +198,8 @@ class _Fit:
 
     def solve(self) -> tuple[Array, Array]:
         """The best numbers and the derivatives of the misfit there."""
+        from scipy.optimize import least_squares
+
         parameters = self.loop.parameters
         shortest = 1e-4 * self.span
         starts = {"gain": parameters["gain"], "lag": 0.02 * self.span, "initial output": self.start}

@@ -16,24 +16,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, least_squares
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._extremes import check_dies_out, read_extremes
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
 from deadtime.estimation.fit._residuals import robust_covariance
+from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
 from deadtime.estimation.models._held_transfer import held_transfer
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_decay"]
+__all__ = ["Decay"]
 
 Array = NDArray[np.float64]
 
@@ -42,69 +44,87 @@ Array = NDArray[np.float64]
 FEWEST, LEAST = 5, 1e-6
 
 
-def estimate_by_decay(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),
-    tail: float = 0.3,
-) -> DelayEstimate:
-    """Delay from the rate of the tail, which begins where the share `tail` of the step is left."""
-    check_delay_alone("decay", free)
-    stiffness = stiffness_of(loop, "decay")
-    simulated = SimulatedRecording(recording, loop, window)
-    answer = read_step(simulated.recording)
-    share = positive("tail", tail)
-    if share >= 1.0:
-        raise ValueError(f"tail={tail}: it begins where that share of the step is left, below 1")
-    extremes = read_extremes(answer)
-    check_dies_out(extremes, "decay")
-    if extremes:
-        raise NotIdentifiableError(
-            "the output overshoots, so the rightmost roots are no real ones and the tail is no "
-            "exponential: use method='decrement', 'overshoot' or 'waveform'"
-        )
-    rate, error, samples = _tail_rate(answer, _begin(answer, loop, share))
-    lag = loop.parameters["lag"]
+@dataclass(frozen=True)
+class Decay(Method):
+    """Delay from the exponential tail of a step response that does not overshoot.
 
-    def delay_of(r: float) -> float:
-        return _delay(r, stiffness, lag, loop.sample_time)
+    Parameters
+    ----------
+    tail : float
+        The tail begins where this share of the step is left; between 0 and 1.
 
-    delay = delay_of(rate)
-    step = 1e-6 * rate
-    slope = (delay_of(rate + step) - delay_of(rate - step)) / (2.0 * step)
-    stderr = abs(slope) * error
-    if delay < 0.0:
-        raise NotIdentifiableError(
-            f"the tail decays with {rate:.4g} 1/s, slower than with K = {stiffness:.4g} 1/s and no "
-            "delay at all: the gain is smaller than it is taken to be, or the tail begins too "
-            "late; check the gains"
+    Raises
+    ------
+    ValueError
+        When the share is not between 0 and 1.
+    """
+
+    tail: float = 0.3
+
+    name: ClassVar[str] = "decay"
+
+    def __post_init__(self) -> None:
+        if positive("tail", self.tail) >= 1.0:
+            raise ValueError(
+                f"tail={self.tail}: the tail begins where this share of the step is left, so give "
+                "a number below 1"
+            )
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("decay", free)
+        stiffness = stiffness_of(loop, "decay")
+        simulated = SimulatedRecording(recording, loop, window)
+        answer = read_step(simulated.recording)
+        extremes = read_extremes(answer)
+        check_dies_out(extremes, "decay")
+        if extremes:
+            raise NotIdentifiableError(
+                "the output overshoots, so the rightmost roots are no real ones and the tail is no "
+                "exponential: use method='decrement', 'overshoot' or 'waveform'"
+            )
+        rate, error, samples = _tail_rate(answer, _begin(answer, loop, self.tail))
+        lag = loop.parameters["lag"]
+
+        def delay_of(r: float) -> float:
+            return _delay(r, stiffness, lag, loop.sample_time)
+
+        delay = delay_of(rate)
+        step = 1e-6 * rate
+        slope = (delay_of(rate + step) - delay_of(rate - step)) / (2.0 * step)
+        stderr = abs(slope) * error
+        if delay < 0.0:
+            raise NotIdentifiableError(
+                f"the tail decays with {rate:.4g} 1/s, slower than with K = {stiffness:.4g} 1/s "
+                "and no delay at all: the gain is smaller than it is taken to be, or the tail "
+                "begins too late; check the gains"
+            )
+        held = 0.5 * (loop.sample_time or 0.0)
+        if rate * (delay + lag + held) >= 1.0:
+            raise NotIdentifiableError(
+                f"the tail decays with {rate:.4g} 1/s, faster than e·K = {math.e * stiffness:.4g} "
+                "1/s, the most without overshoot: K·Td is near or above 1/e; use "
+                "method='decrement' or 'waveform'"
+            )
+        return read_off_estimate(
+            "decay",
+            simulated,
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            answer.start,
+            message=(
+                f"{samples} samples of the tail decay with {rate:.4g} ± {error:.2g} 1/s: takes the "
+                f"gain to be {loop.parameters['gain']:g} and the output to end at the reference"
+            ),
+            uncalibrated=(
+                "the decay method takes the gain as given and the tail for one exponential: noise "
+                f"alone makes the delay uncertain by {stderr:.2g} s, a gain that is 1 % off moves "
+                f"it by {0.01 / rate:.2g} s, and what other roots leave in the tail shifts it "
+                "further; use method='waveform' for an interval"
+            ),
+            details={"rate": rate, "rate_error": error, "tail_samples": samples},
         )
-    held = 0.5 * (loop.sample_time or 0.0)
-    if rate * (delay + lag + held) >= 1.0:
-        raise NotIdentifiableError(
-            f"the tail decays with {rate:.4g} 1/s, faster than e·K = {math.e * stiffness:.4g} 1/s, "
-            "the most without overshoot: K·Td is near or above 1/e; use method='decrement' or "
-            "'waveform'"
-        )
-    return read_off_estimate(
-        "decay",
-        simulated,
-        {"delay": delay},
-        np.array([[stderr**2]]),
-        answer.start,
-        message=(
-            f"{samples} samples of the tail decay with {rate:.4g} ± {error:.2g} 1/s: takes the "
-            f"gain to be {loop.parameters['gain']:g} and the output to end at the reference"
-        ),
-        uncalibrated=(
-            "the decay method takes the gain as given and the tail for one exponential: noise "
-            f"alone makes the delay uncertain by {stderr:.2g} s, a gain that is 1 % off moves it "
-            f"by {0.01 / rate:.2g} s, and what other roots leave in the tail shifts it further; "
-            "use method='waveform' for an interval"
-        ),
-        details={"rate": rate, "rate_error": error, "tail_samples": samples},
-    )
 
 
 def _begin(answer: StepReading, loop: ControlLoop, share: float) -> float:
@@ -124,6 +144,8 @@ def _begin(answer: StepReading, loop: ControlLoop, share: float) -> float:
 
 def _tail_rate(answer: StepReading, begin: float) -> tuple[float, float, int]:
     """Rate of an exponential from `begin` on, its standard error and the number of samples."""
+    from scipy.optimize import least_squares
+
     rows = answer.since >= begin
     # What is left below rounding adds nothing but its error.
     rows &= np.maximum.accumulate((1.0 - answer.travelled)[::-1])[::-1] > LEAST * 1e-3
@@ -158,6 +180,8 @@ def _tail_rate(answer: StepReading, begin: float) -> tuple[float, float, int]:
 
 def _delay(rate: float, stiffness: float, lag: float, sample_time: float | None) -> float:
     """Delay of the loop with the root -rate; negative where there is none."""
+    from scipy.optimize import brentq
+
     if lag * rate >= 1.0:
         raise NotIdentifiableError(
             f"the tail decays with {rate:.4g} 1/s, faster than a lag of {lag:g} s lets it: the lag "

@@ -17,10 +17,11 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
@@ -31,14 +32,15 @@ from deadtime.estimation.data._extremes import (
     read_extremes,
     weighted_slope,
 )
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import StepReading, read_step, stiffness_of
+from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._read_off import read_off_estimate
 from deadtime.estimation.models._held_transfer import held_transfer
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_decrement", "loop_with_root"]
+__all__ = ["Decrement", "loop_with_root"]
 
 Array = NDArray[np.float64]
 
@@ -48,75 +50,77 @@ Array = NDArray[np.float64]
 OTHER_ROOTS = 0.03
 
 
-def estimate_by_decrement(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay", "gain"),
-) -> DelayEstimate:
+@dataclass(frozen=True)
+class Decrement(Method):
     """Delay, and gain if it is free, from the decay of successive peaks and valleys."""
-    names = checked_names(free, loop)
-    if "lag" in names:
-        raise ValueError(
-            "the decrement method has two numbers, damping and frequency, for delay and gain: fix "
-            "the lag, or use method='waveform'"
-        )
-    if "delay" not in names:
-        raise ValueError("the decrement method determines the delay: leave it among `free`")
-    stiffness = stiffness_of(loop, "decrement")
-    simulated = SimulatedRecording(recording, loop, window)
-    answer = read_step(simulated.recording)
-    extremes = read_extremes(answer)
-    check_dies_out(extremes, "decrement")
-    extremes = _linear(extremes, answer, loop)
-    pair, pair_cov = _ringing(extremes)
-    lag = loop.parameters["lag"]
 
-    def numbers(sigma: float, omega: float) -> Array:
-        return np.array(loop_with_root(complex(-sigma, omega), lag, loop.sample_time))
+    name: ClassVar[str] = "decrement"
 
-    found = numbers(*pair)
-    slopes = np.stack(
-        [
-            (numbers(*(pair + change)) - numbers(*(pair - change))) / (2.0 * change.sum())
-            for change in np.diag(1e-6 * pair[1] * np.ones(2))
-        ],
-        axis=1,
-    )
-    cov = slopes @ pair_cov @ slopes.T
-    delay, gain = float(found[0]), float(found[1]) / loop.parameters["Kp"]
-    values = {"delay": delay, "gain": gain}
-    scale = np.array([1.0, loop.parameters["Kp"]])
-    own = cov / np.outer(scale, scale)
-    if "gain" not in names:
-        share = cov[0, 1] / cov[1, 1]
-        values = {"delay": delay + share * (stiffness - float(found[1]))}
-        own = np.array([[cov[0, 0] - share * cov[0, 1]]])
-    if values["delay"] <= 0.0:
-        raise NotIdentifiableError(
-            f"the peaks die out with a damping ratio of {pair[0] / math.hypot(*pair):.3g}, more "
-            f"than a loop with K = {stiffness:g} 1/s and any delay has: check the gains"
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        names = checked_names(free, loop)
+        if "lag" in names:
+            raise ValueError(
+                "the decrement method has two numbers, damping and frequency, for delay and gain: "
+                "fix the lag, or use method='waveform'"
+            )
+        if "delay" not in names:
+            raise ValueError("the decrement method determines the delay: leave it among `free`")
+        stiffness = stiffness_of(loop, "decrement")
+        simulated = SimulatedRecording(recording, loop, window)
+        answer = read_step(simulated.recording)
+        extremes = read_extremes(answer)
+        check_dies_out(extremes, "decrement")
+        extremes = _linear(extremes, answer, loop)
+        pair, pair_cov = _ringing(extremes)
+        lag = loop.parameters["lag"]
+
+        def numbers(sigma: float, omega: float) -> Array:
+            return np.array(loop_with_root(complex(-sigma, omega), lag, loop.sample_time))
+
+        found = numbers(*pair)
+        slopes = np.stack(
+            [
+                (numbers(*(pair + change)) - numbers(*(pair - change))) / (2.0 * change.sum())
+                for change in np.diag(1e-6 * pair[1] * np.ones(2))
+            ],
+            axis=1,
         )
-    return read_off_estimate(
-        "decrement",
-        simulated,
-        values,
-        own,
-        answer.start,
-        message=_message(extremes, names, pair),
-        uncalibrated=(
-            "the decrement method takes the response for one decaying oscillation: noise alone "
-            f"makes the delay uncertain by {math.sqrt(own[0, 0]):.2g} s, but what other roots "
-            "leave in the first peaks, and noise that circulates in the loop, shift it further; "
-            "use method='waveform' for an interval"
-        ),
-        details={
-            "damping_ratio": float(pair[0] / math.hypot(*pair)),
-            "damped_frequency": float(pair[1]),
-            "extremes": [(extreme.time, extreme.height) for extreme in extremes],
-            "gain_read": gain,
-        },
-    )
+        cov = slopes @ pair_cov @ slopes.T
+        delay, gain = float(found[0]), float(found[1]) / loop.parameters["Kp"]
+        values = {"delay": delay, "gain": gain}
+        scale = np.array([1.0, loop.parameters["Kp"]])
+        own = cov / np.outer(scale, scale)
+        if "gain" not in names:
+            share = cov[0, 1] / cov[1, 1]
+            values = {"delay": delay + share * (stiffness - float(found[1]))}
+            own = np.array([[cov[0, 0] - share * cov[0, 1]]])
+        if values["delay"] <= 0.0:
+            raise NotIdentifiableError(
+                f"the peaks die out with a damping ratio of {pair[0] / math.hypot(*pair):.3g}, "
+                f"more than a loop with K = {stiffness:g} 1/s and any delay has: check the gains"
+            )
+        return read_off_estimate(
+            "decrement",
+            simulated,
+            values,
+            own,
+            answer.start,
+            message=_message(extremes, names, pair),
+            uncalibrated=(
+                "the decrement method takes the response for one decaying oscillation: noise "
+                f"alone makes the delay uncertain by {math.sqrt(own[0, 0]):.2g} s, but what other "
+                "roots leave in the first peaks, and noise that circulates in the loop, shift it "
+                "further; use method='waveform' for an interval"
+            ),
+            details={
+                "damping_ratio": float(pair[0] / math.hypot(*pair)),
+                "damped_frequency": float(pair[1]),
+                "extremes": [(extreme.time, extreme.height) for extreme in extremes],
+                "gain_read": gain,
+            },
+        )
 
 
 def loop_with_root(root: complex, lag: float, sample_time: float | None) -> tuple[float, float]:
@@ -125,6 +129,8 @@ def loop_with_root(root: complex, lag: float, sample_time: float | None) -> tupl
     The phase of the plant at the root falls as the delay grows, so there is one delay for every
     turn; the rightmost root belongs to the first.
     """
+    from scipy.optimize import brentq
+
     plant = root * (lag * root + 1.0)
     # e^(-s Td) = -s (lag s + 1)/K
     delay = -cmath.phase(-plant) / root.imag

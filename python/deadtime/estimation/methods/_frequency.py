@@ -19,13 +19,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._base.validation import positive
+from deadtime._base.validation import positive, whole_number
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._commands import commands_over_samples
 from deadtime.estimation.data._evidence import (
@@ -36,15 +36,17 @@ from deadtime.estimation.data._evidence import (
 )
 from deadtime.estimation.data._excitation import ROUNDING, check_gain, check_moves
 from deadtime.estimation.data._periodic import PeriodicSpectra, periodic_spectra
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.fit._line_fit import LineProfile, Lines, fit_lines
 from deadtime.estimation.fit._profile import Profile
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
+from deadtime.estimation.methods._method import Method
 from deadtime.estimation.models._held_response import HeldResponse
 from deadtime.estimation.models._held_transfer import held_transfer
 from deadtime.loops import ControlLoop, Integrator
 from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_frequency"]
+__all__ = ["Frequency"]
 
 Array = NDArray[np.float64]
 
@@ -58,79 +60,103 @@ NO_LAG = 1e-9
 EVEN = 1e-3
 
 
-def estimate_by_frequency(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str],
-    period: float | None = None,
-    left_out: int = 1,
-    highest: float | None = None,
-) -> DelayEstimate:
-    """Fit `free` to the lines of the DFT, up to `highest` Hz.
+@dataclass(frozen=True)
+class Frequency(Method):
+    """Maximum likelihood at the lines of a spectrum, for periodic experiments.
 
-    With a `period` in s the first `left_out` periods are taken for transient.
+    Parameters
+    ----------
+    period : float, optional
+        Period of the excitation in s, a whole number of samples. Without one, all lines of the
+        window are used.
+    left_out : int
+        Periods at the beginning that are left out as transient.
+    highest : float, optional
+        Highest frequency that is used, Hz; all of them if not given.
+
+    Raises
+    ------
+    ValueError
+        When the period or the frequency is not above zero, or `left_out` is negative.
     """
-    names = checked_names(free, loop)
-    if not isinstance(loop.plant, Integrator):
-        raise ValueError(
-            f"the frequency method is for an Integrator, the loop has a "
-            f"{type(loop.plant).__name__}: use method='waveform'"
+
+    period: float | None = None
+    left_out: int = 1
+    highest: float | None = None
+
+    name: ClassVar[str] = "frequency"
+
+    def __post_init__(self) -> None:
+        for name, value in (("period", self.period), ("highest", self.highest)):
+            if value is not None:
+                positive(name, value)
+        whole_number("left_out", self.left_out, least=0)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        from scipy import special
+
+        ((recording, loop, window),) = runs
+        names = checked_names(free, loop)
+        if not isinstance(loop.plant, Integrator):
+            raise ValueError(
+                f"the frequency method is for an Integrator, the loop has a "
+                f"{type(loop.plant).__name__}: use method='waveform'"
+            )
+        data = recording.window(*window)
+        rows = recording.rows(*window)
+        _check_even(data)
+        command, source = commands_over_samples(recording, loop)
+        response = HeldResponse(recording.time[: rows.stop], command[: rows.stop])
+        check_moves(data.output, command[rows])
+        top = math.inf if self.highest is None else self.highest
+        if self.period is None:
+            lines = _record_lines(data, response, len(names), top)
+        else:
+            spectra = periodic_spectra(data, command[rows], self.period, self.left_out, top)
+            lines = _periodic_lines(spectra, data.sample_time, len(names))
+        known = {name: loop.parameters[name] for name in ("gain", "lag")}
+        known["delay"] = 0.0 if loop.delay is None else loop.delay
+        found, jacobian = fit_lines(lines, names, known)
+        loose = [i for i, name in enumerate(names) if name != "lag" or found["lag"] > 0.0]
+        check_distinguishable(jacobian[:, loose], [names[i] for i in loose])
+        power = lines.cost(found)
+        scale = power / lines.freedom
+        worse, wider = 1.0, scale
+        if lines.known_noise:
+            worse = float(special.chdtrc(lines.freedom, power / lines.widening))
+            wider = max(lines.widening, scale)
+        inverse = np.linalg.inv(jacobian[:, loose].T @ jacobian[:, loose])
+        cov = embedded(np.asarray(wider * inverse), loose, len(names))
+        values = {name: found[name] for name in names}
+        errors = standard_errors(names, cov)
+        check_gain(values, errors)
+        residuals = _residuals(data, response, found)
+        whiteness = whiteness_of(residuals, len(names))
+        exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
+        adequate = exact or (worse > SIGNIFICANCE if lines.known_noise else whiteness.white)
+        return DelayEstimate(
+            method="frequency",
+            loop=loop.replace(**values),
+            free=names,
+            stderr=errors,
+            cov=cov,
+            crb=None,
+            recording=data,
+            residuals=residuals,
+            whiteness=whiteness,
+            adequate=adequate,
+            message=_message(names, lines, source, adequate),
+            uncalibrated=_why_uncalibrated(loop),
+            details={"lines": lines.describe, "command": source, "p_value_of_model": worse},
+            _profile=Profile(
+                cost=LineProfile(lines, names, found),
+                best=power,
+                freedom=lines.freedom,
+                widening=dict.fromkeys(errors, math.sqrt(wider / scale) if scale > 0.0 else 1.0),
+                preferred="delay and lag are alike" if "lag" in names else "",
+            ),
         )
-    data = recording.window(*(window or (None, None)))
-    rows = recording.rows(*(window or (None, None)))
-    _check_even(data)
-    command, source = commands_over_samples(recording, loop)
-    response = HeldResponse(recording.time[: rows.stop], command[: rows.stop])
-    check_moves(data.output, command[rows])
-    top = math.inf if highest is None else positive("highest", highest)
-    if period is None:
-        lines = _record_lines(data, response, len(names), top)
-    else:
-        spectra = periodic_spectra(data, command[rows], positive("period", period), left_out, top)
-        lines = _periodic_lines(spectra, data.sample_time, len(names))
-    known = {name: loop.parameters[name] for name in ("gain", "lag")}
-    known["delay"] = 0.0 if loop.delay is None else loop.delay
-    found, jacobian = fit_lines(lines, names, known)
-    loose = [i for i, name in enumerate(names) if name != "lag" or found["lag"] > 0.0]
-    check_distinguishable(jacobian[:, loose], [names[i] for i in loose])
-    power = lines.cost(found)
-    scale = power / lines.freedom
-    worse, wider = 1.0, scale
-    if lines.known_noise:
-        worse = float(special.chdtrc(lines.freedom, power / lines.widening))
-        wider = max(lines.widening, scale)
-    inverse = np.linalg.inv(jacobian[:, loose].T @ jacobian[:, loose])
-    cov = embedded(np.asarray(wider * inverse), loose, len(names))
-    values = {name: found[name] for name in names}
-    errors = standard_errors(names, cov)
-    check_gain(values, errors)
-    residuals = _residuals(data, response, found)
-    whiteness = whiteness_of(residuals, len(names))
-    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
-    adequate = exact or (worse > SIGNIFICANCE if lines.known_noise else whiteness.white)
-    return DelayEstimate(
-        method="frequency",
-        loop=loop.replace(**values),
-        free=names,
-        stderr=errors,
-        cov=cov,
-        crb=None,
-        recording=data,
-        residuals=residuals,
-        whiteness=whiteness,
-        adequate=adequate,
-        message=_message(names, lines, source, adequate),
-        uncalibrated=_why_uncalibrated(loop),
-        details={"lines": lines.describe, "command": source, "p_value_of_model": worse},
-        _profile=Profile(
-            cost=LineProfile(lines, names, found),
-            best=power,
-            freedom=lines.freedom,
-            widening=dict.fromkeys(errors, math.sqrt(wider / scale) if scale > 0.0 else 1.0),
-            preferred="delay and lag are alike" if "lag" in names else "",
-        ),
-    )
 
 
 def _check_even(data: Recording) -> None:

@@ -17,23 +17,23 @@ holds few frequencies: weightings that treat all alike then amplify noise.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, special
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._extremes import check_dies_out, read_ringing
 from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
 from deadtime.estimation.data._input_output import InputOutput, read_input_output
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.methods._method import Method, check_choice
 from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 
-__all__ = ["Weighting", "estimate_by_gcc"]
+__all__ = ["GCC", "Weighting"]
 
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
 Array = NDArray[np.float64]
@@ -49,63 +49,80 @@ SMOOTHED = 0.05
 LONGEST_FILTER = 12
 
 
-def estimate_by_gcc(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),
-    weighting: Weighting = "none",
-) -> DelayEstimate:
-    """Delay at the peak of the cross-correlation of command and answer."""
-    check_delay_alone("gcc", free)
-    if weighting not in get_args(Weighting):
-        raise ValueError(f"weighting={weighting!r} is not one of {', '.join(get_args(Weighting))}")
-    simulated = SimulatedRecording(recording, loop, window)
-    data = simulated.recording
-    read = read_input_output(recording, loop, simulated, "gcc")
-    if int(np.count_nonzero(np.diff(read.command))) < 2:
-        raise NotIdentifiableError(
-            "the command changes once in the window, as one at its limit throughout does: its "
-            "correlation has no peak; use a smaller step, or method='output_error'"
+@dataclass(frozen=True)
+class GCC(Method):
+    """Delay at the peak of the generalised cross-correlation of command and response.
+
+    Parameters
+    ----------
+    weighting : {"none", "scot", "phat", "prewhitened"}
+        Weighting of the cross spectrum.
+
+    Raises
+    ------
+    ValueError
+        For another weighting.
+    """
+
+    weighting: Weighting = "none"
+
+    name: ClassVar[str] = "gcc"
+
+    def __post_init__(self) -> None:
+        check_choice("weighting", self.weighting, get_args(Weighting))
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("gcc", free)
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        read = read_input_output(recording, loop, simulated, "gcc")
+        if int(np.count_nonzero(np.diff(read.command))) < 2:
+            raise NotIdentifiableError(
+                "the command changes once in the window, as one at its limit throughout does: its "
+                "correlation has no peak; use a smaller step, or method='output_error'"
+            )
+        p_value = feedback_p_value(data)
+        feedback = p_value < FEEDBACK
+        if feedback:
+            check_dies_out(read_ringing(data), "gcc")
+        # Noise that comes back within the same sample makes a peak at no shift.
+        least = 1 if feedback else 0
+        gain = float(loop.parameters.get("gain", 1.0))
+        shifts, correlation = correlogram(read.command, np.sign(gain) * read.answer, self.weighting)
+        near = (shifts >= least - 1) & (shifts <= read.longest + 1)
+        shifts, correlation = shifts[near], correlation[near]
+        place = int(np.argmax(correlation[1:-1])) + 1
+        share = _explained(read, int(shifts[place]))
+        peak = float(shifts[place]) + _between(correlation, place, self.weighting)
+        delay = max(0.0, peak * read.sample_time - read.late)
+        return read_off_estimate(
+            "gcc",
+            simulated,
+            {"delay": delay},
+            None,
+            float(data.output[0]),
+            message=_message(self.weighting, share, feedback, read),
+            uncalibrated=(
+                "the gcc method reads the peak of a correlation: the error formulas for it hold "
+                "for stationary noise in open loop only"
+                + (", and here the command is made from the output" if feedback else "")
+                + "; use method='output_error' for an interval"
+            ),
+            details={
+                "weighting": self.weighting,
+                "correlation": share,
+                "feedback": feedback,
+                "feedback_p_value": p_value,
+            },
         )
-    p_value = feedback_p_value(data)
-    feedback = p_value < FEEDBACK
-    if feedback:
-        check_dies_out(read_ringing(data), "gcc")
-    # Noise that comes back within the same sample makes a peak at no shift.
-    least = 1 if feedback else 0
-    gain = float(loop.parameters.get("gain", 1.0))
-    shifts, correlation = correlogram(read.command, np.sign(gain) * read.answer, weighting)
-    near = (shifts >= least - 1) & (shifts <= read.longest + 1)
-    shifts, correlation = shifts[near], correlation[near]
-    place = int(np.argmax(correlation[1:-1])) + 1
-    share = _explained(read, int(shifts[place]))
-    peak = float(shifts[place]) + _between(correlation, place, weighting)
-    delay = max(0.0, peak * read.sample_time - read.late)
-    return read_off_estimate(
-        "gcc",
-        simulated,
-        {"delay": delay},
-        None,
-        float(data.output[0]),
-        message=_message(weighting, share, feedback, read),
-        uncalibrated=(
-            "the gcc method reads the peak of a correlation: the error formulas for it hold for "
-            "stationary noise in open loop only"
-            + (", and here the command is made from the output" if feedback else "")
-            + "; use method='output_error' for an interval"
-        ),
-        details={
-            "weighting": weighting,
-            "correlation": share,
-            "feedback": feedback,
-            "feedback_p_value": p_value,
-        },
-    )
 
 
 def correlogram(u: Array, r: Array, weighting: Weighting) -> tuple[Array, Array]:
     """Shifts in samples and the generalised cross-correlation of u and r at them."""
+    from scipy import signal
+
     if weighting == "prewhitened":
         whitener = _whitener(u)
         u, r = np.convolve(u, whitener)[: u.size], np.convolve(r, whitener)[: r.size]
@@ -156,6 +173,8 @@ def _between(correlation: Array, place: int, weighting: Weighting) -> float:
 
 def _explained(read: InputOutput, shift: int) -> float:
     """Correlation coefficient of answer and shifted command; refused if chance explains it."""
+    from scipy import signal, special
+
     late = max(0, shift)
     size = read.command.size
     u, r = read.command[: size - late], read.answer[late:]

@@ -19,7 +19,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +28,13 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._extremes import check_dies_out, read_extremes
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
+from deadtime.estimation.methods._method import Method, check_choice
 from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 
-__all__ = ["Construction", "estimate_by_graphical"]
+__all__ = ["Construction", "Graphical"]
 
 Construction = Literal["tangent", "two_point", "first_movement"]
 Array = NDArray[np.float64]
@@ -45,55 +46,75 @@ LEAST = 1e-9
 DRAWN = 30
 
 
-def estimate_by_graphical(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),
-    construction: Construction = "tangent",
-    shares: tuple[float, float] = (0.1, 0.35),
-) -> DelayEstimate:
-    """Delay from the beginning of one step response, by a construction with straight lines."""
-    check_delay_alone("graphical", free)
-    if construction not in get_args(Construction):
-        choices = ", ".join(get_args(Construction))
-        raise ValueError(f"construction={construction!r} is not one of {choices}")
-    simulated = SimulatedRecording(recording, loop, window)
-    answer = read_step(simulated.recording)
-    check_dies_out(read_extremes(answer), "graphical")
-    moved = _first_movement(answer)
-    delay, stderr = float(answer.since[moved]), math.nan
-    if construction != "first_movement":
-        stiffness_of(loop, "graphical")
-    if construction == "two_point":
-        low, high = shares
+@dataclass(frozen=True)
+class Graphical(Method):
+    """Delay from the beginning of one step response, by a construction with straight lines.
+
+    Parameters
+    ----------
+    construction : {"tangent", "two_point", "first_movement"}
+        The line through the straight part of the rise, the line through two points of it, or the
+        first sample that stands out of the noise.
+    shares : (float, float)
+        Shares of the step that the two points of ``"two_point"`` have reached, increasing.
+
+    Raises
+    ------
+    ValueError
+        For another construction, or shares that do not increase between 0 and 1.
+    """
+
+    construction: Construction = "tangent"
+    shares: tuple[float, float] = (0.1, 0.35)
+
+    name: ClassVar[str] = "graphical"
+
+    def __post_init__(self) -> None:
+        check_choice("construction", self.construction, get_args(Construction))
+        low, high = self.shares
         if not 0.0 < low < high < 1.0:
-            raise ValueError(f"shares={shares}: give two that increase, between 0 and 1")
-        delay = _two_point(answer, low, high)
-    elif construction == "tangent":
-        delay, stderr = _tangent(answer, moved, loop.sample_time)
-    if not delay > 0.0:
-        raise NotIdentifiableError(
-            f"the line meets the start {-delay:.3g} s before the step: the samples on it are too "
-            "few or too noisy, or there is no delay; use method='waveform'"
+            raise ValueError(f"shares={self.shares}: give two that increase, between 0 and 1")
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("graphical", free)
+        simulated = SimulatedRecording(recording, loop, window)
+        answer = read_step(simulated.recording)
+        check_dies_out(read_extremes(answer), "graphical")
+        moved = _first_movement(answer)
+        delay, stderr = float(answer.since[moved]), math.nan
+        if self.construction != "first_movement":
+            stiffness_of(loop, "graphical")
+        if self.construction == "two_point":
+            delay = _two_point(answer, *self.shares)
+        elif self.construction == "tangent":
+            delay, stderr = _tangent(answer, moved, loop.sample_time)
+        if not delay > 0.0:
+            raise NotIdentifiableError(
+                f"the line meets the start {-delay:.3g} s before the step: the samples on it are "
+                "too few or too noisy, or there is no delay; use method='waveform'"
+            )
+        return read_off_estimate(
+            "graphical",
+            simulated,
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            answer.start,
+            message=(
+                f"{self.construction.replace('_', ' ')} of one step: a lag counts as delay, in part"
+            ),
+            uncalibrated=(
+                "the graphical method looks at the first samples that move, and how it is misled "
+                "by a lag or by its own thresholds is in no formula; use method='waveform' for an "
+                "interval"
+            ),
+            details={
+                "construction": self.construction,
+                "first_movement": float(answer.since[moved]),
+                "noise": answer.noise,
+            },
         )
-    return read_off_estimate(
-        "graphical",
-        simulated,
-        {"delay": delay},
-        np.array([[stderr**2]]),
-        answer.start,
-        message=f"{construction.replace('_', ' ')} of one step: a lag counts as delay, in part",
-        uncalibrated=(
-            "the graphical method looks at the first samples that move, and how it is misled by a "
-            "lag or by its own thresholds is in no formula; use method='waveform' for an interval"
-        ),
-        details={
-            "construction": construction,
-            "first_movement": float(answer.since[moved]),
-            "noise": answer.noise,
-        },
-    )
 
 
 def _first_movement(answer: StepReading) -> int:

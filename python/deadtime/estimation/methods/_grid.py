@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
@@ -35,12 +35,12 @@ from deadtime.estimation.data._excitation import (
     check_gain,
     start_and_span,
 )
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
-from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
+from deadtime.estimation.methods._method import Method, check_initial_output
 
-__all__ = ["estimate_by_grid"]
+__all__ = ["Grid"]
 
 Array = NDArray[np.float64]
 
@@ -65,73 +65,97 @@ HOPELESS = 1e3
 TWO_SIDED_95 = 1.96
 
 
-def estimate_by_grid(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str],
-    delays: ArrayLike | None = None,
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Lowest point of the cost over `delays`, refined over all of `free`."""
-    names = checked_names(free, loop)
-    if "delay" not in names:
-        raise ValueError("the grid method goes over the delay: leave it among `free`")
-    simulated = SimulatedRecording(recording, loop, window)
-    data = simulated.recording
-    check_excitation(data, len(names))
-    problem = _Problem(simulated, names, initial_output)
-    grid = problem.grid() if delays is None else _checked(delays)
-    costs, points = problem.over(grid)
-    point = problem.refined(costs, points)
-    problem.check_ends(point)
+@dataclass(frozen=True)
+class Grid(Method):
+    """Cost of the simulated loop over a grid of delays, its lowest point refined.
 
-    misfit, jacobian = problem.misfit(point), problem.jacobian(point)
-    residuals = -misfit
-    held = [
-        i for i, name in enumerate(problem.labels) if name == "lag" and problem.at_least(point, i)
-    ]
-    loose = [i for i in range(len(problem.labels)) if i not in held]
-    check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
-    whiteness = whiteness_of(residuals, len(names))
-    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
-    adequate = whiteness.white or exact
-    size, count = len(problem.labels), len(names)
-    white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
-    spread = white
-    if not adequate:
-        spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
-    errors = standard_errors(names, spread)
-    check_gain(problem.values(point), errors)
-    noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
-    low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
-    return DelayEstimate(
-        method="grid",
-        loop=loop.replace(**problem.values(point)),
-        free=names,
-        stderr=errors,
-        cov=spread[:count, :count],
-        crb=CramerRaoBound(tuple(problem.labels), noise, standard_errors(names, white)),
-        recording=data,
-        residuals=residuals,
-        whiteness=whiteness,
-        adequate=adequate,
-        message=_message(names, grid, adequate),
-        uncalibrated=(
-            "the grid method fits the answer to the reference, and noise that goes round the loop "
-            "is no part of that: the curvature of the cost gives "
-            f"{max(0.0, point[0] + low):.4g} to {point[0] + high:.4g} s (95 %), which holds the "
-            "delay that often only where noise does not circulate; use method='output_error' or "
-            "'waveform' for an interval"
-        ),
-        details={
-            "delays": grid.tolist(),
-            "costs": costs.tolist(),
-            "valleys": [float(grid[i]) for i in _valleys(costs)],
-            "curvature_interval_95": [max(0.0, float(point[0] + low)), float(point[0] + high)],
-            "initial_output": problem.start_of(point),
-        },
-    )
+    Parameters
+    ----------
+    delays : array_like, shape (n,), optional
+        Delays to try in s, increasing, three at least, none below zero. By default 25 from zero
+        to 60 % of the window.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        When the delays are fewer than three, do not increase, or are negative.
+    """
+
+    delays: ArrayLike | None = None
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "grid"
+
+    def __post_init__(self) -> None:
+        if self.delays is not None:
+            object.__setattr__(self, "delays", tuple(_checked(self.delays).tolist()))
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        names = checked_names(free, loop)
+        if "delay" not in names:
+            raise ValueError("the grid method goes over the delay: leave it among `free`")
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        check_excitation(data, len(names))
+        problem = _Problem(simulated, names, self.initial_output)
+        grid = problem.grid() if self.delays is None else np.array(self.delays)
+        costs, points = problem.over(grid)
+        point = problem.refined(costs, points)
+        problem.check_ends(point)
+
+        misfit, jacobian = problem.misfit(point), problem.jacobian(point)
+        residuals = -misfit
+        held = [
+            i
+            for i, name in enumerate(problem.labels)
+            if name == "lag" and problem.at_least(point, i)
+        ]
+        loose = [i for i in range(len(problem.labels)) if i not in held]
+        check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
+        whiteness = whiteness_of(residuals, len(names))
+        exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
+        adequate = whiteness.white or exact
+        size, count = len(problem.labels), len(names)
+        white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
+        spread = white
+        if not adequate:
+            spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
+        errors = standard_errors(names, spread)
+        check_gain(problem.values(point), errors)
+        noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
+        low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
+        return DelayEstimate(
+            method="grid",
+            loop=loop.replace(**problem.values(point)),
+            free=names,
+            stderr=errors,
+            cov=spread[:count, :count],
+            crb=CramerRaoBound(tuple(problem.labels), noise, standard_errors(names, white)),
+            recording=data,
+            residuals=residuals,
+            whiteness=whiteness,
+            adequate=adequate,
+            message=_message(names, grid, adequate),
+            uncalibrated=(
+                "the grid method fits the answer to the reference, and noise that goes round the "
+                "loop is no part of that: the curvature of the cost gives "
+                f"{max(0.0, point[0] + low):.4g} to {point[0] + high:.4g} s (95 %), which holds "
+                "the delay that often only where noise does not circulate; use "
+                "method='output_error' or 'waveform' for an interval"
+            ),
+            details={
+                "delays": grid.tolist(),
+                "costs": costs.tolist(),
+                "valleys": [float(grid[i]) for i in _valleys(costs)],
+                "curvature_interval_95": [max(0.0, float(point[0] + low)), float(point[0] + high)],
+                "initial_output": problem.start_of(point),
+            },
+        )
 
 
 def _checked(delays: ArrayLike) -> Array:
@@ -266,6 +290,8 @@ class _Problem:
 
     def _descended(self, point: Array, held: int | None = None) -> Array:
         """Least squares over all numbers, or all but one, from a point."""
+        from scipy.optimize import least_squares
+
         loose = [place for place in range(point.size) if place != held]
 
         def at(moved: Array) -> Array:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +29,16 @@ from deadtime.estimation.data._commands import (
 )
 from deadtime.estimation.data._evidence import checked_names, excited
 from deadtime.estimation.data._excitation import check_moves
-from deadtime.estimation.data._several import Flights, Window, each_flight
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.fit._joint import solve_jointly
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
-from deadtime.estimation.methods._conclusion import Fitted, concluded, without_vanishing
+from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.methods._method import Method, check_initial_output
 from deadtime.estimation.models._plant_path import Path, path_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_output_error", "estimate_from_commands"]
+__all__ = ["OutputError", "estimate_from_commands"]
 
 Array = NDArray[np.float64]
 
@@ -58,33 +60,39 @@ BLOCK = 200_000
 ON_SAMPLES = 1e-3
 
 
-def estimate_by_output_error(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Fit `free` to the response of the plant to the logged command."""
-    return estimate_from_commands("output_error", recording, loop, window, free, initial_output)
+@dataclass(frozen=True)
+class OutputError(Method):
+    """Least squares on the response of the vehicle to the command as it was logged.
+
+    Parameters
+    ----------
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+    """
+
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "output_error"
+    joint: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the response of the plant to the logged commands."""
+        return estimate_from_commands(self.name, runs, free, self.initial_output)
 
 
 def estimate_from_commands(
     method: str,
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
+    runs: Sequence[Run],
     free: Sequence[str],
     initial_output: float | None = None,
     computed: bool = False,
 ) -> DelayEstimate:
     """Fit to the response to the command: as logged, or `computed` as the controller makes it."""
-    flights = each_flight(recording, loop, window)
-    names = checked_names(free, flights[0].loop)
-    models = [
-        _model(flight.recording, flight.loop, flight.window, names, initial_output, computed)
-        for flight in flights
-    ]
+    names = checked_names(free, runs[0].loop)
+    models = [_model(run, names, initial_output, computed) for run in runs]
     model, found = solve_jointly(models)
     found = without_vanishing(model, found)
     longest = min(LONGEST * one.span for one in models)
@@ -102,7 +110,7 @@ def estimate_from_commands(
         method,
         model,
         found,
-        [Fitted(one.recording, flight.loop) for one, flight in zip(models, flights, strict=True)],
+        [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)],
         message=done,
         details={
             "initial_output": float(start[0]),
@@ -239,17 +247,12 @@ def _runs_away(longest: float) -> None:
 
 
 def _model(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    names: tuple[str, ...],
-    initial_output: float | None,
-    computed: bool,
+    run: Run, names: tuple[str, ...], initial_output: float | None, computed: bool
 ) -> _Model:
     """Commands up to the end of the window, from before its start where the rows tell them."""
-    ends = window or (None, None)
-    rows = recording.rows(*ends)
-    data = recording.window(*ends)
+    recording, loop, window = run
+    rows = recording.rows(*window)
+    data = recording.window(*window)
     command, source = _commands(recording, loop, computed)
     command = command[: rows.stop]
     if len(data) < 2 * (len(names) + 2):

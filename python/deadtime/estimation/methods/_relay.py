@@ -19,21 +19,23 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._step_reading import scatter_of_bends
+from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._read_off import check_delay_alone, estimate_with_residuals
 from deadtime.estimation.models._held_response import HeldResponse
-from deadtime.loops import ControlLoop, Integrator
+from deadtime.loops import Integrator
 from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_relay"]
+__all__ = ["Relay"]
 
 Array = NDArray[np.float64]
 
@@ -57,69 +59,87 @@ UNEVEN, SHRINKING = 0.25, 0.7
 AT_VALUES = 0.9
 
 
-def estimate_by_relay(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),
-    amplitude: float | None = None,
-) -> DelayEstimate:
-    """Delay from the period of a limit cycle; `amplitude` of the relay if it was not logged."""
-    check_delay_alone("relay", free)
-    plant = loop.plant
-    if not isinstance(plant, Integrator):
-        raise ValueError(
-            f"the relay method is for an Integrator, the loop has a {type(plant).__name__}: use "
-            "method='waveform'"
+@dataclass(frozen=True)
+class Relay(Method):
+    """Delay from the period of a limit cycle under relay feedback.
+
+    Parameters
+    ----------
+    amplitude : float, optional
+        Amplitude of the relay, where the command was not logged; only the residuals need it.
+
+    Raises
+    ------
+    ValueError
+        When the amplitude is not above zero.
+    """
+
+    amplitude: float | None = None
+
+    name: ClassVar[str] = "relay"
+
+    def __post_init__(self) -> None:
+        if self.amplitude is not None:
+            positive("amplitude", self.amplitude)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("relay", free)
+        plant = loop.plant
+        if not isinstance(plant, Integrator):
+            raise ValueError(
+                f"the relay method is for an Integrator, the loop has a {type(plant).__name__}: "
+                "use method='waveform'"
+            )
+        data = recording.window(*window)
+        signs, height = _relay(data, self.amplitude)
+        error = data.output - data.reference
+        crossings = _crossings(data.time, error)[LEFT_OUT:]
+        _check_cycle(crossings, error, data.time)
+        switches = _switches(data.time, signs, crossings, loop.is_sampled)
+        half = float(np.mean(np.diff(crossings)))
+        reads = 0.5 * (crossings[1:] + crossings[:-1]) - switches
+        cycles = _paired(reads)
+        late = _late_by_lag(plant.lag, half)
+        delay = float(cycles.mean()) - late
+        stderr = _error_of_mean(cycles)
+        if delay <= 0.0:
+            raise NotIdentifiableError(
+                f"a quarter of the period, {0.5 * half:.3g} s, is all lag and hold: the lag of "
+                f"{plant.lag:g} s is shorter than it is taken to be, or there is no delay"
+            )
+        path = _Path(data, switches, signs, delay, plant.lag)
+        first, last = data.time[path.rows[[0, -1]]]
+        slope = abs(plant.gain) * height if height is not None else path.slope
+        waits = float(np.mean(switches - crossings[:-1]))
+        peaks = _peaks(data.time, error, crossings)
+        return estimate_with_residuals(
+            "relay",
+            loop,
+            data.window(float(first), float(last)),
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            path.residuals(slope),
+            message=(
+                f"{cycles.size} cycles of {2.0 * half:.4g} s; "
+                + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
+                + (f"a lag of {plant.lag:g} s taken off" if plant.lag else "a lag counts as delay")
+            ),
+            uncalibrated=(
+                f"the relay method gives the scatter of {cycles.size} cycles, {stderr:.2g} s for "
+                "their mean, but not what a lag or a drift adds to each of them; use "
+                "method='output_error' for an interval"
+            ),
+            details={
+                "period": 2.0 * half,
+                "cycles": int(cycles.size),
+                "wait_of_hold": waits,
+                "amplitude": float(peaks.mean()),
+                "amplitude_expected": slope * (delay + waits),
+                "slope": path.slope,
+            },
         )
-    data = recording.window(*(window or (None, None)))
-    signs, height = _relay(data, amplitude)
-    error = data.output - data.reference
-    crossings = _crossings(data.time, error)[LEFT_OUT:]
-    _check_cycle(crossings, error, data.time)
-    switches = _switches(data.time, signs, crossings, loop.is_sampled)
-    half = float(np.mean(np.diff(crossings)))
-    reads = 0.5 * (crossings[1:] + crossings[:-1]) - switches
-    cycles = _paired(reads)
-    late = _late_by_lag(plant.lag, half)
-    delay = float(cycles.mean()) - late
-    stderr = _error_of_mean(cycles)
-    if delay <= 0.0:
-        raise NotIdentifiableError(
-            f"a quarter of the period, {0.5 * half:.3g} s, is all lag and hold: the lag of "
-            f"{plant.lag:g} s is shorter than it is taken to be, or there is no delay"
-        )
-    path = _Path(data, switches, signs, delay, plant.lag)
-    first, last = data.time[path.rows[[0, -1]]]
-    slope = abs(plant.gain) * height if height is not None else path.slope
-    waits = float(np.mean(switches - crossings[:-1]))
-    peaks = _peaks(data.time, error, crossings)
-    return estimate_with_residuals(
-        "relay",
-        loop,
-        data.window(float(first), float(last)),
-        {"delay": delay},
-        np.array([[stderr**2]]),
-        path.residuals(slope),
-        message=(
-            f"{cycles.size} cycles of {2.0 * half:.4g} s; "
-            + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
-            + (f"a lag of {plant.lag:g} s taken off" if plant.lag else "a lag counts as delay")
-        ),
-        uncalibrated=(
-            f"the relay method gives the scatter of {cycles.size} cycles, {stderr:.2g} s for their "
-            "mean, but not what a lag or a drift adds to each of them; use method='output_error' "
-            "for an interval"
-        ),
-        details={
-            "period": 2.0 * half,
-            "cycles": int(cycles.size),
-            "wait_of_hold": waits,
-            "amplitude": float(peaks.mean()),
-            "amplitude_expected": slope * (delay + waits),
-            "slope": path.slope,
-        },
-    )
 
 
 def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | None]:
@@ -133,7 +153,7 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
     if size == 0.0 or float(np.mean(at)) < AT_VALUES:
         raise NotIdentifiableError(
             f"the command is at ±{size:.3g} in {100 * float(np.mean(at)):.0f} % of the samples "
-            "only: no relay made it; use method='output_error', or fly Experiment.relay"
+            "only: no relay made it; use method='output_error', or run Experiment.relay"
         )
     return np.where(data.command >= 0.0, 1.0, -1.0), size
 
@@ -244,6 +264,8 @@ def _late_by_lag(lag: float, half: float) -> float:
     1 - (1 + v) e^(-t/lag), v = tanh(half/2 lag), and the output from -p to p; it is zero later than
     in the middle by the time that is returned.
     """
+    from scipy.optimize import brentq
+
     if lag == 0.0:
         return 0.0
     v = math.tanh(0.5 * half / lag)

@@ -21,7 +21,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,20 +30,20 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._evidence import OF_THE_LOOP, OF_THE_VEHICLE, checked_names, excited
 from deadtime.estimation.data._excitation import check_excitation, start_and_span
-from deadtime.estimation.data._several import Flights, FlownOnce, Window, each_flight
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.fit._joint import solve_jointly
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
-from deadtime.estimation.methods._conclusion import Fitted, concluded, without_vanishing
+from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.methods._method import Method, check_choice, check_initial_output
 from deadtime.estimation.methods._output_error import estimate_from_commands
-from deadtime.loops import ControlLoop
 
-__all__ = ["Noise", "estimate_by_waveform"]
+__all__ = ["NoisePath", "Waveform"]
 
 Array = NDArray[np.float64]
 
 #: Where sensor noise goes: into the recording alone, or through the controller as well.
-Noise = Literal["auto", "recording", "loop"]
+NoisePath = Literal["auto", "recording", "loop"]
 
 #: Points of the first grid over the delay, and factors of the first grid over the gain.
 DELAY_POINTS = 24
@@ -67,28 +67,69 @@ ROUNDING = 1e-9
 LIKELIER = 3.0
 
 
-def estimate_by_waveform(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    noise: Noise = "auto",
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Fit `free` of the loop to the window of the recording."""
-    if noise not in get_args(Noise):
-        raise ValueError(f"noise={noise!r} is not one of {', '.join(map(repr, get_args(Noise)))}")
-    if noise == "loop":
-        return _by_innovations(recording, loop, window, free, initial_output)
-    simulated = _by_simulation(recording, loop, window, free, initial_output)
-    if noise == "recording" or not set(free) <= set(OF_THE_VEHICLE):
-        return simulated
-    try:
-        innovations = _by_innovations(recording, loop, window, free, initial_output)
-    except NotIdentifiableError:  # the command cannot be computed, or says less than the loop
-        return simulated
-    likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
-    return simulated if likelier > LIKELIER else innovations
+@dataclass(frozen=True)
+class Waveform(Method):
+    """Least squares on the simulated response of the whole loop.
+
+    Parameters
+    ----------
+    noise : {"auto", "recording", "loop"}
+        Where the sensor noise goes: ``"recording"`` where it is in the recording alone, ``"loop"``
+        where the controller acted on it too. ``"auto"`` takes ``"loop"`` for rows that are the
+        samples of a P controller, unless ``"recording"`` is likelier by a factor of 20.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        For another `noise`.
+    """
+
+    noise: NoisePath = "auto"
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "waveform"
+    joint: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_choice("noise", self.noise, get_args(NoisePath))
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the windows of the runs."""
+        if self.noise == "loop":
+            return self._by_innovations(runs, free)
+        simulated = self._by_simulation(runs, free)
+        if self.noise == "recording" or not set(free) <= set(OF_THE_VEHICLE):
+            return simulated
+        try:
+            innovations = self._by_innovations(runs, free)
+        except NotIdentifiableError:  # the command cannot be computed, or says less than the loop
+            return simulated
+        likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
+        return simulated if likelier > LIKELIER else innovations
+
+    def _by_innovations(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        return estimate_from_commands(self.name, runs, free, self.initial_output, computed=True)
+
+    def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        names = checked_names(free, runs[0].loop, OF_THE_LOOP)
+        models = [_model(run, names, self.initial_output) for run in runs]
+        model, found = solve_jointly(models)
+        found = without_vanishing(model, found)
+        _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
+        return concluded(
+            self.name,
+            model,
+            found,
+            [Run(one.simulated.recording, run.loop) for one, run in zip(models, runs, strict=True)],
+            message=f"least squares over {', '.join(names)} on the response of the loop",
+            details={
+                "initial_output": float([*found.point, self.initial_output][len(names)]),
+                "noise": "recording",
+            },
+        )
 
 
 def _unlikelihood(fit: DelayEstimate) -> float:
@@ -97,51 +138,10 @@ def _unlikelihood(fit: DelayEstimate) -> float:
     Below rounding there is nothing to choose by.
     """
     total = 0.0
-    for one in fit.flights:
+    for one in fit.runs:
         scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))
         total += one.residuals.size * math.log(scatter)
     return total
-
-
-def _by_innovations(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    initial_output: float | None,
-) -> DelayEstimate:
-    return estimate_from_commands(
-        "waveform", recording, loop, window, free, initial_output, computed=True
-    )
-
-
-def _by_simulation(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    initial_output: float | None,
-) -> DelayEstimate:
-    flights = each_flight(recording, loop, window)
-    names = checked_names(free, flights[0].loop, OF_THE_LOOP)
-    models = [_model(flight, names, initial_output) for flight in flights]
-    model, found = solve_jointly(models)
-    found = without_vanishing(model, found)
-    _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
-    return concluded(
-        "waveform",
-        model,
-        found,
-        [
-            Fitted(one.simulated.recording, flight.loop)
-            for one, flight in zip(models, flights, strict=True)
-        ],
-        message=f"least squares over {', '.join(names)} on the response of the loop",
-        details={
-            "initial_output": float([*found.point, initial_output][len(names)]),
-            "noise": "recording",
-        },
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,10 +234,10 @@ class _Model(ModelOfOne):
         return [grids[name] if name in grids else np.array([known[name]]) for name in self.names]
 
 
-def _model(flight: FlownOnce, names: tuple[str, ...], offset: float | None = None) -> _Model:
-    simulated = SimulatedRecording(flight.recording, flight.loop, flight.window)
-    in_flight = simulated.recording.time[0] > flight.recording.time[0]
-    check_excitation(simulated.recording, len(names), in_flight=in_flight)
+def _model(run: Run, names: tuple[str, ...], offset: float | None = None) -> _Model:
+    simulated = SimulatedRecording(*run)
+    in_motion = simulated.recording.time[0] > run.recording.time[0]
+    check_excitation(simulated.recording, len(names), in_motion=in_motion)
     return _Model(simulated, names, offset)
 
 

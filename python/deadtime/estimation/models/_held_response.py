@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 __all__ = ["HeldResponse", "Response"]
 
@@ -82,6 +81,8 @@ class HeldResponse:
 
 def _even(command: Array, decays: Array, rates: Array) -> tuple[Array, Array]:
     """The recursion of v and dv/dlag where commands are evenly apart: two filters."""
+    from scipy.signal import lfilter
+
     d = float(decays[0])
     v = lfilter([0.0, 1.0 - d], [1.0, -d], command)
     p = lfilter([0.0, d * float(rates[0])], [1.0, -d], v - command)
