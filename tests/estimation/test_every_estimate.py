@@ -5,6 +5,7 @@ import math
 import pickle
 
 import deadtime as dtm
+import matplotlib.pyplot
 import numpy as np
 import pytest
 from deadtime.estimation import Frequency
@@ -38,7 +39,12 @@ def test_every_result_is_whole(method):
     fit = dtm.estimate_delay(flight, known, method=method)
     assert "nan" not in fit.summary().lower().replace("dominant", "")
     assert math.isfinite(json.loads(json.dumps(fit.to_dict(), allow_nan=False))["delay"])
-    fit.plot().canvas.draw()
+    axes = fit.plot()
+    axes[0].figure.canvas.draw()
+    assert fit.plot(axes) == axes
+    with pytest.raises(ValueError, match=f"give {len(axes)}"):
+        fit.plot(axes[1:])
+    matplotlib.pyplot.close()
     again = pickle.loads(pickle.dumps(fit))
     assert again.delay == fit.delay
     if fit.calibrated:

@@ -233,15 +233,13 @@ def test_what_is_found_is_told_in_words_and_drawn():
     for part in ("step of 1", "command logged", "reference only", "delay+lag s", "-0.9"):
         assert part in text
     assert "delay ±" in repr(plan)
-    assert len(plan.plot().axes) == 3
-    assert (
-        len(
-            dtm.identifiability(held_loop(), dtm.Experiment.step(), noise=0.01, free=("delay",))
-            .plot()
-            .axes
-        )
-        == 2
-    )
+    assert len(plan.plot()) == 3
+    alone = dtm.identifiability(held_loop(), dtm.Experiment.step(), noise=0.01, free=("delay",))
+    axes = alone.plot()
+    assert len(axes) == 2
+    assert alone.plot(axes) == axes
+    with pytest.raises(ValueError, match="give 2"):
+        alone.plot(axes[1:])
     with pytest.raises(ValueError, match="not free"):
         plan.bound.correlation("delay", "offset")
     again = copy.deepcopy(plan.bound)
@@ -398,7 +396,12 @@ def flat(value=0.0):
     [
         (held_loop(lag=0.1), flat(), {}, "does not excite"),
         (held_loop(lag=0.1), flat(1e3), {}, "1 throughout, at its limit"),
-        (held_loop(delay=3.0), dtm.Experiment.step(2.0, 0.5), {"free": ("delay",)}, "make it longer"),
+        (
+            held_loop(delay=3.0),
+            dtm.Experiment.step(2.0, 0.5),
+            {"free": ("delay",)},
+            "make it longer",
+        ),
         (
             held_loop(),
             dtm.Experiment.step(),

@@ -388,7 +388,7 @@ def test_the_manual_shows_these_numbers(found):
     shown = (ROOT / "docs" / "reproduction-numbers.md").read_text(encoding="utf-8")
     assert found.summary() in shown
     for one in found.comparisons:
-        row = f"| {one.quantity} | {one.printed} | {one.shown} | {one.told} |"
+        row = f"| {one.quantity} | {one.printed} | {one.shown} | {one.outcome} |"
         assert row.replace("<", "&lt;") in shown, "make it anew: python docs/pictures.py"
 
 

@@ -36,7 +36,7 @@ from deadtime._cli.show import (
 from deadtime._cli.verdicts import listed, verdict
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording, read_recording
-from deadtime.reports import demo_flight, study
+from deadtime.reports import demo_recording, study
 from deadtime.reports._page import write_report
 from deadtime.roots import RootSet
 from deadtime.roots._plots import plot_root_set
@@ -305,7 +305,7 @@ def demo(
     check_matplotlib()
     with stages(6, quiet=as_json) as begin:
         begin("flying the simulated loop")
-        flight = demo_flight(seed)
+        flight = demo_recording(seed)
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / "flight.csv"
         _write_flight(flight.recording, file)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from deadtime._base.drawing import new_figure
+from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -19,7 +19,7 @@ from deadtime._cli.show import (
 )
 from deadtime.estimation import Comparison, Method, compare_methods, estimate_delay
 from deadtime.estimation._estimate import JOINT, METHODS, automatic_method
-from deadtime.estimation._plots import plot_estimate, plot_fits
+from deadtime.estimation._plots import estimate_axes, plot_estimate, plot_fits
 from deadtime.estimation.methods._overshoot import OvershootMap
 from deadtime.estimation.methods._waveform import NoisePath
 from deadtime.recordings import read_recording
@@ -94,7 +94,9 @@ def estimate_delays(
         window=window,
     )
     if plot is not None:
-        save_figure(plot_estimate(fit), plot)
+        figure = empty_figure(7.0 + 3.5 * len(fit.runs), 4.6)
+        plot_estimate(fit, estimate_axes(fit, figure))
+        save_figure(figure, plot)
     if as_json:
         print_json(fit.to_dict())
     else:

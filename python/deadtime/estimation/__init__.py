@@ -2,7 +2,7 @@
 
 `_estimate` chooses and runs a method, `_compare` runs several, `_result` is what they return.
 `methods` holds one file a method, `data` what they read from a recording, `models` what they fit,
-`fit` least squares, profiles and residuals, `planning` what an experiment will tell.
+`fit` least squares, profiles and residuals, `planning` the bounds of planned experiments.
 """
 
 from deadtime.estimation._compare import Comparison, compare_methods

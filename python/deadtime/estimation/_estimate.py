@@ -106,8 +106,8 @@ def estimate_delay(
     NotIdentifiableError
         When the recording does not determine what was asked for: no step, no overshoot
         (Kp·Td below 1/e), an output that noise alone would explain, a setpoint that copies the
-        output, a limit cycle where the method is of linear theory, numbers that cannot be told
-        apart.
+        output, a limit cycle where the method is of linear theory, parameters that cannot be
+        distinguished.
     RecordingError
         When the window holds too few samples.
     TypeError
@@ -119,10 +119,10 @@ def estimate_delay(
     Notes
     -----
     A ground station sees the sum of all delays on the way round the loop; from its own log,
-    which part is in the command and which in the measurement cannot be told. A model that does
-    not explain the recording is returned with ``adequate=False``, not refused. Several recordings
-    are weighted by the inverse of their noise where residuals are white, and by that of their
-    excitation where they are not.
+    it cannot distinguish the part in the command from the part in the measurement. A model that
+    does not explain the recording is returned with ``adequate=False``, not refused. Several
+    recordings are weighted by the inverse of their noise where residuals are white, and by that of
+    their excitation where they are not.
 
     References
     ----------

@@ -37,8 +37,9 @@ __all__ = ["Experiment"]
 
 Array = NDArray[np.float64]
 
-#: A relay is a gain this large, in 1/s and its amplitude, with the amplitude as limit; where the
-#: error is zero it switches up, as if the reference were this share of a second of it higher.
+#: A relay is simulated as a P controller with this gain (1/s, times the amplitude) and the
+#: amplitude as its limit. The reference is higher by this share (s, times the amplitude), so that
+#: the relay is up at zero error.
 RELAY_GAIN, RELAY_SHIFT = 1e12, 1e-9
 
 
@@ -49,16 +50,16 @@ class Experiment(ReadOnlyArrays):
     Parameters
     ----------
     time : array_like, shape (n,)
-        Sample times in s, increasing. The vehicle is at rest before the first of them.
+        Sample times in s, increasing. The loop is at rest before the first of them.
     reference : array_like, shape (n,)
-        The reference from each of them on.
+        The reference from each sample time on.
     relay_amplitude : float, optional
         Amplitude of a relay that replaces the controller: the command is plus or minus this, with
         the sign of reference minus output.
     name : str
-        What it is, for tables and labels.
+        Name for tables and labels.
     period : float, optional
-        Period of the reference in s where it repeats itself, a whole number of samples.
+        Period of the reference in s if it is periodic, a whole number of samples.
 
     Raises
     ------
@@ -144,7 +145,7 @@ class Experiment(ReadOnlyArrays):
         sample_time : float
             s.
         rest : float
-            Time of the step in s; with 0 the reference is there at the first sample already.
+            Time of the step in s; with 0 the first sample has the new reference already.
 
         Returns
         -------
@@ -159,7 +160,9 @@ class Experiment(ReadOnlyArrays):
         time = sample_times(duration, sample_time)
         begin = non_negative("rest", rest)
         if begin >= time[-1]:
-            raise ValueError(f"rest={begin} s: the step comes after the end, at {time[-1]:g} s")
+            raise ValueError(
+                f"rest={begin} s: the step is after the end at {time[-1]:g} s; give a shorter rest"
+            )
         height = finite("amplitude", amplitude)
         reference = np.where(time < begin - ON_A_SAMPLE * sample_time, 0.0, height)
         return cls(time, reference, name=f"step of {height:g}")
@@ -178,7 +181,7 @@ class Experiment(ReadOnlyArrays):
             The wave begins with plus this.
         hold : float
             Time between changes of sign in s, half of the period. Where it is no whole number of
-            samples, each change takes place at the first sample after its time.
+            samples, each change is at the first sample after its time.
         sample_time : float
             s.
 
@@ -221,7 +224,7 @@ class Experiment(ReadOnlyArrays):
             Half of the way between the two levels.
         hold : float
             Shortest time between changes of sign in s. Where it is no whole number of samples,
-            each change takes place at the first sample after its time.
+            each change is at the first sample after its time.
         seed : int
             Determines where in the sequence the experiment begins.
         sample_time : float
@@ -260,7 +263,7 @@ class Experiment(ReadOnlyArrays):
         odd: bool = False,
         phases: Literal["random", "schroeder"] = "random",
     ) -> Experiment:
-        """A sum of harmonics of one period, of equal amplitude.
+        """A sum of harmonics of one period, with equal amplitudes.
 
         Parameters
         ----------
@@ -269,17 +272,17 @@ class Experiment(ReadOnlyArrays):
         period : float
             s, a whole number of samples.
         lines : int or sequence of int
-            The excited harmonics, 1 being one oscillation a period; a number: all up to it.
+            The excited harmonics, 1 being one oscillation a period; a number excites all up to it.
         periods : int
-            How often it is repeated.
+            Number of periods.
         seed : int
-            Of random phases.
+            Seed of random phases.
         sample_time : float
             s.
         odd : bool
-            Leave the even ones of `lines` out: what shows on them is a nonlinearity.
+            Leave out the even ones of `lines`: a response at these shows a nonlinearity.
         phases : {"random", "schroeder"}
-            How the phases are chosen.
+            Choice of the phases.
 
         Returns
         -------
@@ -297,7 +300,7 @@ class Experiment(ReadOnlyArrays):
             near = max(1, round(period / sample)) * sample
             raise ValueError(
                 f"period={period} s is no whole number of samples of {sample} s, so the wave would "
-                f"not repeat itself: give {near:.10g}, for example"
+                f"not be periodic: give {near:.10g}, for example"
             )
         count = round(period / sample)
         excited = excited_lines(lines, count, odd)
@@ -318,19 +321,19 @@ class Experiment(ReadOnlyArrays):
         sample_time: float = 0.065,
         reference: float = 0.0,
     ) -> Experiment:
-        """A relay in the place of the controller, which makes the loop oscillate by itself.
+        """A relay in the place of the controller, which causes a limit cycle.
 
         Parameters
         ----------
         duration : float
             s.
         amplitude : float
-            The command is plus or minus this, above zero. It is plus where the output is at the
-            reference, as it is at the start.
+            The command is plus or minus this, above zero. It is plus where the output equals the
+            reference, as at the start.
         sample_time : float
             s.
         reference : float
-            What the output oscillates around.
+            Centre of the oscillation of the output.
 
         Returns
         -------
@@ -338,7 +341,7 @@ class Experiment(ReadOnlyArrays):
 
         Examples
         --------
-        An integrator behind a delay oscillates with four times the delay as its period:
+        The period of an integrator with delay is four times the delay:
 
         >>> import deadtime as dtm
         >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)

@@ -1,16 +1,17 @@
 """Chebyshev spectral continuous-time approximation (Torkamani & Butcher 2013).
 
-The output over the last delay, y(t + θ) for -Td <= θ <= 0, is taken for the polynomial through its
-values Y_0 … Y_N at the Chebyshev points θ_j = Td/2 (cos(jπ/N) - 1). All but the first are moved by
-the differentiation matrix, Y_j' = 2/Td (D Y)_j (Trefethen 2000, chapter 6), the first by the loop,
+The output over the last delay, y(t + θ) for -Td <= θ <= 0, is approximated by the polynomial
+through its values Y_0 … Y_N at the Chebyshev points θ_j = Td/2 (cos(jπ/N) - 1). All but the first
+follow from the differentiation matrix, Y_j' = 2/Td (D Y)_j (Trefethen 2000, chapter 6), the first
+by the loop,
     Y_0' = v,   lag v' + v = K (r - Y_N)
 (v itself the right side without a lag), so the delay equation becomes N + 1 ordinary ones, whose
 step response is a sum of exponentials; the reference is a sum of steps. Delay, gain, lag and the
 output at the start follow by least squares on the recording.
 
-The polynomial cannot have the corners that a step leaves, so the delay comes out biased: at
-K Td = 0.47 and 1.08 by -1.2 and -4.4 % for N = 2, by -0.06 and -0.4 % for N = 3 and by less than
-1e-6 for N = 6. It is for continuous loops without limit, and the same as fitting the waveform.
+The polynomial cannot follow the corners that a step leaves, so the delay is biased: at K Td = 0.47
+and 1.08 by -1.2 and -4.4 % for N = 2, by -0.06 and -0.4 % for N = 3 and by less than 1e-6 for N =
+6. The method is for continuous loops without a limit; it is otherwise the waveform fit.
 """
 
 from __future__ import annotations
@@ -41,13 +42,13 @@ __all__ = ["CTA", "chebyshev_differentiation"]
 
 Array = NDArray[np.float64]
 
-#: Points of the grid over the delay, and its ends as shares of the window.
+#: Points of the initial grid over the delay, and its ends as shares of the window.
 POINTS, SHORTEST, LONGEST = 20, 0.005, 0.6
 
-#: More nodes than this gain nothing: the corners are what is left.
+#: Most intervals: with more, the corners dominate the error.
 MOST_NODES = 24
 
-#: Exponents are kept below this: such a loop explains nothing.
+#: Bound of the exponents, so that unstable loops do not overflow.
 LARGEST_EXPONENT = 50.0
 
 
@@ -82,7 +83,7 @@ class CTA(Method):
         ((recording, loop, window),) = runs
         names = checked_names(free, loop)
         if "delay" not in names:
-            raise ValueError("the cta method is there for the delay: leave it among `free`")
+            raise ValueError("the cta method estimates the delay: keep it among `free`")
         stiffness_of(loop, "cta")
         if loop.is_sampled or loop.limit is not None:
             what = "a hold" if loop.is_sampled else "a limit"
@@ -111,9 +112,9 @@ class CTA(Method):
                 "intervals"
             ),
             uncalibrated=(
-                f"the cta method puts a polynomial of degree {self.intervals} in the place of the "
-                "delay, which biases it; noise alone makes the delay uncertain by "
-                f"{math.sqrt(cov[0, 0]):.2g} s where it does not circulate in the loop; use "
+                "the cta method approximates the delay by a polynomial of degree "
+                f"{self.intervals}, which biases it; noise alone makes the delay uncertain by "
+                f"{math.sqrt(cov[0, 0]):.2g} s where the controller does not act on it; use "
                 "method='waveform' for an interval"
             ),
             details={
@@ -131,7 +132,7 @@ def chebyshev_differentiation(order: int) -> Array:
     c = np.where((index == 0) | (index == order), 2.0, 1.0) * (-1.0) ** index
     away = x[:, None] - x[None, :] + np.eye(order + 1)
     matrix = np.outer(c, 1.0 / c) / away
-    # The diagonal makes constants vanish to rounding, which its formula does not.
+    # With this diagonal the derivative of a constant is zero to rounding.
     return np.asarray(matrix - np.diag(matrix.sum(axis=1)))
 
 
@@ -188,7 +189,7 @@ class _Fit:
         else:
             a[0, nodes - 1] = -stiffness
         rates, modes = np.linalg.eig(a)
-        # The deviation from the new reference begins at -1 all along the delay, at no speed.
+        # The deviation from the new reference is -1 over the whole delay at first, at rest.
         begin = np.where(np.arange(size) < nodes, -1.0, 0.0)
         weights = modes[0] * np.linalg.solve(modes, begin)
         # One of each conjugate pair stands for both.
@@ -197,7 +198,7 @@ class _Fit:
         return rates[upper].astype(np.complex128), weights[upper].astype(np.complex128)
 
     def solve(self) -> tuple[Array, Array]:
-        """The best numbers and the derivatives of the misfit there."""
+        """The parameters of least cost, and the derivatives of the misfit there."""
         from scipy.optimize import least_squares
 
         parameters = self.loop.parameters
@@ -228,7 +229,7 @@ class _Fit:
         delay = float(solution.x[0])
         if not 1.01 * shortest < delay < 0.99 * self.span:
             raise NotIdentifiableError(
-                f"the fit runs away to a delay of {delay:.3g} s, the end of its search: the output "
-                "is no answer of such a loop to this reference; check columns, signs and gains"
+                f"the fit ends at a delay of {delay:.3g} s, a bound of its search: the output is "
+                "no response of such a loop to this reference; check columns, signs and gains"
             )
         return solution.x, np.asarray(solution.jac)

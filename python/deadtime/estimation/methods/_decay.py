@@ -1,15 +1,15 @@
-"""From the exponential tail of a step response that does not overshoot to the delay.
+"""Delay from the exponential tail of a step response that does not overshoot.
 
-With K Td < 1/e the rightmost root of s (lag s + 1) + K e^(-s Td) = 0 is real, s = -r, and what is
-left of a step dies out as e^(-r t). The rate r is fitted to the tail by least squares; then
+With K Td < 1/e the rightmost root of s (lag s + 1) + K e^(-s Td) = 0 is real, s = -r, and the
+control error decays as e^(-r t). The rate r is fitted to the tail by least squares; then
 
     Td = ln(r (1 - lag r)/K)/r                    continuous,
     K = -1/H(e^(-r h); Td)                        sampled every h, H the held plant,
 
-so the gain has to be known: a per cent of it is worth about as much as a per cent of 1/r. The
-next root, also real, decays faster, but near K Td = 1/e hardly so: the later the tail begins, the
-less of it is left, and the less of the step too. The standard error is that of r by the delta
-method. Assumed are the gain, an output that ends at the reference, and that nothing else moves it.
+so the gain has to be known: an error of one per cent in it has about the effect of one in 1/r. The
+mode of the next root, also real, decays faster, but near K Td = 1/e hardly so: a later tail
+contains less of it, and less signal. The standard error is that of r by the delta method. The
+method assumes the gain, an output that ends at the reference, and no disturbance.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_dies_out, read_extremes
+from deadtime.estimation.data._extremes import check_decays, read_extremes
 from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
@@ -39,8 +39,7 @@ __all__ = ["Decay"]
 
 Array = NDArray[np.float64]
 
-#: Fewest samples of a tail, and the least of the step that it begins with: below are noise or
-#: rounding.
+#: Fewest samples of a tail, and the smallest share of the step that is not rounding.
 FEWEST, LEAST = 5, 1e-6
 
 
@@ -76,15 +75,15 @@ class Decay(Method):
         check_delay_alone("decay", free)
         stiffness = stiffness_of(loop, "decay")
         simulated = SimulatedRecording(recording, loop, window)
-        answer = read_step(simulated.recording)
-        extremes = read_extremes(answer)
-        check_dies_out(extremes, "decay")
+        reading = read_step(simulated.recording)
+        extremes = read_extremes(reading)
+        check_decays(extremes, "decay")
         if extremes:
             raise NotIdentifiableError(
-                "the output overshoots, so the rightmost roots are no real ones and the tail is no "
+                "the output overshoots, so the rightmost roots are complex and the tail is no "
                 "exponential: use method='decrement', 'overshoot' or 'waveform'"
             )
-        rate, error, samples = _tail_rate(answer, _begin(answer, loop, self.tail))
+        rate, error, samples = _tail_rate(reading, _begin(reading, loop, self.tail))
         lag = loop.parameters["lag"]
 
         def delay_of(r: float) -> float:
@@ -97,7 +96,7 @@ class Decay(Method):
         if delay < 0.0:
             raise NotIdentifiableError(
                 f"the tail decays with {rate:.4g} 1/s, slower than with K = {stiffness:.4g} 1/s "
-                "and no delay at all: the gain is smaller than it is taken to be, or the tail "
+                "and no delay at all: the gain is smaller than given, or the tail "
                 "begins too late; check the gains"
             )
         held = 0.5 * (loop.sample_time or 0.0)
@@ -112,51 +111,51 @@ class Decay(Method):
             simulated,
             {"delay": delay},
             np.array([[stderr**2]]),
-            answer.start,
+            reading.start,
             message=(
-                f"{samples} samples of the tail decay with {rate:.4g} ± {error:.2g} 1/s: takes the "
-                f"gain to be {loop.parameters['gain']:g} and the output to end at the reference"
+                f"{samples} samples of the tail decay with {rate:.4g} ± {error:.2g} 1/s: assumes "
+                f"a gain of {loop.parameters['gain']:g} and an output that ends at the reference"
             ),
             uncalibrated=(
-                "the decay method takes the gain as given and the tail for one exponential: noise "
+                "the decay method assumes the given gain and an exponential tail: noise "
                 f"alone makes the delay uncertain by {stderr:.2g} s, a gain that is 1 % off moves "
-                f"it by {0.01 / rate:.2g} s, and what other roots leave in the tail shifts it "
+                f"it by {0.01 / rate:.2g} s, and other modes in the tail shift it "
                 "further; use method='waveform' for an interval"
             ),
             details={"rate": rate, "rate_error": error, "tail_samples": samples},
         )
 
 
-def _begin(answer: StepReading, loop: ControlLoop, share: float) -> float:
-    """When the tail begins: the share is left, and no command at its limit is still on its way."""
-    left = 1.0 - answer.travelled
+def _begin(reading: StepReading, loop: ControlLoop, share: float) -> float:
+    """Time after the step from which the error is below the share and no command was limited."""
+    left = 1.0 - reading.travelled
     above = np.flatnonzero(left > share)
-    begin = float(answer.since[above[-1] + 1]) if above[-1] + 1 < left.size else math.inf
+    begin = float(reading.since[above[-1] + 1]) if above[-1] + 1 < left.size else math.inf
     if loop.limit is not None:
-        most = loop.limit / (loop.parameters["Kp"] * abs(answer.size))
+        most = loop.limit / (loop.parameters["Kp"] * abs(reading.size))
         limited = np.flatnonzero(left > most)
         if limited.size:
-            # No longer than until the output first moves: a delay.
-            moved = answer.travelled > max(CLEARANCE * answer.noise, LEAST)
-            begin = max(begin, float(answer.since[limited[-1]] + answer.since[np.argmax(moved)]))
+            # The first movement of the output is an upper bound of the delay.
+            moved = reading.travelled > max(CLEARANCE * reading.noise, LEAST)
+            begin = max(begin, float(reading.since[limited[-1]] + reading.since[np.argmax(moved)]))
     return begin
 
 
-def _tail_rate(answer: StepReading, begin: float) -> tuple[float, float, int]:
+def _tail_rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
     """Rate of an exponential from `begin` on, its standard error and the number of samples."""
     from scipy.optimize import least_squares
 
-    rows = answer.since >= begin
-    # What is left below rounding adds nothing but its error.
-    rows &= np.maximum.accumulate((1.0 - answer.travelled)[::-1])[::-1] > LEAST * 1e-3
-    time, left = answer.since[rows], 1.0 - answer.travelled[rows]
+    rows = reading.since >= begin
+    # Errors below rounding hold no information.
+    rows &= np.maximum.accumulate((1.0 - reading.travelled)[::-1])[::-1] > LEAST * 1e-3
+    time, left = reading.since[rows], 1.0 - reading.travelled[rows]
     if time.size < FEWEST:
         raise NotIdentifiableError(
             f"{time.size} samples of a tail, {FEWEST} are needed: sample faster, record longer or "
             "let the tail begin earlier with a larger `tail`"
         )
     time = time - time[0]
-    clear = left > max(CLEARANCE * answer.noise, 0.2 * float(left[0]))
+    clear = left > max(CLEARANCE * reading.noise, 0.2 * float(left[0]))
     first = max(2, int(np.argmin(clear)) if not clear.all() else left.size)
     guess = -np.polyfit(time[:first], np.log(np.abs(left[:first]) + LEAST * 1e-6), 1)[0]
 
@@ -172,8 +171,8 @@ def _tail_rate(answer: StepReading, begin: float) -> tuple[float, float, int]:
     error = math.sqrt(robust_covariance(jacobian, -found.fun)[1, 1])
     if height <= 0.0 or rate <= 0.0 or rate < CLEARANCE * error:
         raise NotIdentifiableError(
-            f"the tail decays with {rate:.3g} ± {error:.2g} 1/s, no rate that stands out of the "
-            "noise: let it begin earlier with a larger `tail`, or use method='waveform'"
+            f"the tail decays with {rate:.3g} ± {error:.2g} 1/s, not distinguishable from "
+            "zero: let it begin earlier with a larger `tail`, or use method='waveform'"
         )
     return rate, error, int(time.size)
 
@@ -184,8 +183,8 @@ def _delay(rate: float, stiffness: float, lag: float, sample_time: float | None)
 
     if lag * rate >= 1.0:
         raise NotIdentifiableError(
-            f"the tail decays with {rate:.4g} 1/s, faster than a lag of {lag:g} s lets it: the lag "
-            "is smaller than it is taken to be"
+            f"the tail decays with {rate:.4g} 1/s, faster than possible with a lag of {lag:g} s: "
+            "the lag is smaller than given"
         )
     delay = math.log(rate * (1.0 - lag * rate) / stiffness) / rate
     if sample_time is None:
@@ -196,7 +195,7 @@ def _delay(rate: float, stiffness: float, lag: float, sample_time: float | None)
     def excess(late: float) -> float:
         return math.log((-1.0 / held_transfer(complex(z), late, lag, h)).real / stiffness)
 
-    # The hold delays by about half a sample; less than none shows as negative by as much.
+    # The hold delays by about half a sample; a rate that is too small gives a negative delay.
     if excess(0.0) <= 0.0:
         return min(excess(0.0) / rate, -1e-300)
     return float(brentq(excess, 0.0, max(delay, 0.0) + h, xtol=1e-15))

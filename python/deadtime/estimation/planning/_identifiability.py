@@ -13,7 +13,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.processes import Progress
 from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import method_of
-from deadtime.estimation.data._evidence import OF_THE_VEHICLE, checked_names
+from deadtime.estimation.data._evidence import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
@@ -31,7 +31,7 @@ from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 __all__ = ["Identifiability", "identifiability"]
 
@@ -197,14 +197,29 @@ class Identifiability(ReadOnlyArrays):
         lines += [f"  {remark}" for remark in self.remarks]
         return "\n".join(lines)
 
-    def plot(self) -> Figure:
-        """The expected recording, the effect of each quantity on it, and delay against lag.
+    def plot(self, ax: Sequence[Axes] | None = None) -> list[Axes]:
+        """Draw the expected recording, the effect of each quantity on it, and delay against lag.
 
         Needs matplotlib.
+
+        Parameters
+        ----------
+        ax : sequence of matplotlib.axes.Axes, optional
+            One for the recording, one for the effects, and one for delay against lag where both
+            are free. By default those of a new figure.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            If `ax` holds another number of axes.
         """
         from deadtime.estimation.planning._plots import plot_identifiability
 
-        return plot_identifiability(self)
+        return plot_identifiability(self, ax)
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} ± {error:.3g}" for name, error in self.stderr.items())
@@ -286,7 +301,7 @@ def identifiability(
     if not isinstance(experiment, Experiment):
         raise TypeError(f"experiment is a {type(experiment).__name__}, not an Experiment")
     if free is None:
-        free = ["delay", *(name for name in OF_THE_VEHICLE if loop.parameters.get(name))]
+        free = ["delay", *(name for name in VEHICLE_PARAMETERS if loop.parameters.get(name))]
     names = checked_names(free, loop)
     level = positive("noise", noise.deviation if isinstance(noise, WhiteNoise) else noise)
     if initial_output is not None and finite("initial_output", initial_output) != 0.0:

@@ -118,17 +118,17 @@ def from_the_command(
     late = delay(values["delay"] + LONGER * recording.sample_time)
     plant = TransferFunction(num, den)
 
-    def answer(system: TransferFunction) -> Array:
+    def response(system: TransferFunction) -> Array:
         return np.asarray(simulate(system * late, time, command, input_time=time).outputs)
 
     slopes: dict[str, Array] = {}
     for name in names:
         if name == "delay":
-            slopes[name] = -answer(plant * s)
+            slopes[name] = -response(plant * s)
         elif name == "gain":
-            slopes[name] = answer(plant) / values["gain"]
+            slopes[name] = response(plant) / values["gain"]
         else:  # a lag or time constant
-            slopes[name] = -answer(plant * s / (values[name] * s + 1.0))
+            slopes[name] = -response(plant * s / (values[name] * s + 1.0))
     if offset:
         slopes["initial output"] = np.ones(len(recording))
     return slopes

@@ -1,16 +1,18 @@
-"""Drawing of planned experiments; matplotlib is imported when something is drawn."""
+"""Plots of planned experiments. Matplotlib is imported when something is drawn."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from deadtime._base.drawing import COLOURS, REFERENCE, empty_figure
+from deadtime._base.drawing import COLOURS, REFERENCE, bare_axes
+from deadtime.estimation._plots import shown_figure
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from deadtime.estimation.planning._identifiability import Identifiability
     from deadtime.estimation.planning._planned_bound import PlannedBound
@@ -21,23 +23,27 @@ __all__ = ["plot_identifiability"]
 TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
 
 
-def plot_identifiability(plan: Identifiability) -> Figure:
-    """The expected recording over its sensitivities; delay against lag where both are free."""
+def plot_identifiability(plan: Identifiability, axes: Sequence[Axes] | None = None) -> list[Axes]:
+    """The expected recording, its sensitivities; delay against lag where both are free."""
     both = plan.correlation is not None
-    figure = empty_figure(10.0 if both else 7.0, 5.0)
-    layout: Any = (
-        [["recording", "ellipse"], ["slopes", "ellipse"]] if both else [["recording"], ["slopes"]]
-    )
-    axes = figure.subplot_mosaic(layout, width_ratios=[3.0, 2.0] if both else [1.0])
-    for one in axes.values():
-        one.spines[["top", "right"]].set_visible(False)
-        one.grid(alpha=0.25)
-    axes["slopes"].sharex(axes["recording"])
-    _draw_recording(axes["recording"], plan)
-    _draw_slopes(axes["slopes"], plan)
+    axes = _new_axes(both) if axes is None else list(axes)
+    if len(axes) != 2 + both:
+        raise ValueError(f"ax holds {len(axes)} axes: give {2 + both}")
+    for one in axes:
+        bare_axes(one)
+    _draw_recording(axes[0], plan)
+    _draw_slopes(axes[1], plan)
     if both:
-        _draw_ellipse(axes["ellipse"], plan)
-    return figure
+        _draw_ellipse(axes[2], plan)
+    return axes
+
+
+def _new_axes(both: bool) -> list[Axes]:
+    figure = shown_figure(10.0 if both else 7.0, 5.0)
+    grid = figure.add_gridspec(2, 1 + both, width_ratios=[3.0, 2.0][: 1 + both])
+    upper = figure.add_subplot(grid[0, 0])
+    axes = [upper, figure.add_subplot(grid[1, 0], sharex=upper)]
+    return [*axes, figure.add_subplot(grid[:, 1])] if both else axes
 
 
 def _draw_recording(ax: Axes, plan: Identifiability) -> None:
