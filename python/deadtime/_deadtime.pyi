@@ -1,20 +1,31 @@
 """Signatures of the native part."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, final
+from typing import Any, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "Certificate",
     "CharacteristicMatrix",
+    "Contour",
     "DelayPieces",
     "DelayRun",
+    "Expansion",
     "Family",
     "LinearLoop",
     "LinearSystem",
+    "MapBoundary",
+    "MapCells",
+    "Monotone",
+    "ProvedBoxes",
     "QuasiPolynomial",
+    "RootSet",
+    "Segment",
+    "Sensitivity",
     "Signal",
+    "StabilityRadius",
     "at_read",
     "at_write",
     "configuration_read",
@@ -55,31 +66,106 @@ __all__ = [
     "wrightomega",
 ]
 
-_Listed: TypeAlias = tuple[
-    NDArray[np.complex128],
-    NDArray[np.int64],
-    NDArray[np.float64],
-    NDArray[np.bool_],
-    int,
-    tuple[float, float],
-    tuple[float, float],
-]
-
 _Pair: TypeAlias = tuple[float, float]
-# Start, end, middle, reference, value, error, slope.
-_Segment: TypeAlias = tuple[complex, complex, complex, int, complex, float, float]
-# Start, end, middle, reference, slope, error, bend.
-_Monotone: TypeAlias = tuple[float, float, float, int, float, float, float]
-# Count, scale, zeros, beyond, closed, contours, real.
-_Proof: TypeAlias = tuple[
-    int,
-    int,
-    int,
-    tuple[int, float] | None,
-    tuple[_Pair, _Pair],
-    list[tuple[_Pair, _Pair, bool, int, list[_Segment]]],
-    list[tuple[_Segment | None, _Monotone | None]],
-]
+_Axes: TypeAlias = dict[str, NDArray[np.float64]]
+_Region: TypeAlias = tuple[_Pair, _Pair]
+
+@final
+class RootSet:
+    @property
+    def roots(self) -> NDArray[np.complex128]: ...
+    @property
+    def multiplicities(self) -> NDArray[np.int64]: ...
+    @property
+    def radii(self) -> NDArray[np.float64]: ...
+    @property
+    def resolved(self) -> NDArray[np.bool_]: ...
+    @property
+    def counted(self) -> int: ...
+    @property
+    def region(self) -> _Region: ...
+
+@final
+class Sensitivity:
+    @property
+    def root(self) -> complex: ...
+    @property
+    def coefficients(self) -> NDArray[np.complex128]: ...
+
+@final
+class Segment:
+    @property
+    def start(self) -> complex: ...
+    @property
+    def end(self) -> complex: ...
+    @property
+    def middle(self) -> complex: ...
+    @property
+    def reference(self) -> int: ...
+    @property
+    def value(self) -> complex: ...
+    @property
+    def error(self) -> float: ...
+    @property
+    def slope(self) -> float: ...
+
+@final
+class Monotone:
+    @property
+    def start(self) -> float: ...
+    @property
+    def end(self) -> float: ...
+    @property
+    def middle(self) -> float: ...
+    @property
+    def reference(self) -> int: ...
+    @property
+    def slope(self) -> float: ...
+    @property
+    def error(self) -> float: ...
+    @property
+    def bend(self) -> float: ...
+
+@final
+class Contour:
+    @property
+    def re(self) -> _Pair: ...
+    @property
+    def im(self) -> _Pair: ...
+    @property
+    def symmetric(self) -> bool: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def segments(self) -> list[Segment]: ...
+
+@final
+class Certificate:
+    @property
+    def region(self) -> _Region: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def scale(self) -> int: ...
+    @property
+    def zeros(self) -> int: ...
+    @property
+    def beyond(self) -> tuple[int, float] | None: ...
+    @property
+    def closed(self) -> _Region: ...
+    @property
+    def contours(self) -> list[Contour]: ...
+    @property
+    def real(self) -> list[Segment | Monotone]: ...
+
+@final
+class Expansion:
+    @property
+    def coefficients(self) -> NDArray[np.complex128]: ...
+    @property
+    def errors(self) -> NDArray[np.float64]: ...
+    @property
+    def delay(self) -> float: ...
 
 @final
 class CharacteristicMatrix:
@@ -91,8 +177,8 @@ class CharacteristicMatrix:
     ) -> CharacteristicMatrix: ...
     def is_invertible(self) -> bool: ...
     def count(self, re: tuple[float, float], im: tuple[float, float]) -> int: ...
-    def roots(self, re: tuple[float, float], im: tuple[float, float]) -> _Listed: ...
-    def rightmost(self, n: int) -> _Listed: ...
+    def roots(self, re: tuple[float, float], im: tuple[float, float]) -> RootSet: ...
+    def rightmost(self, n: int) -> RootSet: ...
     def spectral_abscissa(self) -> float: ...
     def chain_abscissa(self) -> tuple[float, float]: ...
     def is_stable(self) -> bool: ...
@@ -114,20 +200,16 @@ class QuasiPolynomial:
     def derivative(self, order: int) -> QuasiPolynomial: ...
     def values(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
     def count(self, re: tuple[float, float], im: tuple[float, float], edge: str) -> int: ...
-    def certify(self, re: tuple[float, float], im: tuple[float, float]) -> _Proof: ...
+    def certify(self, re: tuple[float, float], im: tuple[float, float]) -> Certificate: ...
     def is_stable(self, strong: bool) -> bool: ...
-    def roots(self, re: tuple[float, float], im: tuple[float, float], edge: str) -> _Listed: ...
-    def rightmost(self, n: int) -> _Listed: ...
+    def roots(self, re: tuple[float, float], im: tuple[float, float], edge: str) -> RootSet: ...
+    def rightmost(self, n: int) -> RootSet: ...
     def spectral_abscissa(self, strong: bool) -> float: ...
-    def sensitivity(
-        self, root: complex, delays: list[float], powers: list[int]
-    ) -> tuple[complex, NDArray[np.complex128]]: ...
+    def sensitivity(self, root: complex, delays: list[float], powers: list[int]) -> Sensitivity: ...
     def chain_abscissa(self) -> float: ...
     def exact_chain_abscissa(self) -> float | None: ...
     def base_delay(self) -> float | None: ...
-    def expansion(
-        self, s: complex, order: int
-    ) -> tuple[NDArray[np.complex128], NDArray[np.float64], float]: ...
+    def expansion(self, s: complex, order: int) -> Expansion: ...
     def logarithmic_derivatives(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
 
 def thread_count(threads: int | None = None) -> int: ...
@@ -152,88 +234,128 @@ def lambertw0_number(x: object) -> np.float64 | None: ...
 def lambertwm1_number(x: object) -> np.float64 | None: ...
 def dde_root_number(a0: object, a1: object, delay: object, k: object) -> np.complex128 | None: ...
 
+class _FamilyTerm(Protocol):
+    @property
+    def coefficient(self) -> float: ...
+    @property
+    def exponents(self) -> Sequence[tuple[str, int]]: ...
+    @property
+    def power(self) -> int: ...
+    @property
+    def constant(self) -> float: ...
+    @property
+    def slopes(self) -> Sequence[tuple[str, float]]: ...
+
+class _MapQuestion(Protocol):
+    @property
+    def decay(self) -> float: ...
+    @property
+    def damping(self) -> _Pair | None: ...
+    @property
+    def abscissa(self) -> bool: ...
+    @property
+    def proof(self) -> str: ...
+
+@final
+class MapCells:
+    @property
+    def unstable(self) -> NDArray[np.int32]: ...
+    @property
+    def abscissa(self) -> NDArray[np.float64] | None: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+@final
+class MapBoundary:
+    @property
+    def gain(self) -> NDArray[np.float64]: ...
+    @property
+    def row(self) -> NDArray[np.int64]: ...
+    @property
+    def omega(self) -> NDArray[np.float64]: ...
+    @property
+    def crossing(self) -> NDArray[np.int32]: ...
+    @property
+    def along(self) -> str: ...
+
 @final
 class Family:
-    def __new__(
-        cls, names: list[str], terms: list[tuple[float, list[int], int, float, list[float]]]
-    ) -> Family: ...
-    def at(self, values: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def __new__(cls, names: list[str], terms: Sequence[_FamilyTerm]) -> Family: ...
+    def at(self, values: list[float]) -> QuasiPolynomial: ...
     def map(
         self,
-        values: list[float],
-        parameters: tuple[int, int],
-        first: NDArray[np.float64],
-        second: NDArray[np.float64],
-        decay: float,
-        damping: tuple[float, float] | None,
-        abscissa: bool,
-        cells: bool,
+        axes: _Axes,
+        question: _MapQuestion,
+        *,
         threads: int | None = None,
         progress: Callable[[int], object] | None = None,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64] | None, NDArray[np.uint8]]: ...
-    def chains(
-        self,
-        values: list[float],
-        parameters: tuple[int, int],
-        first: NDArray[np.float64],
-        second: NDArray[np.float64],
-    ) -> NDArray[np.float64]: ...
+    ) -> MapCells: ...
+    def chains(self, axes: _Axes) -> NDArray[np.float64]: ...
     def boundaries(
-        self,
-        values: list[float],
-        parameters: tuple[int, int],
-        first: NDArray[np.float64],
-        second: NDArray[np.float64],
-        decay: float,
-        damping: tuple[float, float] | None,
-        threads: int | None = None,
-    ) -> (
-        tuple[
-            int,
-            list[
-                tuple[
-                    NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int32]
-                ]
-            ],
-        ]
-        | None
-    ): ...
+        self, axes: _Axes, *, decay: float, damping: _Pair | None
+    ) -> list[MapBoundary] | None: ...
     def crossings(
         self, values: list[float], parameter: int, ends: tuple[float, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]: ...
 
+@final
+class ProvedBoxes:
+    @property
+    def low(self) -> NDArray[np.float64]: ...
+    @property
+    def high(self) -> NDArray[np.float64]: ...
+    @property
+    def unstable(self) -> NDArray[np.int32]: ...
+    @property
+    def undecided(self) -> float: ...
+    @property
+    def parameter(self) -> NDArray[np.int8]: ...
+    @property
+    def at(self) -> NDArray[np.float64]: ...
+    @property
+    def link(self) -> NDArray[np.int64]: ...
+
+@final
+class StabilityRadius:
+    @property
+    def radius(self) -> float: ...
+    @property
+    def upper(self) -> float: ...
+    @property
+    def witness(self) -> dict[str, float] | None: ...
+
 def proved_boxes(
     family: Family,
-    ranges: list[_Pair],
-    undecided: float,
-    boxes: int,
+    ranges: dict[str, _Pair],
+    *,
+    tol: float,
+    max_boxes: int,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.int32],
-    tuple[NDArray[np.int8], NDArray[np.float64], NDArray[np.int64]],
-    float,
-]: ...
+) -> ProvedBoxes: ...
 def largest_stable_box(
     family: Family,
-    ranges: list[_Pair],
-    around: list[float] | None,
+    ranges: dict[str, _Pair],
+    *,
+    around: dict[str, float] | None,
     tol: float,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> list[_Pair] | None: ...
+) -> dict[str, _Pair] | None: ...
 def stability_radius(
-    family: Family, point: list[float], scales: list[float], tol: float, boxes: int
-) -> tuple[float, float, list[float] | None]: ...
+    family: Family,
+    point: dict[str, float],
+    scales: dict[str, float],
+    *,
+    tol: float,
+    max_boxes: int,
+) -> StabilityRadius: ...
 def robust_map(
     family: Family,
-    ranges: list[_Pair],
-    parameters: tuple[int, int],
-    first: NDArray[np.float64],
-    second: NDArray[np.float64],
-    boxes: int,
+    axes: _Axes,
+    over: dict[str, _Pair],
+    *,
+    max_boxes: int,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> NDArray[np.int32]: ...

@@ -10,6 +10,7 @@ from typing import get_args
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.ranges import OpenRange
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._evidence import check_setpoint_active
 from deadtime.estimation.data._runs import paired_runs
@@ -20,7 +21,7 @@ from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
 from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording, Window
+from deadtime.recordings import Recording
 
 __all__ = ["Comparison", "compare_methods"]
 
@@ -203,7 +204,7 @@ def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: s
 def compare_methods(
     recording: Recording,
     loop: ControlLoop,
-    window: Window | None = None,
+    window: OpenRange | None = None,
 ) -> Comparison:
     """Estimate the delay of a recording by every method that applies.
 

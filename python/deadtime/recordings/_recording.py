@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,7 @@ from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import unmasked
 
-__all__ = ["MINIMUM_SAMPLES", "Recording", "Step", "Window", "window_ends"]
-
-#: Part of a recording, (low, high) in s; None leaves an end open.
-Window: TypeAlias = tuple[float | None, float | None] | list[float | None]
+__all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
 
 #: Largest absolute value. The squares of larger ones may overflow, and no physical quantity has
 #: them.
@@ -187,16 +184,6 @@ class Recording(ReadOnlyArrays):
             )
             for row in changed
         ]
-
-
-def window_ends(window: Window | None) -> tuple[float | None, float | None]:
-    """Both ends of a window, None where it is open; without a window both are."""
-    if window is None:
-        return None, None
-    if not isinstance(window, (tuple, list)) or len(window) != 2:
-        raise TypeError(f"window={window!r}: give (low, high) in s, None for an open end")
-    low, high = window
-    return low, high
 
 
 def _unmasked_rows(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from deadtime._base.ranges import OpenRange
 from deadtime.estimation import Comparison, DelayEstimate, compare_methods
 from deadtime.experiments import Experiment, Noise
 from deadtime.loops import PV, Controller, ControlLoop, Integrator, P, kit_plant
 from deadtime.loops._derivative_filter import PAPER_FILTER
-from deadtime.recordings import Recording, Window
+from deadtime.recordings import Recording
 from deadtime.systems import Response
 from deadtime.tuning import Design, critical_gain, design
 
@@ -118,7 +119,7 @@ class Study:
 
     recording: Recording
     known: ControlLoop
-    window: Window | None
+    window: OpenRange | None
     comparison: Comparison
     held_limit: float
     continuous_limit: float
@@ -169,7 +170,7 @@ def study(
     recording: Recording,
     loop: ControlLoop,
     *,
-    window: Window | None = None,
+    window: OpenRange | None = None,
     truth: DemoRecording | None = None,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Study:

@@ -309,12 +309,12 @@ class QuasiPolynomial(Characteristic):
             raise ValueError(f"order={order}: from 0 to 60")
         if not cmath.isfinite(place):
             raise ValueError(f"s={place}: give a finite number")
-        coefficients, errors, tau = self._native.expansion(place, highest)
-        if not np.isfinite(errors).all():
+        found = self._native.expansion(place, highest)
+        if not np.isfinite(found.errors).all():
             raise ValueError(
                 f"s={place}: a power of s or an exponential leaves the range of double precision"
             )
-        return Expansion(coefficients, errors, tau)
+        return Expansion(found.coefficients, found.errors, found.delay)
 
 
 def _quotient(num: QuasiPolynomial, den: QuasiPolynomial) -> TransferFunction:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays, read_only
+from deadtime._deadtime import MapBoundary
 from deadtime.roots import ParametricQuasiPolynomial
 
 __all__ = ["Boundary", "boundaries_of", "chains_of"]
@@ -60,39 +61,29 @@ def boundaries_of(
     family: ParametricQuasiPolynomial,
     axes: dict[str, _Floats],
     decay: float,
-    damping: tuple[float, float] | None = None,
-    threads: int | None = None,
+    damping: tuple[float, float] | None,
 ) -> tuple[Boundary, ...]:
     """Curves on which members of `family` have roots on the edge, longest first."""
-    names = tuple(axes)
-    found = family._family.boundaries(*_grid(family, axes), decay, damping, threads)
+    found = family._family.boundaries(axes, decay=decay, damping=damping)
     if found is None:
         raise ValueError(
-            f"the family is affine in neither {names[0]} nor {names[1]}, and a root of all its "
+            f"the family is affine in neither {' nor '.join(axes)}, and a root of all its "
             "members stays at 0: cancel the factor s to see where the others cross"
         )
-    along, curves = found
-    across = axes[names[1 - along]]
-    result = []
-    for gains, rows, omega, crossing in sorted(curves, key=lambda curve: -len(curve[0])):
-        pair = (gains, across[rows])
-        values = dict(zip(names, pair if along == 0 else pair[::-1], strict=True))
-        for array in (*values.values(), omega, crossing):
-            read_only(array)
-        result.append(Boundary(values, omega, crossing, names[along]))
-    return tuple(result)
+    return tuple(
+        _boundary(curve, axes) for curve in sorted(found, key=lambda curve: -len(curve.gain))
+    )
+
+
+def _boundary(curve: MapBoundary, axes: dict[str, _Floats]) -> Boundary:
+    values = {
+        name: curve.gain if name == curve.along else points[curve.row]
+        for name, points in axes.items()
+    }
+    return Boundary(values, curve.omega, curve.crossing, curve.along)
 
 
 def chains_of(family: ParametricQuasiPolynomial, axes: dict[str, _Floats]) -> _Floats:
     """Abscissas of the chains of roots of the members of `family`, shape (n0, n1)."""
-    found: _Floats = read_only(family._family.chains(*_grid(family, axes)))
+    found: _Floats = read_only(family._family.chains(axes))
     return found
-
-
-def _grid(
-    family: ParametricQuasiPolynomial, axes: dict[str, _Floats]
-) -> tuple[list[float], tuple[int, int], _Floats, _Floats]:
-    """Values, places and points of two parameters as the native core takes them."""
-    one, two = axes
-    places = (family.names.index(one), family.names.index(two))
-    return [0.0] * len(family.names), places, axes[one], axes[two]

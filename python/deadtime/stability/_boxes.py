@@ -16,17 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
-from deadtime._base.frozen import ReadOnlyArrays, read_only
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.ranges import Range
 from deadtime._base.validation import finite, positive, real_array, thread_number, whole_number
+from deadtime.roots._family import family_of
 from deadtime.stability._intervals import (
     Floats,
     Given,
     Progress,
-    Range,
     System,
-    inverse,
-    native_family,
-    placed,
+    Values,
     ranges_of,
     side,
 )
@@ -173,6 +172,7 @@ def proved_boxes(
     ranges: Given,
     tol: float = 1e-3,
     *,
+    at: Values | None = None,
     max_boxes: int = 1_000_000,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -182,12 +182,14 @@ def proved_boxes(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
-    ranges : mapping of str to (low, high) or float
-        One to three ranges; further parameters have a value.
+        What to judge.
+    ranges : mapping of str to (low, high)
+        One to three ranges.
     tol : float
         Share of the ranges that may stay undecided, from 0 to 1. The number of boxes grows like
         1/tol for two parameters and 1/tol**2 for three.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     max_boxes : int
         The division ends with this many boxes (some hundred bytes each), whatever is undecided
         then; `ProvedBoxes.undecided` says how much.
@@ -237,30 +239,33 @@ def proved_boxes(
     >>> boxes.count_at(Kp=2.0, Kv=0.3), boxes.undecided <= 0.01
     (0, True)
     """
-    names, ends = ranges_of(ranges)
+    ends = ranges_of(ranges)
     share = finite("tol", tol)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
-    native, places = native_family(family, names)
-    low, high, unstable, tree, undecided = _deadtime.proved_boxes(
-        native,
-        placed(ends, places),
-        share,
-        whole_number("max_boxes", max_boxes),
-        thread_number(threads),
-        progress,
+    found = _deadtime.proved_boxes(
+        family_of(family, tuple(ends), at)._family,
+        ends,
+        tol=share,
+        max_boxes=whole_number("max_boxes", max_boxes),
+        threads=thread_number(threads),
+        progress=progress,
     )
-    # The family may hold its parameters in another order.
-    order = [places.index(index) for index in range(len(names))]
-    low, high = low[:, places], high[:, places]
-    parameter = np.array([*order, -1], dtype=np.int64)[tree[0]]
-    nodes = {"parameter": parameter, "at": tree[1], "link": tree[2]}
-    for array in (low, high, unstable, nodes):
-        read_only(array)
+    tree: dict[str, NDArray[Any]] = {
+        "parameter": found.parameter,
+        "at": found.at,
+        "link": found.link,
+    }
     if progress is not None:
-        progress(len(tree[0]))
+        progress(len(found.parameter))
     return ProvedBoxes(
-        names, dict(zip(names, ends, strict=True)), low, high, unstable, max(undecided, 0.0), nodes
+        names=tuple(ends),
+        ranges=ends,
+        low=found.low,
+        high=found.high,
+        unstable=found.unstable,
+        undecided=max(found.undecided, 0.0),
+        _tree=tree,
     )
 
 
@@ -268,6 +273,7 @@ def largest_stable_box(
     family: System,
     ranges: Given,
     *,
+    at: Values | None = None,
     around: Mapping[str, SupportsFloat] | None = None,
     tol: float = 1e-3,
     threads: int | None = None,
@@ -278,9 +284,11 @@ def largest_stable_box(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
-    ranges : mapping of str to (low, high) or float
+        What to judge.
+    ranges : mapping of str to (low, high)
         As in `proved_boxes`. Volumes are measured relative to them.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     around : mapping of str to float, optional
         A point that the box is to hold.
     tol : float
@@ -309,43 +317,42 @@ def largest_stable_box(
     >>> {name: (round(low, 2), round(high, 2)) for name, (low, high) in box.items()}
     {'Kp': (0.01, 3.45), 'Kv': (-0.27, 0.88)}
     """
-    names, ends = ranges_of(ranges)
+    ends = ranges_of(ranges)
     step = positive("tol", tol)
-    native, places = native_family(family, names)
-    point = None
-    if around is not None:
-        given = _named("around", around, names, dict(zip(names, ends, strict=True)))
-        point = [given[names[place]] for place in inverse(places)]
+    native = family_of(family, tuple(ends), at)._family
     found = _deadtime.largest_stable_box(
-        native, placed(ends, places), point, step, thread_number(threads), progress
+        native,
+        ends,
+        around=None if around is None else _named("around", around, ends),
+        tol=step,
+        threads=thread_number(threads),
+        progress=progress,
     )
     if found is None:
         held = "" if around is None else f" around {dict(around)}"
         raise ValueError(
             f"no stable box{held} was found in "
-            + ", ".join(side(name, *end) for name, end in zip(names, ends, strict=True))
+            + ", ".join(side(name, *end) for name, end in ends.items())
             + ": try other ranges"
         )
-    return {name: found[place] for name, place in zip(names, places, strict=True)}
+    return found
 
 
 def _named(
     what: str,
     given: Mapping[str, SupportsFloat],
-    names: tuple[str, ...],
     ranges: Mapping[str, Range],
 ) -> dict[str, float]:
     """A point in ranges; parameters with a value need not be named."""
     if not isinstance(given, Mapping):
         raise TypeError(f"{what}={given!r}: give a dict such as {{'Kp': 2.0}}")
-    unknown = [name for name in given if name not in names]
+    unknown = [name for name in given if name not in ranges]
     if unknown:
-        raise ValueError(f"{what}: {unknown[0]} has no range, but {', '.join(names)}")
+        raise ValueError(f"{what}: {unknown[0]} has no range, but {', '.join(ranges)}")
     point = {}
-    for name in names:
-        low, high = ranges[name]
+    for name, (low, high) in ranges.items():
         if name not in given and low < high:
-            raise ValueError(f"{what} has no {name}: give {', '.join(names)}")
+            raise ValueError(f"{what} has no {name}: give {', '.join(ranges)}")
         point[name] = finite(name, given.get(name, low))
         if not low <= point[name] <= high:
             raise ValueError(f"{what}: {name}={point[name]} lies outside {low} to {high}")

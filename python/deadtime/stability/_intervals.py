@@ -1,19 +1,16 @@
-"""Intervals of gains and delays as arguments, and the order in which the core holds them."""
+"""Intervals of gains and delays as arguments."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import SupportsFloat, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
-from deadtime._base.validation import finite
+from deadtime._base.ranges import Range, interval
 from deadtime.loops import ControlLoop
 from deadtime.roots import ParametricQuasiPolynomial
-from deadtime.roots._family import family_of
 
 __all__ = [
     "MOST_MOVING",
@@ -22,18 +19,16 @@ __all__ = [
     "Progress",
     "Range",
     "System",
-    "inverse",
-    "native_family",
-    "placed",
+    "Values",
     "ranges_of",
     "side",
 ]
 
 Floats: TypeAlias = NDArray[np.float64]
 Progress: TypeAlias = Callable[[int], object]
-Range: TypeAlias = tuple[float, float]
 System: TypeAlias = ParametricQuasiPolynomial | ControlLoop
-Given: TypeAlias = Mapping[str, tuple[SupportsFloat, SupportsFloat] | SupportsFloat]
+Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
+Values: TypeAlias = Mapping[str, SupportsFloat]
 
 #: Boxes are made of up to this many parameters.
 MOST_MOVING = 3
@@ -44,46 +39,16 @@ def side(name: str, low: float, high: float) -> str:
     return f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}"
 
 
-def ranges_of(given: Given) -> tuple[tuple[str, ...], list[Range]]:
-    """Names and ends of ranges and values."""
+def ranges_of(given: Given) -> dict[str, Range]:
+    """Ends of ranges by the names of their parameters."""
     if not isinstance(given, Mapping):
         raise TypeError(f"ranges={given!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
     if not given:
         raise ValueError("ranges of no parameter: give one to three")
-    ends = []
-    for name, value in given.items():
-        if isinstance(value, (tuple, list, np.ndarray)):
-            if len(value) != 2:
-                raise ValueError(f"{name}={value!r}: a range is (low, high)")
-            low, high = (finite(name, end) for end in value)
-            if low > high:
-                raise ValueError(
-                    f"{name}={value!r}: the low end of a range is not above its high end"
-                )
-            if math.isinf(high - low):
-                raise ValueError(f"{name}={value!r}: the range is wider than 1e308")
-        else:
-            low = high = finite(name, value)
-        ends.append((low, high))
-    if sum(low < high for low, high in ends) > MOST_MOVING:
+    ends = {name: interval(name, value, may_be_point=True) for name, value in given.items()}
+    if sum(low < high for low, high in ends.values()) > MOST_MOVING:
         raise ValueError(
             f"ranges for more than {MOST_MOVING} parameters ({', '.join(given)}): "
-            "give the others values"
+            "give the others values in at={...}"
         )
-    return tuple(given), ends
-
-
-def native_family(system: System, names: tuple[str, ...]) -> tuple[_deadtime.Family, list[int]]:
-    """The family in the core, and where it holds each parameter."""
-    family = family_of(system, names)
-    return family._family, [family.names.index(name) for name in names]
-
-
-def inverse(places: list[int]) -> list[int]:
-    """The place among the names of each parameter of the family."""
-    return [places.index(index) for index in range(len(places))]
-
-
-def placed(ends: list[Range], places: list[int]) -> list[Range]:
-    """The ranges in the order of the family."""
-    return [ends[index] for index in inverse(places)]
+    return ends

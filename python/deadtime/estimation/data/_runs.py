@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
+from deadtime._base.ranges import OpenRange, is_range, open_interval
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording, Window
-from deadtime.recordings._recording import window_ends
+from deadtime.recordings import Recording
 
 __all__ = ["Loops", "Recordings", "Run", "Windows", "paired_runs"]
 
@@ -18,7 +18,7 @@ Recordings: TypeAlias = Recording | Sequence[Recording]
 Loops: TypeAlias = ControlLoop | Sequence[ControlLoop]
 
 #: The part to use: one window for all recordings, or a list of them, one for each.
-Windows: TypeAlias = Window | Sequence[Window | None] | None
+Windows: TypeAlias = OpenRange | list[OpenRange | None] | None
 
 
 class Run(NamedTuple):
@@ -26,7 +26,7 @@ class Run(NamedTuple):
 
     recording: Recording
     loop: ControlLoop
-    window: tuple[float | None, float | None] = (None, None)
+    window: OpenRange = (None, None)
 
 
 def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> list[Run]:
@@ -36,7 +36,8 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
         raise ValueError("no recording was given: give one, or a list of them")
     number = len(recordings)
     loops = list(loop) if isinstance(loop, (list, tuple)) else [loop] * number
-    windows = _windows(window, number)
+    one_for_all = not isinstance(window, (tuple, list)) or (is_range(window) and len(window) == 2)
+    windows: list[Any] = [window] * number if one_for_all else list(window)
     for name, given in (("loop", loops), ("window", windows)):
         if len(given) != number:
             raise ValueError(
@@ -48,7 +49,7 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
             raise TypeError(f"recording[{index}] must be a Recording, got {type(one).__name__}")
         if not isinstance(its_loop, ControlLoop):
             raise TypeError(f"loop[{index}] must be a ControlLoop, got {type(its_loop).__name__}")
-        runs.append(Run(one, its_loop, window_ends(ends)))
+        runs.append(Run(one, its_loop, _checked(ends)))
     plants = {type(run.loop.plant).__name__ for run in runs}
     if len(plants) > 1:
         raise ValueError(
@@ -58,10 +59,7 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
     return runs
 
 
-def _windows(windows: Windows, number: int) -> list[Any]:
-    """The window of each recording."""
-    if isinstance(windows, (list, tuple)):
-        nested = any(isinstance(window, (list, tuple)) for window in windows)
-        if nested or (number > 1 and all(window is None for window in windows)):
-            return list(windows)
-    return [windows] * number
+def _checked(window: OpenRange | None) -> OpenRange:
+    open_interval("window", window)
+    low, high = (None, None) if window is None else window
+    return low, high

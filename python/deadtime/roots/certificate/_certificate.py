@@ -197,35 +197,6 @@ class Certificate(Proof):
             ) from None
         return read
 
-    @classmethod
-    def _made(
-        cls,
-        coefficients: list[list[float]],
-        delays: list[float],
-        region: tuple[Range, Range],
-        proof: Any,
-    ) -> Certificate:
-        """Adopt what the native code found."""
-        count, scale, zeros, beyond, closed, contours, real = proof
-        return cls(
-            tuple(map(tuple, coefficients)),
-            tuple(delays),
-            region,
-            count,
-            scale,
-            zeros,
-            beyond,
-            closed,
-            tuple(
-                Contour(re, im, symmetric, number, tuple(Segment(*part) for part in segments))
-                for re, im, symmetric, number, segments in contours
-            ),
-            tuple(
-                Monotone(*monotone) if empty is None else Segment(*empty)
-                for empty, monotone in real
-            ),
-        )
-
 
 def _plain(value: Any) -> Any:
     """Turn a value into what JSON holds; floats and complex numbers as hexadecimal text."""
