@@ -301,7 +301,7 @@ def _state_of(navdata: Navdata, clock: float | None, now: float, missing: int) -
         sequence=navdata.sequence,
         vehicle_time=clock,
         climb=navdata.climb,
-        climb_demand=navdata.climb_demand,
+        climb_setpoint=navdata.climb_setpoint,
         # NaN is no angle that a watch would let pass.
         roll=math.nan if navdata.roll is None else navdata.roll,
         pitch=math.nan if navdata.pitch is None else navdata.pitch,
