@@ -67,9 +67,9 @@ def test_no_pulse_of_an_input_is_lost(system):
     # 191 of 200 pulses of 0.5 s in 60 s were.
     found = [
         found_or_refused(
-            lambda pulse=pulse: dtm.simulate(
-                system, [0.0, 60.0], pulse, vectorized=True
-            ).outputs.flat[-1],
+            lambda pulse=pulse: system.simulate([0.0, 60.0], pulse, vectorized=True).outputs.flat[
+                -1
+            ],
             pulse.area,
             1e-11,
             "input_breaks",

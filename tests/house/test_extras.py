@@ -51,7 +51,6 @@ DRAWN = {
     ).plot(),
     "RootSet.plot": lambda: LOOP.rightmost().plot(),
     "StabilityMap.plot": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)).plot(),
-    "SystemResponse.plot": lambda: SYSTEM.step_response(TIME).plot(),
     "TransferFunction.bode": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)).bode(),
     "TransferFunction.nyquist": lambda: (2.0 / dtm.s * dtm.delay(0.36)).nyquist(),
 }

@@ -7,6 +7,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.loops._plants import realise, rest
 from loops import INTEGRATOR, TIMES
 from scipy.integrate import solve_ivp
 
@@ -52,6 +53,30 @@ def test_info_does_not_depend_on_the_output_grid():
         assert coarse[name] == pytest.approx(fine[name], rel=1e-6, abs=1e-9)
 
 
+FEEDTHROUGH = [
+    ([0.5, 3.0], [1.0, 1.5]),
+    ([0.3, 1.2, 3.0], [1.0, 0.8, 2.0]),
+    ([-0.4, 1.0, 2.0, 1.5], [2.0, 3.0, 4.0, 1.0]),
+]
+
+
+@pytest.mark.parametrize(("num", "den"), FEEDTHROUGH)
+def test_a_plant_with_direct_feedthrough_rests_at_an_output_that_is_not_zero(num, den):
+    # x' = A x + B u = 0 and y = C x + D u; the sign of D u failed no test.
+    state, command = rest(num, den, 0.8)
+    plant = realise(num, den)
+    assert command == pytest.approx(0.8 * den[-1] / num[-1], rel=1e-15)
+    np.testing.assert_allclose(plant.A @ state + plant.B * command, 0.0, atol=1e-14)
+    assert plant.C @ state + plant.D * command == pytest.approx(0.8, rel=1e-14)
+    for sample_time in (None, 0.05):
+        loop = dtm.ControlLoop(
+            dtm.RationalPlant(num, den), dtm.PI(0.1, 0.2), delay=0.3, sample_time=sample_time
+        )
+        stays = loop.simulate(np.linspace(0.0, 3.0, 31), 0.8, initial_output=0.8)
+        np.testing.assert_allclose(stays.outputs, 0.8, rtol=1e-12)
+        np.testing.assert_allclose(stays.inputs, command, rtol=1e-12)
+
+
 def test_a_step_response_finds_its_own_time():
     response = dtm.ControlLoop(INTEGRATOR, dtm.P(1.31), delay=0.36, limit=0.1).step_response()
     # Ten seconds at the limit before it settles.
@@ -68,7 +93,7 @@ def test_plot_draws_output_reference_and_command():
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("agg")
     response = dtm.ControlLoop(INTEGRATOR, dtm.P(1.0), delay=0.1).simulate(TIMES)
-    axes = response.plot(command=True)
+    axes = response.plot(inputs=True)
     assert len(axes.lines) == 3
     matplotlib.pyplot.close(axes.figure)
 

@@ -17,7 +17,15 @@ def pair_of_roots(m):
 
 @pytest.mark.parametrize(
     ("m", "distance"),
-    [(3, 1e-3), (3, 1e-6), (3, 1e-9), (4, 1e-4), (6, 1e-2), (6, 1e-4)],
+    [
+        (3, 1e-3),
+        (3, 1e-9),
+        (4, 1e-4),
+        *(
+            pytest.param(*one, marks=pytest.mark.survey)
+            for one in [(3, 1e-6), (6, 1e-2), (6, 1e-4)]
+        ),
+    ],
 )
 def test_edges_beside_multiple_roots(m, distance):
     # The bound on g'' alone asks for segments as short as distance^(m/2): their search ran out.
