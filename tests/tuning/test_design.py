@@ -7,7 +7,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.tuning import critical_gain
-from deadtime.tuning._demands import MarginEstimate
+from deadtime.tuning._margin_estimate import MarginEstimate
 from deadtime.tuning._objectives import dominant_damping
 from deadtime.tuning._problem import pose
 
@@ -137,7 +137,7 @@ def test_a_design_does_not_depend_on_the_unit_of_time(scale):
     one, other = designed(1.0), designed(scale)
     assert other.gains["Kp"] * scale == pytest.approx(one.gains["Kp"], rel=1e-3)
     assert other.abscissa * scale == pytest.approx(one.abscissa, rel=1e-3)
-    assert other.margins.delay / scale == pytest.approx(one.margins.delay, rel=1e-3)
+    assert other.margins.delay_margin / scale == pytest.approx(one.margins.delay_margin, rel=1e-3)
 
 
 def test_margins_that_are_met_anyway_cost_nothing():
@@ -187,7 +187,7 @@ def test_gains_for_an_interval_hold_on_all_of_it():
         alone = dtm.design(SAMPLED, delay=delay, controller=SMOOTH)
         assert alone.abscissa <= best.abscissa + 1e-6
     (trade,) = best.traded
-    assert trade.demand == "interval"
+    assert trade.requirement == "interval"
     assert trade.without == pytest.approx(dtm.design(SAMPLED, controller=SMOOTH).value, rel=2e-3)
 
 
@@ -227,7 +227,7 @@ def test_proofs_for_an_interval_of_the_delay_and_the_gain():
         delay_margin=0.5,
         shape=(21, 21),
     )
-    assert best.proved == ("stable", "gain margin", "delay margin")
+    assert best.proved == ("stable", "gain_margin", "delay_margin")
     boxes = dtm.proved_boxes(best.loop, {"delay": (0.3, 0.9), "gain": (0.9, 1.1)}, tol=0.0)
     assert (boxes.unstable == 0).all()
 
@@ -330,7 +330,7 @@ def test_figures_are_those_of_the_worst_scenario():
         for delay in np.linspace(0.2, 0.3, 9)
     ]
     assert max(times) <= best.value + 1e-3
-    assert best.margins.gain >= 3.0
+    assert best.margins.gain_margin >= 3.0
 
 
 # Refusals, and the result
