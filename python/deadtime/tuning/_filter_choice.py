@@ -22,7 +22,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import trapezoid
 
 from deadtime._base.validation import increasing, positive
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
@@ -206,7 +205,7 @@ def noise_gain(loop: ControlLoop, bandwidth: float) -> float:
     omega = np.geomspace(_LOWEST * bandwidth, bandwidth, _POINTS)
     feedback = loop.controller.transfer_function().frequency_response(omega)
     squared = np.abs(feedback / (1.0 + loop.frequency_response(omega))) ** 2
-    return float(np.sqrt(trapezoid(squared, omega) / bandwidth))
+    return float(np.sqrt(np.trapezoid(squared, omega) / bandwidth))
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize, minimize_scalar
 
 from deadtime.tuning._margin_estimate import MarginEstimate
 from deadtime.tuning._objectives import NEVER, Objective
@@ -260,6 +259,8 @@ class Search:
 def _between_neighbours(
     cost: Callable[[Vector], float], start: Vector, reach: Vector, low: Vector, high: Vector
 ) -> Vector:
+    from scipy.optimize import minimize_scalar
+
     ends = (float(max(start[0] - reach[0], low[0])), float(min(start[0] + reach[0], high[0])))
     found = minimize_scalar(
         lambda gain: cost(np.array([gain])),
@@ -300,6 +301,8 @@ def _by_grids(
 def _by_simplices(
     cost: Callable[[Vector], float], start: Vector, size: Vector, low: Vector, high: Vector
 ) -> Vector:
+    from scipy.optimize import minimize
+
     best, least, turn, idle = start, cost(start), 1.0, 0
     for _ in range(_SIMPLICES):
         corners = best + np.vstack([np.zeros(len(best)), turn * np.diag(size)])

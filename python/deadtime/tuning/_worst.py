@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from deadtime.loops import ControlLoop
 from deadtime.stability import proved_boxes
@@ -40,6 +39,8 @@ def worst_scenario(
     problem: Problem, objective: Objective, gains: Vector, scenarios: Sequence[Scenario]
 ) -> tuple[float, Scenario]:
     """Cost of gains in the worst scenario, which may lie between those given, and that scenario."""
+    from scipy.optimize import minimize_scalar
+
     costs = objective.costs(problem, gains[None, :], scenarios)[0]
     place = int(np.argmax(costs))
     worst, least = scenarios[place], float(costs[place])
