@@ -1,4 +1,4 @@
-"""Data flows one way: imports are read, and an arrow that runs back fails."""
+"""Data flows one way: an import from a later room fails."""
 
 import ast
 from pathlib import Path
@@ -89,7 +89,7 @@ def test_no_import_runs_back():
                 assert room(module) in allowed, f"{name} imports {module}"
 
 
-def test_a_room_is_not_asked_for_its_own_names():
+def test_a_room_does_not_import_from_its_own_init():
     for name, path in modules():
         for module, _ in imports(path):
             assert module != room(name) or module in ("paper", "_cli"), f"{name} imports {module}"

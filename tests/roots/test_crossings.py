@@ -17,7 +17,7 @@ CLOSE = 1e-12
 
 
 def check_by_counts(found):
-    """The counts between crossings, each proved alone, step by the directions."""
+    """The counts between crossings, each proved alone, change by the directions."""
     assert (np.diff(found.counts)[found.counts[1:] >= 0] == found.direction).all()
 
 

@@ -1,4 +1,4 @@
-//! Roots of a region, with their evidence.
+//! Roots of a region with their discs and multiplicities.
 
 use num_complex::Complex64;
 
@@ -47,7 +47,7 @@ impl RootSet {
         }
     }
 
-    /// The roots that are `kept`, by their index, as those of `region`.
+    /// The roots, selected by their index with `kept`, as those of `region`.
     pub(super) fn part(&self, region: Region, kept: impl Fn(usize) -> bool) -> Self {
         fn chosen<T: Copy>(list: &[T], kept: impl Fn(usize) -> bool) -> Vec<T> {
             let numbered = list.iter().enumerate();

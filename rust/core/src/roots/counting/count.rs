@@ -1,10 +1,10 @@
 //! Proved numbers of roots in rectangles and half planes.
 //!
-//! Half planes: with R such that one leading term a sⁿ e^(−sτ) exceeds all others together where
-//! Re s ≥ σ and |s| ≥ R, no root lies beyond R, and along the arc |s| = R arg h follows that of
-//! the leading term, up to the principal argument of their quotient. Only the chord Re s = σ is
-//! walked, and of that, coefficients being real, only the upper half: in long steps where the row
-//! of the leading term dominates (`dominated`).
+//! Half planes: with R such that one leading term a sⁿ e^(−sτ) exceeds all others together where Re
+//! s ≥ σ and |s| ≥ R, no root lies beyond R, and along the arc |s| = R arg h follows that of the
+//! leading term, up to the principal argument of their quotient. arg h is followed along the chord
+//! Re s = σ only, and only along its upper half because the coefficients are real. Where the row of
+//! the leading term dominates, the steps are long (`dominated`).
 
 use std::f64::consts::PI;
 
@@ -25,27 +25,29 @@ use crate::quasipoly::{Jet, QuasiPolynomial, modulus};
 use crate::roots::region::Region;
 use crate::{Error, Task};
 
-/// Evaluations spent on the real axis before the roots themselves are asked for.
+/// Upper limit on the evaluations on the real axis. Near a multiple real root the survey does not
+/// end; the error then makes the caller locate the roots instead.
 const SURVEY_LIMIT: u64 = 10_000;
 
-/// Radii tried for the arc that closes a half plane, each eight times the one before.
+/// Number of radii tried for the arc that closes a half plane, each eight times the one before. At
+/// a larger radius the smaller terms have less influence.
 const FURTHER: u32 = 5;
 
-/// Of `count` roots in a symmetric region, `real` of them real, those not below the axis: the
-/// others come in pairs.
+/// The number of roots that are not below the real axis, of `count` roots in a symmetric region of
+/// which `real` are real. The others form conjugate pairs.
 pub(crate) fn upper_half(count: u64, real: u64) -> u64 {
     real + count.saturating_sub(real) / 2
 }
 
 /// The number of roots in a region, counted with their multiplicity.
 ///
-/// Open sides are closed by proved bounds. Roots on the real axis belong to a region whose lower
-/// (or upper) edge it is.
+/// Open sides are closed by proved bounds. If the lower or upper edge of the region is the real
+/// axis, roots on that axis belong to the region.
 ///
 /// # Errors
 /// [`Error::Argument`] for the zero function, a bad region, or one that holds infinitely many
-/// roots; [`Error::Contour`] where a root lies on the edge or too close to it to tell the side;
-/// [`Error::TooMuch`]; [`Error::Interrupted`].
+/// roots; [`Error::Contour`] where a root lies on the edge, or so close to it that its side cannot
+/// be decided; [`Error::TooMuch`]; [`Error::Interrupted`].
 ///
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Region, count}};
@@ -120,8 +122,8 @@ fn count_right_of_as_given(h: &QuasiPolynomial, sigma: f64, task: &Task) -> Resu
     Ok(zeros + half_plane(&mut Walker::new(&prepared.rest, task), sigma)?)
 }
 
-/// [`count_right_of`] for a finite `sigma` with a walker that is already there; its hints are
-/// those of the chord.
+/// [`count_right_of`] for a finite `sigma` with an existing walker, whose hints are then those of
+/// the chord.
 pub(crate) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Error> {
     let h = walker.probe.function();
     let re = (sigma, f64::INFINITY);
@@ -131,18 +133,18 @@ pub(crate) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     if sigma.abs() > radius {
         return Ok(if sigma > 0.0 { 0 } else { degree as u64 });
     }
-    // All roots are at 0: any radius will do.
+    // All roots are at 0: any positive radius will do.
     let radius = if radius == 0.0 { 1.0 } else { radius };
-    // Just beyond the circle.
+    // Slightly outside the circle.
     let height = |radius: f64| {
         ((radius - sigma) * (radius + sigma)).sqrt() * (1.0 + 1e-9) + f64::MIN_POSITIVE
     };
     walker.probe.refer_to(row);
-    // The further out, the smaller the terms of which nothing but the size is known there.
+    // At a larger radius the terms that are bounded only by their moduli are smaller.
     let tried =
         (0..FURTHER).map(|k| Complex64::new(sigma, height(radius * f64::from(1u32 << (3 * k)))));
     let mut jets = tried.map(|end| (end, walker.jet(end)));
-    // The error of its angle counts twice.
+    // The error of its argument enters twice.
     let sure = |jet: &Jet| is_clear(jet) && modulus(jet.value) > 32.0 * jet.value_error;
     let Some((end, jet)) = jets.find(|(_, jet)| sure(jet)) else {
         return Err(super::winding::overflow(Complex64::new(
@@ -162,8 +164,8 @@ pub(crate) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     let arc = Turn {
         angle: degree as f64 * angle(top, sigma) + angle(quotient.im, quotient.re)
             - walker.probe.delay() * top,
-        // A power of n factors loses 3.3 n u, n angles 8 n u, each of the three summands and the
-        // sums u: 36 u for each leaves room.
+        // A power with n factors has the error 3.3 n u, n angles 8 n u, each of the three summands
+        // and the sums u. The bound allows 36 u for each.
         slack: 1.58 * jet.value_error / modulus(jet.value)
             + 4e-15 * (1.0 + degree as f64 + walker.probe.delay() * top),
     };

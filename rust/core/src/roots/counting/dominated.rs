@@ -1,13 +1,14 @@
-//! Down a vertical line in long steps, as long as one row exceeds all others together.
+//! The change of arg h down a vertical line, in long steps while one row exceeds all the others
+//! together.
 //!
-//! Where |p_c| > Σ_{j≠c} |p_j| e^(−x d_j), g = h e^(s τ_c) = p_c (1 + ζ) with |ζ| < 1: arg g follows
-//! arg p_c, up to the principal argument of g/p_c at the two ends. The exponentials do not turn
-//! in this condition, only polynomials change, so that steps grow with the height and not with
-//! 2π/d. From s down to s − i t, with v = p(s), w = p′(s) and C = P″(|s|), P having the moduli of
-//! the coefficients,
+//! Where |p_c| > Σ_{j≠c} |p_j| e^(−x d_j), g = h e^(s τ_c) = p_c (1 + ζ) with |ζ| < 1: arg g
+//! follows arg p_c, up to the principal argument of g/p_c at the two ends. The arguments of the
+//! exponentials do not enter this condition, only their moduli and the polynomials. The steps
+//! therefore grow with the height and are not limited by 2π/d. From s down to s − i t, with v =
+//! p(s), w = p′(s) and C = P″(|s|), P having the moduli of the coefficients,
 //!     |p| ≥ |v| − t Re(i w v̄)/|v| − C t²/2   and   |p| ≤ |v| − t Re(i w v̄)/|v| + (|w|²/|v| + C) t²/2,
 //! so the condition holds while a quadratic A + B t − K t² is positive; and while
-//! |w| t + C t²/2 < |v|, p_c keeps its half plane.
+//! |w| t + C t²/2 < |v|, p_c stays in one half plane.
 
 use num_complex::Complex64;
 
@@ -16,18 +17,20 @@ use super::winding::{STEP_ERROR, Walker, is_clear};
 use crate::elementary::{angle, exp_above};
 use crate::quasipoly::modulus;
 
-/// Share of what the bounds allow.
+/// Share of the proved step length that is used; the rest covers rounding errors.
 const SHARE: f64 = 0.9;
 
-/// A step shorter than this many radians of the fastest exponential is not worth its while.
+/// Shortest step, in radians of the fastest exponential, for which this method costs less than the
+/// steps of `winding`.
 const WORTH: f64 = 6.0;
 
-/// Rounding of a polynomial, relative to its moduli and for each coefficient.
+/// Rounding error of a polynomial, relative to the sum of its moduli and for each coefficient.
 const ROUNDING: f64 = 1e-14;
 
 const MAX_STEPS: usize = 100_000;
 
-/// A polynomial at a point: value, slope, and the same with moduli, up to the second derivative.
+/// A polynomial at a point: value, slope, and the same sums with moduli, up to the second
+/// derivative.
 struct Row {
     value: Complex64,
     slope: Complex64,
@@ -58,14 +61,15 @@ impl Row {
         }
     }
 
-    /// Change of the modulus with the way down.
+    /// Derivative of the modulus in the downward direction.
     fn lean(&self) -> f64 {
         -(Complex64::I * self.slope * self.value.conj()).re / modulus(self.value)
     }
 }
 
-/// From `from`, Im > 0, as far down as row `leader` is proved to dominate in steps worth taking:
-/// the place reached and how far arg h turned on the way. No way at all is a way.
+/// From `from`, Im > 0, go down as long as row `leader` is proved to dominate in steps of
+/// sufficient length. Returns the point reached and the change of arg h on the way; the point may
+/// be `from` itself.
 pub(crate) fn descend(
     walker: &mut Walker<'_>,
     leader: usize,
@@ -80,7 +84,8 @@ pub(crate) fn descend(
         .delays()
         .iter()
         .map(|delay| exp_above(-(delay - own_delay) * from.re) * (1.0 + 1e-9))
-        // A weight lost in underflow is not none.
+        // A weight that underflows to zero is replaced by a positive number, because the term is
+        // not zero.
         .map(|weight| weight.max(f64::MIN_POSITIVE))
         .collect();
     let span = h
@@ -136,7 +141,8 @@ pub(crate) fn descend(
     (here, Turn { angle, slack })
 }
 
-/// How far down the leader dominates and keeps its half plane; NaN or 0 where nothing is proved.
+/// How far down the leader is proved to dominate and to stay in one half plane; NaN or 0 where
+/// nothing is proved.
 fn step(rows: &[Row], leader: usize, weights: &[f64], height: f64) -> f64 {
     let (mut a, mut b, mut k) = (0.0, 0.0, 0.0);
     let mut half_plane = 0.0;
@@ -181,7 +187,7 @@ mod tests {
     use crate::quasipoly::QuasiPolynomial;
     use crate::{Error, Task};
 
-    /// Both ways down give the same angle; the long steps get further with less.
+    /// Both methods give the same angle, and the long steps need fewer evaluations.
     fn compare(rows: &[&[f64]], delays: &[f64], from: Complex64) -> Result<f64, Error> {
         let rows = rows.iter().map(|row| row.to_vec()).collect();
         let h = QuasiPolynomial::new(rows, delays.to_vec())?;

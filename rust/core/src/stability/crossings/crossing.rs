@@ -1,15 +1,17 @@
-//! Where roots of A + k B cross the edge of what is demanded (`specification`) as k varies: all of them, proved.
+//! Where roots of A + k B cross the edge of the specification as k varies: all crossings, proved.
 //!
-//! They are the zeros of F (`pencil`) on its pieces, up to where no root lies. From a point on, Taylor's
-//! formula with the bound on F‴ proves over some length that F keeps its sign ("clear"), that F′ does
-//! ("monotone"), or that any crossing there has |k| beyond the range. Where what two neighbouring points prove meets, the signs of F at both tell whether
-//! there is exactly one zero between them or none. On the real axis F vanishes, simply if F′ ≠ 0 there.
+//! They are the zeros of F (`pencil`) on its pieces, up to where no root lies. From a point on,
+//! Taylor's formula with the bound on F‴ proves over some length that F keeps its sign ("clear"),
+//! that F′ does ("monotone"), or that any crossing there has |k| beyond the range. Where the
+//! lengths of two neighbouring points meet, the signs of F at both show whether there is exactly
+//! one zero between them or none. On the real axis F vanishes, simply if F′ ≠ 0 there.
 //!
-//! At a simple zero k = −Re(A/B), and as k grows the root goes to the left where F′ > 0, to the right
-//! where F′ < 0: with A/B + k = 0 and D = d(A/B)/ds, ds/dk = −1/D, whose part along the normal −ic of the edge to the
-//! right has the sign of −Im(c D) = −F′/|B|². Two roots cross, s and its mirror image, or one that is real. Where neither can be proved, next to a double zero
-//! of F, the crossing is reported with an interval of k and no direction: what it does to the count is
-//! for others to find out. Each k comes with an interval that is proved to hold it.
+//! At a simple zero k = −Re(A/B), and as k grows the root goes to the left where F′ > 0, to the
+//! right where F′ < 0: with A/B + k = 0 and D = d(A/B)/ds, ds/dk = −1/D, whose part along the
+//! normal −ic of the edge to the right has the sign of −Im(c D) = −F′/|B|². Two roots cross, s and
+//! its mirror image, or one that is real. Where neither can be proved, next to a double zero of F,
+//! the crossing is reported with an interval of k and without a direction; its effect on the count
+//! is found by counting (`row`). Each k has an interval that is proved to contain it.
 
 use num_complex::Complex64;
 
@@ -17,23 +19,23 @@ use super::pencil::{Bounds, Pencil, Point};
 use crate::quasipoly::modulus;
 use crate::{Error, Task};
 
-/// Points tried along one line before it is given up.
+/// Upper limit on the points along one line.
 const MAX_POINTS: u32 = 2_000_000;
 
-/// Lengths lose this share, for the rounding of the inequalities that gave them.
+/// Factor on proved lengths that covers the rounding errors of the inequalities.
 const SHARE: f64 = 1.0 - 1e-9;
 
-/// A place that cannot be resolved is left behind by a step of this, relative to ω and one over the
-/// longest delay, doubled until it is.
+/// First step, relative to ω and to one over the longest delay, past a point that cannot be
+/// resolved. It is doubled until the next point can be.
 const LEAST_STEP: f64 = 1e-9;
 
-/// Doublings of that step.
+/// Upper limit on the doublings of that step.
 const MAX_DOUBLINGS: u32 = 60;
 
-/// Newton steps for one zero.
+/// Upper limit on Newton's steps for one zero.
 const MAX_ITERATIONS: u32 = 30;
 
-/// One place where roots cross the line, or may.
+/// A point where roots cross the line, or may cross it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Crossing {
     /// The imaginary part of the root, 1/s.
@@ -44,8 +46,8 @@ pub(crate) struct Crossing {
     pub(crate) low: f64,
     /// Its other end.
     pub(crate) high: f64,
-    /// Roots that go to the right as k grows, less those that go to the left; `None` where that is not
-    /// known, nor whether any cross at all.
+    /// Roots that move to the right as k grows minus those that move to the left; `None` where it
+    /// is not known whether any cross at all.
     pub(crate) jump: Option<i32>,
     /// B there, where ω = 0.
     pub(crate) slope_at_zero: Option<f64>,
@@ -57,7 +59,7 @@ enum Sense {
     Clear,
     /// The sign of F′.
     Monotone(f64),
-    /// |A| > |k| |B| for all k of the range: what crosses here is of no concern.
+    /// |A| > |k| |B| for all k of the range: a crossing here is outside the range.
     Beyond,
 }
 
@@ -70,7 +72,8 @@ struct Reach {
 /// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece begin on the
 /// real axis?
 ///
-/// `None` where it cannot be searched: B vanishes where A does, or precision is used up.
+/// `None` where the piece cannot be searched: A and B vanish together, or double precision does not
+/// suffice.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.
@@ -110,7 +113,7 @@ pub(crate) fn crossings(
 
 struct Search<'a> {
     pencil: &'a Pencil,
-    /// A length over which the pencil does not change much.
+    /// A length over which the pencil changes little.
     step: f64,
     bounds: Bounds,
     range: (f64, f64),
@@ -131,7 +134,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Bounds that hold from `low`, beyond which all is done, to `high`.
+    /// Bounds that hold from `low`, up to which everything is known, to `high`.
     fn bounds_to(&mut self, low: f64, high: f64) -> Option<Bounds> {
         if high > self.bounds.reach {
             self.bounds = self.pencil.bounds(low, high, self.step)?;
@@ -139,7 +142,8 @@ impl<'a> Search<'a> {
         Some(self.bounds)
     }
 
-    /// The first point of a piece that begins off the real axis, or one beyond it where the sign of F is known.
+    /// The first point of a piece that begins off the real axis, or one beyond it where the sign of
+    /// F is known.
     fn enter(&mut self) -> Option<Point> {
         let first = self.pencil.at(0.0);
         if self.is_clear(&first) {
@@ -149,7 +153,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Deal with the real axis and return a point beyond it where the sign of F is known.
+    /// Treat the start on the real axis and return a point beyond it where the sign of F is known.
     fn start(&mut self) -> Option<Point> {
         let zero = self.pencil.at(0.0);
         let slope = zero.f[1];
@@ -174,7 +178,8 @@ impl<'a> Search<'a> {
         point.f[0].abs() > self.bounds.error[0]
     }
 
-    /// How far from `point`, forwards or backwards, one sense holds; the longest of them.
+    /// The length, forwards or backwards from `point`, over which one of the statements holds; the
+    /// longest of them.
     fn reach(&self, point: &Point, direction: f64, most: f64, bounds: &Bounds) -> Reach {
         let [value, slope, bend] = point.f;
         let (slope, error) = (direction * slope, bounds.error);
@@ -216,7 +221,8 @@ impl<'a> Search<'a> {
         self.range.0.abs().max(self.range.1.abs())
     }
 
-    /// The next point: at most as far as both prove what lies between, or past what cannot be resolved.
+    /// The next point: at most as far as both points prove what lies between, or past what cannot
+    /// be resolved.
     fn advance(&mut self, here: &Point, stride: f64) -> Option<Point> {
         let rest = self.top - here.t;
         let bounds = self.bounds_to(here.t, 1.05 * here.t + 0.5 * self.step)?;
@@ -242,7 +248,7 @@ impl<'a> Search<'a> {
                     return Some(next);
                 }
             }
-            // The own reach is enough if only the sign at its end is known.
+            // One reach suffices if only the sign at its end is known.
             length = if attempt == 0 {
                 0.999 * own.length
             } else {
@@ -252,7 +258,7 @@ impl<'a> Search<'a> {
         self.skip(here)
     }
 
-    /// Leave a place behind where neither F nor F′ is known to keep its sign.
+    /// Step past a point where neither F nor F′ is known to keep its sign.
     fn skip(&mut self, here: &Point) -> Option<Point> {
         let mut step = LEAST_STEP * here.t.max(self.step);
         for _ in 0..MAX_DOUBLINGS {
@@ -286,7 +292,8 @@ impl<'a> Search<'a> {
             let [value, slope, bend] = best.f;
             let error = self.bounds.error;
             if value.abs() <= 4.0 * error[0] && slope != 0.0 {
-                // Within this distance F changes its sign if |F′| stays above half of what it is here.
+                // Within this distance F changes its sign if |F′| stays above half of its value
+                // here.
                 let radius = 2.0 * (value.abs() + error[0]) / slope.abs() * (1.0 + 1e-9);
                 let loss = error[1] + radius * (bend.abs() + error[2] + radius * self.bounds.third);
                 if loss < 0.5 * slope.abs() {
@@ -316,7 +323,7 @@ impl<'a> Search<'a> {
         self.record(&middle, half * (1.0 + 1e-9), jump)
     }
 
-    /// Note the crossing within `radius` of `point`, if its k may lie in the range.
+    /// Store the crossing within `radius` of `point`, if its k may lie in the range.
     fn record(&mut self, point: &Point, radius: f64, jump: Option<i32>) -> Option<()> {
         let bounds = self.bounds_to(point.t - radius, point.t + radius)?;
         let (a, b) = (modulus(point.a), modulus(point.b));
@@ -349,7 +356,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Up to where a + b t + c t² > 0.
+/// The t up to which a + b t + c t² > 0.
 fn quadratic(a: f64, b: f64, c: f64) -> f64 {
     if a <= 0.0 {
         return 0.0;
@@ -366,7 +373,8 @@ fn quadratic(a: f64, b: f64, c: f64) -> f64 {
     }
 }
 
-/// Up to where, at most, a + b t + c t² − d t³ is known to be positive: t³ ≤ T t² for t ≤ T.
+/// The t, at most `most`, up to which a + b t + c t² − d t³ is proved to be positive: t³ ≤ T t² for
+/// t ≤ T.
 fn cubic(a: f64, b: f64, c: f64, d: f64, most: f64) -> f64 {
     let (mut trial, mut best) = (most, 0.0f64);
     for _ in 0..4 {
@@ -380,11 +388,11 @@ fn cubic(a: f64, b: f64, c: f64, d: f64, most: f64) -> f64 {
     best
 }
 
-/// Is there exactly one zero between two points, or none? `None` where their reaches do not tell.
+/// Is there exactly one zero between two points, or none? `None` where their reaches do not decide.
 fn between(left: &Point, right_of: Reach, right: &Point, left_of: Reach) -> Option<bool> {
     let gap = right.t - left.t;
     let differ = (left.f[0] > 0.0) != (right.f[0] > 0.0);
-    // One of them alone may reach all the way.
+    // One of them alone may reach the whole way.
     if right_of.length >= gap {
         return settled(right_of.sense, differ);
     }

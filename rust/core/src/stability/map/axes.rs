@@ -1,4 +1,4 @@
-//! The axes of a map, and what is asked of it.
+//! The axes of a map, and the question it answers.
 
 use crate::Task;
 use crate::stability::family::Family;
@@ -16,19 +16,20 @@ pub struct Axis<'a> {
 /// How the count of a cell is proved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Proof {
-    /// By all crossings of its row, or the proof that a block of cells has none, and one count for all in between.
+    /// By all crossings of its row, or by the proof that a block of cells has none, and one count
+    /// for all cells in between.
     #[default]
     Curves,
-    /// By a count of its own.
+    /// By a separate count.
     Cells,
 }
 
-/// What is asked of a map.
+/// The question that a map answers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
-    /// Roots that offend against this are counted.
+    /// The specification whose violating roots are counted.
     pub specification: Specification,
-    /// Is the spectral abscissa asked for too?
+    /// Is the spectral abscissa requested as well?
     pub abscissa: bool,
     /// How counts are proved.
     pub proof: Proof,

@@ -15,10 +15,12 @@ use crate::stability::crossings::Crossing;
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
-/// Cells a side of a block.
+/// Cells along one side of a block. Larger blocks prove more cells at once and give fewer tasks for
+/// the threads.
 const SIDE: usize = 64;
 
-/// The family of a map over its grid; `None` where points are in disorder, or a root stays on the edge.
+/// The family of a map over its grid; `None` where points are not in order, or a root stays on the
+/// edge.
 pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
     let [first, second] = map.axes;
     let places = [first.parameter, second.parameter];
@@ -35,7 +37,8 @@ pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
 /// The index of the axis along the rows, and the crossings of each.
 pub(crate) type Crossed = (usize, Vec<Vec<Crossing>>);
 
-/// The crossings of the edge along every row, which runs along the axis with more points, and the index of that.
+/// The crossings of the edge along every row, and the index of the axis along the rows: that with
+/// more points.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.

@@ -1,8 +1,8 @@
 //! What holds over intervals of some parameters, for each point of two others.
 //!
-//! A cell is stable throughout if every member with its two values and the others in their
-//! intervals is: proved by boxes of those others. It is not as soon as one member is found that is
-//! not stable; members at both ends and in the middle are tried first.
+//! A cell is stable if every member with its two values and the others in their intervals is
+//! stable, which is proved by boxes of those others. It is not stable as soon as one unstable
+//! member is found; members at both ends and in the middle are tried first.
 
 use super::axes::Axis;
 use crate::stability::boxes::{BoxExpansion, Finding, Reduced, check, find_unstable, reduce};
@@ -11,8 +11,9 @@ use crate::stability::family::Family;
 use crate::stability::specification::Specification;
 use crate::{Error, Task, memory};
 
-/// Judge the cells over `axes`: 0 where all members are stable, the largest number of unstable roots
-/// met, −1 for infinitely many, −2 where undecided. `ranges` holds intervals and values of the others.
+/// Judge the cells over `axes`: 0 where all members are stable, the largest number of unstable
+/// roots found, −1 for infinitely many, −2 where undecided. `ranges` holds intervals and values of
+/// the others.
 ///
 /// # Errors
 /// [`Error::Argument`] for axes that do not name two parameters, ranges that are not finite or
