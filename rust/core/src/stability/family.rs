@@ -127,7 +127,7 @@ impl Family {
         if term.exponents.len() != count || term.delay.slopes.len() != count {
             return Err(Error::argument(format!(
                 "a term has {} exponents and {} slopes of its delay for {count} parameters: give \
-                 one of each a parameter",
+                 one of each for every parameter",
                 term.exponents.len(),
                 term.delay.slopes.len()
             )));
@@ -143,7 +143,7 @@ impl Family {
         let highest = term.exponents.iter().fold(term.power, |a, b| a.max(*b));
         if highest > MAX_POWER {
             return Err(Error::argument(format!(
-                "a power of {highest}: powers up to {MAX_POWER} are taken"
+                "a power of {highest}: give powers up to {MAX_POWER}"
             )));
         }
         Ok(())
@@ -196,7 +196,8 @@ impl Family {
         QuasiPolynomial::new(coefficients, delays)
     }
 
-    /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine in it.
+    /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine
+    /// in it.
     pub fn split(&self, parameter: usize) -> Option<(Self, Self)> {
         let exponent = |term: &Term| term.exponents.get(parameter).copied().unwrap_or(0);
         let part = |wanted: u32| {
@@ -258,7 +259,7 @@ impl Family {
     fn check_values(&self, values: &[f64]) -> Result<(), Error> {
         if values.len() != self.names.len() {
             return Err(Error::argument(format!(
-                "{} values for {} parameters ({}): give one value a parameter",
+                "{} values for {} parameters ({}): give one value for each parameter",
                 values.len(),
                 self.names.len(),
                 self.names.join(", ")

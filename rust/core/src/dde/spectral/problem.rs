@@ -186,7 +186,7 @@ impl Problem {
         let resolution = 1e-13 * self.start.abs().max(self.end.abs());
         if let Some(delay) = self.delays.iter().find(|delay| **delay <= resolution) {
             return refuse(format!(
-                "the delay {delay} vanishes beside the times of t_span in double precision: leave \
+                "the delay {delay} is lost in the rounding errors of the times of t_span: leave \
                  it out, or shift and scale time"
             ));
         }
@@ -219,7 +219,7 @@ impl Problem {
         }
         if self.atol.len() != 1 && self.atol.len() != self.dim() {
             return refuse(format!(
-                "atol has {} entries for {} components: give one, or one a component",
+                "atol has {} entries for {} components: give one, or one for each component",
                 self.atol.len(),
                 self.dim()
             ));

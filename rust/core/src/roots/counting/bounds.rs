@@ -17,9 +17,9 @@
 //!    kind, since each of them carries an e^(−x d). Far to the left: the same for h(−s).
 //!
 //! Inequalities are tested with a relative margin of 1e-9. It covers their rounding: sums of
-//! non-negative numbers lose u per summand, weights are upper bounds (`exp_above`) of exponents that
-//! are wrong by 746 · 3 u at most, or by what `right_edge` adds to them. `cauchy_radius` starts from
-//! a guess but ends with a radius at which the inequality itself was tested.
+//! non-negative numbers lose u per summand, weights are upper bounds (`exp_above`) of exponents
+//! that are wrong by 746 · 3 u at most, or by what `right_edge` adds to them. `cauchy_radius`
+//! starts from a guess but ends with a radius at which the inequality itself was tested.
 
 use num_complex::Complex64;
 

@@ -1,12 +1,12 @@
 //! Chains of roots when the delays are exact multiples of one base.
 //!
-//! The difference part D(s) = Σ b_j e^(−s d_j) is then periodic along vertical lines, a polynomial in
-//! e^(−s base). If D does not wind about 0 over a period of Re s = σ, it has no zeros right of the line, and
-//! |1/D| takes its maximum over that half plane on the line (maximum principle), where samples and a
-//! Lipschitz constant bound it. |D| ≥ δ then gives a radius beyond which δ |s|ⁿ exceeds all lower
-//! powers: right of the line no root lies beyond that radius, and only the roots of a rectangle
-//! have to be counted. Rationally independent delays have no such base, and delays close to the
-//! given ones need not have one; `chains::abscissa` has the bound for both.
+//! The difference part D(s) = Σ b_j e^(−s d_j) is then periodic along vertical lines, a polynomial
+//! in e^(−s base). If D does not wind about 0 over a period of Re s = σ, it has no zeros right of
+//! the line, and |1/D| takes its maximum over that half plane on the line (maximum principle),
+//! where samples and a Lipschitz constant bound it. |D| ≥ δ then gives a radius beyond which δ |s|ⁿ
+//! exceeds all lower powers: right of the line no root lies beyond that radius, and only the roots
+//! of a rectangle have to be counted. Rationally independent delays have no such base, and delays
+//! close to the given ones need not have one; `chains::abscissa` has the bound for both.
 
 use std::f64::consts::PI;
 

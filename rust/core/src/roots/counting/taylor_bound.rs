@@ -1,9 +1,9 @@
 //! Bounds by the Taylor polynomial of g, for points next to several roots.
 //!
 //! There g″ is as small as a power of the distance to the roots, but a bound by moduli does not
-//! become small. With the Taylor coefficients a_k of g at m up to the n-th, in two words, their
-//! errors e_k, and the bound R of `remainder` on the next one in the disc of radius r about m
-//! (Taylor's formula for g and for g′):
+//! become small. With the Taylor coefficients a_k of g at m up to the n-th, in double-double
+//! arithmetic, their errors e_k, and the bound R of `remainder` on the next one in the disc of
+//! radius r about m (Taylor's formula for g and for g′):
 //!     |g − g(m)| ≤ Σ_{1≤k≤n} (|a_k| + e_k) rᵏ + R rⁿ⁺¹,
 //!     |g′| ≤ Σ_{1≤k≤n} k (|a_k| + e_k) rᵏ⁻¹ + (n + 1) R rⁿ.
 //! The sums have the relative error 4n u, u = 2⁻⁵³, which MARGIN covers.

@@ -112,7 +112,7 @@ impl<'a> Walker<'a> {
         self.double_doubles = MAX_DOUBLE_DOUBLE;
     }
 
-    /// Check for cancellation and for the limit on evaluations, every so many evaluations.
+    /// Check for cancellation and for the limit on evaluations.
     pub(crate) fn pause(&mut self) -> Result<(), Error> {
         let spent = self.probe.evaluations();
         if spent < self.checked + CHECK_EVERY {

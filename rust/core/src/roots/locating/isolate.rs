@@ -29,7 +29,7 @@ const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
 /// Walks along lines and iterates towards roots.
 pub(crate) trait Seek: Walk {
-    /// Check for cancellation and for the limit on evaluations, every so many evaluations.
+    /// Check for cancellation and for the limit on evaluations.
     fn pause(&mut self) -> Result<(), Error>;
 
     /// Newton's iteration from `start` as long as it stays in `window`.
@@ -369,7 +369,7 @@ impl<'w, W: Seek> Search<'w, W> {
             counted,
             found: found.map(|disc| (disc.center, disc.multiplicity)).collect(),
             advice: format!(
-                "near {:e}{:+e}i double precision does not tell the roots apart; another unit of \
+                "near {:e}{:+e}i double precision does not separate the roots; another unit of \
                  time or a less expanded form of the equation may help",
                 0.5 * (cell.re.0 + cell.re.1),
                 cell.im.1

@@ -89,7 +89,7 @@ pub(crate) fn between_lines(sigma: f64, chain: f64) -> Error {
         limit: EVALUATIONS_PER_LINE,
         unit: "evaluations on a line",
         advice: format!(
-            "no root lies right of Re s = {sigma:.6}, but what lies between that and the chains of \
+            "no root lies right of Re s = {sigma:.6}, but the roots between that line and the chains of \
              roots at Re s = {chain:.6} could not be counted; use count with both ends of im, or \
              give delays that are almost equal one value"
         ),

@@ -1,8 +1,8 @@
 //! Proved statements about det M around one point s.
 //!
 //! Row i of M is multiplied by e^(s τ_c(i)), rows and columns by powers of two (`balance`), so that
-//! nothing overflows: arg det M = arg det G − T Im s with T = Σ τ_c(i). Let R be the computed inverse
-//! of G(s), G(s) R = I − Y, |Y| ≤ α in the Frobenius norm, K a matrix and κ a number. With
+//! nothing overflows: arg det M = arg det G − T Im s with T = Σ τ_c(i). Let R be the computed
+//! inverse of G(s), G(s) R = I − Y, |Y| ≤ α in the Frobenius norm, K a matrix and κ a number. With
 //!     G(s + δ) R = (1 + κ δ)(I + Z),  Z = (−Y + δ (K − κ I) + (rest))/(1 + κ δ),
 //! as long as f ≥ |Z| stays below 1 along the step, the argument of det G changes by n arg(1 + κ δ)
 //! up to |arg det(I + Z)| ≤ |tr Z| + |tr Z²|/2 + … ≤ t − log(1 − f) − f. The trace t is bounded
@@ -11,8 +11,10 @@
 //! e^Re z), or only the part of G′ R that is free of exponentials, |e^z − 1| ≤ min(|z|, 2) g: where
 //! sE dominates that reaches far. κ = tr K/n takes out the factor that all of G has in common.
 //!
-//! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d), derived as in
-//! `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x| in the exponent); a row of products with R at most as many u more as it has entries. Both are in `loss`.
+//! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d),
+//! derived as in `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x|
+//! in the exponent); a row of products with R at most as many u more as it has entries. Both are in
+//! `loss`.
 
 use std::f64::consts::LN_2;
 
@@ -505,8 +507,8 @@ pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> 
         return Ok(());
     }
     Err(Error::argument(
-        "the determinant of the characteristic matrix is zero for every s, or cannot be told \
-         from it: the equations do not determine the state, look for rows of E, N and A that \
+        "the determinant of the characteristic matrix is zero for every s, or too close to zero \
+         to decide: the equations do not determine the state, look for rows of E, N and A that \
          depend on one another, or for entries that differ too much in size",
     ))
 }

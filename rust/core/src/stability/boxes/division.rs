@@ -112,7 +112,7 @@ pub fn proved_boxes(
 pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>, Error> {
     if ranges.len() != family.names().len() {
         return Err(Error::argument(format!(
-            "{} ranges for {} parameters ({}): give one range a parameter",
+            "{} ranges for {} parameters ({}): give one range for each parameter",
             ranges.len(),
             family.names().len(),
             family.names().join(", ")

@@ -1,6 +1,7 @@
 //! Is h(s; p) ≠ 0 for all p in a box and all s in a stretch of the edge?
 //!
-//! With centres c, s_0 and p = c + δ, s = s_0 + ηe, |δ_i| ≤ r_i, |η| ≤ ρ, |e| = 1, Taylor's theorem gives
+//! With centres c, s_0 and p = c + δ, s = s_0 + ηe, |δ_i| ≤ r_i, |η| ≤ ρ, |e| = 1, Taylor's theorem
+//! gives
 //!     h = h_0 + Σ δ_i ∂_i h + η ∂_η h + E,  |E| ≤ ½ Σ_ab x_a x_b max |∂_a ∂_b h|,  x = (r, ρ),
 //! the first part of which fills a zonotope. Its distance from 0 exceeds |E| if, for some n,
 //!     |Re n̄ h_0| − Σ_a |Re n̄ ∂_a h| x_a > |n| max |E|.

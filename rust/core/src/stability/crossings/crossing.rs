@@ -69,8 +69,8 @@ struct Reach {
     sense: Sense,
 }
 
-/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece begin on the
-/// real axis?
+/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece
+/// begin on the real axis?
 ///
 /// `None` where the piece cannot be searched: A and B vanish together, or double precision does not
 /// suffice.

@@ -115,7 +115,8 @@ pub fn boundaries(
     }))
 }
 
-/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it cannot be formed.
+/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it
+/// cannot be formed.
 ///
 /// # Errors
 /// As for [`map`].
@@ -203,7 +204,7 @@ fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, 
             limit: MAX_CELLS as u64,
             unit: "cells",
             advice: format!(
-                "{} by {} is more than a picture holds: take fewer points, or several maps of \
+                "{} by {} points were requested: take fewer points, or several maps of \
                  smaller ranges",
                 first.points.len(),
                 second.points.len()

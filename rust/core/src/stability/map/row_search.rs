@@ -1,7 +1,7 @@
 //! Crossings of the edge along a row whose family need not be affine in its parameter p.
 //!
-//! The row is divided as a `block` of one direction; cells that stay open are divided further, in p, about the
-//! zeros (t, p) of h(s(t); p) on the edge that Newton's method finds there:
+//! The row is divided as a `block` of one direction; cells that stay open are divided further, in
+//! p, about the zeros (t, p) of h(s(t); p) on the edge that Newton's method finds there:
 //!     (∂_t h, ∂_p h) (δt, δp) = −h, as two real equations.
 //! All values further than CLOSE of a cell from such a zero are proved to have no roots on the
 //! edge. The clear intervals between two gaps have one count, which is made at one member, and the
