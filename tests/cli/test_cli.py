@@ -1,4 +1,4 @@
-"""The command: what it prints, what it writes, and one clear line for whatever goes wrong."""
+"""The command: what it prints, what it writes, and one line for each error."""
 
 import os
 import re
@@ -239,7 +239,7 @@ BAD_NUMBERS = [
 
 
 @pytest.mark.parametrize(("arguments", "words"), BAD_NUMBERS)
-def test_hopeless_numbers(tmp_path, arguments, words):
+def test_invalid_numbers_are_refused(tmp_path, arguments, words):
     assert words in one_clear_line(run(*arguments, cwd=tmp_path))
 
 
@@ -258,7 +258,7 @@ def test_hopeless_numbers(tmp_path, arguments, words):
         (["--command", "u"], "no column"),
     ],
 )
-def test_hopeless_estimates(demo, more, words):
+def test_invalid_options_of_estimate_are_refused(demo, more, words):
     folder, _ = demo
     arguments = ["estimate", folder / "demo" / "flight.csv", *COLUMNS, "--kp", "2.4", *more]
     assert words in one_clear_line(run(*arguments))

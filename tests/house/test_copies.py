@@ -1,6 +1,7 @@
-"""Loops, results and errors go through pickle and copy, and stay read-only on the way."""
+"""Loops, results and errors survive pickle and copy, and stay read-only."""
 
 import copy
+import functools
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -30,10 +31,12 @@ def mapped():
     return chart
 
 
+@functools.cache
 def designed():
     return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
 
 
+@functools.cache
 def filtered():
     return dtm.design_filter(LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9)
 
@@ -105,7 +108,7 @@ def test_a_copied_response_is_still_measured_between_its_output_times():
         dtm.RecordingError("no file"),
     ],
 )
-def test_errors_come_back_whole(error):
+def test_errors_survive_pickling(error):
     # An error that does not survive this breaks the pool it is raised in.
     for way in WAYS.values():
         other = way(error)

@@ -1,4 +1,4 @@
-"""A child that is forked while a kernel runs ends as it likes, and can compute on its own."""
+"""A child that is forked while a kernel runs can compute and ends normally."""
 
 import os
 import subprocess

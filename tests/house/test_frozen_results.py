@@ -1,4 +1,4 @@
-"""Every result goes through pickle and copy, can be compared, and does not change."""
+"""Every result survives pickle and copy, can be compared, and is read-only."""
 
 import copy
 import dataclasses
@@ -53,12 +53,12 @@ MADE = {
         LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9
     ),
     "FirstOrder": lambda: dtm.FirstOrder(1.0, 0.3),
-    "Flight": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)).flights[0],
+    "FittedRun": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)).runs[0],
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
     "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
     "Margins": CONTINUOUS.margin,
-    "MonteCarlo": lambda: planned().monte_carlo(3, processes=1, circulates=False),
+    "MonteCarlo": lambda: planned().monte_carlo(3, processes=1, noise_in_loop=False),
     "P": lambda: dtm.P(2.0),
     "PD": lambda: dtm.PD(2.0, 0.1),
     "PI": lambda: dtm.PI(2.0, 0.1),
@@ -78,12 +78,12 @@ MADE = {
         CONTINUOUS, {"Kp": (0.5, 3), "Kv": (0, 0.5)}, {"delay": (0.3, 0.4)}, shape=(3, 3)
     ),
     "RootSet": LOOP.rightmost,
-    "Sensitivity": lambda: h.sensitivity(h.rightmost()[0]),
+    "RootSensitivity": lambda: h.root_sensitivity(h.rightmost()[0]),
     "StabilityMap": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)),
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
-    "Sweep": lambda: dtm.sweep(LOOP, {"Kp": [1.0, 2.0]}),
-    "SystemResponse": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
+    "Sweep": lambda: dtm.sweep(LOOP, {"Kp": np.array([1.0, 2.0])}),
+    "Response of a system": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
     "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
     "TransferFunction": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)),
     "Whiteness": lambda: dtm.estimation.Whiteness(1.0, 0.5, 3, 0.1),
@@ -110,7 +110,7 @@ def public_types():
             yield kind
 
 
-def test_the_list_of_types_is_whole():
+def test_the_list_of_types_is_complete():
     # Bases that are never made, and tuples of arrays.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW",

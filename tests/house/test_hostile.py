@@ -1,4 +1,4 @@
-"""Arguments no one should give: each is refused by name, none hangs or comes back as nonsense."""
+"""Invalid arguments: each is refused by name, none hangs or gives a wrong result."""
 
 import json
 import os
@@ -57,7 +57,7 @@ def test_the_number_of_poles_is_whole(loop, n):
         {"steady_state": np.nan},
     ],
 )
-def test_figures_of_a_response_have_sensible_bounds(bad):
+def test_metrics_of_a_response_have_sensible_bounds(bad):
     response = LOOP.simulate(np.linspace(0.0, 10.0, 101))
     with pytest.raises((TypeError, ValueError), match=next(iter(bad))):
         response.info(**bad)
@@ -82,7 +82,7 @@ def test_algebra_takes_numbers_in_arrays_of_no_dimension():
 
 
 @pytest.mark.parametrize("one", [dtm.s + 1, dtm.parameters("K")[0]])
-def test_what_does_not_change_loses_nothing_either(one):
+def test_attributes_of_frozen_objects_cannot_be_deleted(one):
     with pytest.raises(AttributeError, match="does not change"):
         del one._native
 
@@ -151,7 +151,7 @@ def rows(sample="{t},{r},{y}", step=0.1, size=1.0):
         ("{t},{r},1_000", "time,reference,output", "'1_000'"),
     ],
 )
-def test_cells_that_are_not_what_they_seem(tmp_path, sample, head, words):
+def test_ambiguous_cells_of_a_table_are_refused(tmp_path, sample, head, words):
     listed = [one.replace("0.", "") for one in rows(sample)] if "0,{t}" in sample else rows(sample)
     with pytest.raises(dtm.RecordingError, match=words):
         dtm.read_recording(table(tmp_path, listed, head))
@@ -180,7 +180,7 @@ def test_fits_that_would_take_minutes_are_refused():
 
 
 @pytest.mark.parametrize("kind", ["noise", "wrong sign"])
-def test_outputs_that_answer_no_step_are_refused(kind):
+def test_outputs_that_do_not_respond_to_a_step_are_refused(kind):
     # A gain at the end of its search once came back with adequate=True.
     times = np.arange(150) * 0.065
     step = (times > 1.0).astype(float)
@@ -251,7 +251,7 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path):
     assert done.stderr == f"deadtime: {where}: No such file or directory\n"
 
 
-def test_figures_that_do_not_exist_are_words_in_print_and_null_in_json():
+def test_metrics_that_do_not_exist_are_words_in_print_and_null_in_json():
     slow = ["simulate", "--kp", "1e-6", "--delay", "0.36"]
     printed = command(*slow)
     assert printed.returncode == 0

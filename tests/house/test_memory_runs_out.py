@@ -1,4 +1,4 @@
-"""Memory that runs out is a `MemoryError` with the size, and the interpreter goes on."""
+"""A failed allocation is a `MemoryError` with the size, and the interpreter continues."""
 
 import os
 import subprocess

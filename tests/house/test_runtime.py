@@ -1,4 +1,4 @@
-"""The seam: threads, interpreter lock, fork, Ctrl-C, progress."""
+"""Calls into the kernel: threads, interpreter lock, fork, Ctrl-C, progress."""
 
 import os
 import signal
@@ -37,7 +37,7 @@ def test_thread_count_takes_argument_then_environment():
 
 
 @pytest.mark.parametrize("value", ["two", "-1", "1.5"])
-def test_nonsense_in_the_environment_is_named(value):
+def test_invalid_environment_variables_are_named(value):
     result = run_python(
         "from deadtime import _deadtime as n; n.thread_count()", DEADTIME_NUM_THREADS=value
     )

@@ -34,8 +34,8 @@ LOOPS = [
 
 
 def cut(loop):
-    """Transition matrix with the command cut, where the command goes in and where it comes out."""
-    model = loop._model
+    """Transition matrix with the loop opened at the command, and its input and output vectors."""
+    model = loop.specification.model
     matrices = [
         replace(model, K=np.zeros_like(model.K), L=direct)
         .native(loop.delay, loop.sample_time)

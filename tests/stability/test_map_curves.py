@@ -37,7 +37,7 @@ def test_every_cell_is_the_one_counted_alone(name, shape):
 
 @names
 @pytest.mark.parametrize("options", [{"decay": 0.3}, {"decay": -0.4}, {"damping": (0.5, 3.0)}])
-def test_so_it_is_for_decay_and_damping(name, options):
+def test_every_cell_with_decay_and_damping_is_the_one_counted_alone(name, options):
     family, ranges = FAMILIES[name]
     assert_same(*both(family, ranges, (31, 30), **options))
 
@@ -56,7 +56,7 @@ def test_a_slanted_edge_is_searched_to_its_end():
     # It was once left at the height at which the last, upright piece ends.
     a, b = dtm.parameters("a b")
     family = s**3 + 2 * b * delay(0.25) + 0 * a
-    ranges = {"a": [0.0], "b": [-2.0, -1.0, 1.0]}
+    ranges = {"a": [0.0], "b": np.array([-2.0, -1.0, 1.0])}
     chart = dtm.stability_map(family, ranges, abscissa=False, damping=(0.4, 1.5))
     assert chart.unstable.tolist() == [[3, 1, 2]]
 
@@ -107,7 +107,7 @@ def test_boundaries_are_roots_on_the_axis(name):
 
 
 @pytest.mark.parametrize("decay", [0.0, 0.4])
-def test_boundaries_part_different_counts(decay):
+def test_boundaries_separate_different_counts(decay):
     family, ranges = FAMILIES["two delays"]
     chart = dtm.stability_map(family, ranges, (60, 60), abscissa=False, decay=decay)
     step = 1e-4
@@ -124,7 +124,7 @@ def test_boundaries_part_different_counts(decay):
             assert sides[1] - sides[0] == curve.crossing[index]
 
 
-def test_cells_on_the_boundary_say_so():
+def test_cells_on_the_boundary_have_their_own_status():
     family, ranges = FAMILIES["velocity"]
     chart = dtm.stability_map(family, ranges, (21, 21), abscissa=False)
     on_it = chart.status == MapStatus.BOUNDARY
@@ -148,13 +148,15 @@ def test_the_limits_of_the_altitude_loop():
     family, _ = FAMILIES["velocity"]
     edge = math.pi / (2 * LAG)
     chart = dtm.stability_map(
-        family, {"Kp": [edge - 1e-9, edge + 1e-9], "Kv": [-1.1, 0.0, 1.1]}, abscissa=False
+        family,
+        {"Kp": np.array([edge - 1e-9, edge + 1e-9]), "Kv": np.array([-1.1, 0.0, 1.1])},
+        abscissa=False,
     )
     assert chart.unstable.tolist() == [[-1, 0, -1], [-1, 2, -1]]
     for time, limit in ((0.36, 4.0244), (0.10, 12.459)):
         loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.0), delay=time, sample_time=0.065)
         sampled = dtm.stability_map(
-            loop, {"Kp": [limit - 1e-3, limit + 1e-3], "gain": [1.0]}, abscissa=False
+            loop, {"Kp": np.array([limit - 1e-3, limit + 1e-3]), "gain": [1.0]}, abscissa=False
         )
         assert sampled.unstable.ravel().tolist() == [0, 2]
 
@@ -242,7 +244,7 @@ def test_pickled_maps_keep_their_boundaries():
         ({"damping": (0.5, 1.0), "decay": 2.0}, ValueError, "beyond the decay"),
     ],
 )
-def test_demands_that_make_no_sense_are_refused(options, error, word):
+def test_invalid_requirements_are_refused(options, error, word):
     family, ranges = FAMILIES["velocity"]
     with pytest.raises(error, match=word):
         dtm.stability_map(family, ranges, (3, 3), **options)

@@ -19,7 +19,7 @@ def fly(
     duration=5.0,
     rest=0.5,
     size=1.0,
-    circulates=True,
+    noise_in_loop=True,
 ):
     """A flight with its command logged, and what is known of its loop."""
     loop = dtm.ControlLoop(
@@ -29,7 +29,7 @@ def fly(
     time = np.arange(round((duration + rest) / step)) * step
     reference = np.where(time < rest - 1e-9, 0.0, size)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
-    seen = reference - error if circulates else reference
+    seen = reference - error if noise_in_loop else reference
     flown = loop.simulate(time, seen, reference_time=time, initial_output=0.0, reference_before=0.0)
     known = loop.replace(delay=None, lag=0.0)
     return dtm.Recording(time, reference, flown.outputs + error, flown.inputs), known
@@ -65,11 +65,13 @@ CASES = {
 def errors_of(case, runs, method, **options):
     """Errors of the delay in ms over flights with different noise, and the estimates."""
     what = CASES[case]
-    circulates = what.get("ts", TS) is not None
+    noise_in_loop = what.get("ts", TS) is not None
     found, errors = [], []
     for seed in range(runs):
-        flight, known = fly(seed=seed, rest=options.get("rest", 0.0), circulates=circulates, **what)
-        keywords = {name: value for name, value in options.items() if name != "rest"}
+        flight, known = fly(
+            seed=seed, rest=options.get("rest", 0.0), noise_in_loop=noise_in_loop, **what
+        )
+        keywords = {name: value for name, value in options.items() if name == "free"}
         fit = dtm.estimate_delay(flight, known, method=method, **{"free": ("delay",)} | keywords)
         found.append(fit)
         errors.append(1e3 * (fit.delay - what.get("delay", 0.36)))

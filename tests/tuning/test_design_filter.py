@@ -1,4 +1,4 @@
-"""The filter of the derivative: noise against what it costs, by closed forms and by simulation."""
+"""The filter of the derivative: noise and loss, against closed forms and simulation."""
 
 import math
 

@@ -9,16 +9,14 @@ Squire & Trapp 1998).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._deadtime import loop_sensitivities
-from deadtime.loops._model import LoopModel, refuse_discretised, state_at_rest
-
-if TYPE_CHECKING:
-    from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._model import refuse_discretised, state_at_rest
+from deadtime.loops._specification import LoopSpecification
 
 __all__ = ["output_and_input_slopes", "slope_names"]
 
@@ -28,7 +26,7 @@ Slopes = dict[str, Vector]
 _STEP = 1e-30
 
 
-def slope_names(loop: ControlLoop, names: Sequence[str]) -> tuple[str, ...]:
+def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...]:
     """Check the names of the numbers with respect to which slopes are asked for."""
     if isinstance(names, str):
         raise TypeError(f"sensitivities={names!r}: give a sequence of names, such as ({names!r},)")
@@ -45,7 +43,7 @@ def slope_names(loop: ControlLoop, names: Sequence[str]) -> tuple[str, ...]:
                 "respect to the lag; give the plant a small lag, or take the slope with respect "
                 "to the delay, which acts like it"
             )
-        if name == "delay" and known[name] == 0.0 and not loop.is_sampled:
+        if name == "delay" and known[name] == 0.0 and loop.sample_time is None:
             raise ValueError(
                 "sensitivities: at delay=0 a continuous loop has no slope with respect to the "
                 "delay that could be computed without one; give it a small delay"
@@ -54,7 +52,7 @@ def slope_names(loop: ControlLoop, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def output_and_input_slopes(
-    loop: ControlLoop,
+    loop: LoopSpecification,
     names: Sequence[str],
     initial: tuple[float, float],
     since: Vector,
@@ -79,7 +77,6 @@ def output_and_input_slopes(
         commands.append(np.imag(held) / _STEP)
         moves = name == "delay" and loop.delay_path == "measurement"
         aheads.append(units[name] if moves else 0.0)
-    ahead = values["delay"] if loop.delay_path == "measurement" else 0.0
     outputs, inputs = loop_sensitivities(
         len(state),
         _row(loop, values),
@@ -89,7 +86,7 @@ def output_and_input_slopes(
         command,
         np.array(commands),
         np.array(aheads),
-        since + ahead,
+        since + loop.output_lead,
         since,
         *rest,
     )
@@ -99,6 +96,6 @@ def output_and_input_slopes(
     )
 
 
-def _row(loop: ControlLoop, values: dict[str, Any]) -> NDArray[Any]:
-    model = LoopModel.build(loop.plant, loop.controller, values)
+def _row(loop: LoopSpecification, values: dict[str, Any]) -> NDArray[Any]:
+    model = loop.model_at(values)
     return model.row(values["delay"], values.get("sample_time"), values.get("limit"))

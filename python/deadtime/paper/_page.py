@@ -99,7 +99,7 @@ def _part(name: str, part: Part, figure: Figure | None) -> Iterator[str]:
 
 def _compared(one: Comparison) -> str:
     why = "; ".join(words for words in (one.model, one.note) if words)
-    cells = (one.where, one.quantity, one.printed, one.shown, one.told, why)
+    cells = (one.where, one.quantity, one.printed, one.shown, one.outcome, why)
     row = table_row(cells, "td", len(HEADS))
     return row.replace("<tr>", f'<tr class="{CLASSES[one.verdict]}">', 1)
 

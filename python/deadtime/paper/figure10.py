@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 import deadtime as dtm
 from deadtime.loops._derivative_filter import PAPER_FILTER
@@ -159,6 +158,8 @@ def figure10() -> Figure10:
 
 
 def _curve(loop: dtm.ControlLoop) -> Curve:
+    from scipy.optimize import minimize_scalar
+
     def abscissa(gain: float) -> float:
         return loop.replace(Kv=float(gain)).spectral_abscissa()
 
@@ -180,6 +181,7 @@ def _rightmost(loop: dtm.ControlLoop) -> complex:
 
 def _turns_complex() -> float:
     """Gain at which the rightmost real root and the rightmost pair lie equally far right."""
+    from scipy.optimize import brentq
 
     def lead(gain: float) -> float:
         found = (
@@ -271,6 +273,7 @@ def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comp
 
 def _delay_of_marker() -> float:
     """The delay at which the rightmost root is that of the figure's marker, s."""
+    from scipy.optimize import brentq
 
     def off(delay: float) -> float:
         loop = velocity_loop(0.3, filtered=False).replace(delay=delay)

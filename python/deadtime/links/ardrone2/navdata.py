@@ -178,7 +178,7 @@ video_stream, pressure, kalman_pressure, wifi
         return None if self.altitude is None else _finite(-self.altitude.altitude_vz)
 
     @property
-    def climb_demand(self) -> float | None:
+    def climb_setpoint(self) -> float | None:
         """The vertical speed that the drone follows, m/s, up positive, where it says a finite one.
 
         The echo of the commands that have reached it.

@@ -206,7 +206,7 @@ class Endpoint:
             return
         now = self._loop.time()
         if self.peer is not None and address != self.peer:
-            self.statistics.strangers += 1
+            self.statistics.foreign += 1
             return
         try:
             packet = self._wire.decode(data)

@@ -35,7 +35,7 @@ class EmulatorOptions:
     Parameters
     ----------
     plant : {"kit", "paper", "real", "thrust"}
-        How height answers the demanded climb.
+        How height answers the commanded climb.
     delay : float, optional
         Transport delay of motion commands, s; by default that of the plant.
     jitter : float

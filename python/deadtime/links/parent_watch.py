@@ -1,7 +1,6 @@
-"""Standard input as a lifeline: a process that was started by another one ends with it.
+"""Notice when the parent process ends: it holds the other end of standard input.
 
-Whoever starts a process holds the other end of its standard input. The system closes that end when
-its holder ends, however it does, by ``kill -9`` as well.
+The system closes that end when its holder ends, in whatever way, by ``kill -9`` as well.
 """
 
 from __future__ import annotations
@@ -12,13 +11,13 @@ import sys
 import threading
 from contextlib import suppress
 
-__all__ = ["input_ends"]
+__all__ = ["parent_ended"]
 
 
-def input_ends() -> asyncio.Event:
-    """An event of the running loop that is set at the end of standard input.
+def parent_ended() -> asyncio.Event:
+    """An event of the running loop that is set when standard input ends.
 
-    What is read until then is thrown away. Without a standard input it has ended already.
+    What is read until then is discarded. Without a standard input it has ended already.
     """
     ended = asyncio.Event()
     if sys.stdin is None:  # its number may be that of another file by now
