@@ -32,7 +32,7 @@ mod winding;
 pub(crate) use bounds::{dominance, radius_right_of};
 pub(crate) use cell::Cell;
 pub use certificate::{Certificate, Contour, certify};
-pub(crate) use closed_region::{Closed, close};
+pub(crate) use closed_region::{Closed, EDGE_MARGIN, close};
 pub(crate) use count::half_plane;
 pub use count::{count, count_right_of};
 pub(crate) use exact_delays::cell_right_of;

@@ -19,6 +19,12 @@ const ORDER: usize = 8;
 /// Covers the rounding of the sums.
 const MARGIN: f64 = 1e-12;
 
+/// Ratio of two radii that are tried.
+const SHRINKAGE: f64 = 0.7;
+
+/// Upper limit on the radii that are tried.
+const MAX_ROUNDS: usize = 60;
+
 /// Moduli of the Taylor coefficients about a point.
 pub(crate) struct TaylorBound<'a> {
     h: &'a QuasiPolynomial,
@@ -87,8 +93,8 @@ impl<'a> TaylorBound<'a> {
     fn largest(&self, room: f64, most: f64, bound: impl Fn(&Self, f64) -> f64) -> f64 {
         let slope = self.sizes.first().copied().unwrap_or(f64::INFINITY);
         let first = (room / slope).min(most).max(0.0);
-        std::iter::successors(Some(first), |r| Some(0.7 * r))
-            .take(60)
+        std::iter::successors(Some(first), |r| Some(SHRINKAGE * r))
+            .take(MAX_ROUNDS)
             .find(|r| bound(self, *r) < room)
             .map_or(0.0, |r| r * (1.0 - MARGIN))
     }

@@ -27,6 +27,9 @@ const IDLE_CUTS: u32 = 8;
 /// evenly.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
+/// Starts around a cluster: angle of the first one in rad, distance as a share of the radius.
+const AROUND: (f64, f64) = (0.3, 0.7);
+
 /// Walks along lines and iterates towards roots.
 pub(crate) trait Seek: Walk {
     /// Check for cancellation and for the limit on evaluations.
@@ -312,8 +315,8 @@ impl<'w, W: Seek> Search<'w, W> {
         let starts = 3 * multiplicity;
         for k in 0..starts {
             self.walker.pause()?;
-            let angle = 0.3 + TAU * f64::from(k) / f64::from(starts);
-            let start = center + Complex64::from_polar(0.7 * radius, angle);
+            let angle = AROUND.0 + TAU * f64::from(k) / f64::from(starts);
+            let start = center + Complex64::from_polar(AROUND.1 * radius, angle);
             if let Outcome::Simple(disc) = self.walker.newton(start, &window)? {
                 self.insert(disc);
             }

@@ -47,6 +47,19 @@ const FLOOR: f64 = 1e-150;
 /// Lower limit that replaces a size lost in underflow, because the size may grow along the step.
 const LEAST: f64 = 1e-150;
 
+/// Upper limit on the lengths tried for one reach.
+const MAX_ROUNDS: usize = 100;
+
+/// Residual below which the inverse is accurate enough for a step of Newton's iteration.
+const RESOLVED: f64 = 0.1;
+
+/// Ratio of the bounds of a reach at which the search for it ends.
+const CLOSE_LENGTHS: f64 = 0.9;
+
+/// Points, in units of the rate. A matrix that is not singular everywhere is regular in double
+/// precision at one of them.
+const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
+
 /// The part of one delay in one row of G, times R.
 #[derive(Debug, Clone, Copy)]
 struct Part {
@@ -110,7 +123,7 @@ impl LocalEnclosure {
 
     /// Is the inverse accurate enough for a step of Newton's iteration?
     pub(super) fn is_resolved(&self) -> bool {
-        self.residual < 0.1
+        self.residual < RESOLVED
     }
 
     /// The same without any proof, for Newton's iteration.
@@ -200,13 +213,13 @@ impl LocalEnclosure {
                     0.5 * high
                 };
             }
-            for _ in 0..100 {
+            for _ in 0..MAX_ROUNDS {
                 if holds(guess) {
                     low = guess;
                 } else {
                     high = guess;
                 }
-                if low > 0.9 * high || high < 1e-300 {
+                if low > CLOSE_LENGTHS * high || high < 1e-300 {
                     break;
                 }
                 guess = if low == 0.0 {
@@ -491,10 +504,6 @@ fn add_multiple(row: &mut (Vec<f64>, Vec<f64>), factor: f64, (re, im): (&[f64], 
         *sum += factor * x;
     }
 }
-
-/// Points, in units of the rate. A matrix that is not singular everywhere is regular in double
-/// precision at one of them.
-const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
 
 /// # Errors
 /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.

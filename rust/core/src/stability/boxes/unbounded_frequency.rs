@@ -24,6 +24,9 @@ use crate::elementary::exp;
 
 const MARGIN: f64 = 1e-9;
 
+/// Ratio of the bounds at which the bisection for the radius ends.
+const WIDTH: f64 = 1.05;
+
 /// What is proved for large |s| over a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum UnboundedFrequency<const D: usize> {
@@ -220,7 +223,7 @@ fn radius<const D: usize>(
             }
         }
     }
-    while high > 1.05 * low {
+    while high > WIDTH * low {
         let middle = (low * high).sqrt();
         if holds(middle) {
             high = middle;

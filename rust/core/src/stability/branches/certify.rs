@@ -31,15 +31,15 @@ const SQUARES: std::ops::Range<f64> = 1e-280..1e300;
 /// Added to a square, this exceeds every effect of underflow.
 const TINY: f64 = 1e-300;
 
-/// The discs of the roots next to starting values.
-pub(crate) struct Certify<'a>(pub(crate) &'a Plane);
-
 /// Number of arguments: start, k, the three bounds there, the centre of these and how far starts
 /// may be from it.
 pub(crate) const ARGUMENTS: usize = 9;
 
 /// Number of values: root, radius, ds/dk. The radius is infinite where nothing is proved.
 pub(crate) const VALUES: usize = 5;
+
+/// The discs of the roots next to starting values.
+pub(crate) struct Certify<'a>(pub(crate) &'a Plane);
 
 impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
     #[inline(always)]

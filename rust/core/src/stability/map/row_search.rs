@@ -28,6 +28,9 @@ const SMALL: f64 = 1e-10;
 /// Stretches of a cell from which a zero is searched for.
 const STARTS: usize = 3;
 
+/// Relative difference of frequencies below which two zeros are the same.
+const SAME_ZERO: f64 = 1e-6;
+
 /// A zero of h on the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Zero {
@@ -272,7 +275,7 @@ fn united(intervals: Vec<Interval>) -> Vec<Interval> {
                 for zero in zeros {
                     let same = |other: &Zero| {
                         let off = (other.omega - zero.omega).abs();
-                        off <= 1e-6 * other.omega.max(zero.omega)
+                        off <= SAME_ZERO * other.omega.max(zero.omega)
                     };
                     if !own.iter().any(same) {
                         own.push(zero);
