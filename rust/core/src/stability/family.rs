@@ -8,10 +8,7 @@
 //! negative only by rounding errors is zero.
 
 use crate::Error;
-use crate::quasipoly::QuasiPolynomial;
-
-/// Relative difference of delays below which they are merged.
-const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
+use crate::quasipoly::{QuasiPolynomial, equate_close_delays};
 
 /// Upper limit on a power of s or of a parameter. A larger one is most likely a typing error.
 const MAX_POWER: u32 = 1000;
@@ -183,15 +180,7 @@ impl Family {
         if rows.is_empty() {
             return Ok(QuasiPolynomial::zero());
         }
-        rows.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let mut last = f64::NEG_INFINITY;
-        for (_, delay) in &mut rows {
-            if *delay - last <= SAME_DELAY * *delay {
-                *delay = last;
-            } else {
-                last = *delay;
-            }
-        }
+        equate_close_delays(&mut rows);
         let (coefficients, delays) = rows.into_iter().unzip();
         QuasiPolynomial::new(coefficients, delays)
     }

@@ -134,3 +134,14 @@ fn largest<S: Scalar>(terms: &[S], read: impl Fn(S) -> f64) -> f64 {
         if size > m { size } else { m }
     })
 }
+
+#[cfg(test)]
+impl Series {
+    /// The polynomial with these coefficients.
+    pub(crate) fn of(coefficients: &[f64]) -> Self {
+        let mut out = Self::constant(0.0);
+        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
+        out.degree = coefficients.len() - 1;
+        out
+    }
+}
