@@ -12,8 +12,9 @@ import numpy as np
 from deadtime import paper
 from deadtime._base.drawing import new_figure
 from deadtime._cli.fly import emulated_drone
+from deadtime.estimation import Waveform
 from deadtime.flights import FlightPlan, fly_experiment
-from deadtime.flights._plots import plot_checked, plot_learned, plot_told
+from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
 from deadtime.internet._loop import run_internet_loop
 from deadtime.internet._plots import plot_internet_loop
@@ -77,7 +78,7 @@ def reproduction() -> None:
             ]
             lines += ["|---|---|---|---|---|"]
             lines += [
-                f"| {one.where} | {one.quantity} | {one.printed} | {one.shown} | {one.told} |"
+                f"| {one.where} | {one.quantity} | {one.printed} | {one.shown} | {one.outcome} |"
                 for one in part.comparisons
             ]
             lines += [""]
@@ -93,7 +94,7 @@ def guess(Kp: float = 1.31) -> dtm.ControlLoop:
 def planned_step() -> None:
     """The smallest standard errors that a step on the guessed loop can give."""
     plan = dtm.identifiability(guess(), dtm.Experiment.step(5.0), noise=0.01, initial_output=0.0)
-    plan.plot().savefig(IMAGES / "planned-step.png", dpi=90)
+    plan.plot()[0].figure.savefig(IMAGES / "planned-step.png", dpi=90)
 
 
 def hold() -> None:
@@ -164,15 +165,17 @@ def estimating() -> None:
     )
     known = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), sample_time=0.065, limit=1.0)
     step, free = dtm.Experiment.step(8.0, rest=1.04), ("delay", "gain", "lag")
-    flight = step.fly(vehicle, noise=0.002, seed=2)
+    flight = step.run(vehicle, noise=0.002, seed=2)
     fit = dtm.estimate_delay(flight, known, free=free)
-    fit.plot().savefig(IMAGES / "estimate-lag.png", dpi=80)
-    dtm.estimate_delay(flight, known).plot().savefig(IMAGES / "estimate-lagless.png", dpi=80)
+    fit.plot()[0].figure.savefig(IMAGES / "estimate-lag.png", dpi=80)
+    dtm.estimate_delay(flight, known).plot()[0].figure.savefig(
+        IMAGES / "estimate-lagless.png", dpi=80
+    )
 
     gains = (0.8, 1.6, 2.4)
-    flights = [step.fly(vehicle.replace(Kp=Kp), 0.002, seed) for seed, Kp in enumerate(gains)]
+    flights = [step.run(vehicle.replace(Kp=Kp), 0.002, seed) for seed, Kp in enumerate(gains)]
     joint = dtm.estimate_delay(flights, [known.replace(Kp=Kp) for Kp in gains], free=free)
-    joint.plot().savefig(IMAGES / "estimate-joint.png", dpi=65)
+    joint.plot()[0].figure.savefig(IMAGES / "estimate-joint.png", dpi=65)
 
     smooth = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0))
     best = dtm.design(
@@ -208,8 +211,8 @@ def flying() -> None:
         figure.savefig(IMAGES / "flying-learned.png", dpi=90)
         told = read_telemetry(found.before.telemetry, found.before.recording)
         figure, axes = new_figure(7.5, 4.2, rows=2)
-        plot_told(axes, told, found.before)
-        figure.savefig(IMAGES / "flying-told.png", dpi=90)
+        plot_telemetry(axes, told, found.before)
+        figure.savefig(IMAGES / "flying-telemetry.png", dpi=90)
     print(found.verdict())
 
 
@@ -217,12 +220,14 @@ def internet_loop() -> None:
     """The Internet loop on a network with jitter and losses, and the effect of the policies."""
     bad = udp.Network(delay=udp.Normal(0.05, 0.01), loss=udp.Bursts.of(0.05, 4.0))
     jitters = udp.Network(delay=udp.Normal(0.05, 0.01), loss=0.05)
-    found = run_internet_loop(udp.Trial(gain=8.0, there=jitters, back=jitters))
+    found = run_internet_loop(udp.Trial(gain=8.0, forward_path=jitters, return_path=jitters))
     printed = {
         float(gain): paper.delay_by_dominant_root(gain, percent / 100.0)
         for gain, percent in paper.PRINTED_OVERSHOOTS.items()
     }
-    plot_internet_loop(found, printed).savefig(IMAGES / "internet-loop.png", dpi=90)
+    figure, axes = new_figure(10.0, 4.2, columns=2)
+    plot_internet_loop(found, printed, axes)
+    figure.savefig(IMAGES / "internet-loop.png", dpi=90)
 
     policies = {
         "newest wins": udp.NewestWins(),
@@ -234,7 +239,9 @@ def internet_loop() -> None:
     )
     for ax, (name, policy) in zip(axes, policies.items(), strict=True):
         for seed in range(40):
-            trial = udp.Trial(gain=6.0, there=bad, back=bad, seed=seed, policy=policy, duration=4.0)
+            trial = udp.Trial(
+                gain=6.0, forward_path=bad, return_path=bad, seed=seed, policy=policy, duration=4.0
+            )
             recording = virtual_time.run(udp.run_trial(trial)).plant.recording
             ax.plot(recording.time - 1.0, recording.output, "C0", alpha=0.25, linewidth=0.8)
         ax.plot(recording.time - 1.0, recording.reference, "k--", linewidth=0.8)
@@ -256,17 +263,17 @@ def thrust_step(gain: float, step: float, noise: float = 0.0) -> dtm.Recording:
     for k, height in enumerate(reference):
         now = k * 65_000
         if k >= 4:
-            motion.demand(now, commands[k - 4])
+            motion.follow(now, commands[k - 4])
         heights.append(motion.at(now)[0] + noise * random.standard_normal())
         commands.append(float(np.clip(gain * (height - heights[-1]), -2.0, 2.0)))
     return dtm.Recording(np.arange(160) * TS, reference, heights, commands)
 
 
 def first_order_climb(amplitude: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The climb after a step of its demand, divided by the step, and the fitted lag and delay."""
+    """The climb after a step of its setpoint, divided by the step, and the fitted lag and delay."""
     motion = ThrustMotion(Thruster())
     motion.settle(0, 0.0)
-    motion.demand(0, amplitude)
+    motion.follow(0, amplitude)
     climb = np.array([motion.at(round(1e6 * t))[1] for t in time]) / amplitude
 
     def error(parameters: np.ndarray) -> np.ndarray:
@@ -280,15 +287,15 @@ def thrust() -> None:
     """Climb and height of the thrust model, beside first-order fits to them."""
     figure, axes = plt.subplots(1, 3, figsize=(12.5, 3.8), layout="constrained")
     time = np.arange(0.0, 0.8, 0.002)
-    print("demand (m/s)  lag (s)  delay (s)  lag + delay (s)")
+    print("setpoint (m/s)  lag (s)  delay (s)  lag + delay (s)")
     for amplitude in (0.1, 1.0, -1.0, 2.0, -2.0):
         climb, (lag, delay) = first_order_climb(amplitude, time)
         print(f"{amplitude:4.1f}  {lag:.3f}  {delay:.3f}  {lag + delay:.3f}")
-        axes[0].plot(time, climb, linewidth=1.2, label=f"demand {amplitude:+.1f} m/s")
+        axes[0].plot(time, climb, linewidth=1.2, label=f"setpoint {amplitude:+.1f} m/s")
         if amplitude == 0.1:
             first = -np.expm1(-np.maximum(time - delay, 0.0) / lag)
     axes[0].plot(time, first, "k--", linewidth=1.0, label="delay and first-order lag")
-    axes[0].set(xlabel="time (s)", ylabel="climb / demand", title="A step of the demanded climb")
+    axes[0].set(xlabel="time (s)", ylabel="climb / setpoint", title="A step of the commanded climb")
     axes[0].legend(frameon=False)
 
     thruster, gain = Thruster(), 2.0
@@ -314,7 +321,7 @@ def thrust() -> None:
     for number, step in enumerate((0.1, 0.4, 0.8, 1.6)):
         clean, noisy = (thrust_step(gain, step, noise) for noise in (0.0, 0.002))
         fit = dtm.estimate_delay(
-            noisy, known, free=("delay", "gain", "lag"), method="waveform", initial_output=0.0
+            noisy, known, free=("delay", "gain", "lag"), method=Waveform(initial_output=0.0)
         )
         margin = fit.loop.replace(limit=None).margin()
         fitted = fit.loop.simulate(np.arange(144) * TS, step).outputs

@@ -161,8 +161,8 @@ def test_a_design(tmp_path):
         "--plot", picture,
     )  # fmt: skip
     assert fixed["gains"]["Kp"] == 2.0
-    assert fixed["margins"]["gain"] >= 2.25
-    assert "holds the design back" in fixed["traded"]["gain margin"]
+    assert fixed["margins"]["gain_margin"] >= 2.25
+    assert "holds the design back" in fixed["traded"]["gain_margin"]
     assert picture.stat().st_size > 5000
     chosen = found("design", "--delay", 0.36, "--fix", "Kp=2", "--choose-filter")
     assert 100 < chosen["filter"] < 200

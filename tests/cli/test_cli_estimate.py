@@ -27,7 +27,7 @@ def files(tmp_path_factory):
         loop = dtm.ControlLoop(
             dtm.Integrator(0.9), dtm.P(Kp), delay=0.36, sample_time=0.065, limit=1.0
         )
-        flight = dtm.Experiment.step(8.0, rest=1.04).fly(loop, noise=0.004, seed=3)
+        flight = dtm.Experiment.step(8.0, rest=1.04).run(loop, noise=0.004, seed=3)
         flown[name] = write(flight, folder / f"{name}.csv")
     return flown
 
@@ -112,8 +112,14 @@ def test_two_real_flights_together():
         (["--kp", 2, "--kp", 3], "1 file and 2 of --kp"),
         (["--kp", 2, "--noise", "loop"], "--noise is for one method"),
         (["--kp", 2, "--initial-output", 0], "--initial-output is for one method"),
-        (["--kp", 2, "--method", "gcc", "--noise", "loop"], "no option 'noise'"),
-        (["--kp", 2, "--method", "output_error", "--map", "exact"], "no option 'map'"),
+        (
+            ["--kp", 2, "--method", "gcc", "--noise", "loop"],
+            "--noise is not an option of --method gcc",
+        ),
+        (
+            ["--kp", 2, "--method", "output_error", "--map", "exact"],
+            "--map is not an option of --method output_error",
+        ),
         (["--kp", 2, "--method", "cta"], "continuous loops"),
         (["--kp", 2, "--method", "relay"], "no limit cycle"),
         (["--kp", 2, "--method", "decrement", "--free", "delay,lag"], "fix the lag"),
@@ -138,7 +144,7 @@ def test_invalid_combinations_of_options_for_several_files(files, more, words):
 
 def test_a_reference_equal_to_the_output_is_refused(tmp_path):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
-    flight = dtm.Experiment.step(8.0, rest=1.04).fly(loop)
+    flight = dtm.Experiment.step(8.0, rest=1.04).run(loop)
     copied = dtm.Recording(flight.time, flight.output, flight.output, flight.command)
     file = write(copied, tmp_path / "copied.csv")
     said = one_clear_line(run("estimate", file, "--kp", 2, "--sample-time", 0.065))

@@ -43,9 +43,9 @@ def test_the_whole_experiment_in_virtual_time(tmp_path):
     assert 0.33 < told["overshoot_method"][1] < 0.38
     assert told["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
     assert told["transport"]["delay"] == pytest.approx(0.26, abs=0.01)
-    assert told["vehicle_lateness"] == pytest.approx(0.142, abs=0.015)
+    assert told["vehicle_delay"] == pytest.approx(0.142, abs=0.015)
     low, high = told["vehicle"]["interval_95"]["time_constant"]
-    assert low < told["vehicle_lateness"] < high
+    assert low < told["vehicle_delay"] < high
     last = told["flights"][-1]
     assert last["overshoot"] < 5.0
     assert last["settling_time"] < min(one["settling_time"] for one in told["flights"][:-1])

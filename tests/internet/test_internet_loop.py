@@ -40,7 +40,7 @@ WAY = Network(delay=0.05)
 
 @pytest.fixture(scope="module")
 def calm():
-    return run_internet_loop(Trial(gain=8.0, there=WAY, back=WAY))
+    return run_internet_loop(Trial(gain=8.0, forward_path=WAY, return_path=WAY))
 
 
 def test_with_constant_delays_every_method_finds_what_was_measured(calm):
@@ -81,7 +81,9 @@ def test_all_of_it_is_said_in_plain_values(calm):
 
 
 def test_a_lag_is_found_apart_from_the_delay():
-    found = run_internet_loop(Trial(gain=5.0, there=WAY, back=WAY, lag=0.05), gains=(5.0,))
+    found = run_internet_loop(
+        Trial(gain=5.0, forward_path=WAY, return_path=WAY, lag=0.05), gains=(5.0,)
+    )
     for method in ("waveform", "output_error"):
         fit = found.runs[0].estimates[method]
         assert (fit.delay, fit.lag) == pytest.approx((0.1, 0.05), abs=1e-6)
@@ -99,7 +101,9 @@ def test_a_lag_is_found_apart_from_the_delay():
 )
 def test_intervals_of_replayed_steps_cover_the_mean_age(way, monkeypatch):
     monkeypatch.setattr("deadtime.internet._loop.REPLAYS", 100)
-    trials = [Trial(gain=8.0, there=way, back=way, seed=100 * index) for index in range(10)]
+    trials = [
+        Trial(gain=8.0, forward_path=way, return_path=way, seed=100 * index) for index in range(10)
+    ]
     methods = ("dominant", "exact")
     loops = [run_internet_loop(one, (6.0, 8.0, 10.0), methods=methods) for one in trials]
     age = float(np.mean([loop.age for loop in loops]))
@@ -115,7 +119,7 @@ def test_intervals_of_replayed_steps_cover_the_mean_age(way, monkeypatch):
 
 def test_a_jitter_buffer_gives_the_exact_delay_on_a_network_that_jitters():
     way = Network(delay=Normal(0.05, 0.01))
-    trial = Trial(gain=6.0, there=way, back=way, policy=JitterBuffer(0.16))
+    trial = Trial(gain=6.0, forward_path=way, return_path=way, policy=JitterBuffer(0.16))
     found = run_internet_loop(trial, gains=(5.0, 6.0))
     for run in found.runs:
         assert run.delay("waveform") == pytest.approx(0.16, abs=1e-6)
@@ -123,7 +127,7 @@ def test_a_jitter_buffer_gives_the_exact_delay_on_a_network_that_jitters():
 
 
 def test_both_ends_keep_recordings_that_can_be_read(tmp_path, calm):
-    trial = Trial(gain=8.0, there=WAY, back=WAY)
+    trial = Trial(gain=8.0, forward_path=WAY, return_path=WAY)
     found = run_internet_loop(trial, (8.0,), folder=tmp_path, methods=["output_error"])
     names = sorted(file.name for file in tmp_path.iterdir())
     assert names == ["01-gain-8-controller.csv", "01-gain-8-plant.csv"]
@@ -147,7 +151,7 @@ def test_a_spread_of_one_or_none_has_no_interval():
 
 
 def test_without_enough_replayed_steps_the_runs_give_the_interval():
-    trial = Trial(gain=8.0, there=WAY, back=Network(Normal(0.05, 0.01)), duration=2.0)
+    trial = Trial(gain=8.0, forward_path=WAY, return_path=Network(Normal(0.05, 0.01)), duration=2.0)
     whole = run_internet_loop(trial, (7.0, 8.0, 9.0), methods=["exact"])
     few = dataclasses.replace(whole, _errors=tuple({"exact": np.zeros(3)} for _ in range(3)))
     assert whole.spread("exact").replayed
@@ -189,7 +193,7 @@ def unsteadiness(found):
 def test_over_udp_in_three_processes_the_estimate_is_what_was_measured():
     tries = []
     while len(tries) < 4 and (not tries or unsteadiness(tries[-1]) > 0.003):
-        trial = Trial(gain=8.0, there=WAY, back=WAY)
+        trial = Trial(gain=8.0, forward_path=WAY, return_path=WAY)
         tries.append(run_internet_loop(trial, (8.0,), mode="processes"))
     found = min(tries, key=unsteadiness)
     (run,) = found.runs

@@ -168,7 +168,7 @@ def test_what_a_real_drone_tells_divides_its_delay():
     flown = [state for state in replayed()[1] if state.flying]
     time = np.array([state.vehicle_time for state in flown])
     time -= time[0]
-    columns = np.array([[s.climb_demand, s.climb, s.height] for s in flown]).T
+    columns = np.array([[s.climb_setpoint, s.climb, s.height] for s in flown]).T
     rows = (time > 0.6) & (time < 13.5)  # before the reference is moved
     told = telemetry_of((time[rows], *columns[:, rows]), time[rows], 1.0 - columns[2][rows])
     split = split_delay([told])
@@ -177,7 +177,7 @@ def test_what_a_real_drone_tells_divides_its_delay():
     assert high > 0.07
     assert split.transport.delay == pytest.approx(0.095, abs=0.5 * BETWEEN + 0.03)
     assert split.transport.gain == pytest.approx(1.0, abs=0.15)
-    assert 0.2 < split.vehicle_lateness < 0.37
+    assert 0.2 < split.vehicle_delay < 0.37
     late = "delay+time_constant" if "delay" in split.vehicle.free else "time_constant"
     low, high = split.vehicle.ci(0.95, late)
     assert 0.2 < low < high < 0.45

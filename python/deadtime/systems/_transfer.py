@@ -468,12 +468,33 @@ class TransferFunction(HasPoles, HasResponses):
         """
         return margins(self._num, self._den)
 
+    def sensitivity(self) -> TransferFunction:
+        """Sensitivity S = 1/(1 + G) of the loop closed around this one.
+
+        Returns
+        -------
+        TransferFunction
+            From a disturbance of the output to the output; 1 - S is ``feedback(G)``.
+
+        Raises
+        ------
+        ValueError
+            If G is -1 everywhere.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> (2.0 / s * delay(0.36)).sensitivity()
+        s / (s + 2 exp(-0.36 s))
+        """
+        return feedback(1.0, self)
+
     def bode(
         self,
         omega: ArrayLike | None = None,
         *,
         margins: bool = False,
-        axes: Sequence[Axes] | None = None,
+        ax: Sequence[Axes] | None = None,
     ) -> Sequence[Axes]:
         """Draw gain and phase over frequency.
 
@@ -484,7 +505,7 @@ class TransferFunction(HasPoles, HasResponses):
             lowest corner to a decade above the highest.
         margins : bool, default False
             Take this as a loop gain and mark its margins.
-        axes : sequence of two matplotlib.axes.Axes, optional
+        ax : sequence of two matplotlib.axes.Axes, optional
             Where to draw gain and phase; a new figure by default.
 
         Returns
@@ -501,7 +522,7 @@ class TransferFunction(HasPoles, HasResponses):
 
         places = self._plotted(omega, 0.1, 10.0)
         found = self.margin() if margins else None
-        drawn = shown_rows(axes, 2)
+        drawn = shown_rows(ax, 2)
         plot_bode(drawn, self, places, found)
         return drawn
 

@@ -1,4 +1,4 @@
-//! Which way an element goes, so that its neighbours in a vector can be those that go the same.
+//! Elements sorted by the branch of code that they need.
 //!
 //! A vector executes every branch that one of its lanes needs. Sorting a block by branch avoids
 //! this; no bit of a result depends on it.

@@ -16,6 +16,8 @@ pub(super) const DEGREE: usize = 24;
 /// Number of coefficients, and of Gauss nodes.
 pub(super) const TERMS: usize = DEGREE + 1;
 
+static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
+
 /// One series, or values at the nodes.
 pub(super) type Series = [f64; TERMS];
 
@@ -27,8 +29,6 @@ struct Tables {
     slope: Series,
     back: Series,
 }
-
-static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
 
 impl Tables {
     fn new() -> Self {

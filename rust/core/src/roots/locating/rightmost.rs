@@ -205,8 +205,8 @@ pub fn spectral_abscissa(h: &QuasiPolynomial, strong: bool, task: &Task) -> Resu
 fn beyond_reach() -> Error {
     Error::argument(
         "no line that could be counted has a root to its right: the numbers of this equation \
-         differ too much in size for double precision; leave out time constants of almost \
-         nothing, or choose another unit of time",
+         differ too much in size for double precision; leave out time constants close to zero, \
+              or choose another unit of time",
     )
 }
 

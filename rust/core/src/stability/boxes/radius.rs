@@ -75,8 +75,8 @@ impl<const D: usize> Ord for Near<D> {
 /// Parameters that delays depend on stay at or above 0.
 ///
 /// # Errors
-/// [`Error::Argument`] where the member at `point` is not stable or cannot be judged, for scales that
-/// are not finite or negative, or more than three above 0; [`Error::Interrupted`].
+/// [`Error::Argument`] where the member at `point` is not stable or cannot be judged, for scales
+/// that are not finite or negative, or more than three above 0; [`Error::Interrupted`].
 pub fn stability_radius(
     family: &Family,
     point: &[f64],
@@ -86,7 +86,7 @@ pub fn stability_radius(
 ) -> Result<Radius, Error> {
     if scales.len() != point.len() {
         return Err(Error::argument(format!(
-            "{} scales for {} parameters: give one a parameter",
+            "{} scales for {} parameters: give one for each parameter",
             scales.len(),
             point.len()
         )));

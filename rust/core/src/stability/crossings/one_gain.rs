@@ -47,8 +47,9 @@ pub struct Place {
 /// has a root on the imaginary axis, by increasing frequency. `values` holds the other parameters.
 ///
 /// # Errors
-/// [`Error::Argument`] where the family is not affine in the parameter, its leading terms do not outweigh all
-/// others in the whole range, a root stays at 0, or precision does not suffice; [`Error::Interrupted`].
+/// [`Error::Argument`] where the family is not affine in the parameter, its leading terms do not
+/// outweigh all others in the whole range, a root stays at 0, or precision does not suffice;
+/// [`Error::Interrupted`].
 ///
 /// ```
 /// use deadtime::{Task, stability::{Affine, Family, Term, crossings_along}};
@@ -81,7 +82,7 @@ pub fn crossings_along(
     family.check_delays(&ranges)?;
     let Some((constant, slope)) = family.split(parameter) else {
         return Err(Error::argument(format!(
-            "{name} enters otherwise than as a factor of some terms"
+            "{name} does not enter only as a factor of terms"
         )));
     };
     let mut bare = values.to_vec();

@@ -17,9 +17,6 @@ use crate::dde::control_loop::series::Series;
 /// Upper limit on the pieces in the queue (bounds memory and time).
 const MOST_PIECES: usize = 1_000_000;
 
-/// The lowest derivative that jumps at a breaking point; [`SMOOTH`] where none does.
-pub(super) type Order = u8;
-
 /// No break.
 pub(super) const SMOOTH: Order = u8::MAX;
 
@@ -37,6 +34,9 @@ const SAME_SLOPE: f64 = 256.0 * f64::EPSILON;
 
 /// Factor by which the recorded longest length shrinks with each piece.
 const FORGET: f64 = 0.998;
+
+/// The lowest derivative that jumps at a breaking point; [`SMOOTH`] where none does.
+pub(super) type Order = u8;
 
 /// w(t) = series((t − origin)/scale) from `start` to `end`.
 #[derive(Debug, Clone, Copy)]
@@ -172,8 +172,7 @@ impl<S: Scalar> Pieces<S> {
                 limit: MOST_PIECES as u64,
                 unit: "pieces of the command in one delay",
                 advice:
-                    "shorten the time simulated or the list of reference jumps, and set a lag of \
-                         almost nothing to zero"
+                    "shorten the time simulated or the list of reference jumps, and set lags close to zero to zero"
                         .to_owned(),
             });
         }
