@@ -38,7 +38,8 @@ impl Figures {
     };
 
     /// In the order of the fields.
-    pub fn to_array(self) -> [f64; 9] {
+    #[cfg(test)]
+    pub(crate) fn to_array(self) -> [f64; 9] {
         [
             self.rise_time,
             self.settling_time,
