@@ -22,7 +22,7 @@ from deadtime.links.ardrone2.emulator import Thruster, ThrustMotion
 from scipy.optimize import least_squares
 
 IMAGES = Path(__file__).parent / "images"
-NUMBERS = Path(__file__).parent / "reproduction-numbers.md"
+NUMBERS = Path(__file__).parent / "paper/reproduction-numbers.md"
 
 
 def fixed_steps() -> None:

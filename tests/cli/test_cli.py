@@ -1,12 +1,12 @@
 """The command: what it prints, what it writes, and one clear line for whatever goes wrong."""
 
-import json
 import os
 import re
 import subprocess
 import sys
 
 import pytest
+from command_line import found, one_clear_line, run
 from deadtime.roots import Certificate
 from flights import flight_path
 
@@ -15,7 +15,8 @@ COLUMNS = ["--time", "t_s", "--reference", "ref_m", "--output", "height_m"]
 FLOWN = ["--sample-time", "0.065", "--limit", "1", "--window", "13", "25.5"]
 
 
-def run(*arguments, cwd=None, **environment):
+def process(*arguments, cwd=None, **environment):
+    """The command as a process of its own: the entry, its exit code, its terminal."""
     return subprocess.run(
         [*DEADTIME, *map(str, arguments)],
         capture_output=True,
@@ -27,16 +28,11 @@ def run(*arguments, cwd=None, **environment):
     )
 
 
-def found(*arguments, cwd=None):
-    result = run(*arguments, "--json", cwd=cwd)
-    assert result.returncode == 0, result.stderr
-    return json.loads(result.stdout)
-
-
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
-    result = run("demo", cwd=folder)
+    # A process of its own, on a terminal that has no more than ASCII.
+    result = process("demo", cwd=folder, PYTHONIOENCODING="ascii", LC_ALL="C")
     assert result.returncode == 0, result.stderr
     return folder, result.stdout
 
@@ -51,6 +47,8 @@ def test_the_demo_shows_the_truth_beside_the_estimates(demo):
     assert "Kp above 2.5" in printed
     assert "inf" not in printed
     assert "Try Kp" in printed
+    # On this ASCII terminal, where a bullet and a minus once ended it with exit code 1.
+    assert "?" not in printed
 
 
 def test_the_demo_writes_a_flight_and_a_self_contained_report(demo):
@@ -81,7 +79,7 @@ def test_the_report_is_valid_and_says_what_its_pictures_show(demo):
 def test_a_narrow_terminal_leaves_out_no_digits(demo):
     folder, _ = demo
     file = folder / "demo" / "flight.csv"
-    narrow = run("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN, COLUMNS="40").stdout
+    narrow = process("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN, COLUMNS="40").stdout
     assert "…" not in narrow
     assert "waveform with lag" in narrow
 
@@ -189,18 +187,6 @@ def test_a_report_of_a_flight(demo, tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert "<svg" in out.read_text(encoding="utf-8")
-
-
-def estimate(file, *more):
-    return ["estimate", file, *COLUMNS, "--kp", "2.4", *more]
-
-
-def one_clear_line(result):
-    assert result.returncode not in (0, None)
-    assert "Traceback" not in result.stderr
-    assert result.stderr.strip(), "nothing was said"
-    assert result.stdout == ""
-    return result.stderr.strip()
 
 
 @pytest.mark.parametrize("command", ["estimate", "report"])

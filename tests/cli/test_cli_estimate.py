@@ -3,10 +3,9 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from command_line import found, one_clear_line, run
 from deadtime.estimation._estimate import METHODS
 from flights import flight_path
-from test_cli import one_clear_line
-from test_cli_map import found, run
 
 LOGGED = ["--command", "command"]
 FLOWN = ["--sample-time", "0.065", "--limit", "1"]

@@ -74,13 +74,11 @@ def test_a_missing_extra_is_said_with_the_line_that_installs_it(monkeypatch, cap
     assert said == "deadtime: pip install 'deadtime[plot]'\n"
 
 
-def test_the_demo_ends_well_on_an_ascii_terminal(tmp_path):
-    # A bullet and a minus that ASCII lacks once ended it with exit code 1.
-    done = command("demo", cwd=tmp_path, PYTHONIOENCODING="ascii", LC_ALL="C")
-    assert done.returncode == 0, done.stderr
-    shown = done.stdout.decode("ascii")
-    assert "Try Kp" in shown
-    assert "?" not in shown
+def test_a_failure_is_one_line_and_the_exit_code_of_the_process(tmp_path):
+    done = command("estimate", "none.csv", "--kp", "2", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, b"")
+    assert done.stderr.decode().startswith("deadtime: ")
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_commands_are_readable_in_latin_1():

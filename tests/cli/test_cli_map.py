@@ -1,39 +1,13 @@
 """The command `deadtime map` with all its options."""
 
-import io
-import json
 import math
-import subprocess
-import sys
-from contextlib import redirect_stderr, redirect_stdout
-from unittest.mock import patch
 
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._cli.app import run as run_command
-from test_cli import one_clear_line
+from command_line import found, one_clear_line, run
 
 SMALL = ["--delay", 0.36, "--shape", 31, 21]
-
-
-def run(*arguments):
-    """Run the command in this process: starting one costs more than a map."""
-    command = ["deadtime", *map(str, arguments)]
-    out, err = io.StringIO(), io.StringIO()
-    with patch.object(sys, "argv", command), redirect_stdout(out), redirect_stderr(err):
-        try:
-            run_command()
-            code = 0
-        except SystemExit as ended:
-            code = ended.code or 0
-    return subprocess.CompletedProcess(command, code, out.getvalue(), err.getvalue())
-
-
-def found(*arguments):
-    result = run(*arguments, "--json")
-    assert result.returncode == 0, result.stderr
-    return json.loads(result.stdout)
 
 
 def test_counts_alone_are_those_of_the_full_map():

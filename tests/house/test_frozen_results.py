@@ -78,11 +78,11 @@ MADE = {
         CONTINUOUS, {"Kp": (0.5, 3), "Kv": (0, 0.5)}, {"delay": (0.3, 0.4)}, shape=(3, 3)
     ),
     "RootSet": LOOP.rightmost,
-    "Sensitivity": lambda: h.sensitivity(h.rightmost()[0]),
+    "RootSensitivity": lambda: h.root_sensitivity(h.rightmost()[0]),
     "StabilityMap": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)),
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
-    "Sweep": lambda: dtm.sweep(LOOP, {"Kp": [1.0, 2.0]}),
+    "Sweep": lambda: dtm.sweep(LOOP, {"Kp": np.array([1.0, 2.0])}),
     "SystemResponse": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
     "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
     "TransferFunction": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)),

@@ -114,7 +114,7 @@ def test_overshoot_under_a_limit(delay, overshoot):
 
 def stacked_exponentials(loop, times, delays):
     """All delay intervals side by side: a constant linear system in the time within a delay."""
-    model, delay = loop._model, loop.delay
+    model, delay = loop.specification.model, loop.delay
     n = len(model.B)
     outputs = np.zeros(len(times))
     starts = [np.zeros(n)]
@@ -179,7 +179,7 @@ def test_limits_of_higher_orders(name, limit):
     plant, controller = HIGHER[name]
     delay = 0.31
     loop = dtm.ControlLoop(plant, controller, delay=delay, limit=limit)
-    model = loop._model
+    model = loop.specification.model
     times = np.linspace(0.0, 2.4, 49)
     outputs = np.zeros(len(times))
     state, past = np.zeros(len(model.B)), lambda t: 0.0

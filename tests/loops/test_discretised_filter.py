@@ -143,7 +143,7 @@ def test_what_cannot_run_it_says_so():
     smooth = dtm.DerivativeFilter(38.0, discretisation="tustin")
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.19, smooth), delay=0.36, sample_time=TS)
     with pytest.raises(ValueError, match="a sweep cannot"):
-        dtm.sweep(loop, {"Kp": [1.0, 2.0]}, [0.0, 1.0])
+        dtm.sweep(loop, {"Kp": (1.0, 2.0, 2)}, [0.0, 1.0])
     with pytest.raises(ValueError, match="sensitivities cannot"):
         loop.simulate([0.0, 1.0], sensitivities=("Kp",))
     with pytest.raises(ValueError, match="a map cannot"):

@@ -267,7 +267,7 @@ def test_the_kit_plant():
 def test_equations_are_the_polynomials(plant, controller):
     """Loop gain and reference gain at a point of the plane, by both forms."""
     loop = dtm.ControlLoop(plant, controller, delay=0.1)
-    model = loop._model
+    model = loop.specification.model
     s = 0.7 + 1.9j
     resolvent = np.linalg.inv(s * np.eye(len(model.B)) - model.A)
     from_command = model.K @ resolvent @ model.B + model.L

@@ -142,7 +142,7 @@ def test_characteristic_functions():
 def test_characteristic_function_is_the_determinant(plant, controller, delay):
     """Up to the factor that the plant's and the controller's denominators leave."""
     loop = dtm.ControlLoop(plant, controller, delay=delay)
-    model, h = loop._model, loop.characteristic()
+    model, h = loop.specification.model, loop.characteristic()
 
     def determinant(s):
         n = len(model.B)
@@ -217,7 +217,7 @@ def test_numbers_may_be_symbols(plant, controller):
         name: value if name == "delay" else dtm.QuasiPolynomial([[value]], [0.0])
         for name, value in loop.parameters.items()
     }
-    h, symbolic = loop.characteristic(), loop._characteristic(symbols)
+    h, symbolic = loop.characteristic(), loop.specification.characteristic_at(symbols)
     points = np.array([0.7 + 1.9j, -0.4 + 3.0j, 2.0 - 1.0j])
     np.testing.assert_allclose(symbolic(points), h(points), rtol=1e-12)
 
@@ -276,3 +276,40 @@ def test_a_sampled_loop_slower_than_rounding_is_refused():
     with pytest.raises(ValueError, match="beyond double precision"):
         loop.is_stable()
     assert not loop.replace(Kp=1e20).is_stable()
+
+
+def test_poles_of_a_sampled_loop_in_a_region_are_its_eigenvalues():
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.P(5.0), delay=0.36, sample_time=0.065)
+    z = np.linalg.eigvals(loop.transition_matrix())
+    inside = np.log(z[(np.abs(z) > np.exp(-10 * 0.065)) & (z.imag >= 0.0)]) / 0.065
+    found = loop.poles(re=(-10, None), im=(0, None))
+    np.testing.assert_allclose(np.sort_complex(found.roots), np.sort_complex(inside), rtol=1e-9)
+    assert found.counted == len(inside) > 1
+    assert loop.count(re=(0, None)) == np.count_nonzero(np.abs(z) > 1.0) == 2
+    assert loop.count() == np.count_nonzero(z)
+
+
+def test_a_pole_of_a_sampled_loop_on_the_edge_is_refused():
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.P(5.0), delay=0.36, sample_time=0.065)
+    pole = loop.rightmost().roots[0]
+    with pytest.raises(dtm.ContourError, match="edge") as refused:
+        loop.count(re=(pole.real, None))
+    assert refused.value.place == pole
+    assert refused.value.inside == 0
+    with pytest.raises(ValueError, match="low < high"):
+        loop.count(re=(1, 0))
+    with pytest.raises(ValueError, match="finitely many"):
+        loop.certify(re=(0, None))
+
+
+def test_a_continuous_loop_answers_as_its_characteristic_function():
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.PV(2.0, 0.3), delay=0.36)
+    h = loop.characteristic()
+    region = {"re": (-12, 2), "im": (0, 100)}
+    assert loop.count(**region) == h.count(**region) == loop.certify(**region).count
+    np.testing.assert_array_equal(loop.poles(**region).roots, h.roots(**region).roots)
+    assert loop.crossings({"Kp": (0.1, 9)}).values == pytest.approx(
+        [loop.stable_range("Kp")[1]], rel=1e-9
+    )
+    assert loop.is_stable() == loop.is_stable(strong=False) == h.is_stable()
+    assert loop.spectral_abscissa(strong=False) == h.spectral_abscissa(strong=False)

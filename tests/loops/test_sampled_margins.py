@@ -35,7 +35,7 @@ LOOPS = [
 
 def cut(loop):
     """Transition matrix with the command cut, where the command goes in and where it comes out."""
-    model = loop._model
+    model = loop.specification.model
     matrices = [
         replace(model, K=np.zeros_like(model.K), L=direct)
         .native(loop.delay, loop.sample_time)

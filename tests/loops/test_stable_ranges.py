@@ -39,7 +39,7 @@ def test_a_window_of_instability_ends_the_range_of_the_delay(factor):
     high = loop.stable_range("delay")[1]
     assert high == pytest.approx(first_crossing(factor), rel=1e-7)
     assert dtm.delay_margin(loop) == pytest.approx(high - 0.3, rel=1e-6)
-    within = loop._characteristic(
+    within = loop.specification.characteristic_at(
         loop.parameters | {"delay": high * (1.0 + 1e-5 * (factor > 1.001))}
     )
     if factor > 1.001:
@@ -183,7 +183,9 @@ def test_continuous_ranges_have_no_unstable_root_by_proved_counts(data):
     value = loop.parameters[name]
 
     def unstable(point):
-        return loop._characteristic(loop.parameters | {name: point}).count(re=(0.0, None))
+        return loop.specification.characteristic_at(loop.parameters | {name: point}).count(
+            re=(0.0, None)
+        )
 
     for point in inside(low, high, value):
         if low < point < high:

@@ -10,7 +10,7 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.loops._model import LoopModel, rest_of
+from deadtime.loops._model import rest_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from loops import loops
@@ -98,17 +98,23 @@ def test_a_p_loop_has_the_overshoot_of_the_closed_form():
 
 
 def test_arrays_broadcast_and_keep_their_shape():
-    found = dtm.sweep(DRONE, {"Kp": [[1.0], [2.0]], "delay": [0.1, 0.2, 0.3]}, 8.0)
+    found = dtm.sweep(DRONE, {"Kp": [[1.0], [2.0]], "delay": np.array([0.1, 0.2, 0.3])}, 8.0)
     assert found["overshoot"].shape == found.status.shape == (2, 3)
     lone = dtm.sweep(DRONE, {"Kp": 2.0, "delay": 0.2}, 8.0)
     assert lone.shape == ()
     assert lone["overshoot"] == found["overshoot"][1, 1]
     outputs = dtm.sweep(DRONE, {"Kp": [[1.0], [2.0]]}, [0.0, 1.0], responses=True).outputs
     assert outputs.shape == (2, 1, 2)
+    grid = dtm.sweep(DRONE, {"Kp": (1, 2, 3), "delay": (0.1, 0.3, 5), "gain": [0.9]}, 8.0)
+    assert grid.shape == (3, 5, 1)
+    assert (
+        grid["overshoot"][2, 1, 0]
+        == dtm.sweep(DRONE, {"Kp": 2.0, "delay": 0.1 + 0.05, "gain": 0.9}, 8.0)["overshoot"]
+    )
     nothing = dtm.sweep(DRONE, {"Kp": []}, 8.0)
     assert nothing["overshoot"].shape == (0,)
     with pytest.raises(ValueError, match="do not broadcast"):
-        dtm.sweep(DRONE, {"Kp": [1.0, 2.0], "delay": [0.1, 0.2, 0.3]}, 8.0)
+        dtm.sweep(DRONE, {"Kp": np.array([1.0, 2.0]), "delay": np.array([0.1, 0.2, 0.3])}, 8.0)
 
 
 def test_a_lag_of_none_among_others_makes_loops_of_another_order():
@@ -124,27 +130,27 @@ def test_a_lag_of_none_among_others_makes_loops_of_another_order():
 
 def test_what_grows_without_bound_says_so():
     free = DRONE.replace(limit=None)
-    found = dtm.sweep(free, {"Kp": [1.0, 30.0, 1e3]}, 20.0)
+    found = dtm.sweep(free, {"Kp": np.array([1.0, 30.0, 1e3])}, 20.0)
     assert found.status.tolist() == [
         dtm.loops.SweepStatus.OK,
         dtm.loops.SweepStatus.UNSETTLED,
         dtm.loops.SweepStatus.UNSETTLED,
     ]
-    found = dtm.sweep(free, {"Kp": [1.0, 30.0, 1e3]}, 400.0)
+    found = dtm.sweep(free, {"Kp": np.array([1.0, 30.0, 1e3])}, 400.0)
     assert found.status[2] == dtm.loops.SweepStatus.DIVERGED
     assert all(np.isnan(column[2]) for column in found.metrics.values())
     assert not any(np.isnan(column[0]) for column in found.metrics.values())
-    outputs = dtm.sweep(free, {"Kp": [1.0, 1e3]}, [0.0, 400.0], responses=True)
+    outputs = dtm.sweep(free, {"Kp": np.array([1.0, 1e3])}, [0.0, 400.0], responses=True)
     assert np.isnan(outputs.outputs[1]).all()
     assert outputs.status.tolist() == [0, dtm.loops.SweepStatus.DIVERGED]
     # The same beyond the lanes.
     lagging = free.replace(plant=dtm.Integrator(1.0, 0.1))
-    assert dtm.sweep(lagging, {"Kp": [1.0, 1e3]}, 400.0).status.tolist() == [0, 2]
+    assert dtm.sweep(lagging, {"Kp": np.array([1.0, 1e3])}, 400.0).status.tolist() == [0, 2]
 
 
 def test_endless_work_is_refused_for_its_set_alone():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
-    found = dtm.sweep(loop, {"delay": [0.3, 1e-8]}, 10.0)
+    found = dtm.sweep(loop, {"delay": np.array([0.3, 1e-8])}, 10.0)
     assert found.status.tolist() == [0, dtm.loops.SweepStatus.REFUSED]
     assert np.isnan(found["overshoot"][1])
 
@@ -189,7 +195,7 @@ def test_instruction_sets_agree_to_the_bit():
 @settings(max_examples=60, deadline=None)
 @given(loop=loops())
 def test_the_rest_of_many_loops_is_that_of_each(loop):
-    gains = LoopModel.build(loop.plant, loop.controller, loop.parameters).rest_gains
+    gains = loop.specification.model.rest_gains
     output, command = rest_of(loop.plant, loop.controller, loop.parameters)
     assume(gains is not None)
     np.testing.assert_allclose([output, command], gains, atol=1e-12)
@@ -216,7 +222,7 @@ def test_progress_counts_the_sets():
 
 
 def test_the_best_set_is_named():
-    found = dtm.sweep(DRONE, {"Kp": [0.5, 1.2, 2.9]}, 10.0)
+    found = dtm.sweep(DRONE, {"Kp": np.array([0.5, 1.2, 2.9])}, 10.0)
     assert found.best() == {"Kp": 1.2}
     assert found.best("peak") == {"Kp": 0.5}
     with pytest.raises(KeyError, match="holds rise_time"):
@@ -230,10 +236,10 @@ def test_the_best_set_is_named():
     ("values", "time", "words"),
     [
         ({"mass": [1.0]}, 5.0, "mass"),
-        ({"Kp": [1.0, np.nan]}, 5.0, "nan"),
-        ({"delay": [0.1, -0.2]}, 5.0, "delay=-0.2"),
-        ({"gain": [1.0, 0.0]}, 5.0, "gain=0"),
-        ({"Kp": [1.0, 0.0]}, 5.0, "loop is open"),
+        ({"Kp": np.array([1.0, np.nan])}, 5.0, "nan"),
+        ({"delay": np.array([0.1, -0.2])}, 5.0, "delay=-0.2"),
+        ({"gain": np.array([1.0, 0.0])}, 5.0, "gain=0"),
+        ({"Kp": np.array([1.0, 0.0])}, 5.0, "loop is open"),
         ({"Kp": [1.0]}, -5.0, "time=-5"),
         ({"Kp": [1.0]}, [0.0, 2.0, 1.0], "does not come after"),
     ],
@@ -253,7 +259,7 @@ def test_a_sweep_without_a_delay_is_refused():
 
 
 def test_the_page_of_the_manual_runs():
-    page = Path(__file__).resolve().parents[2] / "docs" / "sweeps-and-sensitivities.md"
+    page = Path(__file__).resolve().parents[2] / "docs" / "guide/sweeps-and-sensitivities.md"
     blocks = re.findall(r"```pycon\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 5
     examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "page", None, 0)
@@ -265,7 +271,7 @@ def test_the_page_of_the_manual_runs():
 
 def test_without_a_time_sets_are_measured_until_they_settle():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
-    found = dtm.sweep(loop, {"Kp": [0.1, 1.0, 3.0]})
+    found = dtm.sweep(loop, {"Kp": np.array([0.1, 1.0, 3.0])})
     # Kp = 0.1 takes 40 s to settle, ten delays are 3.6 s.
     assert found.time[-1] >= 40.0
     assert (found.status == dtm.loops.SweepStatus.OK).all()

@@ -384,7 +384,7 @@ def test_the_page_is_valid_and_fetches_nothing(found):
 
 
 def test_the_manual_shows_these_numbers(found):
-    shown = (ROOT / "docs" / "reproduction-numbers.md").read_text(encoding="utf-8")
+    shown = (ROOT / "docs" / "paper/reproduction-numbers.md").read_text(encoding="utf-8")
     assert found.summary() in shown
     for one in found.comparisons:
         row = f"| {one.quantity} | {one.printed} | {one.shown} | {one.told} |"

@@ -213,7 +213,7 @@ def test_results_do_not_change_and_survive_pickling():
 REFUSED = [
     (s + K * delay(1.0), {"Kp": (0, 1)}, None, "Kp: no such parameter"),
     (s + K * delay(T), {"K": (0, 1)}, None, "no value for T"),
-    (s + K * delay(T), {"K": (0, 1)}, {"K": 1.0, "T": 1.0}, "no value of its own"),
+    (s + K * delay(T), {"K": (0, 1)}, {"K": 1.0, "T": 1.0}, "has a range and the value"),
     (s + K * delay(1.0), {"K": (1, 1)}, None, "below its high end"),
     (s + K * delay(1.0), {}, None, "crossings are those of one"),
     (s + T * delay(T), {"T": (0, 1)}, None, "both a factor and a delay"),
@@ -240,7 +240,7 @@ def test_wrong_types_are_refused():
         dtm.crossings(3, {"K": (0, 1)})
     with pytest.raises(TypeError, match="give a dict"):
         dtm.crossings(s + K, ("K", 0, 1))
-    with pytest.raises(TypeError, match="as \\(low, high\\)"):
+    with pytest.raises(TypeError, match="give a range"):
         dtm.crossings(s + K, {"K": 1.0})
     sampled = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
     with pytest.raises(ValueError, match=r"sample_time=0\.065"):

@@ -56,7 +56,7 @@ def test_a_slanted_edge_is_searched_to_its_end():
     # It was once left at the height at which the last, upright piece ends.
     a, b = dtm.parameters("a b")
     family = s**3 + 2 * b * delay(0.25) + 0 * a
-    ranges = {"a": [0.0], "b": [-2.0, -1.0, 1.0]}
+    ranges = {"a": [0.0], "b": np.array([-2.0, -1.0, 1.0])}
     chart = dtm.stability_map(family, ranges, abscissa=False, damping=(0.4, 1.5))
     assert chart.unstable.tolist() == [[3, 1, 2]]
 
@@ -148,13 +148,15 @@ def test_the_limits_of_the_altitude_loop():
     family, _ = FAMILIES["velocity"]
     edge = math.pi / (2 * LAG)
     chart = dtm.stability_map(
-        family, {"Kp": [edge - 1e-9, edge + 1e-9], "Kv": [-1.1, 0.0, 1.1]}, abscissa=False
+        family,
+        {"Kp": np.array([edge - 1e-9, edge + 1e-9]), "Kv": np.array([-1.1, 0.0, 1.1])},
+        abscissa=False,
     )
     assert chart.unstable.tolist() == [[-1, 0, -1], [-1, 2, -1]]
     for time, limit in ((0.36, 4.0244), (0.10, 12.459)):
         loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.0), delay=time, sample_time=0.065)
         sampled = dtm.stability_map(
-            loop, {"Kp": [limit - 1e-3, limit + 1e-3], "gain": [1.0]}, abscissa=False
+            loop, {"Kp": np.array([limit - 1e-3, limit + 1e-3]), "gain": [1.0]}, abscissa=False
         )
         assert sampled.unstable.ravel().tolist() == [0, 2]
 

@@ -96,7 +96,9 @@ def test_velocity_map_beyond_the_chains():
 
 
 def test_root_at_zero_is_on_the_boundary():
-    chart = dtm.stability_map(VELOCITY, {"Kp": [0.0, 1.0], "Kv": (-0.9, 0.9)}, shape=(2, 21))
+    chart = dtm.stability_map(
+        VELOCITY, {"Kp": np.array([0.0, 1.0]), "Kv": (-0.9, 0.9)}, shape=(2, 21)
+    )
     assert (chart.status[0] == MapStatus.BOUNDARY).all()
     assert (chart.unstable[0] == -2).all()
     assert (np.abs(chart.abscissa[0]) < 1e-300).all()
@@ -107,7 +109,9 @@ def test_root_at_zero_is_on_the_boundary():
 def test_chains_lead_where_no_root_lies_right_of_them():
     # A difference equation: its roots are its chain.
     (a, b) = dtm.parameters("a b")
-    chart = dtm.stability_map(a + b * delay(0.5), {"a": [1.0, 2.0], "b": [0.5, 1.5]})
+    chart = dtm.stability_map(
+        a + b * delay(0.5), {"a": np.array([1.0, 2.0]), "b": np.array([0.5, 1.5])}
+    )
     expected = [[MapStatus.CHAIN, MapStatus.INFINITE], [MapStatus.CHAIN, MapStatus.CHAIN]]
     np.testing.assert_array_equal(chart.status, expected)
     by_hand = np.log([[0.5, 1.5], [0.25, 0.75]]) / 0.5
@@ -117,7 +121,9 @@ def test_chains_lead_where_no_root_lies_right_of_them():
 
 def test_kind_may_change_from_cell_to_cell():
     (a, b) = dtm.parameters("a b")
-    chart = dtm.stability_map(a * s + 1 + b * s * delay(0.5), {"a": [0.0, 1.0], "b": [0.0, 0.5]})
+    chart = dtm.stability_map(
+        a * s + 1 + b * s * delay(0.5), {"a": np.array([0.0, 1.0]), "b": np.array([0.0, 0.5])}
+    )
     # A constant has no root; 1 + s exp(-s/2)/2 is advanced; s + 1; neutral.
     assert chart.status.tolist() == [
         [MapStatus.OK, MapStatus.INFINITE],
@@ -130,7 +136,9 @@ def test_kind_may_change_from_cell_to_cell():
 
 def test_zero_function_and_overflow_are_undecided():
     (a, b) = dtm.parameters("a b")
-    chart = dtm.stability_map(a**2 * s + b, {"a": [0.0, 1e200], "b": [0.0, 1.0]})
+    chart = dtm.stability_map(
+        a**2 * s + b, {"a": np.array([0.0, 1e200]), "b": np.array([0.0, 1.0])}
+    )
     assert chart.status.tolist() == [
         [MapStatus.UNDECIDED, MapStatus.OK],
         [MapStatus.UNDECIDED, MapStatus.UNDECIDED],
@@ -173,7 +181,9 @@ def test_continuous_loop_is_its_characteristic_function():
 
 def test_continuous_loop_over_plant_and_delay():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.PI(Kp=1, Ki=0.1))
-    chart = dtm.stability_map(loop, {"delay": [0.0, 0.2, 0.4], "lag": [0.0, 0.3]}, abscissa=False)
+    chart = dtm.stability_map(
+        loop, {"delay": np.array([0.0, 0.2, 0.4]), "lag": np.array([0.0, 0.3])}, abscissa=False
+    )
     for (i, j), unstable in np.ndenumerate(chart.unstable):
         time, lag = chart.axes["delay"][i], chart.axes["lag"][j]
         h = loop.replace(delay=time, lag=lag).characteristic()
@@ -187,7 +197,7 @@ def test_continuous_loop_over_plant_and_delay():
 def test_hold_lowers_the_largest_gain(time, sample_time, limit):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1), delay=time, sample_time=sample_time)
     gains = limit * np.array([0.5, 0.9, 0.9998, 1.0005, 1.1])
-    chart = dtm.stability_map(loop, {"Kp": gains, "delay": [time, 1.5 * time]})
+    chart = dtm.stability_map(loop, {"Kp": gains, "delay": np.array([time, 1.5 * time])})
     assert chart.stable[:, 0].tolist() == [True, True, True, False, False]
     assert chart.unstable[:, 0].tolist() == [0, 0, 0, 2, 2]
     assert not chart.stable[2:, 1].any()
@@ -225,7 +235,7 @@ def test_sampled_cell_is_the_pointwise_call(plant, controller, ranges):
 
 def test_sampled_loop_with_a_pole_on_the_circle():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1), delay=0.1, sample_time=0.1)
-    chart = dtm.stability_map(loop, {"Kp": [0.0, 1.0], "gain": [1.0, 2.0]})
+    chart = dtm.stability_map(loop, {"Kp": np.array([0.0, 1.0]), "gain": np.array([1.0, 2.0])})
     assert (chart.status[0] == MapStatus.BOUNDARY).all()
     assert (chart.unstable[0] == -2).all()
     assert chart.stable[1].all()
@@ -264,7 +274,9 @@ def test_best_is_the_leftmost_abscissa():
 
 
 def test_arrays_are_read_only_and_survive_pickling():
-    chart = dtm.stability_map(VELOCITY, {"Kp": (0.1, 6), "Kv": [0.0, 0.1, 0.3]}, shape=(5, 9))
+    chart = dtm.stability_map(
+        VELOCITY, {"Kp": (0.1, 6), "Kv": np.array([0.0, 0.1, 0.3])}, shape=(5, 9)
+    )
     assert chart.names == ("Kp", "Kv")
     np.testing.assert_array_equal(chart.axes["Kp"], np.linspace(0.1, 6, 5))
     np.testing.assert_array_equal(chart.axes["Kv"], [0.0, 0.1, 0.3])
@@ -359,11 +371,11 @@ GOOD = {"Kp": (0.0, 6.0), "Kv": (-1.0, 1.0)}
         ({"Kp": (1, 0), "Kv": (0, 1)}, "low end"),
         ({"Kp": (0, np.inf), "Kv": (0, 1)}, "finite"),
         ({"Kp": (0, np.nan), "Kv": (0, 1)}, "finite"),
-        ({"Kp": (0, 1, 2), "Kv": (0, 1)}, "list or array"),
-        ({"Kp": [], "Kv": (0, 1)}, "numbers|not none"),
+        ({"Kp": (0, 1, 1), "Kv": (0, 1)}, "at least n=2"),
+        ({"Kp": [], "Kv": (0, 1)}, "one point or more"),
         ({"Kp": [[0.0, 1.0]], "Kv": (0, 1)}, "one dimension"),
-        ({"Kp": [0.0, np.nan], "Kv": (0, 1)}, "finite"),
-        ({"Kp": [0.0, 0.0], "Kv": (0, 1)}, "increase"),
+        ({"Kp": np.array([0.0, np.nan]), "Kv": (0, 1)}, "finite"),
+        ({"Kp": np.array([0.0, 0.0]), "Kv": (0, 1)}, "increase"),
         ({"Kp": np.arange(10_000), "Kv": np.arange(10_000)}, "smaller"),
     ],
 )

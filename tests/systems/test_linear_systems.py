@@ -468,7 +468,7 @@ def test_what_cannot_be_simulated_is_refused_with_the_reason(system, time, argum
 
 def test_the_page_on_simulation_runs():
     pytest.importorskip("matplotlib").use("Agg")
-    page = Path(__file__).parents[2] / "docs" / "simulating.md"
+    page = Path(__file__).parents[2] / "docs" / "guide/simulating.md"
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 4
     exec("\n".join(blocks), {})

@@ -1,5 +1,7 @@
 """Gains that stabilise: closed forms, gains one by one, and designs of plants that need care."""
 
+import math
+
 import deadtime as dtm
 import numpy as np
 import pytest
@@ -168,11 +170,46 @@ def test_random_plants_gain_by_gain(seed):
 # What is no loop
 
 
-@pytest.mark.parametrize("ask", [dtm.design, dtm.design_filter, lambda tf: dtm.sweep(tf, {"K": 1})])
-def test_a_transfer_function_is_no_loop_and_is_told_what_is(ask):
-    # They raised AttributeError.
+def test_a_transfer_function_is_no_loop_and_is_told_what_is():
+    # It raised AttributeError.
     with pytest.raises(TypeError, match=r"TransferFunction is no ControlLoop.*ControlLoop\(plant"):
-        ask(2.0 / dtm.s * dtm.delay(0.3))
+        dtm.sweep(2.0 / dtm.s * dtm.delay(0.3), {"K": 1})
+
+
+@pytest.mark.parametrize("ask", [dtm.design, dtm.design_filter])
+def test_what_is_neither_loop_nor_plant_is_told_what_is(ask):
+    with pytest.raises(TypeError, match="give a plant"):
+        ask("2/s")
+
+
+# Plants in the place of loops
+
+
+def test_a_plant_is_designed_for_as_the_loop_around_it():
+    G = 0.9 / (dtm.s * (0.1 * dtm.s + 1.0)) * dtm.delay(0.2)
+    loop = dtm.ControlLoop(dtm.Integrator(0.9, 0.1), P1, delay=0.3)
+    wanted = dtm.design(loop, fixed={"Kv": 0.1}, delay=(0.3, 0.4))
+    found = dtm.design(G, fixed={"Kv": 0.1}, delay=(0.1, 0.2))
+    assert found.delays == pytest.approx(wanted.delays)
+    assert found.gains["Kp"] == pytest.approx(wanted.gains["Kp"], rel=1e-6)
+    assert found.abscissa == pytest.approx(wanted.abscissa, rel=1e-6)
+    assert dtm.design(G, fixed={"Kv": 0.1}).delays == (0.2,)
+    with pytest.raises(ValueError, match="delay of the loop is not known"):
+        dtm.design(0.9 / dtm.s)
+
+
+def test_gains_for_a_plant_with_delays_inside_are_found_in_given_ranges():
+    """s + (0.5 + K) e^(-s): the best K makes the two rightmost roots meet, K + 0.5 = 1/e."""
+    G = 1.0 / (dtm.s + 0.5 * dtm.delay(1.0))
+    loop = dtm.ControlLoop(G, P1, delay=1.0)
+    with pytest.raises(ValueError, match="give ranges="):
+        dtm.design(loop, controller=dtm.P)
+    found = dtm.design(loop, controller=dtm.P, ranges={"Kp": (-0.4, 0.5)})
+    assert found.gains["Kp"] == pytest.approx(math.exp(-1) - 0.5, abs=1e-4)
+    assert found.abscissa == pytest.approx(-1.0, abs=1e-2)
+    assert found.proved == ("stable",)
+    with pytest.raises(ValueError, match="state space"):
+        dtm.design(loop, controller=dtm.P, ranges={"Kp": (-0.4, 0.5)}, objective="settling_time")
 
 
 @pytest.mark.parametrize(

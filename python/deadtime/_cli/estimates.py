@@ -41,6 +41,7 @@ def estimate_delays(
     command: opt.Command = None,
     sample_time: opt.Sample_time = None,
     limit: opt.Limit = None,
+    plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     window: opt.Window = None,
     method: Annotated[
@@ -73,7 +74,10 @@ def estimate_delays(
     given = {"map": map, "noise": noise, "initial_output": initial_output}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     method = _chosen(method, len(files), options)
-    loops = [opt.described_loop(one, gain=gain, sample_time=sample_time, limit=limit) for one in kp]
+    loops = [
+        opt.described_loop(one, gain=gain, sample_time=sample_time, limit=limit, plant=plant)
+        for one in kp
+    ]
     if len(loops) not in (1, len(files)):
         raise ValueError(
             f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(loops)} of --kp: give "

@@ -37,6 +37,7 @@ def map_gains(
     delay: opt.Delay,
     kp: Annotated[Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
     kv: Annotated[Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
+    plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     lag: opt.Lag = 0.0,
     sample_time: opt.Sample_time = None,
@@ -65,7 +66,7 @@ def map_gains(
     as_json: opt.As_json = False,
 ) -> None:
     """Map which gains of a PV controller are stable, with the boundary and the best of them."""
-    loop = opt.pv_loop(delay, gain, lag, sample_time, None, filter)
+    loop = opt.pv_loop(delay, gain, lag, sample_time, None, filter, plant)
     with counted("mapping", shape[0] * shape[1], quiet=as_json) as progress:
         chart = stability_map(
             loop,

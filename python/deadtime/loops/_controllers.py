@@ -23,12 +23,13 @@ from numpy.typing import NDArray
 from deadtime._base.validation import finite
 from deadtime.loops._batched_matrices import matrix, vector
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
+from deadtime.loops._given_plants import transfer_function_of
+from deadtime.loops._polynomials import Polynomial, multiplied, scaled, summed
 from deadtime.systems import TransferFunction
 
 __all__ = ["PD", "PI", "PID", "PV", "Controller", "DerivativeFilter", "P"]
 
 Vector = NDArray[np.float64]
-Polynomial = list[Any]
 
 
 class ControllerEquations(NamedTuple):
@@ -78,6 +79,9 @@ def _sampled(
 class Controller(ABC):
     """Base of all controllers: gains, and a filter where there is a derivative."""
 
+    # NumPy and packages built on it leave `G * controller` to this class.
+    __array_ufunc__ = None
+
     def __post_init__(self) -> None:
         for name in self._gains():
             object.__setattr__(self, name, finite(name, getattr(self, name)))
@@ -121,8 +125,20 @@ class Controller(ABC):
         >>> import deadtime as dtm
         >>> dtm.PI(Kp=2.0, Ki=0.5).transfer_function()
         (0.5 + 2 s) / s
+
+        A product with a plant is the loop gain:
+
+        >>> 0.9 / dtm.s * dtm.delay(0.36) * dtm.PV(Kp=2.0, Kv=0.3)
+        (1.8 + 0.27 s) exp(-0.36 s) / s
         """
         return TransferFunction(*self._feedback(self.parameters))
+
+    def __mul__(self, other: object) -> TransferFunction:
+        """Loop gain of this feedback and a plant, a transfer function or a system."""
+        G = transfer_function_of(other)
+        return NotImplemented if G is None else G * self.transfer_function()
+
+    __rmul__ = __mul__
 
     def _replace(self, numbers: Mapping[str, float]) -> Controller:
         """Return the same controller with other numbers."""
@@ -162,12 +178,12 @@ class Controller(ABC):
             omega, damping = values["omega"], values["damping"]
             rolled_off = [1.0, 2.0 * (damping * omega), omega * omega]
             slope = [omega * omega * d, 0.0]
-        num = _scaled(p, _product(integral, rolled_off))
+        num = scaled(p, multiplied(integral, rolled_off))
         if terms.differentiates:
-            num = _sum(num, _product(integral, slope))
+            num = summed(num, multiplied(integral, slope))
         if terms.integrates:
-            num = _sum(num, _scaled(i, rolled_off))
-        return num, _product(integral, rolled_off)
+            num = summed(num, scaled(i, rolled_off))
+        return num, multiplied(integral, rolled_off)
 
     def _equations(self, values: Mapping[str, Any]) -> ControllerEquations:
         """Equations of the states: integral of the error first, filter after it."""
@@ -430,22 +446,3 @@ class PID(Controller):
             differentiates=True,
             derivative_of_error=True,
         )
-
-
-def _product(p: Polynomial, q: Polynomial) -> Polynomial:
-    out: Polynomial = [0.0] * (len(p) + len(q) - 1)
-    for i, a in enumerate(p):
-        for j, b in enumerate(q):
-            out[i + j] = out[i + j] + a * b
-    return out
-
-
-def _sum(p: Polynomial, q: Polynomial) -> Polynomial:
-    if len(p) < len(q):
-        p, q = q, p
-    head = len(p) - len(q)
-    return p[:head] + [a + b for a, b in zip(p[head:], q, strict=True)]
-
-
-def _scaled(factor: Any, p: Polynomial) -> Polynomial:
-    return [factor * a for a in p]

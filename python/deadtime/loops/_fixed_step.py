@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import finite, positive
 from deadtime._deadtime import fixed_step_run
-from deadtime.loops._model import LoopRun, refuse_discretised, state_at_rest
+from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._model import LoopRun, refuse_discretised
 from deadtime.loops._plants import realise
-from deadtime.loops._run import reference_jumps, steady_state
+from deadtime.loops._run import reference_jumps
 from deadtime.systems import Response
-
-if TYPE_CHECKING:
-    from deadtime.loops._control_loop import ControlLoop
 
 __all__ = ["simulate_fixed_step"]
 
@@ -124,7 +121,8 @@ def simulate_fixed_step(
     if duration < 0.0:
         raise ValueError(f"end={duration} s lies before the start of the run at 0")
     refuse_discretised(loop.controller, loop.sample_time, "a run in fixed steps")
-    delay = loop._known_delay()
+    specification = loop.specification
+    delay = specification.known_delay
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
     if reference_time is None and np.ndim(reference):
@@ -136,8 +134,7 @@ def simulate_fixed_step(
     values = loop.parameters
     plant = realise(*loop.plant._polynomials(values))
     past = float(jumps.at(np.array([np.nextafter(0.0, -1.0)]))[0])
-    state, command = state_at_rest(loop.plant, loop.controller, values, initial, past)
-    run = LoopRun(state, command, before, jumps.values, jumps.times)
+    run = LoopRun(*specification.rest_at(initial, past), before, jumps.values, jumps.times)
     settings = FixedStepSettings(
         delay=delay,
         delay_path=loop.delay_path,
@@ -158,7 +155,7 @@ def simulate_fixed_step(
         inputs=found.inputs,
         breaks=jumps.times[moved & within],
         reference=jumps.at(times),
-        steady_state=steady_state(loop, float(jumps.values[-1])),
+        steady_state=specification.steady_state(float(jumps.values[-1])),
         _dense=_Lines(times, found.outputs),
     )
 

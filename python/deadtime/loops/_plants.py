@@ -1,6 +1,7 @@
 r"""Plants: what the delayed command acts on.
 
-Every plant is a proper rational transfer function b(s)/a(s) in floats. Its state space is the
+A plant is a proper rational transfer function b(s)/a(s) in floats (those with delays inside:
+`_given_plants`). Its state space is the
 observable canonical form: with a monic of degree n and D = b\ :sub:`0`,
 
     x_i' = -a_i x_1 + x_{i+1} + (b_i - a_i D) w,   y = x_1 + D w,
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.validation import finite, non_negative, non_zero, unmasked
 from deadtime.loops._batched_matrices import matrix, number, vector
+from deadtime.loops._polynomials import in_s
 from deadtime.systems import TransferFunction
 
 __all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
@@ -43,7 +45,12 @@ class StateSpace(NamedTuple):
 
 
 class Plant(ABC):
-    """A proper rational transfer function from the delayed command w to the output y."""
+    """A proper transfer function from the delayed command w to the output y."""
+
+    @property
+    def is_rational(self) -> bool:
+        """Whether it is a ratio of polynomials; else it has delays inside."""
+        return True
 
     @property
     @abstractmethod
@@ -57,6 +64,11 @@ class Plant(ABC):
     @abstractmethod
     def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
         """Numerator and denominator, descending, in numbers, arrays or symbols of `values`."""
+
+    def _fraction(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Numerator and denominator as quasi-polynomials, or families of them."""
+        num, den = self._polynomials(values)
+        return in_s(num), in_s(den)
 
     def polynomials(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Numerator and denominator of the transfer function.

@@ -8,21 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import finite, increasing, one_dimensional, real_array
 from deadtime._deadtime import on_samples
-from deadtime.loops._model import LoopRun, rest_of
+from deadtime.loops._model import LoopRun
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
+from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
 
-if TYPE_CHECKING:
-    from deadtime.loops._control_loop import ControlLoop
-
-__all__ = ["LEAST", "SHORTEST", "reference_jumps", "settled_step", "simulate_loop", "steady_state"]
+__all__ = ["LEAST", "SHORTEST", "reference_jumps", "settled_step", "simulate_loop"]
 
 Vector = NDArray[np.float64]
 
@@ -37,20 +35,16 @@ _LOST = 20.0
 
 
 class _Again:
-    """The output of one run at any times: the run is made again for them.
-
-    Holds the loop rather than its native form, which does not pickle.
-    """
+    """The output of one run at any times: the run is made again for them."""
 
     __slots__ = ("loop", "run", "start")
 
-    def __init__(self, loop: ControlLoop, start: float, run: LoopRun) -> None:
+    def __init__(self, loop: LoopSpecification, start: float, run: LoopRun) -> None:
         self.loop, self.start, self.run = loop, start, run
 
     def __call__(self, times: Vector) -> Vector:
-        native, ahead = self.loop._runner
         run = _since_start(self.loop, self.start, self.run)
-        return native.outputs(times - self.start + ahead, run)
+        return self.loop.native.outputs(times - self.start + self.loop.output_lead, run)
 
 
 class _Jumps(NamedTuple):
@@ -70,15 +64,15 @@ class _Jumps(NamedTuple):
 
 
 def simulate_loop(
-    loop: ControlLoop,
+    loop: LoopSpecification,
     time: ArrayLike,
     reference: ArrayLike,
     *,
-    initial_output: float,
-    reference_before: float | None,
-    reference_time: ArrayLike | None,
-    command_history: ArrayLike,
-    sample_phase: float,
+    initial_output: float = 0.0,
+    reference_before: float | None = None,
+    reference_time: ArrayLike | None = None,
+    command_history: ArrayLike = (),
+    sample_phase: float = 0.0,
     sensitivities: Sequence[str] = (),
 ) -> Response:
     """Check the arguments of `ControlLoop.simulate` and run it."""
@@ -100,14 +94,13 @@ def simulate_loop(
     if not isinstance(command_history, tuple) or command_history:
         history = one_dimensional("command_history", command_history)
     phase = finite("sample_phase", sample_phase)
-    native, ahead = loop._runner
-    run = LoopRun(*loop._at_rest(initial, past), before, held, held_from, history, phase)
+    run = LoopRun(*loop.rest_at(initial, past), before, held, held_from, history, phase)
     # The times are the caller's; what is kept must not change with them.
     kept = times.copy()
-    found = native.respond(kept, run, ahead)
+    found = loop.native.respond(kept, run, loop.output_lead)
     start = float(kept[0])
     again = _Again(loop, start, run)
-    response = Response._of_fresh(kept, found, steady_state(loop, last), again)
+    response = Response._of_fresh(kept, found, loop.steady_state(last), again)
     if not sensitivities:
         return response
     names = slope_names(loop, sensitivities)
@@ -121,48 +114,33 @@ def simulate_loop(
     return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
 
 
-def _since_start(loop: ControlLoop, start: float, run: LoopRun) -> LoopRun:
+def _since_start(loop: LoopSpecification, start: float, run: LoopRun) -> LoopRun:
     """The run in the clock of the stepper, which is zero at the start."""
     times = np.array([start]) if run.reference_time is None else run.reference_time
     since = _moved(loop, times - start, start, run.sample_phase)
     return run._replace(reference=np.atleast_1d(run.reference), reference_time=since)
 
 
-def _moved(loop: ControlLoop, since: Vector, start: float, phase: float) -> Vector:
+def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -> Vector:
     """Times since the start, moved onto the samples they miss by rounding only."""
     if loop.sample_time is None:
         return since
     return on_samples(since, start, loop.sample_time, phase)
 
 
-def settled_step(loop: ControlLoop, amplitude: float) -> Response:
+def settled_step(loop: LoopSpecification, amplitude: float) -> Response:
     """Step response up to where it has settled, found by doubling the time."""
-    delay = loop._known_delay()
-    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
+    delay = loop.known_delay
+    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop.model.A) if abs(pole) > 0.0]
     span = SHORTEST * max([delay + (loop.sample_time or 0.0), *slowest, LEAST])
     for _ in range(_DOUBLINGS):
-        response = loop.simulate(np.linspace(0.0, span, _POINTS), amplitude)
+        response = simulate_loop(loop, np.linspace(0.0, span, _POINTS), amplitude)
         goal = response.outputs[-1] if response.steady_state is None else response.steady_state
         away = np.abs(response.outputs - goal)
         if away[-_POINTS // 4 :].max() <= _SETTLED * abs(goal) or away.max() > _LOST * abs(goal):
             break
         span *= 2.0
     return response
-
-
-def steady_state(loop: ControlLoop, reference: float) -> float | None:
-    """Output that a constant reference leads to, None where there is none or the limit is in it."""
-    if loop._model.update is None:
-        output, command = rest_of(loop.plant, loop.controller, loop.parameters)
-        gains = None if np.isnan(output) else (float(output), float(command))
-    else:
-        gains = loop._model.rest_gains
-    if gains is None:
-        return None
-    output, command = gains
-    if loop.limit is not None and abs(command * reference) > loop.limit:
-        return None
-    return output * reference
 
 
 def reference_jumps(

@@ -9,16 +9,14 @@ Squire & Trapp 1998).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._deadtime import loop_sensitivities
-from deadtime.loops._model import LoopModel, LoopRun, refuse_discretised, state_at_rest
-
-if TYPE_CHECKING:
-    from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._model import LoopRun, refuse_discretised, state_at_rest
+from deadtime.loops._specification import LoopSpecification
 
 __all__ = ["output_and_input_slopes", "slope_names"]
 
@@ -31,18 +29,18 @@ _STEP = 1e-30
 class LoopSlopes(NamedTuple):
     """A loop as the stepper takes it, and derivatives by parameters, a row a parameter.
 
-    They are derivatives of the row, of the state and the command before the start, and of the time
-    by which the output runs ahead of the clock of the stepper.
+    They are derivatives of the row, of the state and the command before the start, and of how much
+    earlier than its measurement the output is.
     """
 
     row: Vector
     row_slopes: Vector
     state_slopes: Vector
     command_slopes: Vector
-    ahead_slopes: Vector
+    output_lead_slopes: Vector
 
 
-def slope_names(loop: ControlLoop, names: Sequence[str]) -> tuple[str, ...]:
+def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...]:
     """Check the names of the numbers with respect to which slopes are asked for."""
     if isinstance(names, str):
         raise TypeError(f"sensitivities={names!r}: give a sequence of names, such as ({names!r},)")
@@ -59,7 +57,7 @@ def slope_names(loop: ControlLoop, names: Sequence[str]) -> tuple[str, ...]:
                 "respect to the lag; give the plant a small lag, or take the slope with respect "
                 "to the delay, which acts like it"
             )
-        if name == "delay" and known[name] == 0.0 and not loop.is_sampled:
+        if name == "delay" and known[name] == 0.0 and loop.sample_time is None:
             raise ValueError(
                 "sensitivities: at delay=0 a continuous loop has no slope with respect to the "
                 "delay that could be computed without one; give it a small delay"
@@ -68,7 +66,7 @@ def slope_names(loop: ControlLoop, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def output_and_input_slopes(
-    loop: ControlLoop,
+    loop: LoopSpecification,
     names: Sequence[str],
     initial: tuple[float, float],
     since: Vector,
@@ -83,7 +81,7 @@ def output_and_input_slopes(
     values: dict[str, Any] = dict(loop.parameters)
     # In units of their own size, all slopes are comparable with the values.
     units = {name: abs(values[name]) or 1.0 for name in names}
-    rows, states, commands, aheads = [], [], [], []
+    rows, states, commands, leads = [], [], [], []
     for name in names:
         stepped = values | {name: complex(values[name], _STEP * units[name])}
         rows.append(_row(loop, stepped).imag / _STEP)
@@ -91,22 +89,21 @@ def output_and_input_slopes(
         states.append(np.imag(begin) / _STEP)
         commands.append(np.imag(held) / _STEP)
         moves = name == "delay" and loop.delay_path == "measurement"
-        aheads.append(units[name] if moves else 0.0)
-    ahead = values["delay"] if loop.delay_path == "measurement" else 0.0
+        leads.append(units[name] if moves else 0.0)
     slopes = LoopSlopes(
         row=_row(loop, values),
         row_slopes=np.array(rows),
         state_slopes=np.array(states),
         command_slopes=np.array(commands),
-        ahead_slopes=np.array(aheads),
+        output_lead_slopes=np.array(leads),
     )
-    found = loop_sensitivities(slopes, run, since + ahead, since)
+    found = loop_sensitivities(slopes, run, since + loop.output_lead, since)
     return (
         {name: row / units[name] for name, row in zip(names, found.outputs, strict=True)},
         {name: row / units[name] for name, row in zip(names, found.inputs, strict=True)},
     )
 
 
-def _row(loop: ControlLoop, values: dict[str, Any]) -> NDArray[Any]:
-    model = LoopModel.build(loop.plant, loop.controller, values)
+def _row(loop: LoopSpecification, values: dict[str, Any]) -> NDArray[Any]:
+    model = loop.model_at(values)
     return model.row(values["delay"], values.get("sample_time"), values.get("limit"))

@@ -38,7 +38,9 @@ def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None
     found = np.full(count, np.nan)
     for i in range(count):
         try:
-            found[i] = loop._abscissa({name: column[i] for name, column in columns.items()})
+            found[i] = loop.specification.abscissa_at(
+                {name: column[i] for name, column in columns.items()}
+            )
         except (DeadtimeError, ValueError):
             continue
     return found

@@ -1,13 +1,12 @@
-"""Characteristic function, poles and stable ranges of a control loop, its limit left out.
+"""Poles of a sampled loop, and stable ranges of the numbers of any loop, limit left out.
 
-A continuous loop with plant b/a and feedback f/g has the characteristic function
-a g + b f e^(-s Td); a sampled one the eigenvalues z of its transition matrix, poles s = ln(z)/Ts.
+A sampled loop has the poles s = ln(z)/Ts, z the eigenvalues of its transition matrix.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.linalg import eig, matrix_balance
 
 from deadtime import _deadtime
 from deadtime._deadtime import sampled_abscissa_grid
+from deadtime.loops._characteristic import characteristic
 from deadtime.loops._continuous_ranges import (
     range_of_corner,
     range_of_damping,
@@ -26,15 +26,11 @@ from deadtime.loops._controllers import Controller
 from deadtime.loops._model import LoopModel, refuse_discretised
 from deadtime.loops._plants import Plant
 from deadtime.loops._sampled_ranges import SampledNumber, further_delay
-from deadtime.roots import Parameter, QuasiPolynomial, RootSet, delay, s
+from deadtime.roots import Parameter, QuasiPolynomial, RootSet
 from deadtime.roots._crossovers import end_of_gain
-from deadtime.systems import TransferFunction
 
 __all__ = [
-    "characteristic",
-    "closed_loop",
     "continuous_range",
-    "open_loop",
     "sampled_abscissa",
     "sampled_grid",
     "sampled_is_stable",
@@ -52,43 +48,6 @@ _OF_FILTER = frozenset({"omega", "damping"})
 # stable for ever, as parts of the value.
 _NEARLY_ZERO = 1e-6
 _FARTHEST = 1e6
-
-
-def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
-    """Build a g + b f e^(-s delay) from numbers or symbols in `values`."""
-    b, a = plant._polynomials(values)
-    f, g = controller._feedback(values)
-    return _in_s(a) * _in_s(g) + _in_s(b) * _in_s(f) * delay(values["delay"])
-
-
-def open_loop(
-    plant: Plant, controller: Controller, values: Mapping[str, float]
-) -> TransferFunction:
-    """Build b f e^(-s delay) / (a g)."""
-    b, a = plant._polynomials(values)
-    f, g = controller._feedback(values)
-    return TransferFunction(_in_s(b) * _in_s(f) * delay(values["delay"]), _in_s(a) * _in_s(g))
-
-
-def closed_loop(
-    plant: Plant, controller: Controller, values: Mapping[str, float], late: bool
-) -> TransferFunction:
-    """Build b r [e^(-s delay)] / (a g + b f e^(-s delay)) with the controller's R = r/g."""
-    b, _ = plant._polynomials(values)
-    r, _ = controller._reference(values)
-    num = _in_s(b) * _in_s(r)
-    if late:
-        num = num * delay(values["delay"])
-    return TransferFunction(num, characteristic(plant, controller, values))
-
-
-def _in_s(coefficients: Sequence[Any]) -> Any:
-    """Polynomial in s from descending coefficients, numbers or symbols."""
-    total: Any = 0.0 * s
-    for power, c in enumerate(reversed(coefficients)):
-        if not (isinstance(c, float) and c == 0.0):
-            total = total + c * s**power
-    return total
 
 
 def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> float:

@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.ranges import given_points, is_range
 from deadtime._base.validation import finite, increasing, positive, real_array, thread_number
 from deadtime._deadtime import sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._model import LoopModel, refuse_discretised, rest_of
+from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._run import LEAST, SHORTEST
 from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
 
@@ -92,9 +93,10 @@ class Sweep(ReadOnlyArrays):
 
     Examples
     --------
+    >>> import numpy as np
     >>> import deadtime as dtm
     >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36, sample_time=0.065)
-    >>> found = dtm.sweep(loop, {"Kp": [1.0, 2.0, 9.0]}, 20.0)
+    >>> found = dtm.sweep(loop, {"Kp": np.array([1.0, 2.0, 9.0])}, 20.0)
     >>> found
     <Sweep: 3 sets over Kp, 1 unsettled>
     >>> found["overshoot"][:2].round(2)
@@ -176,11 +178,11 @@ def sweep(
     ----------
     loop : ControlLoop
         What all sets have in common.
-    values : mapping of str to array_like
-        Arrays of numbers that vary, by their names in `ControlLoop.parameters`, or ``delay``,
-        ``sample_time`` and ``limit``. They broadcast against one another: arrays of one length
-        are sets of numbers, and arrays from `numpy.ix_` or `numpy.meshgrid` make a grid. Results
-        have their common shape.
+    values : mapping of str to (low, high, n) or array_like
+        Numbers that vary, by their names in `ControlLoop.parameters`, or ``delay``,
+        ``sample_time`` and ``limit``. Each range ``(low, high, n)`` of n points is an axis of the
+        results, in the order given; two of them make a grid. Arrays broadcast against one another
+        behind these axes: arrays of one length are sets of numbers.
     time : float or array_like, shape (n,)
         For metrics, the time in s up to which responses are measured, from zero; of an array, the
         first and the last time. By default ten times the longest delay or time constant, and for
@@ -232,8 +234,8 @@ def sweep(
     >>> import numpy as np
     >>> import deadtime as dtm
     >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=0.065, limit=1.0)
-    >>> gains, delays = np.ix_(np.linspace(0.5, 2.5, 5), [0.1, 0.2, 0.36])
-    >>> found = dtm.sweep(loop, {"Kp": gains, "delay": delays}, 15.0)
+    >>> delays = np.array([0.1, 0.2, 0.36])
+    >>> found = dtm.sweep(loop, {"Kp": (0.5, 2.5, 5), "delay": delays}, 15.0)
     >>> found["settling_time"].round(2)
     array([[7.39, 7.07, 6.5 ],
            [3.46, 3.09, 2.2 ],
@@ -302,7 +304,7 @@ class _Sets:
         loop, done = self.loop, 0
         for place, part in _blocks(loop, flat, math.prod(self.shape)):
             numbers: dict[str, Any] = loop.parameters | part
-            model = LoopModel.build(loop.plant, loop.controller, numbers)
+            model = loop.specification.model_at(numbers)
             row = model.row(*(numbers.get(name) for name in ("delay", "sample_time", "limit")))
             rows = np.ascontiguousarray(np.broadcast_to(row, (len(place), row.shape[-1])))
             ahead = loop.delay_path == "measurement"
@@ -360,7 +362,11 @@ class _Sets:
         loop = self.loop
         numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
         waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
-        slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop._model.A) if abs(pole) > 0.0]
+        slowest = [
+            1.0 / abs(pole)
+            for pole in np.linalg.eigvals(loop.specification.model.A)
+            if abs(pole) > 0.0
+        ]
         span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
         found = self.measured(np.array([0.0, span]), progress)
         metrics = {name: figures.flatten() for name, figures in found.metrics.items()}
@@ -436,8 +442,12 @@ def require_loop(loop: object) -> None:
 
 def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int, ...]]:
     if not isinstance(values, Mapping) or not values:
-        raise TypeError(f"values={values!r}: give a dict such as {{'Kp': [1.0, 2.0]}}")
-    arrays = {name: np.array(real_array(name, given)) for name, given in values.items()}
+        raise TypeError(f"values={values!r}: give a dict such as {{'Kp': (0.5, 2.5, 5)}}")
+    arrays = {name: given_points(name, given) for name, given in values.items()}
+    ranges = [name for name, given in values.items() if is_range(given)]
+    behind = max((array.ndim for name, array in arrays.items() if name not in ranges), default=0)
+    for place, name in enumerate(ranges):
+        arrays[name] = arrays[name].reshape(-1, *[1] * (len(ranges) - place - 1 + behind))
     for name, array in arrays.items():
         if not np.isfinite(array).all():
             raise ValueError(f"{name} holds {array[~np.isfinite(array)][0]}: give finite numbers")
@@ -460,7 +470,7 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
         if flat.size and name not in gains:
             for place in {int(flat.argmin()), int(flat.argmax()), int(np.abs(flat).argmin())}:
                 loop = loop.replace(**{name: float(flat[place])})
-    loop._known_delay()
+    _ = loop.specification.known_delay
     sizes = [np.abs(arrays.get(name, gain)) for name, gain in gains.items()]
     if np.any(sum(sizes) == 0.0):
         raise ValueError(

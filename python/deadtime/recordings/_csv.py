@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from deadtime._base.errors import RecordingError
+from deadtime._base.ranges import OpenRange, open_interval
 from deadtime.recordings._recording import Recording
 
 __all__ = ["read_recording"]
@@ -25,7 +26,7 @@ def read_recording(
     reference: str = "reference",
     output: str = "output",
     command: str | None = None,
-    window: tuple[float | None, float | None] | None = None,
+    window: OpenRange | None = None,
     delimiter: str | None = None,
 ) -> Recording:
     r"""Read a recording from a CSV file with a header line.
@@ -109,11 +110,11 @@ def read_recording(
     return recording
 
 
-def _ends(window: tuple[float | None, float | None] | None) -> tuple[float, float]:
+def _ends(window: OpenRange | None) -> tuple[float, float]:
     """Ends of the window, open where None, with room for a last printed digit."""
-    low, high = (None, None) if window is None else window
-    start = -math.inf if low is None else low - 1e-9 * max(1.0, abs(low))
-    stop = math.inf if high is None else high + 1e-9 * max(1.0, abs(high))
+    low, high = open_interval("window", window)
+    start = low if math.isinf(low) else low - 1e-9 * max(1.0, abs(low))
+    stop = high if math.isinf(high) else high + 1e-9 * max(1.0, abs(high))
     return start, stop
 
 

@@ -15,7 +15,7 @@ from deadtime.roots._parametric import Parameter, ParametricQuasiPolynomial, par
 from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, s
 from deadtime.roots._root_set import RootSet
 from deadtime.roots._scalar_delay import dde_roots, rightmost_branches
-from deadtime.roots._sensitivity import Sensitivity
+from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots.certificate._certificate import Certificate
 
 __all__ = [
@@ -26,8 +26,8 @@ __all__ = [
     "Parameter",
     "ParametricQuasiPolynomial",
     "QuasiPolynomial",
+    "RootSensitivity",
     "RootSet",
-    "Sensitivity",
     "crossings",
     "dde_roots",
     "delay",

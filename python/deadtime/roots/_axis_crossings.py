@@ -18,9 +18,8 @@ values themselves carry rounding only.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +27,11 @@ from numpy.typing import NDArray
 from deadtime.roots._crossovers import gain_crossovers
 from deadtime.roots._frequency import DifferenceOfSquares, OnAxis
 from deadtime.roots._multiples import crossings_of_multiples
-from deadtime.roots._parametric import Parameter, ParametricQuasiPolynomial
+from deadtime.roots._parametric import ParametricQuasiPolynomial
 from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, s
 
 __all__ = [
     "Places",
-    "alone",
     "chain_free",
     "is_factor",
     "leading",
@@ -65,22 +63,6 @@ _ROOM = 1e-12
 #: Crossings are not listed within this part of the range of where chains reach the axis: the
 #: frequencies at which they may lie grow without bound there.
 _NEAR_CHAINS = 1e-3
-
-
-def alone(
-    family: ParametricQuasiPolynomial, name: str, values: Mapping[str, float]
-) -> ParametricQuasiPolynomial:
-    """The equation in which `name` alone has no value."""
-    own = Parameter(name)
-    total: Any = 0.0 * own
-    for (powers, power, (constant, slopes)), number in family._terms.items():
-        exponents, rates = dict(powers), dict(slopes)
-        coefficient = math.prod((values[q] ** exponents.get(q, 0) for q in values), start=number)
-        time = constant + sum(values[q] * rates.get(q, 0.0) for q in values)
-        late = delay(own * rates[name] + time) if name in rates else delay(time)
-        total = total + coefficient * own ** exponents.get(name, 0) * s**power * late
-    found: ParametricQuasiPolynomial = total
-    return found
 
 
 def of_gain(

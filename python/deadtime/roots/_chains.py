@@ -130,8 +130,8 @@ class Chain(ReadOnlyArrays):
         Returns
         -------
         complex or ndarray of complex, shape of `n`
-            In 1/s. Their error falls with n, as 1/|s| or a power of it: a small power, hence late,
-            where the bends of two chains are almost the same.
+            In 1/s. Their error falls with n, as ``1/abs(s)`` or a power of it: a small power, hence
+            late, where the bends of two chains are almost the same.
 
         Examples
         --------

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime import _deadtime
+from deadtime._base.ranges import OpenRange, open_interval
 from deadtime.roots._chains import Chain, chains_of
-from deadtime.roots._root_set import Range, RootSet, ends, root_set
-from deadtime.roots._sensitivity import Sensitivity
+from deadtime.roots._root_set import RootSet, root_set
+from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots.certificate._certificate import Certificate
 from deadtime.roots.certificate._proof import proved
 
@@ -32,7 +33,7 @@ class Characteristic:
     _delays: NDArray[np.float64]
 
     def count(
-        self, re: Range | None = None, im: Range | None = None, *, edge: Edge = "error"
+        self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: Edge = "error"
     ) -> int:
         """Count the roots in a region, with multiplicity, and prove the number.
 
@@ -75,9 +76,9 @@ class Characteristic:
         >>> (s**2 + 4).count(re=(0, 1), im=(0, 3), edge="inside")
         1
         """
-        return self._native.count(ends("re", re), ends("im", im), edge)
+        return self._native.count(open_interval("re", re), open_interval("im", im), edge)
 
-    def certify(self, re: Range | None = None, im: Range | None = None) -> Certificate:
+    def certify(self, re: OpenRange | None = None, im: OpenRange | None = None) -> Certificate:
         """Count the roots in a region and write the proof down.
 
         Parameters
@@ -103,11 +104,11 @@ class Characteristic:
         >>> proof.count, proof.verify()
         (16, 16)
         """
-        proof = self._native.certify(ends("re", re), ends("im", im))
+        proof = self._native.certify(open_interval("re", re), open_interval("im", im))
         return proved(self._coefficients.tolist(), self._delays.tolist(), proof)
 
     def roots(
-        self, re: Range | None = None, im: Range | None = None, *, edge: Edge = "error"
+        self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: Edge = "error"
     ) -> RootSet:
         """Locate every root in a region, each with a disc proved to hold it.
 
@@ -142,7 +143,7 @@ class Characteristic:
         >>> ((s + delay(1.0)) ** 2).roots(re=(-1, 1), im=(0, 5)).multiplicities
         array([2])
         """
-        return root_set(self._native.roots(ends("re", re), ends("im", im), edge))
+        return root_set(self._native.roots(open_interval("re", re), open_interval("im", im), edge))
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost roots and prove that nothing else lies that far right.
@@ -338,7 +339,7 @@ class Characteristic:
         """
         return self._native.is_stable(bool(strong))
 
-    def sensitivity(self, root: complex) -> Sensitivity:
+    def root_sensitivity(self, root: complex) -> RootSensitivity:
         r"""Derivatives of a simple root by every coefficient and every delay.
 
         Parameters
@@ -348,7 +349,7 @@ class Characteristic:
 
         Returns
         -------
-        Sensitivity
+        RootSensitivity
             ``coefficients``, shape (m, d+1), and ``delays``, shape (m,), arranged as those of the
             quasi-polynomial.
 
@@ -367,7 +368,7 @@ class Characteristic:
         --------
         >>> from deadtime import delay, s
         >>> h = s + 4.0 * delay(0.36)
-        >>> move = h.sensitivity(h.rightmost()[0])
+        >>> move = h.root_sensitivity(h.rightmost()[0])
         >>> bool(move.coefficients[1, 0].real > 0), bool(move.delays[1].real > 0)
         (True, True)
         """
@@ -379,4 +380,4 @@ class Characteristic:
         coefficients = found.coefficients.reshape(rows, width)
         # h depends on a delay through its row alone, d/dtau of which is -s times the row.
         delays = -found.root * (coefficients * self._coefficients).sum(axis=1)
-        return Sensitivity(found.root, coefficients, delays)
+        return RootSensitivity(found.root, coefficients, delays)

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays, read_only
-from deadtime._base.validation import finite
+from deadtime._base.ranges import Range, interval, numbers_at
 from deadtime.roots._axis_crossings import (
-    alone,
     is_factor,
     leading,
     of_delay,
@@ -26,6 +25,7 @@ from deadtime.roots._axis_crossings import (
 )
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.roots._parametric import ParametricQuasiPolynomial
+from deadtime.roots._quasipolynomial import QuasiPolynomial
 
 __all__ = ["Crossings", "crossings", "delay_margin", "margin_of_family"]
 
@@ -116,7 +116,8 @@ class Crossings(ReadOnlyArrays):
         if not low < middle < high:
             return -2
         try:
-            return self.family.at(**{self.parameter: middle}).count(re=(0.0, None))
+            member: QuasiPolynomial = self.family.at(**{self.parameter: middle})
+            return member.count(re=(0.0, None))
         except DeadtimeError:
             return -2
 
@@ -141,7 +142,7 @@ class Crossings(ReadOnlyArrays):
 
 def crossings(
     family: HasFamily,
-    ranges: Mapping[str, tuple[float, float]],
+    ranges: Mapping[str, Range],
     *,
     at: Mapping[str, SupportsFloat] | None = None,
 ) -> Crossings:
@@ -199,8 +200,8 @@ def crossings(
     >>> found.values.round(4), found.direction
     (array([1.405 , 3.6276, 4.2149]), array([ 2, -2,  2], dtype=int32))
     """
-    (name, ends), fixed = _one_range(ranges), dict(at or {})
-    equation = _alone(family, name, fixed)
+    name, ends = _one_range(ranges)
+    equation = family_of(family, (name,), at)
     equation.at(**{name: ends[0]}), equation.at(**{name: ends[1]})
     unlisted: tuple[tuple[float, float], ...] = ()
     if is_factor(equation, name):
@@ -261,7 +262,7 @@ def delay_margin(
     0.4254
     """
     if isinstance(loop, ParametricQuasiPolynomial):
-        return margin_of_family(loop, dict(at or {}))
+        return margin_of_family(loop, numbers_at(at))
     if at is not None:
         raise TypeError("at= gives the parameters of an equation; a loop has its numbers already")
     found = getattr(loop, "_delay_margin", None)
@@ -274,9 +275,10 @@ def delay_margin(
     return margin
 
 
-def margin_of_family(family: ParametricQuasiPolynomial, at: dict[str, SupportsFloat]) -> float:
+def margin_of_family(family: ParametricQuasiPolynomial, at: Mapping[str, float]) -> float:
     """Growth of the one delay of an equation until its members lose stability, s."""
-    member = family.at(**at)
+    family._family_of(at)
+    member: QuasiPolynomial = family.at(**at)
     delays = {name for _, _, (_, slopes) in family._terms for name, _ in slopes}
     if len(delays) != 1:
         raise ValueError(
@@ -284,8 +286,9 @@ def margin_of_family(family: ParametricQuasiPolynomial, at: dict[str, SupportsFl
             "one of them, and put numbers in place of the others where the equation is written"
         )
     (name,) = delays
-    start = finite(name, at.pop(name))
-    rows = rows_of(_alone(family, name, at), name)
+    start = at[name]
+    others = {other: value for other, value in at.items() if other != name}
+    rows = rows_of(family_of(family, (name,), others), name)
     if any(slope < 0.0 for _, slope in rows):
         raise ValueError(f"a delay of {family!r} falls as {name} grows: it has no delay margin")
     if not member.is_stable():
@@ -302,7 +305,7 @@ def margin_of_family(family: ParametricQuasiPolynomial, at: dict[str, SupportsFl
     return float(later.min()) - start
 
 
-def _one_range(ranges: Any) -> tuple[str, tuple[float, float]]:
+def _one_range(ranges: Any) -> tuple[str, Range]:
     if not isinstance(ranges, Mapping):
         raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6)}}")
     if len(ranges) != 1:
@@ -311,23 +314,4 @@ def _one_range(ranges: Any) -> tuple[str, tuple[float, float]]:
             "those of one; for two there is stability_map and its boundaries"
         )
     ((name, given),) = ranges.items()
-    try:
-        low, high = given
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"{name}={given!r}: give its range as (low, high)") from error
-    low, high = finite(name, low), finite(name, high)
-    if low >= high:
-        raise ValueError(f"{name}={given!r}: the low end of a range is below its high end")
-    return name, (low, high)
-
-
-def _alone(
-    family: HasFamily,
-    name: str,
-    at: Mapping[str, SupportsFloat],
-) -> ParametricQuasiPolynomial:
-    """The equation in which `name` alone has no value."""
-    values = {other: finite(other, value) for other, value in at.items()}
-    if name in values:
-        raise ValueError(f"{name}={values[name]}: what varies has no value of its own")
-    return alone(family_of(family, (name, *values)), name, values)
+    return name, interval(name, given)

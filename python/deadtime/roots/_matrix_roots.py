@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime import _deadtime
-from deadtime.roots._root_set import Range, RootSet, ends, root_set
+from deadtime._base.ranges import OpenRange, open_interval
+from deadtime.roots._root_set import RootSet, root_set
 
 __all__ = ["MatrixDeterminant"]
 
@@ -38,13 +39,13 @@ class MatrixDeterminant:
         """Whether the inverse of E can be verified."""
         return self._native.is_invertible()
 
-    def count(self, re: Range | None = None, im: Range | None = None) -> int:
+    def count(self, re: OpenRange | None = None, im: OpenRange | None = None) -> int:
         """Count the roots in a region, with multiplicity, and prove the number."""
-        return self._native.count(ends("re", re), ends("im", im))
+        return self._native.count(open_interval("re", re), open_interval("im", im))
 
-    def roots(self, re: Range | None = None, im: Range | None = None) -> RootSet:
+    def roots(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
         """Locate every root in a region, each in a disc proved to hold it."""
-        return root_set(self._native.roots(ends("re", re), ends("im", im)))
+        return root_set(self._native.roots(open_interval("re", re), open_interval("im", im)))
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost roots, right of the chains of a neutral system."""

@@ -14,18 +14,22 @@ from __future__ import annotations
 import keyword
 import math
 import numbers
+import sys
 from collections.abc import Collection, Mapping
 from functools import cached_property
-from typing import NamedTuple, SupportsFloat, TypeAlias, cast
+from typing import Any, NamedTuple, SupportsFloat, TypeAlias, cast
 
+from deadtime._base.ranges import numbers_at
 from deadtime._base.validation import finite
 from deadtime._deadtime import Family
 from deadtime.roots._quasipolynomial import QuasiPolynomial, is_number
 
 __all__ = ["Parameter", "ParametricQuasiPolynomial", "parameters"]
 
-#: Most terms of a product.
+#: Most terms of a product: bounds memory and time.
 _MAX_TERMS = 100_000
+
+_EPS = sys.float_info.epsilon
 
 #: Name and power of each parameter, by name.
 _Powers: TypeAlias = tuple[tuple[str, int], ...]
@@ -112,69 +116,91 @@ class ParametricQuasiPolynomial:
         """Names of the parameters, in the order of their first appearance."""
         return self._names
 
-    def at(self, /, **values: SupportsFloat) -> QuasiPolynomial:
-        """Put numbers in.
+    def at(self, /, **values: SupportsFloat) -> Any:
+        """Give some parameters a value, or all of them.
 
         Parameters
         ----------
         **values : float
-            One for each of `names`.
+            For any of `names`.
 
         Returns
         -------
-        QuasiPolynomial
+        ParametricQuasiPolynomial or QuasiPolynomial
+            The former as long as a parameter has no value.
 
         Raises
         ------
         TypeError
             If a value is not a number.
         ValueError
-            If a name is missing or unknown, a value is not finite or a delay is negative there.
+            If a name is unknown, a value is not finite or a delay is negative there.
 
         Examples
         --------
         >>> import deadtime as dtm
         >>> Kp, T = dtm.parameters("Kp T")
-        >>> (dtm.s + Kp * dtm.delay(T)).at(Kp=2.0, T=0.36).kind
+        >>> h = dtm.s + Kp * dtm.delay(T)
+        >>> h.at(T=0.36)
+        s + Kp exp(-0.36 s)
+        >>> h.at(Kp=2.0, T=0.36).kind
         'retarded'
         """
-        unknown = [name for name in values if name not in self._names]
-        missing = [name for name in self._names if name not in values]
+        self._refuse_unknown(values)
+        if len(values) < len(self._names):
+            return self._with({name: finite(name, value) for name, value in values.items()})
+        point = [finite(name, values[name]) for name in self._names]
+        return QuasiPolynomial._wrap(self._family.at(point))
+
+    def _with(self, values: Mapping[str, float]) -> ParametricQuasiPolynomial:
+        """Return the family of the parameters that are not in `values`."""
+        found: _Terms = {}
+        for (powers, power, (constant, slopes)), number in self._terms.items():
+            exponents, rates = dict(powers), dict(slopes)
+            factor = math.prod((values[q] ** exponents.get(q, 0) for q in values), start=number)
+            shifts = [values[q] * rates.get(q, 0.0) for q in values]
+            time = constant + sum(shifts)
+            kept = tuple(pair for pair in slopes if pair[0] not in values)
+            if time < 0.0 and not kept:
+                size = abs(constant) + sum(map(abs, shifts))
+                if time < -_EPS * (len(shifts) + 1) * size:
+                    place = ", ".join(f"{name}={value}" for name, value in values.items())
+                    raise ValueError(f"a delay is {time} s at {place}: delays must not be negative")
+                time = 0.0  # negative by rounding only
+            key = (tuple(pair for pair in powers if pair[0] not in values), power, (time, kept))
+            found[key] = found.get(key, 0.0) + factor
+        return self._of(tuple(name for name in self._names if name not in values), found)
+
+    def _refuse_unknown(self, names: Collection[str]) -> None:
+        unknown = [name for name in names if name not in self._names]
         if unknown:
             raise ValueError(
                 f"{', '.join(unknown)}: no such parameter, there "
                 + (f"is {', '.join(self._names)}" if self._names else "is none")
             )
-        if missing:
-            raise ValueError(f"no value for {', '.join(missing)}: give {missing[0]}=...")
-        point = [finite(name, values[name]) for name in self._names]
-        return QuasiPolynomial._wrap(self._family.at(point))
 
     def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
         """Return this expression, whose parameters must be those in `names`."""
-        unknown = [name for name in names if name not in self.names]
-        if unknown:
-            raise ValueError(
-                f"ranges for {', '.join(unknown)}: no such parameter, there "
-                + (f"is {', '.join(self.names)}" if self.names else "is none")
-            )
+        self._refuse_unknown(names)
         missing = [name for name in self.names if name not in names]
         if missing:
             raise ValueError(
-                f"no value for {', '.join(missing)}: put a number in its place where the family is "
-                "written, or give it a range or a value"
+                f"no value for {', '.join(missing)}: give it a range, or a value in "
+                f"at={{{missing[0]!r}: ...}}"
             )
         return self
 
-    def sensitivity(self, root: complex, /, **values: SupportsFloat) -> dict[str, complex]:
+    def root_sensitivity(
+        self, root: complex, *, at: Mapping[str, SupportsFloat]
+    ) -> dict[str, complex]:
         """Derivatives of a simple root by the parameters, at a point.
 
         Parameters
         ----------
         root : complex
-            A root of ``at(**values)``, in 1/s; its last digits do not matter.
-        **values : float
-            One for each of `names`.
+            A root of ``family.at(**at)``, in 1/s; its last digits do not matter.
+        at : mapping of str to float
+            The values of all parameters.
 
         Returns
         -------
@@ -184,7 +210,8 @@ class ParametricQuasiPolynomial:
         Raises
         ------
         TypeError, ValueError
-            As in `at` and as in `QuasiPolynomial.sensitivity`.
+            As in `at` and as in `QuasiPolynomial.root_sensitivity`; ValueError also if a parameter
+            has no value.
 
         Examples
         --------
@@ -194,12 +221,13 @@ class ParametricQuasiPolynomial:
         >>> import deadtime as dtm
         >>> K, T = dtm.parameters("K T")
         >>> h = dtm.s + K * dtm.delay(T)
-        >>> move = h.sensitivity(0.5j * math.pi, K=0.5 * math.pi, T=1.0)
+        >>> move = h.root_sensitivity(0.5j * math.pi, at={"K": 0.5 * math.pi, "T": 1.0})
         >>> move["K"].real > 0, move["T"].real > 0
         (True, True)
         """
-        h = self.at(**values)
-        point = {name: finite(name, values[name]) for name in self._names}
+        point = numbers_at(at)
+        self._family_of(point)
+        h: QuasiPolynomial = self.at(**point)
         terms = list(self._terms.items())
         times = [
             max(0.0, constant + sum(slope * point[name] for name, slope in slopes))

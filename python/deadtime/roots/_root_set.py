@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import unmasked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,10 +17,7 @@ if TYPE_CHECKING:
     from deadtime import _deadtime
     from deadtime.roots._chains import Chain
 
-__all__ = ["Range", "RootSet", "ends", "root_set"]
-
-#: Ends of a range, None for open ones.
-Range: TypeAlias = tuple[float | None, float | None]
+__all__ = ["RootSet", "root_set"]
 
 _SHOWN = 12
 
@@ -135,24 +130,6 @@ class RootSet(ReadOnlyArrays):
         if len(self) > _SHOWN:
             lines.append(f"  and {len(self) - _SHOWN} more")
         return "\n".join(lines)
-
-
-def ends(name: str, given: Range | None) -> tuple[float, float]:
-    """Ends of a range, infinite where open."""
-    if given is None:
-        return (-math.inf, math.inf)
-    given = unmasked(name, given)
-    try:
-        low, high = given
-        pair = (
-            -math.inf if low is None else float(low),
-            math.inf if high is None else float(high),
-        )
-    except (TypeError, ValueError) as error:
-        raise TypeError(
-            f"{name}={given!r}: give a pair (low, high), None for an open end"
-        ) from error
-    return pair
 
 
 def root_set(found: _deadtime.RootSet) -> RootSet:

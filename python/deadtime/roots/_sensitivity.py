@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
 
-__all__ = ["Sensitivity"]
+__all__ = ["RootSensitivity"]
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity(ReadOnlyArrays):
-    """Derivatives of a simple root; made by `QuasiPolynomial.sensitivity`.
+class RootSensitivity(ReadOnlyArrays):
+    """Derivatives of a simple root; made by `QuasiPolynomial.root_sensitivity`.
 
     Attributes
     ----------

@@ -17,14 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.ranges import Range
 from deadtime._base.validation import finite, positive, real_array, thread_number, whole_number
 from deadtime.roots._family import family_of
 from deadtime.stability._intervals import (
     Floats,
     Given,
     Progress,
-    Range,
     System,
+    Values,
     ranges_of,
     side,
 )
@@ -171,6 +172,7 @@ def proved_boxes(
     ranges: Given,
     tol: float = 1e-3,
     *,
+    at: Values | None = None,
     max_boxes: int = 1_000_000,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -180,12 +182,14 @@ def proved_boxes(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
-    ranges : mapping of str to (low, high) or float
-        One to three ranges; further parameters have a value.
+        What to judge.
+    ranges : mapping of str to (low, high)
+        One to three ranges.
     tol : float
         Share of the ranges that may stay undecided, from 0 to 1. The number of boxes grows like
         1/tol for two parameters and 1/tol**2 for three.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     max_boxes : int
         The division ends with this many boxes (some hundred bytes each), whatever is undecided
         then; `ProvedBoxes.undecided` says how much.
@@ -240,7 +244,7 @@ def proved_boxes(
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
     found = _deadtime.proved_boxes(
-        family_of(family, tuple(ends))._family,
+        family_of(family, tuple(ends), at)._family,
         ends,
         tol=share,
         max_boxes=whole_number("max_boxes", max_boxes),
@@ -269,6 +273,7 @@ def largest_stable_box(
     family: System,
     ranges: Given,
     *,
+    at: Values | None = None,
     around: Mapping[str, SupportsFloat] | None = None,
     tol: float = 1e-3,
     threads: int | None = None,
@@ -279,9 +284,11 @@ def largest_stable_box(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
-    ranges : mapping of str to (low, high) or float
+        What to judge.
+    ranges : mapping of str to (low, high)
         As in `proved_boxes`. Volumes are measured relative to them.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     around : mapping of str to float, optional
         A point that the box is to hold.
     tol : float
@@ -312,7 +319,7 @@ def largest_stable_box(
     """
     ends = ranges_of(ranges)
     step = positive("tol", tol)
-    native = family_of(family, tuple(ends))._family
+    native = family_of(family, tuple(ends), at)._family
     found = _deadtime.largest_stable_box(
         native,
         ends,

@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, SupportsFloat, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays, read_only
+from deadtime._base.ranges import Points, numbers_at
 from deadtime._base.validation import finite, thread_number
 from deadtime.loops import ControlLoop
 from deadtime.loops._family import numbers_of
@@ -141,7 +142,8 @@ class StabilityMap(ReadOnlyArrays):
         >>> import deadtime as dtm
         >>> Kp, Kv = dtm.parameters("Kp Kv")
         >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(0.36)
-        >>> chart = dtm.stability_map(h, {"Kp": [1.0], "Kv": [-1.2, 0.0, 0.7, 1.0]}, abscissa=False)
+        >>> gains = {"Kp": [1.0], "Kv": [-1.2, 0.0, 0.7, 1.0]}
+        >>> chart = dtm.stability_map(h, gains, abscissa=False)
         >>> chart.strongly_stable.tolist()
         [[False, True, True, False]]
         """
@@ -179,7 +181,7 @@ class StabilityMap(ReadOnlyArrays):
         >>> Kp, = dtm.parameters("Kp")
         >>> T, = dtm.parameters("T")
         >>> chart = dtm.stability_map(
-        ...     dtm.s + Kp * dtm.delay(T), {"Kp": (0.1, 2.0), "T": [0.5, 1.0]}, shape=(20, 2)
+        ...     dtm.s + Kp * dtm.delay(T), {"Kp": (0.1, 2.0), "T": (0.5, 1.0)}, shape=(20, 2)
         ... )
         >>> values, abscissa = chart.best()
         >>> {name: round(value, 3) for name, value in values.items()}
@@ -270,9 +272,10 @@ class StabilityMap(ReadOnlyArrays):
 
 def stability_map(
     family: ParametricQuasiPolynomial | ControlLoop,
-    ranges: Mapping[str, tuple[float, float] | ArrayLike],
+    ranges: Mapping[str, Points],
     shape: tuple[int, int] = (101, 101),
     *,
+    at: Mapping[str, SupportsFloat] | None = None,
     abscissa: bool = True,
     decay: float = 0.0,
     damping: tuple[float, float] | None = None,
@@ -285,14 +288,15 @@ def stability_map(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values; its limit plays no
-        part in stability.
-    ranges : mapping of str to (low, high) or array_like
-        Exactly two names. A tuple of two numbers is a range, sampled at as many points as `shape`
-        says, both ends included; a list or an array holds the points themselves, increasing. The
-        first name is the first axis of the results.
+        What to judge. The limit of a loop plays no part in stability.
+    ranges : mapping of str to (low, high), (low, high, n) or ndarray
+        Exactly two names. A range is sampled at n points, both ends included, or at as many as
+        `shape` says; an array holds the points themselves, increasing. The first name is the first
+        axis of the results.
     shape : tuple of int
-        Points along each range.
+        Points along each range that does not say how many it has.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     abscissa : bool
         Compute the spectral abscissa too, at several times the cost of the counts. (For a sampled
         loop it comes with the counts and is always given.)
@@ -350,6 +354,7 @@ def stability_map(
     <StabilityMap Kp 0.1 to 6 (60), Kv -0.9 to 0.9 (37): 1321 of 2220 stable>
     """
     names, axes = map_axes(ranges, shape)
+    fixed = numbers_at(at, names)
     threads = thread_number(threads)
     if proof not in ("curves", "cells"):
         raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
@@ -362,7 +367,7 @@ def stability_map(
             )
         found = _map_sampled(
             family,
-            numbers_of(family.parameters, names),
+            numbers_of(family.parameters, (*names, *fixed)) | fixed,
             names,
             axes,
             question.decay,
@@ -370,7 +375,8 @@ def stability_map(
             progress,
         )
     else:
-        found = _map_family(family_of(family, names), axes, question, threads, progress)
+        known = family_of(family, names, fixed)
+        found = _map_family(known, axes, question, threads, progress)
     if progress is not None:
         progress(cells)
     unstable, alpha, status, judged = found

@@ -10,7 +10,8 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.validation import finite, unmasked
+from deadtime._base.ranges import points_of
+from deadtime._base.validation import finite
 
 __all__ = ["damping_demand", "map_axes"]
 
@@ -33,7 +34,7 @@ def map_axes(
     first, second = ranges
     sizes = _shape(shape)
     axes = {
-        name: _points(name, ranges[name], size)
+        name: points_of(name, ranges[name], size)
         for name, size in zip((first, second), sizes, strict=True)
     }
     cells = math.prod(len(points) for points in axes.values())
@@ -68,26 +69,3 @@ def _shape(shape: Sequence[int]) -> tuple[int, int]:
             "fewer, or several maps of smaller ranges"
         )
     return first, second
-
-
-def _points(name: str, given: Any, size: int) -> _Floats:
-    if isinstance(given, tuple):
-        if len(given) != 2:
-            raise ValueError(
-                f"{name}={given!r}: a tuple is a range (low, high); give points as a list or array"
-            )
-        low, high = (finite(name, end) for end in given)
-        if low >= high:
-            raise ValueError(f"{name}={given!r}: the low end of a range is below its high end")
-        return np.linspace(low, high, size)
-    array = np.asarray(unmasked(name, given))
-    if array.dtype.kind not in "iuf":
-        raise TypeError(f"{name}={given!r}: give a range (low, high) or an array of real numbers")
-    points = np.array(array, dtype=np.float64)
-    if points.ndim != 1 or points.size == 0:
-        raise ValueError(f"{name} of shape {points.shape}: give points in one dimension, not none")
-    if not np.isfinite(points).all():
-        raise ValueError(f"{name}: not all points are finite")
-    if not (np.diff(points) > 0.0).all():
-        raise ValueError(f"{name}: points must increase; sort them and drop repeated ones")
-    return points

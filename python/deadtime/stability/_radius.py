@@ -9,9 +9,10 @@ from typing import SupportsFloat
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import finite, non_negative, positive
+from deadtime._base.ranges import Range
+from deadtime._base.validation import finite, positive
 from deadtime.roots._family import family_of
-from deadtime.stability._intervals import MOST_MOVING, Range, System
+from deadtime.stability._intervals import MOST_MOVING, System, Values
 
 __all__ = ["StabilityRadius", "stability_radius"]
 
@@ -47,6 +48,7 @@ def stability_radius(
     point: Mapping[str, SupportsFloat],
     scales: Mapping[str, SupportsFloat] | None = None,
     *,
+    at: Values | None = None,
     tol: float = 1e-3,
 ) -> StabilityRadius:
     """How far gains and delays may move away from a point, all at once, without loss of stability.
@@ -54,11 +56,13 @@ def stability_radius(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
+        What to judge.
     point : mapping of str to float
-        A stable point.
+        The parameters that move, one to three of them, and where they are: a stable point.
     scales : mapping of str to float, optional
-        The unit in which each parameter moves, its modulus by default; 0 for one that stays.
+        The unit in which each parameter moves; its modulus by default.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     tol : float
         Relative width of the interval from `radius` to `upper`.
 
@@ -94,13 +98,13 @@ def stability_radius(
         unknown = [name for name in scales if name not in values]
         if unknown:
             raise ValueError(f"scale of {unknown[0]}: the point has {', '.join(names)}")
-        units |= {name: non_negative(f"scale of {name}", scales[name]) for name in scales}
+        units |= {name: positive(f"scale of {name}", scales[name]) for name in scales}
     for name, unit in units.items():
         if unit == 0.0 and name not in (scales or ()):
             raise ValueError(f"{name}=0 has no scale of its own: give scales={{{name!r}: ...}}")
-    if sum(unit > 0.0 for unit in units.values()) > MOST_MOVING:
-        raise ValueError(f"more than {MOST_MOVING} parameters move: give the others a scale of 0")
-    known = family_of(family, names)
+    if len(names) > MOST_MOVING:
+        raise ValueError(f"more than {MOST_MOVING} parameters move: give the others in at={{...}}")
+    known = family_of(family, names, at)
     found = _deadtime.stability_radius(
         known._family, values, units, tol=positive("tol", tol), max_boxes=_RADIUS_BOXES
     )

@@ -8,18 +8,19 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.ranges import Points, Range
 from deadtime._base.validation import thread_number
 from deadtime.roots._family import family_of
 from deadtime.stability._intervals import (
     Floats,
     Given,
     Progress,
-    Range,
     System,
+    Values,
     ranges_of,
     side,
 )
@@ -98,10 +99,11 @@ class RobustMap(ReadOnlyArrays):
 
 def robust_map(
     family: System,
-    ranges: Mapping[str, tuple[float, float] | ArrayLike],
+    ranges: Mapping[str, Points],
     over: Given,
     shape: tuple[int, int] = (101, 101),
     *,
+    at: Values | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> RobustMap:
@@ -110,13 +112,15 @@ def robust_map(
     Parameters
     ----------
     family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The other named numbers of a loop keep their values.
-    ranges : mapping of str to (low, high) or array_like
+        What to judge.
+    ranges : mapping of str to (low, high), (low, high, n) or ndarray
         Exactly two names, as in `stability_map`: ranges or the points themselves.
-    over : mapping of str to (low, high) or float
+    over : mapping of str to (low, high)
         Intervals of one to three other parameters, for example of the delay.
     shape : tuple of int
-        Points along each range.
+        Points along each range that does not say how many it has.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
     progress : callable, optional
@@ -150,7 +154,7 @@ def robust_map(
     if twice:
         raise ValueError(f"{twice[0]} is an axis and has an interval: give it one of the two")
     unstable = _deadtime.robust_map(
-        family_of(family, (*axis_names, *held))._family,
+        family_of(family, (*axis_names, *held), at)._family,
         axes,
         held,
         max_boxes=_CELL_BOXES,

@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.frozen import equal
+from deadtime._base.ranges import OpenRange
 from deadtime._base.validation import non_negative, real_array, unmasked
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, RootSet
 from deadtime.roots._crossings import margin_of_family
 from deadtime.roots._determinant import NotExpandedError, expanded
 from deadtime.roots._family import family_of
 from deadtime.roots._matrix_roots import MatrixDeterminant
-from deadtime.roots._root_set import Range
 from deadtime.systems._realisation import Realisation, of_matrices
 from deadtime.systems._run import respond, step_response
 from deadtime.systems._scaled_delays import scaled_family, smallest_delay
@@ -256,7 +256,7 @@ class DelaySystem:
 
         Returns
         -------
-        ndarray of complex, shape (*s.shape, n, n)
+        ndarray of complex, shape ``(*s.shape, n, n)``
 
         Examples
         --------
@@ -397,7 +397,7 @@ class DelaySystem:
 
     # Poles, however many states there are
 
-    def count(self, re: Range | None = None, im: Range | None = None) -> int:
+    def count(self, re: OpenRange | None = None, im: OpenRange | None = None) -> int:
         """Count the poles in a region, with multiplicity, and prove the number.
 
         Parameters
@@ -432,7 +432,7 @@ class DelaySystem:
         """
         return self._determinant().count(re, im)
 
-    def poles(self, re: Range | None = None, im: Range | None = None) -> RootSet:
+    def poles(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
         """Locate every pole in a region, each in a disc proved to hold it.
 
         Parameters
@@ -465,8 +465,8 @@ class DelaySystem:
 
     def zeros(
         self,
-        re: Range | None = None,
-        im: Range | None = None,
+        re: OpenRange | None = None,
+        im: OpenRange | None = None,
         *,
         output: int = 0,
         input: int = 0,  # noqa: A002

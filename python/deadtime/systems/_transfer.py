@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.ranges import OpenRange
 from deadtime._base.validation import non_negative, real_array, unmasked
 from deadtime.roots import QuasiPolynomial, RootSet, delay
 from deadtime.roots._frequency import powers_of_s, without_powers
 from deadtime.roots._quasipolynomial import is_number
-from deadtime.roots._root_set import Range
 from deadtime.systems._interchange import (
     control_package,
     polynomials_of_control,
@@ -301,7 +301,7 @@ class TransferFunction:
 
     # Poles and zeros
 
-    def poles(self, re: Range | None = None, im: Range | None = None) -> RootSet:
+    def poles(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
         """Locate every root of the denominator in a region, each with a disc proved to hold it.
 
         Poles that zeros cancel are among them: see `hidden_modes`.
@@ -329,7 +329,7 @@ class TransferFunction:
         """
         return self._den.roots(re, im)
 
-    def zeros(self, re: Range | None = None, im: Range | None = None) -> RootSet:
+    def zeros(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
         """Locate every root of the numerator in a region, as `poles` does for the denominator.
 
         Parameters
@@ -355,7 +355,7 @@ class TransferFunction:
         return self._num.roots(re, im)
 
     def hidden_modes(
-        self, re: Range | None = None, im: Range | None = None
+        self, re: OpenRange | None = None, im: OpenRange | None = None
     ) -> NDArray[np.complex128]:
         """List the poles in a region that are zeros as well, as far as can be told.
 

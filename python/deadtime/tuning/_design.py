@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
+from deadtime.loops import PV, Controller, DerivativeFilter
 from deadtime.tuning._demands import demanded
 from deadtime.tuning._filter_choice import design_filter
 from deadtime.tuning._make import made
@@ -18,7 +18,7 @@ __all__ = ["design"]
 
 
 def design(
-    loop: ControlLoop,
+    loop: object,
     *,
     controller: type[Controller] | Controller = PV,
     delay: float | tuple[float, float] | None = None,
@@ -38,14 +38,16 @@ def design(
 
     Parameters
     ----------
-    loop : ControlLoop
-        Plant, delay, hold and limit; its controller is replaced.
+    loop : ControlLoop or a plant
+        Plant, delay, hold and limit; its controller is replaced. A plant of any kind that
+        `ControlLoop` takes stands for the continuous loop around it without a limit.
     controller : Controller or class of one
         `P`, `PV`, `PD`, `PI`, `PID`, or an instance whose other numbers, such as the filter of
         its derivative, are to be kept.
     delay : float or (float, float), optional
         The delay, s, or the interval it lies in: the gains are then the best for the worst delay
-        of the whole interval. The loop's own delay if not given.
+        of the whole interval. The loop's own delay if not given. For a plant with a delay in
+        series, what comes on top of that.
     gain : float or (float, float), optional
         The same for the plant's gain.
     objective : {"abscissa", "damping", "settling_time", "overshoot"}
@@ -83,7 +85,7 @@ def design(
         When the delay is not known, no gains in the ranges are stable, or none of them meet the
         margins; the message says what was searched, or what can be had.
     TypeError
-        When `loop` is no `ControlLoop`, or `fixed` or `ranges` no mapping.
+        When `loop` is neither a `ControlLoop` nor a plant, or `fixed` or `ranges` no mapping.
 
     Examples
     --------

@@ -57,7 +57,7 @@ _SIDE = {1: 201, 2: 41, 3: 15}
 
 
 def design_filter(
-    loop: ControlLoop,
+    loop: object,
     *,
     controller: type[Controller] | Controller = PV,
     loss: float = 0.1,
@@ -143,7 +143,7 @@ def design_filter(
 
     ideal_problem = posed(None)
     corners = _corners(ideal_problem, omegas)
-    white = _bandwidth(loop, bandwidth, float(corners[-1]))
+    white = _bandwidth(ideal_problem.loop, bandwidth, float(corners[-1]))
     sides = shape or [_SIDE[len(ideal_problem.free)]] * len(ideal_problem.free)
     ideal = made(ideal_problem, goal, demands, sides)
     task = _Task(posed, goal, demands, white, tuple(sides), surveyed(ideal_problem, sides))

@@ -95,9 +95,10 @@ class _Abscissa(Objective):
     def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
         # A loop need not be made for every number.
         numbers = problem.loop.parameters
+        abscissa_at = problem.loop.specification.abscissa_at
         return np.array(
             [
-                [problem.loop._abscissa(numbers | problem.named(gains) | one) for one in scenarios]
+                [abscissa_at(numbers | problem.named(gains) | one) for one in scenarios]
                 for gains in points
             ]
         )
@@ -205,7 +206,9 @@ def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
 
     The chains of a neutral loop oscillate without end: where they are dominant the ratio is zero.
     """
-    poles = np.asarray(loop._native.poles() if loop.is_sampled else loop.rightmost(_POLES).roots)
+    poles = np.asarray(
+        loop.specification.native.poles() if loop.is_sampled else loop.rightmost(_POLES).roots
+    )
     chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
     abscissa = max(float(poles.real.max(initial=-np.inf)), chain)
     if not abscissa < 0.0:

@@ -11,10 +11,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.ranges import Range, interval
 from deadtime._base.validation import finite, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.loops._sweep import require_loop
-from deadtime.tuning._stabilising import Range, candidate_ranges
+from deadtime.tuning._stabilising import candidate_ranges
 
 __all__ = [
     "Problem",
@@ -97,7 +97,7 @@ class Problem:
 
 
 def pose(
-    loop: ControlLoop,
+    loop: object,
     controller: type[Controller] | Controller,
     delay: float | Range | None,
     gain: float | Range | None,
@@ -107,8 +107,9 @@ def pose(
     threads: int | None,
 ) -> Problem:
     """Check what a design was asked for."""
-    require_loop(loop)
     template = controller_template(controller)
+    if not isinstance(loop, ControlLoop):
+        loop, delay = _around(loop, template, delay)
     held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
     unknown = [name for name in held if name not in template.gains]
     if unknown:
@@ -134,17 +135,33 @@ def pose(
     whole = loop.replace(controller=template, **middle)
     if held:
         whole = whole.replace(**held)
+    if ranges is None and not whole.plant.is_rational:
+        raise ValueError(
+            "ranges: where to look for gains is known for plants that are rational but for one "
+            "delay in series; give ranges= for this one"
+        )
     if ranges is None:
         spans = candidate_ranges(whole, free)
     else:
         given = _mapping("ranges", ranges)
         if set(given) != set(free):
             raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
-        spans = ({name: _range(name, given[name]) for name in free},)
+        spans = ({name: interval(f"the range of {name}", given[name]) for name in free},)
     height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
     return Problem(whole, free, spans, intervals, height, threads)
+
+
+def _around(
+    plant: object, template: Controller, delay: float | Range | None
+) -> tuple[ControlLoop, float | Range | None]:
+    """A loop around a plant, and its delay: the plant's own and what comes on top of it."""
+    loop = ControlLoop(plant, template)
+    if delay is None or loop.delay is None:
+        return loop, delay
+    more = _interval("delay", delay)
+    return loop, (loop.delay + more[0], loop.delay + more[1])
 
 
 def controller_template(controller: type[Controller] | Controller) -> Controller:
@@ -179,33 +196,28 @@ def _mapping(name: str, given: Any) -> dict[str, Any]:
     return dict(given)
 
 
-def _range(name: str, given: Range) -> Range:
-    try:
-        low, high = given
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"the range of {name} is {given!r}: give (low, high)") from error
-    low, high = finite(name, low), finite(name, high)
-    if not low < high:
-        raise ValueError(f"the range of {name} is {given}: give (low, high) with low < high")
-    return low, high
-
-
 def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
     if delay is None:
         if loop.delay is None:
             raise ValueError("the delay of the loop is not known: give delay=, or estimate it")
         return loop.delay, loop.delay
-    if not isinstance(delay, (tuple, list, np.ndarray)):
-        return non_negative("delay", delay), float(delay)
-    low, high = (float(end) for end in delay)
-    if not 0.0 <= low <= high < np.inf:
-        raise ValueError(f"delay={delay!r} is not an interval (low, high) of times >= 0")
+    return _interval("delay", delay)
+
+
+def _interval(name: str, given: float | Range) -> Range:
+    """One time or an interval of times, s."""
+    if not isinstance(given, (tuple, list, np.ndarray)):
+        return non_negative(name, given), float(given)
+    low, high = interval(name, given, may_be_point=True)
+    if low < 0.0:
+        raise ValueError(f"{name}={given!r} is not an interval (low, high) of times >= 0")
     return low, high
 
 
 def _gain_interval(gain: float | Range) -> Range:
-    low, high = gain if isinstance(gain, (tuple, list, np.ndarray)) else (gain, gain)
-    low, high = finite("gain", low), finite("gain", high)
-    if not low <= high or low * high <= 0.0:
+    if not isinstance(gain, (tuple, list, np.ndarray)):
+        gain = (gain, gain)
+    low, high = interval("gain", gain, may_be_point=True)
+    if low * high <= 0.0:
         raise ValueError(f"gain={gain!r} is not an interval (low, high) on one side of zero")
     return low, high

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from deadtime.loops import ControlLoop, sweep
-from deadtime.loops._run import steady_state
 from deadtime.tuning._tail import tail_bound
 
 __all__ = ["BAND", "ProvedStep", "proved_step"]
@@ -34,9 +33,11 @@ class ProvedStep(NamedTuple):
 
 def proved_step(loop: ControlLoop, amplitude: float) -> ProvedStep | None:
     """Simulate a step until its tail is proved to stay at rest; None where that fails."""
-    late = {"delay": loop._known_delay()}
+    if not loop.plant.is_rational:
+        return None
+    late = {"delay": loop.specification.known_delay}
     found = sweep(loop, late, amplitude=amplitude, settling=BAND)
-    rest, end = steady_state(loop, amplitude), float(found.time[-1])
+    rest, end = loop.specification.steady_state(amplitude), float(found.time[-1])
     if rest is None or not np.isfinite(found["settling_time"]):
         return None
     for _ in range(_DOUBLINGS):

@@ -150,7 +150,7 @@ def _most(plain: ControlLoop, num: NDArray[np.float64], den: NDArray[np.float64]
     if len(num) == len(den):
         # Beyond that chains of roots lie on the right, however short the delay.
         return float(_BELOW_ALGEBRAIC * abs(den[0] / num[0]))
-    late = plain._known_delay()
+    late = plain.specification.known_delay
     corners = np.abs(np.concatenate([np.roots(num), np.roots(den)]))
     corners = corners[corners > 0.0]
     low = min([*corners, 1.0 / late if late else np.inf], default=1.0)

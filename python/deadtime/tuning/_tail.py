@@ -52,7 +52,7 @@ def tail_bound(loop: ControlLoop, amplitude: float, end: float) -> float:
 
     Infinite where nothing is proved, as where the command may still meet the limit.
     """
-    model, delay = loop._model, loop._known_delay()
+    model, delay = loop.specification.model, loop.specification.known_delay
     n = len(model.B)
     matrix = np.block(
         [[model.A, model.B[:, None]], [model.K[None, :], np.array([[model.L - 1.0]])]]
@@ -105,9 +105,10 @@ def _sampled(
     loop: ControlLoop, rest: Vector, limit: float, end: float
 ) -> tuple[float, float] | None:
     """Of a sampled loop: z are states, the command that is held, and those under way."""
-    model, period = loop._model, cast(float, loop.sample_time)
-    whole = math.floor(loop._known_delay() / period + _ON_SAMPLE)
-    part = loop._known_delay() - whole * period
+    model, period = loop.specification.model, cast(float, loop.sample_time)
+    delay = loop.specification.known_delay
+    whole = math.floor(delay / period + _ON_SAMPLE)
+    part = delay - whole * period
     part = part if part > _ON_SAMPLE * period else 0.0
     gain = SampledLoopGain.of(model, part, period)
     T, b, c = gain.T, gain.b, gain.c

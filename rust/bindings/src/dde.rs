@@ -114,20 +114,20 @@ impl PyLinearLoop {
 
     /// The response at `time`, in the clock of the caller; the first of the times is the start.
     ///
-    /// Outputs are read `ahead` later, which is the delay where it is in the measurement.
+    /// Outputs are `output_lead` earlier than the measurement, in which the delay then is.
     fn respond<'py>(
         &self,
         py: Python<'py>,
         time: Floats<'py>,
         run: LoopRun<'py>,
-        ahead: f64,
+        output_lead: f64,
     ) -> PyResult<LoopResponse> {
         let start = run.start()?;
         let times = in_order(&time)?;
         let (reference_time, reference) = run.jumps(times.first().copied())?;
         let request = Request {
             time: &times,
-            ahead,
+            output_lead,
             reference_before: run.reference_before,
             reference_time: &reference_time,
             reference: &reference,

@@ -1,7 +1,7 @@
 //! Bindings of `deadtime::stability`: families and maps.
 
 use deadtime::stability::{
-    self, Affine, Axis, Boundaries, Damping, Demand, Family, Proof, Question, Term, Vertex,
+    self, Affine, Axis, Boundaries, Damping, Family, Proof, Question, Specification, Term, Vertex,
 };
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -107,7 +107,7 @@ impl PyFamily {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<MapCells> {
         let question = Question {
-            demand: demand(question.decay, question.damping),
+            specification: specification(question.decay, question.damping),
             abscissa: question.abscissa,
             proof: match question.proof.as_str() {
                 "cells" => Proof::Cells,
@@ -161,7 +161,13 @@ impl PyFamily {
         with_axes(&self.inner, &axes, |axes| {
             let values = vec![0.0; self.inner.names().len()];
             let found = run(py, None, None, |task| {
-                stability::boundaries(&self.inner, &values, axes, demand(decay, damping), task)
+                stability::boundaries(
+                    &self.inner,
+                    &values,
+                    axes,
+                    specification(decay, damping),
+                    task,
+                )
             })?;
             found
                 .map(|found| map_boundaries(py, &self.inner, axes, &found))
@@ -248,8 +254,8 @@ fn map_boundaries(
 }
 
 /// Decay, and (damping ratio, horizon).
-fn demand(decay: f64, damping: Option<(f64, f64)>) -> Demand {
-    Demand {
+fn specification(decay: f64, damping: Option<(f64, f64)>) -> Specification {
+    Specification {
         decay,
         damping: damping.map(|(ratio, horizon)| Damping { ratio, horizon }),
     }

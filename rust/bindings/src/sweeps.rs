@@ -2,7 +2,7 @@
 
 use deadtime::dde::ensemble::{self, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
-use deadtime::dde::{Criteria, Figures};
+use deadtime::dde::{Criteria, Metrics};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -13,19 +13,19 @@ use crate::runtime::{run, run_here};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-type Metric = fn(&Figures) -> f64;
+type Metric = fn(&Metrics) -> f64;
 
 /// The metrics of a response by the names that Python shows.
 const METRICS: [(&str, Metric); 9] = [
-    ("rise_time", |figures| figures.rise_time),
-    ("settling_time", |figures| figures.settling_time),
-    ("peak_time", |figures| figures.peak_time),
-    ("overshoot", |figures| figures.overshoot),
-    ("undershoot", |figures| figures.undershoot),
-    ("settling_min", |figures| figures.settling_min),
-    ("settling_max", |figures| figures.settling_max),
-    ("peak", |figures| figures.peak),
-    ("steady_state", |figures| figures.steady_state),
+    ("rise_time", |metrics| metrics.rise_time),
+    ("settling_time", |metrics| metrics.settling_time),
+    ("peak_time", |metrics| metrics.peak_time),
+    ("overshoot", |metrics| metrics.overshoot),
+    ("undershoot", |metrics| metrics.undershoot),
+    ("settling_min", |metrics| metrics.settling_min),
+    ("settling_max", |metrics| metrics.settling_max),
+    ("peak", |metrics| metrics.peak),
+    ("steady_state", |metrics| metrics.steady_state),
 ];
 
 /// Loops of one structure, a row a loop, and the step of their reference.
@@ -90,11 +90,11 @@ pub(crate) fn sweep_metrics<'py>(
     let sets = sets.read(&rows);
     let criteria = Criteria { rise, settling };
     let found = run(py, threads, progress.as_ref(), |task| {
-        ensemble::figures(&sets, &steady, span, &criteria, task)
+        ensemble::metrics(&sets, &steady, span, &criteria, task)
     })?;
     let metrics = PyDict::new(py);
     for (name, metric) in METRICS {
-        let values = column(&found, |(figures, _)| metric(figures))?;
+        let values = column(&found, |(metrics, _)| metric(metrics))?;
         metrics.set_item(name, values.into_pyarray(py))?;
     }
     let status = column(&found, |(_, outcome)| *outcome as u8)?;
@@ -134,7 +134,7 @@ pub(crate) struct LoopSlopes<'py> {
     row_slopes: Floats<'py>,
     state_slopes: Floats<'py>,
     command_slopes: Floats<'py>,
-    ahead_slopes: Floats<'py>,
+    output_lead_slopes: Floats<'py>,
 }
 
 /// Derivatives of outputs and inputs by parameters, at times since the start of the run.
@@ -150,7 +150,7 @@ pub(crate) fn loop_sensitivities<'py>(
     let (state, history) = (run.state()?, run.command_history()?);
     let state_slopes = in_order(&slopes.state_slopes)?;
     let command_slopes = in_order(&slopes.command_slopes)?;
-    let ahead = in_order(&slopes.ahead_slopes)?;
+    let ahead = in_order(&slopes.output_lead_slopes)?;
     let (output_times, input_times) = (in_order(&output_time)?, in_order(&input_time)?);
     let reference = run.reference()?;
     let of = Sloped {

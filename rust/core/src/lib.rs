@@ -2,21 +2,21 @@
 //! differential equations.
 //!
 //! Everything numerical of the `deadtime` Python package is here, and nothing of Python.
-//! Dependencies run one way: error, lanes ← lambertw; error ← elementary ← quasipoly ← roots ←
+//! Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots ←
 //! stability; quasipoly ← dde.
 
 pub mod dde;
 pub mod elementary;
 pub mod error;
 pub mod lambertw;
-mod lanes;
 pub mod memory;
 pub mod quasipoly;
 pub mod roots;
+mod simd;
 pub mod stability;
 pub mod status;
 pub mod task;
 
 pub use error::Error;
-pub use lanes::instructions;
+pub use simd::instructions;
 pub use task::Task;

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
+from deadtime._base.ranges import OpenRange, is_range, open_interval
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 __all__ = ["Flights", "FlownOnce", "Window", "each_flight"]
 
-_Ends: TypeAlias = tuple[float | None, float | None] | None
-
 #: One recording, or several of the same vehicle.
 Flights: TypeAlias = Recording | Sequence[Recording]
 
 #: The part to use, s: one for all recordings, or a list with one for each.
-Window: TypeAlias = _Ends | list[_Ends]
+Window: TypeAlias = OpenRange | list[OpenRange | None] | None
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class FlownOnce:
 
     recording: Recording
     loop: ControlLoop
-    window: _Ends
+    window: OpenRange | None
 
 
 def each_flight(
@@ -38,7 +37,8 @@ def each_flight(
         raise ValueError("no recording was given: give one, or a list of them")
     number = len(recordings)
     loops = list(loop) if isinstance(loop, (list, tuple)) else [loop] * number
-    windows = window if isinstance(window, list) else [window] * number
+    one_for_all = window is None or (is_range(window) and len(window) == 2)
+    windows: list[Any] = [window] * number if one_for_all else list(window or ())
     for name, given in (("loop", loops), ("window", windows)):
         if len(given) != number:
             raise ValueError(
@@ -50,8 +50,7 @@ def each_flight(
             raise TypeError(f"recording {index} is a {type(one).__name__}, not a Recording")
         if not isinstance(its_loop, ControlLoop):
             raise TypeError(f"loop {index} is a {type(its_loop).__name__}, not a ControlLoop")
-        if ends is not None and not (isinstance(ends, (tuple, list)) and len(ends) == 2):
-            raise TypeError(f"window={ends!r}: give (start, stop) in s, None for an open end")
+        open_interval("window", ends)
         flights.append(FlownOnce(one, its_loop, ends))
     plants = {type(flight.loop.plant).__name__ for flight in flights}
     if len(plants) > 1:

@@ -16,7 +16,7 @@ use super::scalar::Scalar;
 
 /// Φ and the Γ_i of one step length.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Propagator<S = f64> {
+pub(crate) struct Propagator<S = f64> {
     n: usize,
     /// Φ − I, row-major.
     growth: Vec<S>,
@@ -26,7 +26,7 @@ pub struct Propagator<S = f64> {
 
 impl<S: Scalar> Propagator<S> {
     /// For A (n × n row-major), input columns g_i (n each) and step length `h` ≥ 0.
-    pub fn new(a: &[S], inputs: &[&[S]], h: S) -> Self {
+    pub(crate) fn new(a: &[S], inputs: &[&[S]], h: S) -> Self {
         let n = inputs.first().map_or_else(|| side(a), |g| g.len());
         let doublings = doublings(balanced_norm(a, n) * h.value());
         let step = h * S::from(0.5_f64.powi(doublings));
@@ -61,7 +61,7 @@ impl<S: Scalar> Propagator<S> {
     }
 
     /// Φ, row-major.
-    pub fn phi(&self) -> Vec<S> {
+    pub(crate) fn phi(&self) -> Vec<S> {
         let mut phi = self.growth.clone();
         for i in 0..self.n {
             phi[i * self.n + i] += S::from(1.0);
@@ -75,12 +75,12 @@ impl<S: Scalar> Propagator<S> {
     }
 
     /// Γ of input `i`.
-    pub fn gamma(&self, i: usize) -> &[S] {
+    pub(crate) fn gamma(&self, i: usize) -> &[S] {
         &self.gamma[i * self.n..(i + 1) * self.n]
     }
 
     /// `out` = Φ x + Σ Γ_i v_i.
-    pub fn apply(&self, x: &[S], inputs: &[S], out: &mut [S]) {
+    pub(crate) fn apply(&self, x: &[S], inputs: &[S], out: &mut [S]) {
         for (row, out) in out.iter_mut().enumerate() {
             let mut change = S::default();
             for (&f, &x) in self.growth[row * self.n..(row + 1) * self.n].iter().zip(x) {

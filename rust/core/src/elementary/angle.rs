@@ -10,7 +10,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::ANGLES;
 
 /// The angle of (x, y) in (−π, π] within 2⁻⁵⁰; 0 for the zero vector.

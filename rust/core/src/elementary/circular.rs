@@ -15,7 +15,7 @@
 //! *Result.* The two inner sums, below 0.06, lose 0.06 u together; the last sum, below 1 but for
 //! rounding, u/2. In all 0.16 + 0.045 + 0.001 + 0.101 + 0.005 + 0.06 + 0.5 < 0.9 u.
 
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::{INVERSE_TURN, SINES};
 
 pub(super) const STEPS_PER_UNIT: f64 = 10.185_916_357_881_302;

@@ -13,7 +13,7 @@
 //! Together less than 1.1 u, of T: 1.12 u of e^r T. The power of two is exact down to 2⁻¹⁰²²,
 //! below it costs one rounding, 2⁻¹⁰⁷⁵.
 
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::POWERS;
 
 pub(super) const STEPS_PER_UNIT: f64 = 46.166_241_308_446_83;

@@ -13,7 +13,7 @@
 //! (r and series), 0.5 u² (products), 3.1 u² (sum) and 0.2 u² (inner sum): below 6 u².
 
 use super::double_double::DoubleDouble;
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::{POWERS, SINES};
 
 const EXP_STEPS_PER_UNIT: f64 = 46.166_241_308_446_83;

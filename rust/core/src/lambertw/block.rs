@@ -5,11 +5,11 @@
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
+use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
-use super::kernel::{self, Point};
-use super::route::Order;
-use super::{delay, huge_branch, log_form, real, special_values};
+use super::branch_sort::Order;
+use super::kernel::Point;
+use super::{delay, huge_branch, kernel, log_form, real, special_values};
 
 /// Elements in a block.
 const BLOCK: usize = 256;

@@ -6,7 +6,7 @@
 //! from h = e (z + 1/e) with 1/e in two words: -1/e itself is not a double.
 //! Guaranteed: relative error of 1 + w of a few 2^-53 for |p| < 0.02, and 1e-8 for |p| < 0.52.
 
-use crate::lanes::{Complex, Simd};
+use crate::simd::{Complex, Simd};
 
 /// 1/e = INVERSE_E + INVERSE_E_LOW to 106 bits.
 pub(super) const INVERSE_E: f64 = 0.367_879_441_171_442_33;

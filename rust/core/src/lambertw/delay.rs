@@ -12,7 +12,7 @@
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Mask, Real, Simd};
+use crate::simd::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{INVERSE_E, one_plus_w};
 use super::elementary::{Reduced, cos_sin, exp, rough_log};
@@ -22,7 +22,7 @@ use super::guess::{
 use super::huge_branch::{HUGE_BRANCH, fixed_point};
 use super::refine::{Scaled, correction};
 use super::special_values;
-use super::two_word::{TwoWord, product};
+use crate::simd::double_double::{DoubleDouble, product};
 
 /// Products a0 T and a1 T up to here are treated; beyond, the answer is NaN.
 const LARGEST: f64 = 1e300;
@@ -95,9 +95,9 @@ fn without_delay(a0: f64, a1: f64, k: i64) -> Complex64 {
 
 /// (sigma - alpha) e^sigma = beta on branch k >= 0, below the cut where mirrored.
 struct Problem<S: Simd> {
-    alpha: TwoWord<S>,
+    alpha: DoubleDouble<S>,
     /// beta = factor 2^exponent.
-    factor: TwoWord<S>,
+    factor: DoubleDouble<S>,
     exponent: Real<S>,
 }
 
@@ -245,15 +245,17 @@ impl<S: Simd> Problem<S> {
     fn one_plus_ez(&self, wanted: Mask<S>) -> Real<S> {
         let zero = self.alpha.hi.constant(0.0);
         let one = zero.constant(1.0);
-        let alpha = TwoWord::new(
+        let alpha = DoubleDouble::new(
             wanted.select(self.alpha.hi, zero),
             wanted.select(self.alpha.lo, zero),
         );
-        let argument = TwoWord::from_word(one).plus(alpha.negated()).normalised();
+        let argument = DoubleDouble::from_word(one)
+            .plus(alpha.negated())
+            .normalised();
         let (factor, power) = exp(argument.hi, argument.lo);
         let power = wanted.select(power + self.exponent, zero).power_of_two();
         let ez = factor.times(self.factor).scaled(power);
-        TwoWord::from_word(one).plus(ez).rounded()
+        DoubleDouble::from_word(one).plus(ez).rounded()
     }
 
     #[inline(always)]
@@ -272,7 +274,7 @@ impl<S: Simd> Problem<S> {
         let flip_im = (half | quarters.eq(-1.0)).select(0.0, zero.constant(-0.0));
         let power = (power + self.exponent).power_of_two();
         let modulus = modulus.times(self.factor).scaled(power);
-        let w_re = TwoWord::from_word(sigma.re)
+        let w_re = DoubleDouble::from_word(sigma.re)
             .plus(self.alpha.negated())
             .normalised();
         let t_re = modulus.times(chosen(odd, sine, cosine)).flipped(flip_re);
@@ -301,7 +303,7 @@ impl<S: Simd> Problem<S> {
         let beta = self.factor.scaled(self.beta_power());
         let sum = self.alpha.plus(beta).rounded();
         let one = zero.constant(1.0);
-        let one_plus_beta = TwoWord::from_word(one).plus(beta).rounded();
+        let one_plus_beta = DoubleDouble::from_word(one).plus(beta).rounded();
         // A common factor keeps the squares of the division in range.
         let unit = one / (beta.hi.abs() + 1.0);
         let mut s = sigma;
@@ -330,6 +332,6 @@ fn folded<S: Simd>(sigma: Complex<S>, real: Mask<S>) -> Complex<S> {
 
 /// Lane by lane: `yes` where true, `no` elsewhere.
 #[inline(always)]
-fn chosen<S: Simd>(mask: Mask<S>, yes: TwoWord<S>, no: TwoWord<S>) -> TwoWord<S> {
-    TwoWord::new(mask.select(yes.hi, no.hi), mask.select(yes.lo, no.lo))
+fn chosen<S: Simd>(mask: Mask<S>, yes: DoubleDouble<S>, no: DoubleDouble<S>) -> DoubleDouble<S> {
+    DoubleDouble::new(mask.select(yes.hi, no.hi), mask.select(yes.lo, no.lo))
 }

@@ -6,9 +6,9 @@
 //! Valid for |a| < 5000 (exponential) and |b| < 2^23 (sine and cosine). Errors are meant beside 1:
 //! a sine next to a multiple of pi (other than 0) is good to 2^-61, not to 2^-61 of itself.
 
-use crate::lanes::{Complex, Real, Simd};
+use crate::simd::{Complex, Real, Simd};
 
-use super::two_word::{Constant, TwoWord, ordered_sum, product, sum};
+use crate::simd::double_double::{Constant, DoubleDouble, ordered_sum, product, sum};
 
 const LOG2_E: f64 = std::f64::consts::LOG2_E;
 /// ln 2 in pieces of 40 and 53 bits.
@@ -81,17 +81,17 @@ fn polynomial<S: Simd, const PAIRS: usize>(
 
 /// `e^(a + low)` as a factor in [0.7, 1.42] and a power of two; `low` is at most an ulp of `a`.
 #[inline(always)]
-pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (TwoWord<S>, Real<S>) {
+pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (DoubleDouble<S>, Real<S>) {
     let n = (a * LOG2_E).nearest();
     let [first, second] = LN_2;
     // The first difference is exact. If the second piece is the larger one, both are so small
     // that the rounding of this sum is out of sight.
     let piece = product(n, n.constant(second));
     let near = ordered_sum(n.negated_mul_add(first, a), -piece.hi);
-    let r = TwoWord::new(near.hi, (near.lo - piece.lo) + low);
+    let r = DoubleDouble::new(near.hi, (near.lo - piece.lo) + low);
 
     let square = product(r.hi, r.hi);
-    let square = TwoWord::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
+    let square = DoubleDouble::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
     let cube = square.times(r);
     let third = product(cube.hi, r.hi.constant(SIXTH.0));
     let third_low = cube.lo.mul_add(SIXTH.0, cube.hi.mul_add(SIXTH.1, third.lo));
@@ -112,8 +112,8 @@ pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (TwoWord<S>, Real<S>) {
 /// Cosine and sine of an angle less whole quarter turns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reduced<S: Simd> {
-    pub(super) cosine: TwoWord<S>,
-    pub(super) sine: TwoWord<S>,
+    pub(super) cosine: DoubleDouble<S>,
+    pub(super) sine: DoubleDouble<S>,
     /// The quarter turns taken off, modulo 4: -2 or 2, -1, 0 or 1.
     pub(super) quarters: Real<S>,
 }
@@ -129,17 +129,17 @@ pub(super) fn cos_sin<S: Simd>(b: Real<S>, low: Real<S>) -> Reduced<S> {
     let r = ordered_sum(near.hi, n.negated_mul_add(third, near.lo + low));
 
     let square = product(r.hi, r.hi);
-    let square = TwoWord::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
+    let square = DoubleDouble::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
 
     let tail = polynomial(&SIN_TAIL, square.hi) * square.hi;
-    let series = TwoWord::from_word(tail).added_to(ONE_OVER_120);
+    let series = DoubleDouble::from_word(tail).added_to(ONE_OVER_120);
     let series = series.times(square).negated().added_to(SIXTH).negated();
     let bend = series.times(square).times(r);
     let sine = ordered_sum(r.hi, bend.hi);
-    let sine = TwoWord::new(sine.hi, sine.lo + (bend.lo + r.lo));
+    let sine = DoubleDouble::new(sine.hi, sine.lo + (bend.lo + r.lo));
 
     let tail = polynomial(&COS_TAIL, square.hi) * square.hi;
-    let series = TwoWord::from_word(tail).added_to(TWENTY_FOURTH);
+    let series = DoubleDouble::from_word(tail).added_to(TWENTY_FOURTH);
     let series = series.times(square).negated().added_to(HALF).negated();
     let cosine = series.times(square).added_to(ONE);
 
@@ -205,7 +205,7 @@ mod tests {
     }
 
     /// What is left of a two-word sum that ought to be 1.
-    fn beside_one(value: TwoWord<Scalar128b>) -> f64 {
+    fn beside_one(value: DoubleDouble<Scalar128b>) -> f64 {
         ((first(value.hi) - 1.0) + first(value.lo)).abs()
     }
 

@@ -5,7 +5,7 @@
 //! 2 pi i k. The half plane Im w >= 0 belongs to k >= 0 (for k = 0 with Im z >= 0): a step that
 //! leaves it by rounding is folded back, so no step can land on another branch.
 
-use crate::lanes::{Complex, Simd};
+use crate::simd::{Complex, Simd};
 
 use super::coefficients::{
     BEHIND_DENOMINATOR, BEHIND_NUMERATOR, PRINCIPAL_DENOMINATOR, PRINCIPAL_NUMERATOR,

@@ -1,6 +1,6 @@
 //! The element: which starting value, which last step.
 
-use crate::lanes::{Complex, Mask, Real, Simd};
+use crate::simd::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{
     INVERSE_E, INVERSE_E_LOW, branch_root, deep_branch_root, offset,
@@ -10,7 +10,7 @@ use super::elementary::{rough_angle, rough_log};
 use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithmic_step, principal};
 use super::huge_branch::HUGE_BRANCH;
 use super::refine::{Scaled, correction, product_with_exp};
-use super::two_word::{ordered_sum, sum};
+use crate::simd::double_double::{ordered_sum, sum};
 
 /// Distance from -1/e below which the series is the answer.
 pub(super) const SERIES_ANSWERS: f64 = 1.0 / 16_384.0;

@@ -11,14 +11,14 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
+use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
 use super::branch_point::one_plus_w as near_branch_point;
 use super::guess::{behind, logarithmic_step, principal};
 use super::huge_branch::{HUGE_BRANCH, turns};
 use super::kernel::{SERIES_ANSWERS, SERIES_STARTS, reflected};
 use super::refine::{Scaled, correction, product_with_exp};
-use super::two_word::{TwoWord, ordered_sum, product, sum};
+use crate::simd::double_double::{DoubleDouble, ordered_sum, product, sum};
 
 /// What 2 pi and pi lack as doubles.
 const TURN_LOW: f64 = 2.449_293_598_294_706_4e-16;
@@ -69,7 +69,7 @@ pub(super) fn lambertw<S: Simd>(log: Complex<S>, k: Real<S>) -> Complex<S> {
 
 /// `angle` is not negative.
 #[inline(always)]
-fn upper<S: Simd>(modulus: Real<S>, angle: TwoWord<S>) -> Complex<S> {
+fn upper<S: Simd>(modulus: Real<S>, angle: DoubleDouble<S>) -> Complex<S> {
     let zero = modulus.constant(0.0);
     let one = modulus.constant(1.0);
     let unit = Complex::new(one, one);
@@ -156,7 +156,7 @@ impl Kernel<3, 2> for AtAngle {
     #[inline(always)]
     fn lanes<S: Simd>(&self, [modulus, angle, low]: [Real<S>; 3]) -> [Real<S>; 2] {
         let side = angle.sign();
-        let w = upper(modulus, TwoWord::new(angle, low).flipped(side));
+        let w = upper(modulus, DoubleDouble::new(angle, low).flipped(side));
         let w = reflected(w, side);
         [w.re, w.im]
     }

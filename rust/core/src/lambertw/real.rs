@@ -5,7 +5,7 @@
 //! lies 1.2e-17 below it; it is taken for -1/e, where both are -1, and NaN begins one ulp further.
 //! Error: 0.54 ulp.
 
-use crate::lanes::{Real, Simd};
+use crate::simd::{Real, Simd};
 
 use super::branch_point::{INVERSE_E, INVERSE_E_LOW, SERIES};
 use super::coefficients::{
@@ -15,7 +15,7 @@ use super::elementary::{exp, rough_log};
 use super::guess::PRINCIPAL_RADIUS;
 use super::kernel::{SERIES_ANSWERS, SERIES_STARTS, SMALL};
 use super::refine::SCALE_LIFT;
-use super::two_word::TwoWord;
+use crate::simd::double_double::DoubleDouble;
 
 /// Up to here W_-1 has a rational starting value.
 const LOWER_END: f64 = -1.0 / 256.0;
@@ -147,7 +147,7 @@ fn by_log<S: Simd>(log: Real<S>) -> Real<S> {
 
 /// The last step, as in `refine`, with t = x e^-w.
 #[inline(always)]
-fn stepped<S: Simd>(w: Real<S>, t: TwoWord<S>) -> Real<S> {
+fn stepped<S: Simd>(w: Real<S>, t: DoubleDouble<S>) -> Real<S> {
     // One division for 1/w and 1/(1 + w); like all that follows from them, it is at hand before
     // d is.
     let u = w + 1.0;

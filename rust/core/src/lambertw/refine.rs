@@ -5,10 +5,10 @@
 //! the fourth power it leaves less than 1e-17 |w| for the starting values of `guess`; what remains
 //! is the rounding of the result and 2^-61 / |1 + w|.
 
-use crate::lanes::{Complex, Real, Simd};
+use crate::simd::{Complex, Real, Simd};
 
 use super::elementary::{Reduced, cos_sin, exp, turned_back};
-use super::two_word::TwoWord;
+use crate::simd::double_double::DoubleDouble;
 
 /// 2^64 lifts a subnormal number among the normal ones.
 pub(super) const SCALE_LIFT: f64 = 18_446_744_073_709_551_616.0;
@@ -69,8 +69,8 @@ impl<S: Simd> Scaled<S> {
 /// A complex number whose components have two words.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TwoWordComplex<S: Simd> {
-    pub(super) re: TwoWord<S>,
-    pub(super) im: TwoWord<S>,
+    pub(super) re: DoubleDouble<S>,
+    pub(super) im: DoubleDouble<S>,
 }
 
 /// `z e^-w`, to 2^-61 of its modulus; `low` holds second words of w, where there are any.

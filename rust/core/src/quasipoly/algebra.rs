@@ -5,7 +5,7 @@
 //! takes delays that agree to 4 ulp for the same one; where one factor has no delays, nothing is
 //! rounded and nothing merged.
 
-use super::QuasiPolynomial;
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::Error;
 
 /// A product with more coefficients than this is a slip of the pen.
@@ -16,16 +16,6 @@ const MAX_ORDER: u32 = 10_000;
 
 /// Delays of a product closer than this (relative) are the same sum in another order.
 const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
-
-/// `sum += row`.
-pub(super) fn accumulate(sum: &mut Vec<f64>, row: &[f64]) {
-    if sum.len() < row.len() {
-        sum.resize(row.len(), 0.0);
-    }
-    for (total, value) in sum.iter_mut().zip(row) {
-        *total += value;
-    }
-}
 
 fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];

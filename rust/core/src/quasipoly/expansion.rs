@@ -10,9 +10,10 @@
 
 use num_complex::Complex64;
 
-use super::probe::{FLOOR, TINY, modulus};
-use super::sharp::{Complex, LAST_ROUNDING, ROUNDING, Turn, turn};
-use super::{Probe, QuasiPolynomial};
+use super::double_double::{Complex, LAST_ROUNDING, ROUNDING, Turn, turn};
+use super::jet::{FLOOR, TINY, modulus};
+use super::probe::Probe;
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{DoubleDouble, exp_above};
 
 /// Taylor coefficients of g(s) = h(s) e^(s τ) at a point, lowest first.

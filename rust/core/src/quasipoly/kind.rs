@@ -1,6 +1,6 @@
 //! What sort of equation a quasi-polynomial belongs to.
 
-use super::QuasiPolynomial;
+use super::quasi_polynomial::QuasiPolynomial;
 
 /// Told by the degrees of the rows once the smallest delay is factored out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

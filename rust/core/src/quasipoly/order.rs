@@ -5,7 +5,7 @@
 
 use num_bigint::BigInt;
 
-use super::QuasiPolynomial;
+use super::quasi_polynomial::QuasiPolynomial;
 
 /// Sums of this many bits and more are not formed: numbers that far apart do not cancel by intent.
 const MOST_BITS: u32 = 100_000;

@@ -14,56 +14,19 @@
 
 use num_complex::Complex64;
 
-use super::{QuasiPolynomial, sharp};
+use super::double_double;
+use super::jet::{FLOOR, Jet, TINY, modulus};
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, log, sin_cos};
 
 /// Half an ulp of 1, enlarged by what the bounds themselves lose in being computed.
 const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
-/// 2⁻¹⁰¹⁰: u times this is still far above what an underflow loses.
-pub(super) const TINY: f64 = f64::MIN_POSITIVE * 4096.0;
-
-/// Above all that underflow can do to a sum of terms.
-pub(super) const FLOOR: f64 = 1e-290;
-
 /// No phase is wrong by more than a half turn: 2.5 of the exponential, in units of u.
 const OPPOSITE: f64 = 5.0 / f64::EPSILON;
 
 /// What an evaluation in two words counts for.
-const SHARP_COST: u64 = 20;
-
-/// |s| within 4u, wherever it is a normal number: two squares and their sum lose 2 u, of which the
-/// root, correctly rounded, keeps half. Where squares leave the range, of the quotient by the larger
-/// part.
-pub(crate) fn modulus(s: Complex64) -> f64 {
-    let square = s.norm_sqr();
-    if square > 1e-280 && square < 1e300 {
-        return square.sqrt();
-    }
-    let large = s.re.abs().max(s.im.abs());
-    if square.is_nan() {
-        f64::NAN
-    } else if large == 0.0 || large.is_infinite() {
-        large
-    } else {
-        (s / large).norm_sqr().sqrt() * large
-    }
-}
-
-/// Value and slope of g at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jet {
-    /// g(s).
-    pub value: Complex64,
-    /// g′(s).
-    pub slope: Complex64,
-    /// Bound on the error of `value`.
-    pub value_error: f64,
-    /// Bound on the error of `slope`.
-    pub slope_error: f64,
-    /// Index of the largest term, where it exceeds the reference term fourfold.
-    pub overtaken_by: Option<usize>,
-}
+const DOUBLE_DOUBLE_COST: u64 = 20;
 
 /// Evaluates one quasi-polynomial at many points, relative to a reference term c.
 #[derive(Debug, Clone)]
@@ -93,13 +56,13 @@ struct Part {
 
 /// How fast g can change from a point on, terms that are small and fast being counted by their size.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Calm {
+pub(crate) struct DominatedTerms {
     /// Slope of the other terms.
     pub(crate) slope: Complex64,
     /// Bound on their second derivative nearby.
     pub(crate) bend: f64,
     /// What the small ones can change g by, at most.
-    pub(crate) ripple: f64,
+    pub(crate) perturbation: f64,
 }
 
 impl<'a> Probe<'a> {
@@ -295,11 +258,11 @@ impl<'a> Probe<'a> {
 
     /// As [`jet`](Self::jet), in two words: some twenty times the work, for places where rounding
     /// hides what double precision could say.
-    pub fn sharp_jet(&mut self, s: Complex64) -> Jet {
-        self.evaluations += SHARP_COST;
+    pub fn double_double_jet(&mut self, s: Complex64) -> Jet {
+        self.evaluations += DOUBLE_DOUBLE_COST;
         self.weigh(s.re);
         self.parts_at = None;
-        sharp::jet(self.h, self.reference, s)
+        double_double::jet(self.h, self.reference, s)
     }
 
     /// Bound on |g″| at every s with |s| ≤ `modulus` whose real part lies between x and
@@ -345,18 +308,18 @@ impl<'a> Probe<'a> {
     /// What [`curvature`](Self::curvature) says, without the terms that together can change g by no more
     /// than `most` on the way to Re s = x + `shift`; `None` where there are none or nothing else, or the
     /// last jet was not taken at `s`.
-    pub(crate) fn calm(
+    pub(crate) fn dominated_terms(
         &self,
         s: Complex64,
         (modulus, shift): (f64, f64),
         most: f64,
-    ) -> Option<Calm> {
+    ) -> Option<DominatedTerms> {
         if self.parts_at != Some(s) {
             return None;
         }
         let far = self.x + shift;
         let share = most / self.parts.len() as f64;
-        let (mut slope, mut bend, mut ripple) = (Complex64::ZERO, FLOOR, 0.0);
+        let (mut slope, mut bend, mut perturbation) = (Complex64::ZERO, FLOOR, 0.0);
         let (mut small, mut other) = (false, false);
         for (((row, &gap), &weight), part) in self.terms().zip(&self.parts) {
             let (p, dp, ddp) = sizes(row, modulus);
@@ -364,7 +327,7 @@ impl<'a> Probe<'a> {
             let change = part.size + p * heaviest;
             if gap != 0.0 && change < share {
                 small = true;
-                ripple += change;
+                perturbation += change;
             } else {
                 other = true;
                 let gap = gap.abs();
@@ -372,10 +335,10 @@ impl<'a> Probe<'a> {
                 bend += (2.0 * ddp + gap * (2.0 * dp + gap * p)) * heaviest;
             }
         }
-        (small && other).then_some(Calm {
+        (small && other).then_some(DominatedTerms {
             slope,
             bend: bend * (1.0 + 1e-9),
-            ripple: (ripple + FLOOR) * (1.0 + 1e-9),
+            perturbation: (perturbation + FLOOR) * (1.0 + 1e-9),
         })
     }
 }

@@ -3,7 +3,10 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{Probe, QuasiPolynomial, beyond, modulus};
+use super::jet::modulus;
+use super::overflow;
+use super::probe::Probe;
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, sin_cos};
 use crate::memory::filled;
 use crate::{Error, Task};
@@ -52,7 +55,7 @@ impl QuasiPolynomial {
     pub fn value(&self, s: Complex64) -> Complex64 {
         let Scaled { value, delay, .. } = self.scaled_value(s);
         if !value.is_finite() && s.is_finite() {
-            return beyond::value(self, s);
+            return overflow::value(self, s);
         }
         if delay == 0.0 {
             return value;
@@ -88,7 +91,7 @@ impl QuasiPolynomial {
         let mut jet = probe.jet(s);
         let drowned = |value, error| modulus(value) < DROWNED * error;
         if drowned(jet.value, jet.value_error) || drowned(jet.slope, jet.slope_error) {
-            jet = probe.sharp_jet(s);
+            jet = probe.double_double_jet(s);
         }
         let size = modulus(jet.value);
         (jet.slope / size) * (jet.value.conj() / size) - probe.delay()

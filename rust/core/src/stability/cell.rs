@@ -8,7 +8,7 @@
 
 use num_complex::Complex64;
 
-use super::demand::Demand;
+use super::specification::Specification;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{
     Region, chain_abscissa, count_right_of, rightmost, roots, unstable_and_rightmost,
@@ -46,7 +46,7 @@ impl Cell {
     };
 }
 
-/// Judge the stability of h: how many of its roots offend against `demand`? With `abscissa`, also how far
+/// Judge the stability of h: how many of its roots offend against `specification`? With `abscissa`, also how far
 /// they are from the axis.
 ///
 /// * `Ok`: count (and abscissa) hold.
@@ -63,15 +63,15 @@ impl Cell {
 /// [`Error::Interrupted`] alone.
 ///
 /// ```
-/// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::{Demand, judge}, status::CellStatus};
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::{Specification, judge}, status::CellStatus};
 /// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![5.0]], vec![0.0, 0.36])?;
-/// let cell = judge(&h, Demand::default(), true, &Task::new())?;
+/// let cell = judge(&h, Specification::default(), true, &Task::new())?;
 /// assert_eq!((cell.unstable, cell.status), (2, CellStatus::Ok));
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn judge(
     h: &QuasiPolynomial,
-    demand: Demand,
+    specification: Specification,
     abscissa: bool,
     task: &Task,
 ) -> Result<Cell, Error> {
@@ -87,9 +87,9 @@ pub fn judge(
     }
     let chain = chain_abscissa(h);
     if !abscissa {
-        let (unstable, status) = match by_chain(h, chain, demand.leftmost()) {
+        let (unstable, status) = match by_chain(h, chain, specification.leftmost()) {
             Some(known) => known,
-            None => by_count(offending(h, demand, task))?,
+            None => by_count(offending(h, specification, task))?,
         };
         return Ok(Cell {
             unstable,
@@ -97,13 +97,16 @@ pub fn judge(
             status,
         });
     }
-    let ((unstable, status), set) = match by_chain(h, chain, demand.leftmost()) {
+    let ((unstable, status), set) = match by_chain(h, chain, specification.leftmost()) {
         Some(known) => (known, rightmost(h, 1, task)),
-        None if demand == Demand::default() => {
+        None if specification == Specification::default() => {
             let (number, set) = unstable_and_rightmost(h, task);
             (by_count(number)?, set)
         }
-        None => (by_count(offending(h, demand, task))?, rightmost(h, 1, task)),
+        None => (
+            by_count(offending(h, specification, task))?,
+            rightmost(h, 1, task),
+        ),
     };
     // −∞ where no root lies right of the chains.
     let isolated = set.map(|set| set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re));
@@ -138,9 +141,9 @@ pub(super) fn with_abscissa(cell: Cell, isolated: f64, chain: f64) -> Cell {
 }
 
 /// The number of offending roots: counted, or sorted one by one where the edge is not one line.
-fn offending(h: &QuasiPolynomial, demand: Demand, task: &Task) -> Result<u64, Error> {
-    let line = demand.leftmost();
-    if demand.damping.is_none() {
+fn offending(h: &QuasiPolynomial, specification: Specification, task: &Task) -> Result<u64, Error> {
+    let line = specification.leftmost();
+    if specification.damping.is_none() {
         return count_right_of(h, line, task);
     }
     let set = match roots(h, &Region::right_of(line), task) {
@@ -148,7 +151,7 @@ fn offending(h: &QuasiPolynomial, demand: Demand, task: &Task) -> Result<u64, Er
         Err(Error::Contour { .. }) => roots(h, &Region::right_of(1.01 * line), task)?,
         set => set?,
     };
-    demand.offending(&set).ok_or(Error::Contour {
+    specification.offending(&set).ok_or(Error::Contour {
         place: Complex64::new(line, 0.0),
         distance: 0.0,
     })

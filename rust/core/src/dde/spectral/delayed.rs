@@ -6,10 +6,10 @@
 //! one-sided. Where a delay is shorter than the element, shifted nodes lie in the element itself;
 //! their values follow from the iterate and are renewed at each sweep.
 
-use super::super::history::History;
+use super::chebyshev;
+use super::history::History;
 use super::nodes::Nodes;
 use crate::Error;
-use crate::dde::chebyshev;
 
 /// How far end nodes are moved inwards to find their piece, in gaps between nodes.
 const INWARDS: f64 = 0.01;

@@ -5,13 +5,13 @@
 //! steps, is a small part of the tolerance. Where the Jacobian has served before, the ratio it
 //! showed last stands in for the second step, with a margin.
 
-use super::super::history::History;
+use super::chebyshev;
 use super::delayed::{Delayed, Place};
 use super::dense::dot;
+use super::history::History;
 use super::newton::Newton;
 use super::nodes::Nodes;
-use super::{Columns, Equation, Problem};
-use crate::dde::chebyshev;
+use super::problem::{Columns, Equation, Problem};
 use crate::{Error, Task};
 
 /// What iteration may leave, in tolerances.

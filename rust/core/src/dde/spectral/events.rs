@@ -10,12 +10,12 @@
 
 use std::ops::Range;
 
-use super::super::history::Piece;
+use super::chebyshev;
+use super::history::Piece;
 use super::isolate::separators;
 use super::nodes::{Nodes, nodes};
-use super::{Equation, Event};
+use super::problem::{Equation, Event};
 use crate::Error;
-use crate::dde::chebyshev;
 
 /// A false position is close to an end of its bracket within this part of it.
 const CLOSE: f64 = 0.01;

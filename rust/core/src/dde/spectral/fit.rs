@@ -9,10 +9,10 @@
 //! become tiny, and a run of them is a breaking point, at the tiniest. Close to a joint, where there
 //! are no points, it shows in values or slopes that differ there; it is found by bisection.
 
-use super::super::breaks::BreakingPoint;
-use super::Piece;
+use super::breaks::BreakingPoint;
+use super::chebyshev;
+use super::history::Piece;
 use crate::Error;
-use crate::dde::chebyshev;
 
 const POINTS: usize = 20;
 /// Coefficients at the end that must be small.

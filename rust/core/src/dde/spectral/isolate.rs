@@ -4,8 +4,8 @@
 //! there, |c_0| > Σ |c_k|, or that it is monotonic, the same of its derivative: |T_k| ≤ 1. What is
 //! still undecided in the smallest cells are zeros that rounding does not tell apart.
 
+use super::chebyshev;
 use super::nodes::nodes;
-use crate::dde::chebyshev;
 
 /// Halvings of [−1, 1]: beyond, two zeros drown in rounding between them.
 const DEEPEST: u32 = 26;

@@ -9,8 +9,8 @@
 
 use super::dense::add_multiple;
 use super::nodes::Nodes;
+use super::problem::{Columns, Equation};
 use super::sparsity::Sparsity;
-use super::{Columns, Equation};
 use crate::{Error, Task};
 
 /// Columns in which everything moves.

@@ -11,9 +11,9 @@ use super::delayed::Delayed;
 use super::dense::{Factors, add_multiple, dot};
 use super::jacobian::{Differences, Jacobian, Point};
 use super::nodes::Nodes;
+use super::problem::{Columns, Equation};
 use super::shifted::Shifted;
 use super::sparsity::Sparsity;
-use super::{Columns, Equation};
 use crate::{Error, Task};
 
 /// Off-diagonal part of J, relative to its diagonal, that is left to the sweeps.

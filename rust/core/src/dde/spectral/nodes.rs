@@ -12,8 +12,8 @@
 
 use std::sync::OnceLock;
 
+use super::chebyshev;
 use super::dense::Factors;
-use crate::dde::chebyshev;
 
 /// The numbers of nodes to choose from.
 pub(super) const ORDERS: [usize; 9] = [4, 6, 8, 10, 12, 14, 16, 20, 24];

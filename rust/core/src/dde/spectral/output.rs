@@ -1,6 +1,6 @@
 //! Which values of a run are given back.
 
-use super::super::history::Piece;
+use super::history::Piece;
 use crate::Error;
 use crate::memory::{append, push};
 

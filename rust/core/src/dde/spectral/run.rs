@@ -1,16 +1,16 @@
 //! A run from the start to the end: elements one after the other.
 
-use super::super::breaks::{BreakingPoint, Breaks};
-use super::super::history::Piece;
-use super::control::{self, Verdict};
+use super::breaks::{BreakingPoint, Breaks};
+use super::control::Verdict;
 use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
+use super::history::Piece;
 use super::newton::Newton;
 use super::nodes::{Nodes, nodes};
 use super::output::Output;
+use super::problem::{Equation, Outcome, Problem, Solution};
 use super::unread::{Reading, Unread};
-use super::{Equation, Outcome, Problem, Solution};
-use crate::dde::chebyshev;
+use super::{chebyshev, control};
 use crate::{Error, Task};
 
 /// Elements shorter than this part of their time are rounding.
@@ -33,7 +33,7 @@ const RETREAT: f64 = 0.3;
 /// to be worth them.
 const OVERLAP: f64 = 12.0;
 /// Elements to wait after one of that kind failed, at most.
-const PATIENCE: u32 = 4096;
+const LONGEST_WAIT: u32 = 4096;
 /// Orders of a jump that matter beside one for each digit of the tolerance.
 const UNSEEN: u32 = 2;
 /// A jump of a neutral slope below this part of the tolerance is none.
@@ -211,8 +211,8 @@ impl<'a> Run<'a> {
                 }
             }
             if self.solution.refused > before && end - start > self.shortest_delay {
-                let patience = (2 * self.wait.1).min(PATIENCE);
-                self.wait = (patience, patience);
+                let wait = (2 * self.wait.1).min(LONGEST_WAIT);
+                self.wait = (wait, wait);
             }
         }
     }

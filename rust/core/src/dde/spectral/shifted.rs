@@ -197,9 +197,9 @@ fn transposed(values: &[f64], length: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::nodes::{ORDERS, nodes};
-    use super::super::sparsity::Sparsity;
     use super::*;
+    use crate::dde::spectral::nodes::{ORDERS, nodes};
+    use crate::dde::spectral::sparsity::Sparsity;
 
     /// A chain of neighbours, or everything coupled with everything.
     fn matrix(dim: usize, full: bool) -> Jacobian {

@@ -2,9 +2,10 @@
 
 use proptest::prelude::*;
 
-use super::super::breaks::BreakingPoint;
-use super::super::history::{History, Piece};
+use super::breaks::BreakingPoint;
+use super::history::{History, Piece};
 use super::*;
+use crate::{Error, Task};
 
 /// A right-hand side node by node: f(t, y, z, dz, out).
 struct Plain<F> {

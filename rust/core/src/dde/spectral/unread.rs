@@ -8,11 +8,11 @@
 //! included. The right-hand side is not called. A stretch that the nodes do not stand for ends the
 //! element at its start or, where it is the first one, at its end.
 
-use super::super::history::History;
-use super::Problem;
+use super::chebyshev;
 use super::element::Element;
+use super::history::History;
 use super::nodes::Nodes;
-use crate::dde::chebyshev;
+use super::problem::Problem;
 
 /// Tolerances that the polynomial may be off: stored pieces and nodes both err by a part of one.
 const UNREAD: f64 = 10.0;

@@ -16,8 +16,8 @@ use std::collections::VecDeque;
 use crate::Error;
 
 use super::legendre::TERMS;
-use super::slack;
 use super::terms::Feed;
+use crate::dde::limits::slack;
 
 /// A jump below this part of what rounding is relative to has faded.
 const FADED: f64 = f64::EPSILON;

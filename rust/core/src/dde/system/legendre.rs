@@ -192,6 +192,12 @@ pub(super) fn restricted(series: &[f64], offset: f64, ratio: f64) -> Series {
     out
 }
 
+/// The Gauss nodes at which series are taken from values, and what takes those to coefficients: the
+/// part of value i in coefficient k at i m + k, m being the number of both.
+pub fn legendre_tables() -> (Vec<f64>, Vec<f64>) {
+    (nodes().to_vec(), transform().concat())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,11 +1,10 @@
 //! What a run hands out: outputs, states and inputs at the times asked for, and the breaks.
 
-use super::slack;
+use super::equations::{SystemEquations, SystemResponse};
 use super::terms::Feed;
 use super::track::Track;
-use super::{SystemEquations, SystemResponse};
 use crate::Error;
-use crate::dde::wanted::RESPONSE;
+use crate::dde::limits::{RESPONSE, slack};
 use crate::memory::{push, reserved};
 
 /// The signals of a run, as far as they are known.

@@ -1,16 +1,18 @@
 //! The method of steps: elements from breaking point to breaking point.
 
-use crate::dde::linear::DIVERGED;
+use crate::dde::limits::DIVERGED;
 use crate::{Error, Task};
 
 use super::element::Element;
-use super::given::{first_break, passed_breaks};
+use super::equations::{Past, Signal, SystemEquations, SystemResponse};
+use super::input_breaks::{first_break, passed_breaks};
 use super::jumps::{Jumps, Scale};
 use super::legendre::TERMS;
 use super::outputs::{Outputs, Signals};
-use super::terms::{self, Feed};
+use super::terms;
+use super::terms::Feed;
 use super::track::{KINDS, Piece, Track};
-use super::{Past, Signal, SystemEquations, SystemResponse, slack};
+use crate::dde::limits::slack;
 
 /// Elements between two looks at the task.
 const CHECK_EVERY: u64 = 256;

@@ -3,8 +3,8 @@
 use crate::Error;
 
 use super::legendre::TERMS;
-use super::slack;
 use super::track::{Sizes, Track};
+use crate::dde::limits::slack;
 
 /// A matrix, row-major, that acts with a delay in s.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,8 @@
 
 use std::collections::VecDeque;
 
-use super::legendre::{self, DEGREE, Series, TERMS};
+use super::legendre;
+use super::legendre::{DEGREE, Series, TERMS};
 
 /// One piece: coefficient k of column j at `series[j (degree + 1) + k]`.
 #[derive(Debug, Clone, PartialEq, Default)]

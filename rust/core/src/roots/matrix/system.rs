@@ -5,9 +5,6 @@
 //! Reinsch 1969; Osborne 1960). That is exact and moves no root, and the inequalities of the
 //! proofs, which compare norms, hold over longer steps.
 
-use num_complex::Complex64;
-
-use super::place::Place;
 use crate::Error;
 
 /// Sweeps of balancing; it converges in few.
@@ -209,28 +206,6 @@ impl CharacteristicMatrix {
             .filter(late)
             .flat_map(|term| &term.entries)
             .any(|entry| entry.slope != 0.0)
-    }
-}
-
-/// Points, in units of the rate, at one of which a matrix that is regular at all is so in double
-/// precision.
-const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
-
-impl CharacteristicMatrix {
-    /// # Errors
-    /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
-    pub(super) fn check_regular(&self) -> Result<(), Error> {
-        let rate = self.rate;
-        let regular =
-            |(x, y): &(f64, f64)| Place::new(self, Complex64::new(x * rate, y * rate)).is_some();
-        if POINTS.iter().any(regular) {
-            return Ok(());
-        }
-        Err(Error::argument(
-            "the determinant of the characteristic matrix is zero for every s, or cannot be told \
-             from it: the equations do not determine the state, look for rows of E, N and A that \
-             depend on one another, or for entries that differ too much in size",
-        ))
     }
 }
 

@@ -1,6 +1,6 @@
 //! How far arg det M turns along a line, and Newton's iteration on det M: walks on matrices.
 //!
-//! Two neighbours reach to a point between them (`place`): the true change of arg det M is that
+//! Two neighbours reach to a point between them (`local_enclosure`): the true change of arg det M is that
 //! expected from both, up to less than 2.5, and computed arguments are wrong by 0.1 at most. So the
 //! difference of the computed ones that is next to the expected change is the true one up to their
 //! errors, which cancel in the sum but at the two ends of the line.
@@ -10,13 +10,12 @@
 
 use num_complex::Complex64;
 
-use super::place::{Place, Reach};
+use super::local_enclosure::{LocalEnclosure, Reach};
 use super::system::CharacteristicMatrix;
 use crate::quasipoly::modulus;
-use crate::roots::cell::{Cell, Walk};
-use crate::roots::isolate::Seek;
-use crate::roots::newton::{Disc, Outcome};
-use crate::roots::winding::Turn;
+use crate::roots::counting::{Cell, Turn, Walk};
+use crate::roots::disc::Disc;
+use crate::roots::locating::{Outcome, Seek};
 use crate::{Error, Task};
 
 use std::f64::consts::{PI, TAU};
@@ -37,7 +36,7 @@ const MAX_STEPS: usize = 40;
 const STEP_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// Evaluations for the walk around a small square.
-const PATIENCE: u64 = 1000;
+const EAGER_LIMIT: u64 = 1000;
 
 /// Places next to a root that are tried before a line counts as blocked.
 const MOST_UNCLEAR: u32 = 5;
@@ -46,16 +45,16 @@ const MOST_UNCLEAR: u32 = 5;
 const STRETCH: f64 = 1.9;
 
 /// Walks along lines; keeps the budget, the hints of roots and the discs already proved.
-pub(in crate::roots) struct MatrixWalker<'a> {
+pub(super) struct MatrixWalker<'a> {
     system: &'a CharacteristicMatrix,
     task: &'a Task,
     /// Where Newton's step from the points closest to a root leads to.
-    pub(in crate::roots) hints: Vec<Complex64>,
+    pub(super) hints: Vec<Complex64>,
     known: Vec<Disc>,
     /// Where no single root could be proved.
     stalled: Vec<Complex64>,
     /// Evaluations at which a small square is given up for a larger one.
-    patience: u64,
+    eager_limit: u64,
     evaluations: u64,
     work: u64,
     limit: u64,
@@ -69,7 +68,7 @@ impl<'a> MatrixWalker<'a> {
             hints: Vec::new(),
             known: Vec::new(),
             stalled: Vec::new(),
-            patience: u64::MAX,
+            eager_limit: u64::MAX,
             evaluations: 0,
             work: 0,
             limit: limit.min(MAX_EVALUATIONS),
@@ -85,7 +84,7 @@ impl<'a> MatrixWalker<'a> {
         let size = self.system.size() as u64;
         self.evaluations += 1;
         self.work += 20 * size * size * size + 1000;
-        if self.evaluations > self.patience {
+        if self.evaluations > self.eager_limit {
             return Err(Error::Contour {
                 place: Complex64::ZERO,
                 distance: 0.0,
@@ -107,16 +106,16 @@ impl<'a> MatrixWalker<'a> {
         Ok(())
     }
 
-    fn place(&mut self, s: Complex64) -> Result<Option<Place>, Error> {
+    fn enclosure(&mut self, s: Complex64) -> Result<Option<LocalEnclosure>, Error> {
         self.spend()?;
-        Ok(Place::new(self.system, s))
+        Ok(LocalEnclosure::new(self.system, s))
     }
 
-    /// The error of a line that cannot be proved to be clear of roots at `place`.
+    /// The error of a line that cannot be proved to be clear of roots at `local_enclosure`.
     fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
         let mut distance = 4.0 * f64::EPSILON * modulus(place).max(1e-3 * self.system.rate());
         // The place may be clear itself, and the root as far as Newton's step leads.
-        if let Some(here) = Place::tried(self.system, place) {
+        if let Some(here) = LocalEnclosure::tried(self.system, place) {
             let correction = modulus(here.correction);
             if correction.is_finite() {
                 distance = distance.max(2.0 * correction);
@@ -125,7 +124,7 @@ impl<'a> MatrixWalker<'a> {
         for _ in 0..40 {
             let mut clear = true;
             for step in [Complex64::ONE, -Complex64::ONE, Complex64::I] {
-                clear &= self.place(place + step * distance)?.is_some();
+                clear &= self.enclosure(place + step * distance)?.is_some();
             }
             if clear {
                 break;
@@ -138,11 +137,11 @@ impl<'a> MatrixWalker<'a> {
     /// The next place, with the point between where both reaches meet: its distance from `here`.
     fn step(
         &mut self,
-        here: &Place,
+        here: &LocalEnclosure,
         to: Complex64,
         (along, rest): (Complex64, f64),
         stretch: &mut f64,
-    ) -> Result<(Place, Reach, f64, Reach), Error> {
+    ) -> Result<(LocalEnclosure, Reach, f64, Reach), Error> {
         let reach = here.reach(along, rest);
         let mut length = if reach.length >= rest {
             rest
@@ -159,7 +158,7 @@ impl<'a> MatrixWalker<'a> {
             if next == here.s {
                 break;
             }
-            if let Some(ahead) = self.place(next)? {
+            if let Some(ahead) = self.enclosure(next)? {
                 let gone = modulus(next - here.s) * (1.0 + 1e-12);
                 let back = ahead.reach(-along, gone);
                 if back.length + reach.length >= gone * (1.0 + 1e-9) || reach.length >= gone {
@@ -188,7 +187,7 @@ impl<'a> MatrixWalker<'a> {
         let mut half = 4.0 * f64::EPSILON * size.sqrt() * modulus(z).max(1e-3 * self.system.rate());
         let mut growth = 3.0;
         while half < most {
-            if self.place(z + half)?.is_some() {
+            if self.enclosure(z + half)?.is_some() {
                 // A square that would meet the real axis is made symmetric about it.
                 let symmetric = z.im.abs() <= 1.5 * half;
                 let (center, im) = if symmetric {
@@ -197,14 +196,14 @@ impl<'a> MatrixWalker<'a> {
                     (z, (z.im - half, z.im + half))
                 };
                 // Next to a defective root steps are as short as the square of the distance.
-                self.patience = self.evaluations + PATIENCE;
+                self.eager_limit = self.evaluations + EAGER_LIMIT;
                 let cell = Cell::new(self, (center.re - half, center.re + half), im, symmetric);
-                growth = if self.evaluations > self.patience {
+                growth = if self.evaluations > self.eager_limit {
                     9.0
                 } else {
                     3.0
                 };
-                self.patience = u64::MAX;
+                self.eager_limit = u64::MAX;
                 match cell {
                     Ok(cell) if cell.count > 0 => {
                         return Ok(u32::try_from(cell.count).ok().map(|multiplicity| Disc {
@@ -255,7 +254,7 @@ impl Walk for MatrixWalker<'_> {
             return Ok(Turn::default());
         }
         let along = (to - from) / ((to - from).re.abs() + (to - from).im.abs());
-        let Some(mut here) = self.place(from)? else {
+        let Some(mut here) = self.enclosure(from)? else {
             return Err(self.blocked(from)?);
         };
         let mut turn = Turn {
@@ -316,7 +315,7 @@ impl Seek for MatrixWalker<'_> {
         let mut slow = 0.0;
         for _ in 0..MAX_STEPS {
             self.spend()?;
-            let Some(here) = Place::tried(self.system, z) else {
+            let Some(here) = LocalEnclosure::tried(self.system, z) else {
                 return self.proved(z);
             };
             let step = here.correction;
