@@ -46,7 +46,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::sampled::{SampledCells, sampled_abscissa_grid};
     #[pymodule_export]
-    use super::solver::{DelayPieces, DelayRun, solve_delay_equation};
+    use super::solver::{DelayPieces, DelayRun, solve_dde};
     #[pymodule_export]
     use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]
