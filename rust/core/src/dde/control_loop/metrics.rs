@@ -48,8 +48,9 @@ impl Metrics {
         steady_state: f64::NAN,
     };
 
-    /// The fields in their order.
-    pub fn to_array(self) -> [f64; 9] {
+    /// In the order of the fields.
+    #[cfg(test)]
+    pub(crate) fn to_array(self) -> [f64; 9] {
         [
             self.rise_time,
             self.settling_time,
