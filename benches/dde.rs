@@ -1,4 +1,4 @@
-//! The linear stepper: one simulation of ten seconds each, the poles of a sampled loop, sweeps, and
+//! Linear control loops: one simulation of ten seconds each, the poles of a sampled loop, sweeps, and
 //! runs in fixed steps.
 
 use std::hint::black_box;

@@ -1,6 +1,6 @@
 //! Lambert W: time per block of 1000 elements, one thread.
 //!
-//! The disc is what control problems ask for; next to -1/e and extreme exponents are where
+//! The disc is typical of control problems; next to -1/e and extreme exponents are where
 //! other implementations slow down or fail.
 
 use std::hint::black_box;

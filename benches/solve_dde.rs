@@ -1,4 +1,4 @@
-//! The spectral method of steps with right-hand sides that cost next to nothing.
+//! The spectral method of steps with right-hand sides that cost very little.
 
 use std::hint::black_box;
 
