@@ -9,7 +9,7 @@ from deadtime import FlightAbortedError, LinkError
 from deadtime.links import Limits, run
 from deadtime.links.ardrone2 import ARDrone2, Navdata, build_navdata
 from deadtime.links.ardrone2.commands import Ref, decode
-from deadtime.links.ardrone2.connection import _Door
+from deadtime.links.ardrone2.connection import _PeerFilter
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.emulator.settings import Settings
 from emulated import LIMITS, client_of, connected, emulator
@@ -405,7 +405,7 @@ def test_what_a_socket_hands_on_from_elsewhere_is_counted_and_dropped():
     # A system that filters less than it should: the protocol checks address and port itself.
     async def fly():
         async with connected() as (_, drone):
-            door = _Door(drone._link.take, drone._link.reader.refuse)
+            door = _PeerFilter(drone._link.take, drone._link.reader.refuse)
             door._peer = ("127.0.0.1", 5554)
             before = (await drone.state()).sequence
             forged = build_navdata(Navdata(1 << 31, before + 1))
