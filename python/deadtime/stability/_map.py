@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays, read_only
+from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.ranges import Points, numbers_at
 from deadtime._base.validation import finite, thread_number
@@ -261,6 +262,15 @@ class StabilityMap(ReadOnlyArrays):
         )
         data["abscissa"].attrs["units"] = "1/s"
         return data
+
+    def _repr_html_(self) -> str:
+        numbers, cells = np.unique(self.unstable, return_counts=True)
+        told = {-1: "infinitely many", -2: "not known"}
+        rows = [
+            table_row((told.get(number, str(number)), str(count)), "td", 2)
+            for number, count in zip(numbers.tolist(), cells.tolist(), strict=True)
+        ]
+        return table(("unstable roots", "cells"), rows, repr(self).strip("<>"))
 
     def __repr__(self) -> str:
         sides = ", ".join(

@@ -25,6 +25,7 @@ from deadtime.roots import (
 )
 from deadtime.roots._frequency import powers_of_s, without_powers
 from deadtime.roots._quasipolynomial import is_number
+from deadtime.roots._text import latex
 from deadtime.systems._interchange import (
     control_package,
     polynomials_of_control,
@@ -158,6 +159,9 @@ class TransferFunction(HasPoles, HasResponses):
         above = f"({num})" if _is_sum(num) else num
         below = f"({den})" if _is_sum(den) or " " in den or "-" in den else den
         return f"{above} / {below}" if den != "1" else num
+
+    def _repr_latex_(self) -> str:
+        return rf"$\frac{{{latex(repr(self._num))}}}{{{latex(repr(self._den))}}}$"
 
     # Algebra
 
