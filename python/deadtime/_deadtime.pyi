@@ -14,18 +14,26 @@ __all__ = [
     "DelayRun",
     "Expansion",
     "Family",
+    "FixedStepResponse",
+    "LegendreTables",
     "LinearLoop",
     "LinearSystem",
+    "LinearSystemResponse",
+    "LoopResponse",
+    "LoopSensitivities",
     "MapBoundary",
     "MapCells",
     "Monotone",
     "ProvedBoxes",
     "QuasiPolynomial",
     "RootSet",
+    "SampledCells",
     "Segment",
     "Sensitivity",
     "Signal",
     "StabilityRadius",
+    "SweepMetrics",
+    "SweepResponses",
     "at_read",
     "at_write",
     "configuration_read",
@@ -34,6 +42,7 @@ __all__ = [
     "dde_roots",
     "doubles_read",
     "doubles_write",
+    "fixed_step_run",
     "lambertw",
     "lambertw0",
     "lambertw0_number",
@@ -54,13 +63,14 @@ __all__ = [
     "navdata_layouts",
     "navdata_read",
     "navdata_write",
+    "on_samples",
     "proved_boxes",
     "robust_map",
     "sampled_abscissa_grid",
-    "solve_delay_equation",
+    "solve_dde",
     "spin",
     "stability_radius",
-    "sweep_figures",
+    "sweep_metrics",
     "sweep_responses",
     "thread_count",
     "wrightomega",
@@ -359,124 +369,260 @@ def robust_map(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> NDArray[np.int32]: ...
-def fixed_step_run(
-    plant: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float],
-    controller: tuple[
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        float,
-        float,
-        float,
-        float,
-    ],
-    delay: float,
-    delay_path: str,
-    limit: float | None,
-    sample_steps: int | None,
-    solver: str,
-    step: float,
-    steps: int,
-    state: NDArray[np.float64],
-    output: float,
-    command: float,
-    reference: tuple[float, NDArray[np.float64], NDArray[np.float64]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def on_samples(
-    since: NDArray[np.float64], start: float, sample_time: float, sample_phase: float
-) -> NDArray[np.float64]: ...
+
+_Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
+
+class _SampleUpdate(Protocol):
+    @property
+    def states(self) -> NDArray[np.float64]: ...
+    @property
+    def command(self) -> NDArray[np.float64]: ...
+    @property
+    def reference(self) -> NDArray[np.float64]: ...
+
+class _LoopEquations(Protocol):
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def E(self) -> NDArray[np.float64]: ...
+    @property
+    def K(self) -> NDArray[np.float64]: ...
+    @property
+    def L(self) -> float: ...
+    @property
+    def M(self) -> float: ...
+    @property
+    def C(self) -> NDArray[np.float64]: ...
+    @property
+    def D(self) -> float: ...
+    @property
+    def impulse(self) -> float: ...
+    @property
+    def update(self) -> _SampleUpdate | None: ...
+
+class _LoopRun(Protocol):
+    @property
+    def state(self) -> NDArray[np.float64]: ...
+    @property
+    def command(self) -> float: ...
+    @property
+    def reference_before(self) -> float: ...
+    @property
+    def reference(self) -> float | NDArray[np.float64]: ...
+    @property
+    def reference_time(self) -> NDArray[np.float64] | None: ...
+    @property
+    def command_history(self) -> NDArray[np.float64] | None: ...
+    @property
+    def sample_phase(self) -> float: ...
+
+@final
+class LoopResponse:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+    @property
+    def breaks(self) -> NDArray[np.float64]: ...
+    @property
+    def reference(self) -> NDArray[np.float64]: ...
 
 @final
 class LinearLoop:
     def __new__(
         cls,
-        a: NDArray[np.float64],
-        b: NDArray[np.float64],
-        e: NDArray[np.float64],
-        k: NDArray[np.float64],
-        l: float,
-        m: float,
-        c: NDArray[np.float64],
-        d: float,
+        equations: _LoopEquations,
         delay: float,
         sample_time: float | None = None,
         limit: float | None = None,
-        impulse: float = 0.0,
-        update: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> LinearLoop: ...
-    def simulate(
-        self,
-        output_times: NDArray[np.float64],
-        input_times: NDArray[np.float64],
-        state: NDArray[np.float64],
-        command: float,
-        reference_before: float,
-        reference_times: NDArray[np.float64],
-        reference_values: NDArray[np.float64],
-        command_history: NDArray[np.float64],
-        sample_phase: float,
-    ) -> tuple[
-        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]: ...
+    def outputs(self, time: NDArray[np.float64], run: _LoopRun) -> NDArray[np.float64]: ...
     def respond(
-        self,
-        time: NDArray[np.float64],
-        ahead: float,
-        state: NDArray[np.float64],
-        command: float,
-        before: float,
-        reference: float | tuple[NDArray[np.float64], NDArray[np.float64]],
-        command_history: NDArray[np.float64] | None,
-        sample_phase: float,
-    ) -> tuple[
-        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]: ...
+        self, time: NDArray[np.float64], run: _LoopRun, output_lead: float
+    ) -> LoopResponse: ...
     def transition_matrix(self) -> NDArray[np.float64]: ...
     def balanced_matrix(self) -> NDArray[np.float64]: ...
     def poles(self) -> NDArray[np.complex128]: ...
 
+def on_samples(
+    since: NDArray[np.float64], start: float, sample_time: float, sample_phase: float
+) -> NDArray[np.float64]: ...
+
+class _SampledLoops(Protocol):
+    @property
+    def cells(self) -> int: ...
+    @property
+    def states(self) -> int: ...
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def K(self) -> NDArray[np.float64]: ...
+    @property
+    def L(self) -> NDArray[np.float64]: ...
+    @property
+    def gain(self) -> NDArray[np.float64]: ...
+    @property
+    def delay(self) -> NDArray[np.float64]: ...
+    @property
+    def sample_time(self) -> NDArray[np.float64]: ...
+
+@final
+class SampledCells:
+    @property
+    def abscissa(self) -> NDArray[np.float64]: ...
+    @property
+    def unstable(self) -> NDArray[np.int32]: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+def sampled_abscissa_grid(
+    loops: _SampledLoops,
+    *,
+    decay: float,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> SampledCells: ...
+
+class _StateSpace(Protocol):
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def C(self) -> NDArray[np.float64]: ...
+    @property
+    def D(self) -> float: ...
+
+class _ControllerEquations(Protocol):
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def E(self) -> NDArray[np.float64]: ...
+    @property
+    def C(self) -> NDArray[np.float64]: ...
+    @property
+    def p(self) -> float: ...
+    @property
+    def q(self) -> float: ...
+    @property
+    def M(self) -> float: ...
+    @property
+    def impulse(self) -> float: ...
+
+class _FixedStepSettings(Protocol):
+    @property
+    def delay(self) -> float: ...
+    @property
+    def delay_path(self) -> str: ...
+    @property
+    def limit(self) -> float | None: ...
+    @property
+    def sample_steps(self) -> int | None: ...
+    @property
+    def solver(self) -> str: ...
+    @property
+    def step(self) -> float: ...
+    @property
+    def steps(self) -> int: ...
+    @property
+    def initial_output(self) -> float: ...
+
+@final
+class FixedStepResponse:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+
+def fixed_step_run(
+    plant: _StateSpace,
+    controller: _ControllerEquations,
+    run: _LoopRun,
+    settings: _FixedStepSettings,
+) -> FixedStepResponse: ...
+
+class _LoopSlopes(Protocol):
+    @property
+    def row(self) -> NDArray[np.float64]: ...
+    @property
+    def row_slopes(self) -> NDArray[np.float64]: ...
+    @property
+    def state_slopes(self) -> NDArray[np.float64]: ...
+    @property
+    def command_slopes(self) -> NDArray[np.float64]: ...
+    @property
+    def output_lead_slopes(self) -> NDArray[np.float64]: ...
+
+@final
+class LoopSensitivities:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+
 def loop_sensitivities(
-    states: int,
-    row: NDArray[np.float64],
-    row_slopes: NDArray[np.float64],
-    state: NDArray[np.float64],
-    state_slopes: NDArray[np.float64],
-    command: float,
-    command_slopes: NDArray[np.float64],
-    ahead: NDArray[np.float64],
-    output_times: NDArray[np.float64],
-    input_times: NDArray[np.float64],
-    reference_before: float,
-    reference_times: NDArray[np.float64],
-    reference_values: NDArray[np.float64],
-    command_history: NDArray[np.float64],
-    sample_phase: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def sweep_figures(
-    states: int,
-    rows: NDArray[np.float64],
-    amplitude: float,
-    is_ahead: bool,
-    steady: NDArray[np.float64],
+    slopes: _LoopSlopes,
+    run: _LoopRun,
+    output_time: NDArray[np.float64],
+    input_time: NDArray[np.float64],
+) -> LoopSensitivities: ...
+
+class _LoopSets(Protocol):
+    @property
+    def states(self) -> int: ...
+    @property
+    def rows(self) -> NDArray[np.float64]: ...
+    @property
+    def amplitude(self) -> float: ...
+    @property
+    def is_ahead(self) -> bool: ...
+
+@final
+class SweepMetrics:
+    @property
+    def metrics(self) -> dict[str, NDArray[np.float64]]: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+@final
+class SweepResponses:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+def sweep_metrics(
+    sets: _LoopSets,
+    *,
+    steady_state: NDArray[np.float64],
     span: float,
     settling: float,
-    rise: tuple[float, float],
+    rise: _Pair,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+) -> SweepMetrics: ...
 def sweep_responses(
-    states: int,
-    rows: NDArray[np.float64],
-    amplitude: float,
-    is_ahead: bool,
-    times: NDArray[np.float64],
+    sets: _LoopSets,
+    time: NDArray[np.float64],
+    *,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
-def legendre_tables() -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+) -> SweepResponses: ...
 
-_Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
+@final
+class LegendreTables:
+    @property
+    def nodes(self) -> NDArray[np.float64]: ...
+    @property
+    def transform(self) -> NDArray[np.float64]: ...
+
+def legendre_tables() -> LegendreTables: ...
 
 @final
 class Signal:
@@ -484,45 +630,48 @@ class Signal:
         cls, edges: NDArray[np.float64], series: NDArray[np.float64], breaks: Sequence[int]
     ) -> Signal: ...
 
+class _SystemMatrices(Protocol):
+    @property
+    def states(self) -> int: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def outputs(self) -> int: ...
+    @property
+    def A(self) -> _Terms: ...
+    @property
+    def N(self) -> _Terms: ...
+    @property
+    def B(self) -> _Terms: ...
+    @property
+    def C(self) -> _Terms: ...
+    @property
+    def F(self) -> _Terms: ...
+    @property
+    def D(self) -> _Terms: ...
+
+@final
+class LinearSystemResponse:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def states(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+    @property
+    def breaks(self) -> NDArray[np.float64]: ...
+
 @final
 class LinearSystem:
-    def __new__(
-        cls,
-        states: int,
-        inputs: int,
-        outputs: int,
-        a: _Terms,
-        n: _Terms,
-        b: _Terms,
-        c: _Terms,
-        f: _Terms,
-        d: _Terms,
-    ) -> LinearSystem: ...
+    def __new__(cls, matrices: _SystemMatrices) -> LinearSystem: ...
     def simulate(
         self,
-        times: NDArray[np.float64],
+        time: NDArray[np.float64],
         state: NDArray[np.float64],
         history: Signal,
-        slopes: Signal | None,
+        history_derivative: Signal | None,
         inputs: Signal,
-    ) -> tuple[
-        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]: ...
-
-def sampled_abscissa_grid(
-    cells: int,
-    states: int,
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    k: NDArray[np.float64],
-    l: NDArray[np.float64],
-    scale: NDArray[np.float64],
-    delay: NDArray[np.float64],
-    sample_time: NDArray[np.float64],
-    decay: float,
-    threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]: ...
+    ) -> LinearSystemResponse: ...
 
 @final
 class DelayPieces:
@@ -542,53 +691,88 @@ class DelayPieces:
     def count(self) -> int: ...
     def evaluate(self, times: NDArray[np.float64], nu: int) -> NDArray[np.float64]: ...
 
+class _DelayEvent(Protocol):
+    @property
+    def function(self) -> Callable[..., Any]: ...
+    @property
+    def direction(self) -> int: ...
+    @property
+    def terminal(self) -> int: ...
+
+class _DelayJump(Protocol):
+    @property
+    def time(self) -> float: ...
+    @property
+    def change(self) -> Callable[..., Any] | None: ...
+
+class _DelayProblem(Protocol):
+    @property
+    def fun(self) -> Any: ...
+    @property
+    def t_span(self) -> _Pair: ...
+    @property
+    def history(self) -> Any: ...
+    @property
+    def history_derivative(self) -> Callable[..., Any] | None: ...
+    @property
+    def delays(self) -> NDArray[np.float64]: ...
+    @property
+    def y0(self) -> NDArray[np.float64]: ...
+    @property
+    def neutral(self) -> bool: ...
+    @property
+    def rtol(self) -> float: ...
+    @property
+    def atol(self) -> NDArray[np.float64]: ...
+    @property
+    def t_eval(self) -> NDArray[np.float64] | None: ...
+    @property
+    def dense_output(self) -> bool: ...
+    @property
+    def events(self) -> Sequence[_DelayEvent]: ...
+    @property
+    def jumps(self) -> Sequence[_DelayJump]: ...
+    @property
+    def history_breaks(self) -> NDArray[np.float64]: ...
+    @property
+    def args(self) -> tuple[Any, ...]: ...
+    @property
+    def vectorized(self) -> bool: ...
+    @property
+    def max_step(self) -> float: ...
+    @property
+    def max_steps(self) -> int | None: ...
+    @property
+    def jac_sparsity(self) -> tuple[list[int], list[int]] | None: ...
+
 @final
 class DelayRun:
     @property
-    def times(self) -> NDArray[np.float64]: ...
+    def t(self) -> NDArray[np.float64]: ...
     @property
-    def values(self) -> NDArray[np.float64]: ...
+    def y(self) -> NDArray[np.float64]: ...
     @property
-    def event_times(self) -> list[NDArray[np.float64]]: ...
+    def t_events(self) -> list[NDArray[np.float64]]: ...
     @property
-    def event_values(self) -> list[NDArray[np.float64]]: ...
+    def y_events(self) -> list[NDArray[np.float64]]: ...
     @property
     def breaks(self) -> NDArray[np.float64]: ...
     @property
-    def calls(self) -> int: ...
+    def nfev(self) -> int: ...
     @property
-    def nodes(self) -> int: ...
+    def n_nodes(self) -> int: ...
     @property
-    def elements(self) -> int: ...
+    def n_elements(self) -> int: ...
     @property
-    def refused(self) -> int: ...
+    def n_rejected(self) -> int: ...
     @property
-    def outcome(self) -> int: ...
+    def outcome(self) -> str: ...
     @property
-    def place(self) -> float: ...
+    def end(self) -> float: ...
     @property
     def pieces(self) -> DelayPieces: ...
 
-def solve_delay_equation(
-    fun: Callable[..., Any] | tuple[int, int],
-    args: tuple[Any, ...],
-    vectorized: bool,
-    span: tuple[float, float],
-    initial: NDArray[np.float64],
-    delays: NDArray[np.float64],
-    neutral: bool,
-    history: Any,
-    history_slope: Callable[[float], Any] | None,
-    history_breaks: NDArray[np.float64],
-    tolerances: tuple[float, NDArray[np.float64]],
-    longest: float,
-    times: NDArray[np.float64] | None,
-    keep: bool,
-    sparsity: tuple[list[int], list[int]] | None,
-    most: int | None,
-    events: list[tuple[Any, int, int]],
-    jumps: list[tuple[float, Any]],
-) -> DelayRun: ...
+def solve_dde(problem: _DelayProblem) -> DelayRun: ...
 
 _Words: TypeAlias = tuple[int, int, int, int]
 _LoopFields: TypeAlias = tuple[int, float, int, float, float, float, float, int]

@@ -232,7 +232,7 @@ def test_responses_superpose(system, p, q):
 
 @settings(max_examples=25, deadline=None)
 @given(system=systems(), shift=st.floats(-5.0, 5.0))
-def test_the_clock_does_not_matter(system, shift):
+def test_the_response_does_not_depend_on_the_start_time(system, shift):
     times = np.linspace(0.0, 3.0, 31)
     still = system.simulate(times, math.sin, history=[1.0, 2.0])
     moved = system.simulate(times + shift, lambda t: math.sin(t - shift), history=[1.0, 2.0])
@@ -285,7 +285,7 @@ def test_the_state_at_the_start_is_the_one_given():
 
 
 def test_a_run_of_noise_does_not_shorten_elements_for_ever():
-    """A settled speed, zero but for rounding, seen through three delays: once a million steps."""
+    """A speed that is zero but for rounding, with three delays: this once took a million steps."""
     A = {tau: np.zeros((5, 5)) for tau in (0.0, 0.3, 0.5, 0.7)}
     A[0.0][:2, :2] = [[0, 1], [-4, -1]]
     A[0.0][2:, 2:] = -np.eye(3)
@@ -321,7 +321,7 @@ def stable(problem):
 
 @pytest.mark.parametrize("key", [p.key for p in gallery.problems() if stable(p)])
 def test_responses_decay_at_the_rate_of_the_certified_rightmost_root(key):
-    """Roots and simulation share nothing; both must know how fast a perturbation dies.
+    """Roots and simulation share no code; both give the decay rate of a perturbation.
 
     The envelope is the largest state, each weighted by the root's modulus, over windows of one
     half turn of the root (or one time constant), late enough for the second root to be gone.

@@ -438,10 +438,8 @@ def _map_sampled(
         if low < 0.0 or (name == "sample_time" and low == 0.0):
             raise ValueError(f"{name}={low}: delays are zero or more, sample times above zero")
     cells = values | {name: np.ravel(grid) for name, grid in grids.items()}
-    abscissa, unstable, status = sampled_grid(
-        loop.plant, loop.controller, cells, decay, threads, report
-    )
-    unsure = (status == MapStatus.BOUNDARY) | (status == MapStatus.UNDECIDED)
-    unstable = np.where(unsure, np.int32(-2), unstable)
+    found = sampled_grid(loop.plant, loop.controller, cells, decay, threads, report)
+    unsure = (found.status == MapStatus.BOUNDARY) | (found.status == MapStatus.UNDECIDED)
+    unstable = np.where(unsure, np.int32(-2), found.unstable)
     shape = first.shape
-    return unstable.reshape(shape), abscissa.reshape(shape), status.reshape(shape), None
+    return unstable.reshape(shape), found.abscissa.reshape(shape), found.status.reshape(shape), None

@@ -104,10 +104,10 @@ def respond(
         past = signals.constant(state)
     if initial_state is not None:
         state = _vector("initial_state", initial_state, model.states, "states")
-    y, x, u, breaks = model.native.simulate(times - start, state, past, slopes, source)
+    found = model.native.simulate(times - start, state, past, slopes, source)
     count = len(times)
-    outputs = y.reshape(count, model.outputs).T
-    shown = u.reshape(count, model.inputs).T
+    outputs = found.outputs.reshape(count, model.outputs).T
+    shown = found.inputs.reshape(count, model.inputs).T
     if (model.inputs, model.outputs) == (1, 1):
         outputs, shown = outputs[0], shown[0]
     arguments: dict[str, Any] = {
@@ -128,8 +128,8 @@ def respond(
         time=times,
         outputs=outputs,
         inputs=shown,
-        breaks=breaks + start,
-        states=x.reshape(count, model.states).T,
+        states=found.states.reshape(count, model.states).T,
+        breaks=found.breaks + start,
         steady_state=float(rest[0]) if rest is not None and outputs.ndim == 1 else rest,
         _dense=_Run(system, start, arguments) if len(times) > 1 else None,
     )

@@ -32,7 +32,8 @@ Sampler = Callable[[Vector], NDArray[np.float64]]
 RESOLUTION = 1e-3
 
 # Values at these nodes, times the matrix, are coefficients.
-_NODES, _TRANSFORM = legendre_tables()
+_TABLES = legendre_tables()
+_NODES, _TRANSFORM = _TABLES.nodes, _TABLES.transform
 _TERMS = len(_NODES)
 
 _EPS = float(np.finfo(float).eps)

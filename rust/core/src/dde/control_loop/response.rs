@@ -1,8 +1,9 @@
-//! A loop's response in the caller's own clock: what `simulate` gives, as it is handed out.
+//! The response of a loop in the caller's clock.
 //!
-//! The run starts at the first of the times. Times and jumps of the reference that miss a sample
-//! only by the rounding of that clock are moved onto it; breaking points of output and command
-//! become one list, those within rounding of one another one point.
+//! The run starts at the first of the times. Times and jumps of the reference that differ from a
+//! sample only by rounding errors of that clock are moved onto the sample. Breaking points of
+//! output and command are merged into one list, in which points that differ only by rounding errors
+//! are one.
 
 use crate::memory::{append, collected, copied};
 use crate::{Error, Task};
@@ -11,28 +12,28 @@ use super::linear_loop::{LinearLoop, Start};
 use super::reference::Reference;
 use crate::dde::limits::RESPONSE;
 
-/// Roundings of a time of the clock, in units of the last place.
+/// Rounding error of a time of the clock, relative to the time.
 const CLOCK: f64 = 4.0 * f64::EPSILON;
 
-/// Breaking points closer than this part of their time are one.
+/// Breaking points closer than this share of their time are merged.
 const ONE_BREAK: f64 = 64.0 * f64::EPSILON;
 
-/// What is asked for, in the caller's clock.
+/// A request, in the caller's clock.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
     /// Output times, increasing; the first is the start of the run.
-    pub times: &'a [f64],
-    /// How much later the output is read, s: the delay, where it sits in the measurement.
-    pub ahead: f64,
+    pub time: &'a [f64],
+    /// How much earlier than its measurement the output is, s: the delay, where it sits there.
+    pub output_lead: f64,
     /// The reference before its first jump.
-    pub before: f64,
+    pub reference_before: f64,
     /// Times of its jumps, increasing.
-    pub reference_times: &'a [f64],
+    pub reference_time: &'a [f64],
     /// Its values from those times on.
-    pub reference_values: &'a [f64],
+    pub reference: &'a [f64],
 }
 
-/// The response at the times asked for.
+/// The response at the requested times.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Response {
     /// y.
@@ -53,8 +54,8 @@ impl LinearLoop {
         request: &Request<'_>,
         task: &Task,
     ) -> Result<Response, Error> {
-        increasing("time", request.times)?;
-        let Some(&first) = request.times.first() else {
+        increasing("time", request.time)?;
+        let Some(&first) = request.time.first() else {
             return Ok(Response::default());
         };
         let since = |times: &[f64]| {
@@ -64,22 +65,25 @@ impl LinearLoop {
                 .map(|time| on_sample(time - first, first, sample));
             collected(RESPONSE, moved)
         };
-        let jumps = since(request.reference_times)?;
-        let values = copied(RESPONSE, request.reference_values)?;
-        let reference = Reference::new(request.before, jumps, values)?;
-        let input_times = since(request.times)?;
+        let jumps = since(request.reference_time)?;
+        let values = copied(RESPONSE, request.reference)?;
+        let reference = Reference::new(request.reference_before, jumps, values)?;
+        let input_times = since(request.time)?;
         let later: Vec<f64>;
-        let output_times = if request.ahead == 0.0 {
+        let output_times = if request.output_lead == 0.0 {
             &input_times
         } else {
-            later = collected(RESPONSE, input_times.iter().map(|t| t + request.ahead))?;
+            later = collected(
+                RESPONSE,
+                input_times.iter().map(|t| t + request.output_lead),
+            )?;
             &later
         };
         let found = self.simulate(start, &reference, output_times, &input_times, task)?;
 
         let mut breaks = found.output_breaks;
         for t in &mut breaks {
-            *t -= request.ahead;
+            *t -= request.output_lead;
         }
         append(RESPONSE, &mut breaks, &found.input_breaks)?;
         breaks.retain(|&t| t >= 0.0);
@@ -91,11 +95,11 @@ impl LinearLoop {
             *t += first;
         }
         let absolute = Reference::new(
-            request.before,
-            copied(RESPONSE, request.reference_times)?,
-            copied(RESPONSE, request.reference_values)?,
+            request.reference_before,
+            copied(RESPONSE, request.reference_time)?,
+            copied(RESPONSE, request.reference)?,
         )?;
-        let reference = request.times.iter().map(|&t| absolute.at(t));
+        let reference = request.time.iter().map(|&t| absolute.at(t));
         Ok(Response {
             outputs: found.outputs,
             inputs: found.inputs,
@@ -105,8 +109,8 @@ impl LinearLoop {
     }
 }
 
-/// `since` the start of a run at `start` in its clock, on a sample (every so many seconds, from
-/// the phase on) that it misses by rounding only.
+/// `since` the start of a run at `start` of the clock, moved onto a sample if it differs from it
+/// only by rounding errors. `sample` holds the sample time and the time of the first sample.
 pub fn on_sample(since: f64, start: f64, sample: Option<(f64, f64)>) -> f64 {
     let Some((sample_time, phase)) = sample else {
         return since;
