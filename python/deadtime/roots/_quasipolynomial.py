@@ -133,7 +133,7 @@ class QuasiPolynomial(Characteristic):
 
     @property
     def kind(self) -> Kind:
-        """Kind of equation, told after the smallest delay is factored out.
+        """Kind of equation, determined after the smallest delay is factored out.
 
         'polynomial' (one row), 'retarded' (the highest power of s without delay only), 'neutral'
         (also with delay), 'difference' (no power of s at all), or 'advanced' (the highest power

@@ -41,7 +41,8 @@ class MapStatus(IntEnum):
     BOUNDARY = 1
     """A root, or a chain of them, lies on the boundary to working precision."""
     CHAIN = 2
-    """The chains of roots of a neutral equation lead; told only where the abscissa is computed."""
+    """The chains of roots of a neutral equation determine the abscissa; set only where that is
+    computed."""
     INFINITE = 3
     """Infinitely many unstable roots."""
     UNDECIDED = 4
@@ -265,9 +266,9 @@ class StabilityMap(ReadOnlyArrays):
 
     def _repr_html_(self) -> str:
         numbers, cells = np.unique(self.unstable, return_counts=True)
-        told = {-1: "infinitely many", -2: "not known"}
+        names = {-1: "infinitely many", -2: "not known"}
         rows = [
-            table_row((told.get(number, str(number)), str(count)), "td", 2)
+            table_row((names.get(number, str(number)), str(count)), "td", 2)
             for number, count in zip(numbers.tolist(), cells.tolist(), strict=True)
         ]
         return table(("unstable roots", "cells"), rows, repr(self).strip("<>"))

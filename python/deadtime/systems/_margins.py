@@ -46,9 +46,9 @@ __all__ = ["Margins", "first_loss", "margins"]
 
 Vector = NDArray[np.float64]
 
-# Where delays stay in the phase but none of them turns it through 180 degrees, there is no bound on
-# the frequencies: the search ends where the gain is below the first number, or at the second one
-# times the crossover frequency or the turn of the longest delay.
+# Limits of the search for phase crossovers where no frequency bounds them, as when delays enter the
+# phase and none of them turns it through 180 degrees: a gain below _SMALLEST_GAIN, or _TURNS times
+# the crossover frequency or the frequency at which the longest delay turns the phase once.
 _SMALLEST_GAIN = 1e-8
 _TURNS = 1e3
 
