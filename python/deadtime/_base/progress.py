@@ -22,7 +22,7 @@ _SHARE, _FACTOR = 0.1, 2.0
 
 @contextmanager
 def reported(progress: Progress, total: int | None = None) -> Iterator[Report | None]:
-    """Give the function to call with the number of items done, None where nobody asked.
+    """Give the function to call with the number of items done; None where `progress` is False.
 
     True is a bar of rich or tqdm, whichever is installed, otherwise lines on stderr.
     """
