@@ -228,6 +228,7 @@ def test_all_of_the_step_may_be_at_the_limit_at_first():
     assert (fit.delay, fit.gain) == pytest.approx((0.4, 0.9), abs=1e-7)
 
 
+@pytest.mark.survey
 def test_intervals_cover_what_they_say():
     # Noise that does not circulate: residuals are white and 95 % intervals should hold the truth
     # 95 times in 100. Fewer than 86 of 100 happens once in 2000 with right intervals.

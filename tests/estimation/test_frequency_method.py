@@ -72,6 +72,7 @@ def test_the_benchmark_of_single_records(case, published):
     assert root_mean_square(errors) < published
 
 
+@pytest.mark.survey
 def test_single_records_cover_with_gain_and_start_unknown():
     errors, found = errors_of("1 %", 150, "frequency", free=("delay", "gain"))
     # The bound with gain and offset free is 3.58 ms.
@@ -82,6 +83,7 @@ def test_single_records_cover_with_gain_and_start_unknown():
     assert sum(fit.adequate for fit in found) >= 140
 
 
+@pytest.mark.survey
 @pytest.mark.parametrize("free", [("delay", "gain"), ("delay", "gain", "lag")])
 def test_periods_cover(free):
     lag = 0.06 if "lag" in free else 0.0

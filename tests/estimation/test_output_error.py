@@ -97,6 +97,7 @@ def test_a_noise_free_flight_is_recovered_exactly(delay, gain, lag):
     assert fit.delay_plus_lag == pytest.approx(delay + lag, abs=1e-6)
 
 
+@pytest.mark.survey
 @pytest.mark.parametrize(
     ("free", "start"),
     [(("delay",), 0.0), (("delay", "gain"), None)],
@@ -126,6 +127,7 @@ def test_the_bound_of_a_pure_delay_is_the_closed_form():
     assert fit.crb.free == ("delay",)
 
 
+@pytest.mark.survey
 def test_intervals_cover_where_the_lag_is_at_its_bound():
     held = {"delay": 0, "lag": 0, "delay+lag": 0}
     truth = {"delay": 0.36, "lag": 0.0, "delay+lag": 0.36}

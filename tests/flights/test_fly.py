@@ -252,6 +252,7 @@ def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
 # What is learnt
 
 
+@pytest.mark.survey
 @pytest.mark.parametrize("seed", range(3))
 def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
     stages = []
@@ -288,6 +289,7 @@ def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
     assert fast.timing.jitter < 1e-9
 
 
+@pytest.mark.survey
 def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
     vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), tells_climb=False)
     found = fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)

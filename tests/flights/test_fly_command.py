@@ -12,6 +12,7 @@ import sys
 import time
 
 import pytest
+from command_line import run
 from deadtime._cli.fly import _free_folder
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime.flights._step_test import ROW
@@ -22,7 +23,7 @@ FLY = [sys.executable, "-m", "deadtime", "fly"]
 
 
 def flown(*options):
-    return subprocess.run([*FLY, *map(str, options)], capture_output=True, text=True, check=False)
+    return run("fly", *options)
 
 
 def running(pid):

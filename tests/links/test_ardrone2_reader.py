@@ -66,6 +66,10 @@ def test_a_height_does_not_jump_in_flight():
     reader, states = fed(packet(1), packet(2, height=3.0), packet(3, height=1.02))
     assert [s and s.height for s in states] == [1.0, None, 1.02]
     assert reader.statistics.implausible == 1
+    # By 5 m/s, here for 20 ms, and a bump of 0.1 m.
+    for height, believed in ((1.19, True), (1.21, False), (0.81, True), (0.79, False)):
+        _, states = fed(packet(1), packet(2, height=height), every=0.02)
+        assert (states[1] is not None) is believed
     # On the ground it may: a drone is carried.
     on_ground = [packet(k, height=z, state=0) for k, z in ((1, 0.0), (2, 2.0))]
     assert fed(*on_ground)[1][1].height == 2.0

@@ -1,4 +1,4 @@
-"""Lambert W in threads: bits, callbacks, forks, Ctrl-C and panics."""
+"""Lambert W in threads: equal bits, callbacks, forks, Ctrl-C and panics."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from deadtime import _deadtime as native
 from lambertw_points import LARGE, one_by_one, points, same_bits
 
 
-def test_an_element_does_not_know_its_neighbours():
+def test_an_element_does_not_depend_on_its_neighbours():
     z, k = points(LARGE, 5), np.random.default_rng(6).integers(-4, 5, LARGE)
     whole = dtm.lambertw(z, k)
     for threads in (1, 2, 3):
@@ -33,7 +33,7 @@ def test_an_element_does_not_know_its_neighbours():
 
 
 @pytest.mark.parametrize("name", ["lambertw0", "lambertwm1"])
-def test_real_elements_do_not_either(name):
+def test_real_elements_do_not_depend_on_their_neighbours(name):
     function = getattr(dtm, name)
     x = np.random.default_rng(8).uniform(-0.4, 0.1, LARGE)
     whole = function(x)
@@ -133,7 +133,7 @@ def test_a_forked_child_works_and_does_not_hang():
     assert result.stdout.split() == ["7", "True"], result.stderr
 
 
-def test_nonsense_in_the_environment_is_named():
+def test_invalid_environment_variables_are_named():
     code = """
         import numpy as np
         from deadtime import _deadtime as native

@@ -26,7 +26,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._evidence import check_distinguishable, standard_errors
 from deadtime.experiments import Experiment
-from deadtime.loops import ControlLoop, simulate
+from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 from deadtime.roots import delay, s
 from deadtime.systems import TransferFunction
@@ -119,7 +119,7 @@ def from_the_command(
     plant = TransferFunction(num, den)
 
     def response(system: TransferFunction) -> Array:
-        return np.asarray(simulate(system * late, time, command, input_time=time).outputs)
+        return np.asarray((system * late).simulate(time, command, input_time=time).outputs)
 
     slopes: dict[str, Array] = {}
     for name in names:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from deadtime._base.errors import PacketError
 from deadtime.links.ardrone2.navdata import Navdata, State, parse_navdata
+from deadtime.links.safety import jumps
 from deadtime.links.vehicle import VehicleState
 
 __all__ = [
@@ -37,9 +38,6 @@ SILENCE = 0.5
 
 #: Time for which a state reports lost messages, s.
 RECENT = 1.0
-
-#: Change of the height that is plausible at any speed, m: noise of the ultrasound.
-BUMP = 0.1
 
 #: Control states, the upper half of the word that navdata has for them.
 FLYING, HOVERING = 3, 4
@@ -228,7 +226,7 @@ class NavdataReader:
         height = navdata.height
         if height is None:
             return True
-        return not abs(height - self.newest.height) <= self.max_jump * passed + BUMP
+        return jumps(self.newest.height, height, passed, self.max_jump)
 
     def _taken(self, navdata: Navdata, clock: float | None, now: float) -> VehicleState | None:
         while self._lost and self._lost[0][0] < now - RECENT:
