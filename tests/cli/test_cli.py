@@ -251,7 +251,7 @@ def test_invalid_numbers_are_refused(tmp_path, arguments, words):
         (["--gain", "0"], "gain"),
         (["--sample-time", "-1"], "sample_time"),
         (["--limit", "nan"], "limit"),
-        (["--window", "5", "2"], "earlier time first"),
+        (["--window", "5", "2"], "low below high"),
         (["--window", "500", "600"], "0 samples"),
         (["--output", "altitude"], "no column"),
         (["--method", "waveform", "--free", "mass"], "mass"),
