@@ -40,7 +40,6 @@ if TYPE_CHECKING:
         P,
         RationalPlant,
         kit_plant,
-        simulate,
         simulate_fixed_step,
         sweep,
     )
@@ -78,7 +77,7 @@ _ROOMS = {
     "systems": "DelaySystem TransferFunction feedback",
     "loops": (
         "ControlLoop DerivativeFilter FirstOrder Integrator P PD PI PID PV RationalPlant kit_plant "
-        "simulate simulate_fixed_step sweep"
+        "simulate_fixed_step sweep"
     ),
     "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
     "recordings": "Recording read_recording",
@@ -145,7 +144,6 @@ __all__ = [
     "read_recording",
     "robust_map",
     "s",
-    "simulate",
     "simulate_fixed_step",
     "solve_dde",
     "stability_map",
