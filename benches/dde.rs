@@ -1,5 +1,5 @@
-//! The linear stepper: one simulation of ten seconds each, the poles of a sampled loop, sweeps, and
-//! runs in fixed steps.
+//! Simulation of linear loops: one simulation of ten seconds each, the poles of a sampled loop, sweeps, and
+//! simulations in fixed steps.
 
 use std::hint::black_box;
 

@@ -12,7 +12,10 @@ extensions = [
     "sphinx.ext.mathjax",
 ]
 myst_enable_extensions = ["dollarmath", "amsmath"]
-autodoc_default_options = {"inherited-members": "object,tuple,int,Exception", "special-members": "__call__"}
+autodoc_default_options = {
+    "inherited-members": "object,tuple,int,Exception",
+    "special-members": "__call__",
+}
 autodoc_member_order = "groupwise"
 autodoc_typehints = "none"
 numpydoc_show_class_members = False

@@ -27,7 +27,7 @@ def files(tmp_path_factory):
         loop = dtm.ControlLoop(
             dtm.Integrator(0.9), dtm.P(Kp), delay=0.36, sample_time=0.065, limit=1.0
         )
-        flight = dtm.Experiment.step(8.0, rest=1.04).fly(loop, noise=0.004, seed=3)
+        flight = dtm.Experiment.step(8.0, rest=1.04).run(loop, noise=0.004, seed=3)
         flown[name] = write(flight, folder / f"{name}.csv")
     return flown
 
@@ -60,7 +60,7 @@ def test_options_reach_the_methods_that_have_them(files):
     assert known["delay"] == pytest.approx(0.36, abs=0.02)
 
 
-def test_a_logged_command_is_compared_and_gone_by(files, tmp_path):
+def test_a_logged_command_is_used_and_compared(files, tmp_path):
     picture = tmp_path / "all.png"
     step = ["estimate", files["quick"], "--kp", 2, *FLOWN]
     out = found(*step, *LOGGED, "--plot", picture)
@@ -72,7 +72,7 @@ def test_a_logged_command_is_compared_and_gone_by(files, tmp_path):
     assert "output error" in run(*step, *LOGGED).stdout
 
 
-def test_the_tail_answers_where_nothing_overshoots(files):
+def test_the_decay_method_is_used_where_nothing_overshoots(files):
     out = found("estimate", files["slow"], "--kp", 0.6, "--gain", 0.9, *FLOWN)
     assert out["estimates"]["decay"]["delay"] == pytest.approx(0.36, abs=0.1)
     assert "decrement" not in out["estimates"]
@@ -112,14 +112,20 @@ def test_two_real_flights_together():
         (["--kp", 2, "--kp", 3], "1 file and 2 of --kp"),
         (["--kp", 2, "--noise", "loop"], "--noise is for one method"),
         (["--kp", 2, "--initial-output", 0], "--initial-output is for one method"),
-        (["--kp", 2, "--method", "gcc", "--noise", "loop"], "no option 'noise'"),
-        (["--kp", 2, "--method", "output_error", "--map", "exact"], "no option 'map'"),
+        (
+            ["--kp", 2, "--method", "gcc", "--noise", "loop"],
+            "--noise is not an option of --method gcc",
+        ),
+        (
+            ["--kp", 2, "--method", "output_error", "--map", "exact"],
+            "--map is not an option of --method output_error",
+        ),
         (["--kp", 2, "--method", "cta"], "continuous loops"),
         (["--kp", 2, "--method", "relay"], "no limit cycle"),
         (["--kp", 2, "--method", "decrement", "--free", "delay,lag"], "fix the lag"),
     ],
 )
-def test_what_cannot_be_asked(files, more, words):
+def test_invalid_combinations_of_options(files, more, words):
     assert words in one_clear_line(run("estimate", files["quick"], *FLOWN, *more))
 
 
@@ -131,14 +137,14 @@ def test_what_cannot_be_asked(files, more, words):
         (["--kp", 1, "--kp", 3], "2 files and 3 of --kp"),
     ],
 )
-def test_what_cannot_be_asked_of_several_files(files, more, words):
+def test_invalid_combinations_of_options_for_several_files(files, more, words):
     both = ["estimate", files["quick"], files["slow"], "--kp", 2, *FLOWN]
     assert words in one_clear_line(run(*both, *more))
 
 
-def test_a_setpoint_that_is_not_in_use_is_refused(tmp_path):
+def test_a_reference_equal_to_the_output_is_refused(tmp_path):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
-    flight = dtm.Experiment.step(8.0, rest=1.04).fly(loop)
+    flight = dtm.Experiment.step(8.0, rest=1.04).run(loop)
     copied = dtm.Recording(flight.time, flight.output, flight.output, flight.command)
     file = write(copied, tmp_path / "copied.csv")
     said = one_clear_line(run("estimate", file, "--kp", 2, "--sample-time", 0.065))

@@ -1,4 +1,4 @@
-"""Defects of a command show where they are, users' errors do not; every terminal shows the text."""
+"""Defects of a command show a traceback, users' errors one line; any terminal can show the text."""
 
 import json
 import os
@@ -25,7 +25,7 @@ def command(*arguments, before="", cwd=None, **environment):
 
 
 def ended(monkeypatch, capsys, error):
-    """Exit code and standard error of a command that this error goes through."""
+    """Exit code and standard error of a command that raises this error."""
     from deadtime._cli import app
 
     def fails():
@@ -57,19 +57,19 @@ def test_a_defect_shows_where_it_is_and_asks_to_be_reported(error, monkeypatch, 
      dtm.RecordingError("a row"), dtm.FlightAbortedError("too high"), OverflowError("far"),
      MemoryError("the map needs 3 GiB")],
 )  # fmt: skip
-def test_what_a_user_can_mend_is_one_line(error, monkeypatch, capsys):
+def test_an_error_of_the_user_is_one_line(error, monkeypatch, capsys):
     code, said = ended(monkeypatch, capsys, error)
     assert code == 1
     assert len(said.strip().splitlines()) == 1
     assert said.startswith("deadtime: ")
 
 
-def test_memory_that_is_gone_is_said_with_its_size(monkeypatch, capsys):
+def test_a_memory_error_names_the_size(monkeypatch, capsys):
     said = ended(monkeypatch, capsys, MemoryError("the map needs 3 GiB"))[1]
     assert "the map needs 3 GiB" in said
 
 
-def test_a_missing_extra_is_said_with_the_line_that_installs_it(monkeypatch, capsys):
+def test_a_missing_extra_is_named_with_the_line_that_installs_it(monkeypatch, capsys):
     said = ended(monkeypatch, capsys, dtm.MissingExtraError("pip install 'deadtime[plot]'"))[1]
     assert said == "deadtime: pip install 'deadtime[plot]'\n"
 

@@ -39,7 +39,7 @@ def test_the_delay_margin_of_the_best_cell():
     assert "boundary of" in printed
 
 
-def test_decay_and_damping_leave_less():
+def test_decay_and_damping_leave_fewer_stable_cells():
     plain, slow, damped = (
         found("map", *SMALL, "--counts", *more)
         for more in ([], ["--decay", 1.0], ["--damping", 0.4, 6.0])
@@ -78,7 +78,7 @@ def test_pictures(tmp_path, more):
 
 
 def test_a_gain_is_listed_where_no_chains_reach_the_axis():
-    """The whole range was refused for the part of it in which chains of roots are unstable."""
+    """The whole range was refused once because chains are unstable in a part of it."""
     result = run("map", *SMALL, "--along", "Kv", "--at", "1")
     assert result.returncode == 0
     assert "not listed" in result.stdout

@@ -1,4 +1,4 @@
-"""What the commands claim of a loop: no more roots than they list, no figures that it has not."""
+"""What the commands state about a loop: the roots they list, and only metrics that exist."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What `solve_dde` refuses by name: compiled functions of other types, None, complex numbers."""
+"""`solve_dde` refuses compiled functions of other types, None and complex numbers."""
 
 import ctypes
 

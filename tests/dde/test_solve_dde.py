@@ -129,7 +129,7 @@ def test_numba_functions_are_called_without_python():
     assert np.abs(found.y - values).max() < 1e-8
 
 
-def test_low_level_callables_bring_their_data():
+def test_low_level_callables_receive_their_user_data():
     rate = ctypes.c_double(-2.0)
 
     def function(t, y, z, dz, dy, data):

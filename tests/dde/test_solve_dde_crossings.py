@@ -1,4 +1,4 @@
-"""Every crossing of an event: against closed forms, at jumps, at both ends, in order of time."""
+"""Every sign change of an event is found: closed forms, jumps, both ends, order of time."""
 
 import deadtime as dtm
 import numpy as np
@@ -12,7 +12,7 @@ def rest(t, y, z):
 
 
 def oscillator(omega):
-    """y = (sin, cos)(omega t + phase) without a use for its delay."""
+    """y = (sin, cos)(omega t + phase); the delay has no effect."""
 
     def fun(t, y, z):
         return [omega * y[1], -omega * y[0]]

@@ -1,4 +1,4 @@
-"""Events, jumps and hostile input of `solve_dde`."""
+"""Events, jumps and invalid arguments of `solve_dde`."""
 
 import os
 import signal
@@ -93,7 +93,7 @@ def test_a_breaking_point_at_the_end_of_the_run():
         assert found.t[-1] == end
 
 
-def test_jumps_of_the_solution_travel_with_the_delay():
+def test_jumps_of_the_solution_return_after_the_delay():
     # A dose of 1 at 0.5: y' = -y(t - 1).
     found = dtm.solve_dde(
         decay,

@@ -27,7 +27,7 @@ def modes(matrix, source, start, end):
 
 
 def heat(n):
-    """Second differences on n points between two cold ends, as a sparse matrix."""
+    """Second differences on n points with zero at both ends, as a sparse matrix."""
     ones = np.ones(n)
     return (n + 1) ** 2 * scipy.sparse.diags_array(
         [ones[1:], -2.0 * ones, ones[1:]], offsets=[-1, 0, 1], format="csr"
@@ -81,7 +81,7 @@ def test_a_pattern_that_lacks_entries_is_noticed():
     assert found.nfev < 600
 
 
-def test_stiffness_without_structure_and_beyond_what_is_looked_at_first():
+def test_stiff_systems_with_a_full_jacobian_or_many_components():
     # A full matrix, whose Jacobian waits until sweeps without it fail; 300 components likewise.
     rng = np.random.default_rng(5)
     basis = np.linalg.qr(rng.normal(size=(60, 60)))[0]
@@ -177,7 +177,7 @@ def noisy(t, y, z):
 
 
 @pytest.mark.parametrize("fun", [sliding, noisy])
-def test_runs_that_make_no_headway_end_and_say_why(fun):
+def test_runs_that_make_no_progress_end_with_the_reason(fun):
     found = dtm.solve_dde(fun, (0, 20), 1.0, 1.0, vectorized=True, max_steps=3000)
     assert found.status == -1
     assert not found.success

@@ -1,4 +1,4 @@
-"""What an input, a history or the past of a solution holds is read, whatever the elements are.
+"""No pulse of an input, a history or the past of a solution is missed, for any elements.
 
 Every survey draws pulses of random place, width and height; the truth is the area under the pulse,
 in closed form. `DEADTIME_PULSES=1000 python -m pytest -n 0 tests/dde/test_what_is_read.py` draws a
@@ -45,7 +45,7 @@ def pulses(low, high, seed):
 
 
 def attempt(run):
-    """What a run gives, or why it was refused."""
+    """The result of a run, or the reason for its refusal."""
     try:
         return run(), ""
     except ValueError as error:
@@ -53,7 +53,7 @@ def attempt(run):
 
 
 def found_or_refused(run, truth, tolerance, option):
-    """Whether a run gives the truth, or refuses by the name of what to give."""
+    """Whether a run gives the true value, or its refusal names the argument to give."""
     value, refusal = attempt(run)
     if value is None:
         assert option in refusal
@@ -67,9 +67,9 @@ def test_no_pulse_of_an_input_is_lost(system):
     # 191 of 200 pulses of 0.5 s in 60 s were.
     found = [
         found_or_refused(
-            lambda pulse=pulse: dtm.simulate(
-                system, [0.0, 60.0], pulse, vectorized=True
-            ).outputs.flat[-1],
+            lambda pulse=pulse: system.simulate([0.0, 60.0], pulse, vectorized=True).outputs.flat[
+                -1
+            ],
             pulse.area,
             1e-11,
             "input_breaks",

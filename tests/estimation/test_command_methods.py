@@ -3,6 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation import GCC, ARXScan
 from deadtime.estimation.data._commands import commands_over_samples
 from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
 from deadtime.estimation.models._held_response import HeldResponse
@@ -31,7 +32,7 @@ def open_loop(seed, hold=1, noise=0.01, delay=0.36, samples=300):
 @given(st.floats(TS, 0.9), st.integers(0, 2**31))
 def test_a_scan_with_the_plant_undone_is_exact(delay, seed):
     flight, known = open_loop(seed, noise=0.0, delay=delay)
-    fit = dtm.estimate_delay(flight, known, method="arx_scan", fractional=True)
+    fit = dtm.estimate_delay(flight, known, method=ARXScan(fractional=True))
     assert fit.delay == pytest.approx(delay, abs=1e-9)
     # and delayest's whole number of samples is the one below, or both of them fit
     whole = dtm.estimate_delay(flight, known, method="arx_scan")
@@ -47,7 +48,7 @@ def test_a_peak_between_samples(weighting, part):
     found = []
     for seed in range(8):
         flight, known = open_loop(seed, noise=0.0, delay=delay, samples=600)
-        fit = dtm.estimate_delay(flight, known, method="gcc", weighting=weighting)
+        fit = dtm.estimate_delay(flight, known, method=GCC(weighting=weighting))
         found.append(fit.delay - delay)
     within = {"none": 0.2, "scot": 0.2, "phat": 0.15, "prewhitened": 0.1}[weighting]
     assert abs(np.mean(found)) < within * TS
@@ -55,8 +56,8 @@ def test_a_peak_between_samples(weighting, part):
 
 def test_a_first_order_plant_is_undone():
     loop = dtm.ControlLoop(dtm.FirstOrder(2.0, 0.5), dtm.P(0.3), delay=4 * TS, sample_time=TS)
-    flight = dtm.Experiment.prbs(20.0, 0.5, 2 * TS).fly(loop)
-    fit = dtm.estimate_delay(flight, loop.replace(delay=None), method="arx_scan", fractional=True)
+    flight = dtm.Experiment.prbs(20.0, 0.5, 2 * TS).run(loop)
+    fit = dtm.estimate_delay(flight, loop.replace(delay=None), method=ARXScan(fractional=True))
     assert fit.delay == pytest.approx(4 * TS, abs=1e-9)
     assert fit.adequate
 
@@ -64,12 +65,12 @@ def test_a_first_order_plant_is_undone():
 def test_other_plants_are_correlated_as_they_are():
     plant = dtm.RationalPlant([1.0], [0.01, 0.2, 1.0])
     loop = dtm.ControlLoop(plant, dtm.P(0.5), delay=0.36, sample_time=TS)
-    flight = dtm.Experiment.prbs(20.0, 0.5, 2 * TS).fly(loop)
+    flight = dtm.Experiment.prbs(20.0, 0.5, 2 * TS).run(loop)
     fit = dtm.estimate_delay(flight, loop.replace(delay=None), method="gcc")
     assert 0.36 < fit.delay < 0.36 + 0.3
     assert "not undone" in fit.message
     with pytest.raises(ValueError, match="RationalPlant"):
-        dtm.estimate_delay(flight, loop, method="arx_scan", fractional=True)
+        dtm.estimate_delay(flight, loop, method=ARXScan(fractional=True))
 
 
 def test_the_mean_command_of_a_continuous_loop_stops_before_a_jump():
@@ -106,7 +107,7 @@ def test_the_benchmark_of_correlation(case):
 @pytest.mark.parametrize("case", [case for case in ROWS if case != "3 %"])
 def test_the_benchmark_of_arx_models(case):
     runs = 20 if CASES[case].get("dt") == 0.01 else 60
-    errors, _ = errors_of(case, runs, "arx_scan", fractional=True)
+    errors, _ = errors_of(case, runs, ARXScan(fractional=True))
     assert root_mean_square(errors) < 1.2 * ROWS[case][1]
 
 
@@ -184,9 +185,9 @@ def test_what_is_no_answer_to_a_command_is_refused(method):
 def test_options_are_checked():
     flight, known = fly()
     with pytest.raises(ValueError, match="not one of"):
-        dtm.estimate_delay(flight, known, method="gcc", weighting="roth")
+        dtm.estimate_delay(flight, known, method=GCC(weighting="roth"))
     with pytest.raises(ValueError, match="nb"):
-        dtm.estimate_delay(flight, known, method="arx_scan", nb=0)
+        dtm.estimate_delay(flight, known, method=ARXScan(nb=0))
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -5,6 +5,7 @@ import tracemalloc
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation import Frequency
 from deadtime.estimation._estimate import METHODS
 from deadtime.estimation.data._input_output import InputOutput
 from deadtime.estimation.methods import _arx_scan as arx_scan
@@ -17,27 +18,27 @@ MOST = 2000
 
 
 def flown(method, rows):
-    """A flight of so many rows that suits a method, and the options for it."""
+    """A flight of so many rows that suits a method, and the method with its options."""
     truth = KNOWN.replace(delay=0.36)
     if method == "relay":
-        return dtm.Experiment.relay(0.065 * rows, 0.5).fly(truth, noise=0.005), KNOWN, {}
+        return dtm.Experiment.relay(0.065 * rows, 0.5).run(truth, noise=0.005), KNOWN, method
     if method == "frequency":
         experiment = dtm.Experiment.multisine(0.3, 6.5, lines=8, periods=rows // 100)
-        return experiment.fly(truth, noise=0.005), KNOWN, {"period": 6.5}
+        return experiment.run(truth, noise=0.005), KNOWN, Frequency(period=6.5)
     special = {
-        "cta": {"Kp": 2.0, "ts": None, "limit": None, "circulates": False, "dt": 8.0 / rows},
+        "cta": {"Kp": 2.0, "ts": None, "limit": None, "noise_in_loop": False, "dt": 8.0 / rows},
         "decay": {"Kp": 0.6},
         "decrement": {"Kp": 3.0, "limit": None},
     }.get(method, {})
     duration = 7.0 if "dt" in special else 0.065 * rows - 1.0
     flight, known = fly(noise=0.005, rest=1.0, duration=duration, **special)
-    return flight, known, {}
+    return flight, known, method
 
 
 def peak(method, rows):
-    flight, known, options = flown(method, rows)
+    flight, known, method = flown(method, rows)
     tracemalloc.start()
-    dtm.estimate_delay(flight, known, method=method, **options)
+    dtm.estimate_delay(flight, known, method=method)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return most

@@ -3,6 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation import CTA, Grid
 from deadtime.estimation.methods._cta import chebyshev_differentiation
 from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 
@@ -26,7 +27,7 @@ def test_the_grid_is_exact_where_the_model_is(ts):
 
 def test_the_curve_is_kept_and_its_valleys_are_named():
     # In a limit cycle a delay that is off by a period fits almost as well.
-    flight, known = fly(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, circulates=False)
+    flight, known = fly(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, noise_in_loop=False)
     fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
     delays, costs = np.array(fit.details["delays"]), np.array(fit.details["costs"])
     assert delays.shape == costs.shape
@@ -39,13 +40,13 @@ def test_the_curve_is_kept_and_its_valleys_are_named():
 def test_a_grid_of_ones_own():
     flight, known = fly()
     grid = np.linspace(0.2, 0.6, 9)
-    fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",), delays=grid)
+    fit = dtm.estimate_delay(flight, known, method=Grid(delays=grid), free=("delay",))
     assert fit.details["delays"] == pytest.approx(grid.tolist())
     assert fit.delay == pytest.approx(0.36, abs=1e-9)
     with pytest.raises(dtm.NotIdentifiableError, match="other `delays`"):
-        dtm.estimate_delay(flight, known, method="grid", free=("delay",), delays=[0.1, 0.15, 0.2])
+        dtm.estimate_delay(flight, known, method=Grid(delays=[0.1, 0.15, 0.2]), free=("delay",))
     with pytest.raises(ValueError, match="three"):
-        dtm.estimate_delay(flight, known, method="grid", delays=[0.1, 0.2])
+        dtm.estimate_delay(flight, known, method=Grid(delays=[0.1, 0.2]))
 
 
 @pytest.mark.parametrize(
@@ -62,14 +63,14 @@ def test_a_grid_of_ones_own():
 )
 def test_the_benchmark_of_the_waveform(case, published):
     # 24 flights: the root mean square is known to 14 %.
-    errors, _ = errors_of(case, 24, "grid", initial_output=0.0)
+    errors, _ = errors_of(case, 24, Grid(initial_output=0.0))
     assert root_mean_square(errors) < 1.2 * published * 1.14
 
 
 def test_the_curvature_is_the_spread_where_noise_does_not_circulate():
     errors, said = [], []
     for seed in range(24):
-        flight, known = fly(noise=0.01, seed=seed, circulates=False)
+        flight, known = fly(noise=0.01, seed=seed, noise_in_loop=False)
         fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
         errors.append(fit.delay - 0.36)
         said.append(fit.stderr["delay"])
@@ -102,10 +103,8 @@ def test_the_published_bias_of_few_intervals(Kp, published):
         fit = dtm.estimate_delay(
             flight,
             loop.replace(delay=None),
-            method="cta",
+            method=CTA(intervals=intervals, initial_output=0.0),
             free=("delay",),
-            intervals=intervals,
-            initial_output=0.0,
         )
         assert 1e3 * (fit.delay - 0.36) == pytest.approx(bias, rel=0.05, abs=5e-3)
 
@@ -128,7 +127,7 @@ def test_chebyshev_with_a_lag_and_two_steps():
 
 def test_chebyshev_in_noise_is_the_fit_of_the_waveform():
     for case, published in (("continuous, Kp 1.31", 0.90), ("continuous, Kp 3", 0.14)):
-        errors, _ = errors_of(case, 5, "cta", initial_output=0.0)
+        errors, _ = errors_of(case, 5, CTA(initial_output=0.0))
         assert root_mean_square(errors) < 1.2 * published * 1.4
 
 
@@ -141,7 +140,7 @@ def test_chebyshev_is_for_linear_continuous_loops(change, words):
     with pytest.raises(ValueError, match=words):
         dtm.estimate_delay(flight, known.replace(**change), method="cta")
     with pytest.raises(ValueError, match="intervals"):
-        dtm.estimate_delay(flight, known, method="cta", intervals=0)
+        dtm.estimate_delay(flight, known, method=CTA(intervals=0))
 
 
 # --- what both refuse -----------------------------------------------------------------------
@@ -149,7 +148,7 @@ def test_chebyshev_is_for_linear_continuous_loops(change, words):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_to_fit_is_refused(method):
-    flight, known = fly(ts=None, dt=0.04, limit=None, rest=1.0, noise=0.003, circulates=False)
+    flight, known = fly(ts=None, dt=0.04, limit=None, rest=1.0, noise=0.003, noise_in_loop=False)
 
     def estimate(recording, **options):
         return dtm.estimate_delay(recording, known, method=method, **options)

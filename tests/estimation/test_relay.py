@@ -3,6 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation import Relay
 from flown import TS, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,8 +12,8 @@ from hypothesis import strategies as st
 def relay(delay=0.36, lag=0.0, ts=TS, noise=0.0, seed=0, duration=20.0, dt=0.02):
     """A flight with a relay of 0.5 m/s, and what is known of its loop."""
     loop = dtm.ControlLoop(dtm.Integrator(1.0, lag), dtm.P(1.31), delay=delay, sample_time=ts)
-    flight = dtm.Experiment.relay(duration, 0.5, sample_time=ts or dt).fly(
-        loop, noise=noise, seed=seed, circulates=ts is not None
+    flight = dtm.Experiment.relay(duration, 0.5, sample_time=ts or dt).run(
+        loop, noise=noise, seed=seed, noise_in_loop=ts is not None
     )
     return flight, loop.replace(delay=None, lag=0.0)
 
@@ -57,7 +58,7 @@ def test_a_lag_counts_as_delay_unless_it_is_known():
 
 def test_a_relay_that_was_not_logged():
     flight, known = relay()
-    fit = dtm.estimate_delay(swapped(flight, command=None), known, method="relay", amplitude=0.5)
+    fit = dtm.estimate_delay(swapped(flight, command=None), known, method=Relay(amplitude=0.5))
     assert fit.delay == pytest.approx(0.36, abs=1e-9)
     assert fit.details["slope"] == pytest.approx(0.5, rel=1e-6)
 

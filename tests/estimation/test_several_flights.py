@@ -26,8 +26,8 @@ def test_noise_free_flights_are_recovered_exactly(method, lag):
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
     assert fit.gain == pytest.approx(0.9, abs=1e-6)
     assert fit.lag == pytest.approx(lag, abs=1e-6)
-    assert [one.loop.parameters["Kp"] for one in fit.flights] == [0.8, 1.31, 2.0]
-    assert all(one.loop.delay == fit.delay for one in fit.flights)
+    assert [one.loop.parameters["Kp"] for one in fit.runs] == [0.8, 1.31, 2.0]
+    assert all(one.loop.delay == fit.delay for one in fit.runs)
     assert "3 recordings together" in fit.summary()
 
 
@@ -56,7 +56,7 @@ def test_a_noisy_flight_counts_by_its_noise():
     assert both.stderr["delay"] <= alone.stderr["delay"] * 1.02
     assert abs(both.delay - alone.delay) < 0.2 * alone.stderr["delay"]
     # Residuals are those of the recordings, not the weighted ones of the search.
-    assert both.flights[1].residuals.std() == pytest.approx(0.05, rel=0.2)
+    assert both.runs[1].residuals.std() == pytest.approx(0.05, rel=0.2)
 
 
 def test_coloured_misfit_counts_by_the_size_of_the_step():
@@ -70,12 +70,12 @@ def test_coloured_misfit_counts_by_the_size_of_the_step():
 
 
 def test_the_joint_model_is_its_parts():
-    from deadtime.estimation.data._several import each_flight
+    from deadtime.estimation.data._runs import paired_runs
     from deadtime.estimation.methods._waveform import _model
 
     pairs = [fly(Kp, 0.01, 3) for Kp in (0.8, 2.0)]
-    flights = each_flight([p[0] for p in pairs], [p[1] for p in pairs], None)
-    parts = tuple(_model(flight, ("delay", "gain")) for flight in flights)
+    runs = paired_runs([p[0] for p in pairs], [p[1] for p in pairs])
+    parts = tuple(_model(run, ("delay", "gain")) for run in runs)
     joint = JointModel(parts, (1.0, 0.5))
     assert joint.labels[2:] == tuple(f"initial output of recording {k}" for k in (1, 2))
     point = np.array([0.4, 0.8, 0.01, -0.02])
@@ -92,8 +92,8 @@ def test_the_joint_model_is_its_parts():
         (([], None), ValueError, "no recording"),
         (("two", ["one loop"]), ValueError, "2 recordings and 1 of `loop`"),
         (("two", "loop", [None] * 3), ValueError, "2 recordings and 3 of `window`"),
-        ((["text"], "loop"), TypeError, "recording 0 is a str"),
-        (("two", ["a", "b"]), TypeError, "loop 0 is a str"),
+        ((["text"], "loop"), TypeError, r"recording\[0\] must be a Recording, got str"),
+        (("two", ["a", "b"]), TypeError, r"loop\[0\] must be a ControlLoop, got str"),
         (("two", "plants"), ValueError, "different plants"),
     ],
 )

@@ -5,6 +5,7 @@ import itertools
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation import Decay, Graphical, Overshoot
 from deadtime.estimation.methods._decrement import loop_with_root
 from deadtime.estimation.models._held_transfer import held_transfer
 from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
@@ -94,14 +95,14 @@ def test_the_decrement_has_no_lag_to_give():
 @pytest.mark.parametrize(("x", "tail", "within"), [(0.1, 0.3, 1e-9), (0.2, 0.1, 1e-6)])
 def test_the_tail_tells_the_delay(ts, x, tail, within):
     flight, known = fly(Kp=x / 0.36, ts=ts, dt=TS, limit=None, duration=25.0)
-    fit = dtm.estimate_delay(flight, known, method="decay", tail=tail)
+    fit = dtm.estimate_delay(flight, known, method=Decay(tail=tail))
     assert fit.delay == pytest.approx(0.36, abs=within)
 
 
 def test_close_to_one_over_e_a_later_tail_is_purer():
     flight, known = fly(Kp=0.3 / 0.36, limit=0.5, duration=25.0)
     off = [
-        abs(dtm.estimate_delay(flight, known, method="decay", tail=tail).delay - 0.36)
+        abs(dtm.estimate_delay(flight, known, method=Decay(tail=tail)).delay - 0.36)
         for tail in (0.3, 0.03, 0.001)
     ]
     assert off[0] > 10 * off[1] > 100 * off[2]
@@ -110,7 +111,7 @@ def test_close_to_one_over_e_a_later_tail_is_purer():
 
 def test_the_decay_with_a_known_lag():
     flight, known = fly(Kp=0.5, lag=0.2, limit=None, duration=30.0)
-    fit = dtm.estimate_delay(flight, known.replace(lag=0.2), method="decay", tail=0.01)
+    fit = dtm.estimate_delay(flight, known.replace(lag=0.2), method=Decay(tail=0.01))
     assert fit.delay == pytest.approx(0.36, abs=1e-4)
 
 
@@ -138,7 +139,7 @@ def test_the_standard_error_of_the_decay_is_that_of_repeated_flights():
 def test_the_decay_refuses_by_name(change, known_gain, words):
     flight, known = fly(limit=None, **change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
-        dtm.estimate_delay(flight, known.replace(gain=known_gain), method="decay", tail=0.2)
+        dtm.estimate_delay(flight, known.replace(gain=known_gain), method=Decay(tail=0.2))
 
 
 # --- graphical ------------------------------------------------------------------------------
@@ -159,9 +160,9 @@ def test_the_tangent_is_exact_under_hold_and_limit(delay, Kp, limit, ts):
 
 def test_the_other_constructions():
     flight, known = fly(duration=10.0)
-    two = dtm.estimate_delay(flight, known, method="graphical", construction="two_point")
+    two = dtm.estimate_delay(flight, known, method=Graphical(construction="two_point"))
     assert two.delay == pytest.approx(0.36, abs=1e-9)
-    first = dtm.estimate_delay(flight, known, method="graphical", construction="first_movement")
+    first = dtm.estimate_delay(flight, known, method=Graphical(construction="first_movement"))
     assert 0.36 < first.delay <= 0.36 + TS
 
 
@@ -198,50 +199,50 @@ def test_the_tangent_refuses_by_name(change, words):
 def test_graphical_options_are_checked():
     flight, known = fly()
     with pytest.raises(ValueError, match="not one of"):
-        dtm.estimate_delay(flight, known, method="graphical", construction="ruler")
+        dtm.estimate_delay(flight, known, method=Graphical(construction="ruler"))
     with pytest.raises(ValueError, match="increase"):
         dtm.estimate_delay(
-            flight, known, method="graphical", construction="two_point", shares=(0.3, 0.1)
+            flight, known, method=Graphical(construction="two_point", shares=(0.3, 0.1))
         )
 
 
 # --- what all of them refuse ----------------------------------------------------------------
 
 LINEAR = (
-    ("overshoot", {"map": "dominant"}),
-    ("overshoot", {"map": "exact"}),
-    ("decrement", {}),
-    ("decay", {}),
-    ("graphical", {}),
-    ("gcc", {}),
-    ("arx_scan", {}),
+    "overshoot",
+    Overshoot(map="exact"),
+    "decrement",
+    "decay",
+    "graphical",
+    "gcc",
+    "arx_scan",
 )
 
 
-@pytest.mark.parametrize(("method", "options"), LINEAR)
-def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method, options):
+@pytest.mark.parametrize("method", LINEAR)
+def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method):
     # The overshoot of a loop that its limit alone keeps in bounds was read as that of a stable one.
     flights = ((0.0, 5.0), (0.01, 5.0), (0.03, 20.0))
     for Kp, (noise, duration) in itertools.product((4.2, 4.5, 6.0), flights):
         flight, known = fly(Kp=Kp, noise=noise, duration=duration, rest=1.0)
         with pytest.raises(dtm.NotIdentifiableError, match=r"limit cycle.*'output_error'"):
-            dtm.estimate_delay(flight, known, method=method, **options)
+            dtm.estimate_delay(flight, known, method=method)
 
 
-@pytest.mark.parametrize(("method", "options"), LINEAR)
-def test_a_loop_that_still_rings_is_no_limit_cycle(method, options):
+@pytest.mark.parametrize("method", LINEAR)
+def test_a_loop_that_still_rings_is_no_limit_cycle(method):
     for Kp, seed in itertools.product((3.0, 3.6), range(5)):
         flight, known = fly(Kp=Kp, noise=0.01, duration=12.0, rest=1.0, seed=seed)
         if method == "decay":
             with pytest.raises(dtm.NotIdentifiableError, match="overshoots"):
                 dtm.estimate_delay(flight, known, method=method)
         else:
-            assert dtm.estimate_delay(flight, known, method=method, **options).delay > 0.0
+            assert dtm.estimate_delay(flight, known, method=method).delay > 0.0
 
 
 def test_the_saturated_map_knows_the_limit_and_reads_a_limit_cycle():
     flight, known = fly(Kp=4.5, duration=12.0)
-    fit = dtm.estimate_delay(flight, known, method="overshoot", map="saturated")
+    fit = dtm.estimate_delay(flight, known, method=Overshoot(map="saturated"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
 
 

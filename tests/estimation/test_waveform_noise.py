@@ -3,18 +3,19 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation import Waveform
 from deadtime.estimation.models._plant_path import path_of
 from scipy.signal import lsim
 
 TS = 0.065
 
 
-def fly(noise=0.0, seed=0, delay=0.36, Kp=1.31, limit=1.0, ts=TS, late=0.0, circulates=True):
+def fly(noise=0.0, seed=0, delay=0.36, Kp=1.31, limit=1.0, ts=TS, late=0.0, noise_in_loop=True):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), delay=delay, sample_time=ts, limit=limit)
     time = np.arange(0.0, 8.0, TS)
     reference = np.where(time < 1.0 - 1e-9, 0.0, 1.0)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
-    seen = reference - error if circulates else reference
+    seen = reference - error if noise_in_loop else reference
     if late:
         # What the clock of the output calls t was at t - late.
         fine = loop.simulate(
@@ -33,7 +34,7 @@ def fly(noise=0.0, seed=0, delay=0.36, Kp=1.31, limit=1.0, ts=TS, late=0.0, circ
 def test_innovations_are_white_where_simulated_residuals_are_not():
     flight, known = fly(0.01, seed=2, Kp=3.0)
     plain, innovations = (
-        dtm.estimate_delay(flight, known, method="waveform", free=("delay",), noise=noise)
+        dtm.estimate_delay(flight, known, method=Waveform(noise=noise), free=("delay",))
         for noise in ("recording", "loop")
     )
     assert innovations.method == "waveform"
@@ -42,20 +43,20 @@ def test_innovations_are_white_where_simulated_residuals_are_not():
     assert innovations.rms == pytest.approx(0.01, rel=0.2)
 
 
-@pytest.mark.parametrize("circulates", [True, False])
-def test_where_the_noise_goes_is_found_out(circulates):
+@pytest.mark.parametrize("noise_in_loop", [True, False])
+def test_where_the_noise_goes_is_found_out(noise_in_loop):
     right = 0
     for seed in range(20):
-        flight, known = fly(0.01, seed, Kp=3.0, circulates=circulates)
+        flight, known = fly(0.01, seed, Kp=3.0, noise_in_loop=noise_in_loop)
         fit = dtm.estimate_delay(flight, known, method="waveform")
-        right += fit.details["noise"] == ("loop" if circulates else "recording")
+        right += fit.details["noise"] == ("loop" if noise_in_loop else "recording")
     # Likelihoods of single records come close now and then: in 7 % of them here.
     assert right >= 16
 
 
 def test_a_recording_may_begin_with_its_step():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36, sample_time=TS, limit=1.0)
-    flight = dtm.Experiment.step(6.0).fly(loop)
+    flight = dtm.Experiment.step(6.0).run(loop)
     fit = dtm.estimate_delay(flight, loop.replace(delay=None), method="waveform")
     assert (fit.delay, fit.gain) == pytest.approx((0.36, 1.0), abs=1e-6)
     with pytest.raises(dtm.NotIdentifiableError, match="nothing excites"):
@@ -63,15 +64,13 @@ def test_a_recording_may_begin_with_its_step():
 
 
 def test_a_known_start_sharpens_the_waveform():
-    flight, known = fly(0.01, seed=3, circulates=False)
+    flight, known = fly(0.01, seed=3, noise_in_loop=False)
     free, told = (
         dtm.estimate_delay(
             flight,
             known,
-            method="waveform",
+            method=Waveform(noise="recording", initial_output=start),
             free=("delay",),
-            noise="recording",
-            initial_output=start,
         )
         for start in (None, 0.0)
     )
@@ -92,7 +91,7 @@ def test_intervals_cover_where_the_noise_circulates():
     held = 0
     for seed in range(200):
         flight, known = fly(0.01, seed, Kp=3.0)
-        fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay",), noise="loop")
+        fit = dtm.estimate_delay(flight, known, method=Waveform(noise="loop"), free=("delay",))
         low, high = fit.ci()
         held += low <= 0.36 <= high
     # 190 of 200 expected, with a deviation of 3.1.
@@ -110,7 +109,7 @@ def test_intervals_cover_where_the_noise_circulates():
 def test_innovations_need_a_command_that_can_be_computed(loop, match):
     flight, _ = fly(0.01)
     with pytest.raises(dtm.NotIdentifiableError, match=match):
-        dtm.estimate_delay(flight, loop, method="waveform", noise="loop")
+        dtm.estimate_delay(flight, loop, method=Waveform(noise="loop"))
 
 
 @pytest.mark.parametrize("ts", [TS, None])
@@ -129,7 +128,7 @@ def test_a_clock_that_runs_late_is_recovered(ts, late):
 
 def test_a_start_that_is_not_known_costs_as_much_as_the_bound_says():
     # 0.77 ms become 1.22 ms at 0.3 % of noise: about 1.6 times.
-    flight, known = fly(0.003, circulates=False, ts=None)
+    flight, known = fly(0.003, noise_in_loop=False, ts=None)
     alone = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
     both = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "start"))
     ratio = both.crb.stderr["delay"] / alone.crb.stderr["delay"]
@@ -152,8 +151,8 @@ def test_a_limit_is_recovered():
 
 
 def test_profiles_of_the_waveform_meet_its_intervals():
-    flight, known = fly(0.01, seed=2, circulates=False)
-    fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay",), noise="recording")
+    flight, known = fly(0.01, seed=2, noise_in_loop=False)
+    fit = dtm.estimate_delay(flight, known, method=Waveform(noise="recording"), free=("delay",))
     low, high = fit.ci()
     _, t = fit.profile("delay", [low, fit.delay, high])
     assert t[1] == pytest.approx(0.0, abs=1e-3)

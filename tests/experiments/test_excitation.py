@@ -96,7 +96,7 @@ def test_odd_lines_and_low_peaks():
 
 
 def test_the_command_that_is_logged_is_the_one_the_controller_makes():
-    flight = dtm.Experiment.prbs(10.0, 0.4, 0.4).fly(held_loop(dtm.P(2.0)), noise=0.02, seed=4)
+    flight = dtm.Experiment.prbs(10.0, 0.4, 0.4).run(held_loop(dtm.P(2.0)), noise=0.02, seed=4)
     made = np.clip(2.0 * (flight.reference - flight.output), -1.0, 1.0)
     np.testing.assert_allclose(flight.command, made, atol=1e-12)
 
@@ -127,7 +127,7 @@ def test_noise_that_circulates_goes_through_the_filter_of_a_pv_controller():
     experiment = dtm.Experiment.square(5.0, 0.3, 0.8)
     error = np.random.default_rng(7).normal(0.0, 0.03, len(experiment))
     outputs, commands = by_hand(controller, experiment, error, delay_samples=4)
-    flight = experiment.fly(held_loop(controller, 4 * TS), noise=0.03, seed=7)
+    flight = experiment.run(held_loop(controller, 4 * TS), noise=0.03, seed=7)
     np.testing.assert_allclose(flight.output, outputs, atol=1e-12)
     np.testing.assert_allclose(flight.command, commands, atol=1e-11)
 
@@ -138,13 +138,13 @@ def test_a_continuous_filter_sees_noise_that_holds():
     smooth = dtm.DerivativeFilter(20.0, 1.0)
     loop = held_loop(dtm.PV(1.5, 0.2, smooth), limit=None)
     quiet = dtm.Experiment.step(3.0)
-    flight = quiet.fly(loop, noise=0.03, seed=2)
+    flight = quiet.run(loop, noise=0.03, seed=2)
     error = np.random.default_rng(2).normal(0.0, 0.03, len(quiet))
     # The same through PD, which takes held noise as the reference by itself.
     both = loop.replace(controller=dtm.PD(1.5, 0.2, smooth)).simulate(
         quiet.time, -error, reference_time=quiet.time, reference_before=0.0, initial_output=0.0
     )
-    alone = quiet.fly(loop)
+    alone = quiet.run(loop)
     np.testing.assert_allclose(flight.output - error - alone.output, both.outputs, atol=1e-12)
 
 
@@ -154,18 +154,18 @@ def test_a_continuous_filter_sees_noise_that_holds():
 )
 def test_noise_that_does_not_circulate_leaves_the_loop_alone(controller):
     loop, experiment = held_loop(controller), dtm.Experiment.step(5.0)
-    clean = experiment.fly(loop)
-    logged = experiment.fly(loop, noise=0.01, seed=1, circulates=False)
+    clean = experiment.run(loop)
+    logged = experiment.run(loop, noise=0.01, seed=1, noise_in_loop=False)
     np.testing.assert_array_equal(clean.command, logged.command)
     error = np.random.default_rng(1).normal(0.0, 0.01, len(experiment))
     np.testing.assert_allclose(logged.output - clean.output, error, atol=1e-15)
-    assert (experiment.fly(loop, noise=0.01, seed=1).command != clean.command).any()
+    assert (experiment.run(loop, noise=0.01, seed=1).command != clean.command).any()
 
 
 def test_a_relay_makes_the_limit_cycle_of_theory():
     delay, size = 0.36, 0.5
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(3.0), delay=delay, limit=2.0)
-    flight = dtm.Experiment.relay(20.0, size, sample_time=0.005, reference=1.0).fly(loop)
+    flight = dtm.Experiment.relay(20.0, size, sample_time=0.005, reference=1.0).run(loop)
     assert set(np.abs(flight.command)) == {size}
     rises = flight.time[1:][(flight.command[1:] > 0) & (flight.command[:-1] < 0)]
     np.testing.assert_allclose(np.diff(rises[1:]), 4 * delay, atol=0.006)
@@ -174,7 +174,7 @@ def test_a_relay_makes_the_limit_cycle_of_theory():
 
 
 def test_a_relay_in_a_sampled_loop_switches_at_samples_only():
-    flight = dtm.Experiment.relay(10.0, 0.5).fly(held_loop(dtm.P(1.0), delay=0.36, limit=1.0))
+    flight = dtm.Experiment.relay(10.0, 0.5).run(held_loop(dtm.P(1.0), delay=0.36, limit=1.0))
     np.testing.assert_array_equal(
         flight.command, np.where(flight.reference - flight.output >= -1e-9, 0.5, -0.5)
     )
@@ -184,7 +184,7 @@ def test_the_log_does_not_tell_where_the_delay_is():
     loop = held_loop(dtm.P(2.0))
     other = loop.replace(delay_path="measurement")
     experiment = dtm.Experiment.prbs(5.0, 0.4, 0.4)
-    one, two = experiment.fly(loop, 0.01, seed=3), experiment.fly(other, 0.01, seed=3)
+    one, two = experiment.run(loop, 0.01, seed=3), experiment.run(other, 0.01, seed=3)
     np.testing.assert_array_equal(one.output, two.output)
     np.testing.assert_array_equal(one.command, two.command)
 
@@ -259,4 +259,4 @@ def test_what_is_no_experiment_is_refused(make, match):
 )
 def test_what_cannot_be_flown_is_refused_with_the_reason(experiment, loop, options, match):
     with pytest.raises(ValueError, match=match):
-        experiment.fly(loop, **options)
+        experiment.run(loop, **options)

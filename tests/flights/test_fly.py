@@ -252,6 +252,7 @@ def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
 # What is learnt
 
 
+@pytest.mark.survey
 @pytest.mark.parametrize("seed", range(3))
 def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
     stages = []
@@ -272,7 +273,7 @@ def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
     low, high = fit.ci(0.95)
     assert 0.0 < high - low < 0.03
     assert learned.split.transport.delay == pytest.approx(0.26, abs=0.006)
-    assert learned.split.vehicle_lateness == pytest.approx(0.142, abs=0.015)
+    assert learned.split.vehicle_delay == pytest.approx(0.142, abs=0.015)
     assert f"between {fit.ci(0.95, 'delay+lag')[0]:.3f}" in found.verdict()
     best, after = found.checked
     assert isinstance(after.controller, dtm.PV)
@@ -288,6 +289,7 @@ def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
     assert fast.timing.jitter < 1e-9
 
 
+@pytest.mark.survey
 def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
     vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), tells_climb=False)
     found = fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
@@ -340,14 +342,15 @@ def test_flights_without_a_vehicle_in_them_are_refused(tmp_path):
 
 
 def test_both_parts_are_found_from_what_is_told():
-    # A command in steps; the demand follows it 0.1234 s later, the climb that with a lag of 0.15 s.
+    # A command in steps; the setpoint follows it 0.1234 s later, the climb that with a lag of 0.15
+    # s.
     random = np.random.default_rng(3)
     command_time = np.arange(200) * TS
     command = np.repeat(random.uniform(-0.5, 0.5, 40), 5)
     time = np.arange(0.0, command_time[-1] - 0.005, 0.005)
     time += random.uniform(0.0, 0.002, time.size)
     rows = np.searchsorted(command_time, time - 0.1234, side="right") - 1
-    demand = np.where(rows >= 0, command[np.maximum(rows, 0)], 0.0)
+    setpoint = np.where(rows >= 0, command[np.maximum(rows, 0)], 0.0)
     fine = np.arange(0.0, command_time[-1], 1e-4)
     at = np.searchsorted(command_time, fine - 0.1234, side="right") - 1
     driven = np.where(at >= 0, command[np.maximum(at, 0)], 0.0)
@@ -356,11 +359,11 @@ def test_both_parts_are_found_from_what_is_told():
         speeds[k] = speed
         speed += 1e-4 * (0.8 * value - speed) / 0.15
     climb = np.interp(time, fine, speeds) + random.normal(0.0, 0.01, time.size)
-    split = split_delay([telemetry_of((time, demand, climb, climb), command_time, command)])
+    split = split_delay([telemetry_of((time, setpoint, climb, climb), command_time, command)])
     # The echo is seen at the first message after it: half of 5 ms later on average.
     assert split.transport.delay == pytest.approx(0.1234 + 0.0025, abs=0.002)
     assert split.transport.gain == pytest.approx(1.0, abs=0.01)
-    assert split.vehicle_lateness == pytest.approx(0.15, abs=0.01)
+    assert split.vehicle_delay == pytest.approx(0.15, abs=0.01)
     assert split.vehicle.gain == pytest.approx(0.8, abs=0.01)
 
 

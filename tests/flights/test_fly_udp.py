@@ -15,6 +15,7 @@ from emulated import client_of, emulator, skip_if_too_busy
 PLAN = FlightPlan(gains=(2.4,), settle=3.5, hold=4.0)
 
 
+@pytest.mark.survey
 def test_the_paper_s_gain_and_what_is_designed_for_it(tmp_path):
     async def fly():
         async with emulator(seed=5) as emulated:

@@ -1,6 +1,7 @@
-"""Loops, results and errors go through pickle and copy, and stay read-only on the way."""
+"""Loops, results and errors survive pickle and copy, and stay read-only."""
 
 import copy
+import functools
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -26,14 +27,16 @@ def estimated():
 
 def mapped():
     chart = dtm.stability_map(LOOP, {"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(3, 4))
-    assert chart.stable.shape == (3, 4)  # computed once and kept, so it is sent along
+    assert chart.stable.shape == (3, 4)  # computed once and stored, so it is pickled too
     return chart
 
 
+@functools.cache
 def designed():
     return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
 
 
+@functools.cache
 def filtered():
     return dtm.design_filter(LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9)
 
@@ -82,7 +85,7 @@ def test_results_survive_copying_and_stay_read_only(kind, way):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_a_loop_that_was_used_survives_copying(way):
-    # What a loop keeps for speed, its native form among it, once kept it from being pickled.
+    # The cached native form of a loop could not be pickled once.
     LOOP.step_response()
     other = WAYS[way](LOOP)
     assert other == LOOP
@@ -105,8 +108,8 @@ def test_a_copied_response_is_still_measured_between_its_output_times():
         dtm.RecordingError("no file"),
     ],
 )
-def test_errors_come_back_whole(error):
-    # An error that does not survive this breaks the pool it is raised in.
+def test_errors_survive_pickling(error):
+    # An error that cannot be pickled breaks the pool in which it is raised.
     for way in WAYS.values():
         other = way(error)
         assert type(other) is type(error)

@@ -1,4 +1,4 @@
-"""Without an extra, what needs it says which line installs it, and everything else works."""
+"""Without an extra, functions that need it name the line that installs it; the others work."""
 
 import json
 import subprocess
@@ -51,7 +51,6 @@ DRAWN = {
     ).plot(),
     "RootSet.plot": lambda: LOOP.rightmost().plot(),
     "StabilityMap.plot": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)).plot(),
-    "SystemResponse.plot": lambda: SYSTEM.step_response(TIME).plot(),
     "TransferFunction.bode": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)).bode(),
     "TransferFunction.nyquist": lambda: (2.0 / dtm.s * dtm.delay(0.36)).nyquist(),
 }
@@ -66,13 +65,13 @@ def drawing_methods():
                     yield f"{kind.__name__}.{name}"
 
 
-def test_the_list_of_drawings_is_whole():
+def test_the_list_of_drawings_is_complete():
     assert set(drawing_methods()) == DRAWN.keys()
 
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_drawing_without_matplotlib_says_which_line_installs_it(name, monkeypatch):
-    # All but one raised a bare ModuleNotFoundError.
+    # All but one raised a plain ModuleNotFoundError once.
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(dtm.MissingExtraError, match=r"pip install 'deadtime\[plot\]'") as raised:
         DRAWN[name]()
@@ -102,7 +101,7 @@ def without(missing, *arguments, cwd=None):
     ],
 )
 def test_commands_that_draw_nothing_need_no_matplotlib(arguments):
-    # The command once asked for matplotlib before it looked at what it was to do.
+    # The command once required matplotlib before it examined its options.
     done = without(["matplotlib"], *arguments.split())
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)

@@ -1,4 +1,4 @@
-"""A child that is forked while a kernel runs ends as it likes, and can compute on its own."""
+"""A child that is forked while a kernel runs can compute and ends normally."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ import os
 import sys
 import warnings
 
-warnings.simplefilter("ignore", DeprecationWarning)  # forking with threads about is what is tested
+warnings.simplefilter("ignore", DeprecationWarning)  # the test forks a process with threads
 import deadtime as dtm
 
 child = None
@@ -55,7 +55,7 @@ print("ended", ended)
     ],
 )
 def test_a_child_forked_in_a_progress_function_does_not_hang(act, expected):
-    # It waited for ever for threads that a fork does not take along.
+    # It once waited forever for threads that do not exist in the child.
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(act=act, expected=expected)],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""Every result goes through pickle and copy, can be compared, and does not change."""
+"""Every result survives pickle and copy, can be compared, and is read-only."""
 
 import copy
 import dataclasses
@@ -34,7 +34,7 @@ def planned(**more):
     return dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01, **more)
 
 
-#: One of every public type that is not an error or a plain number, and how it is made.
+#: An expression for one object of every public type that is not an error or a plain number.
 MADE = {
     "Certificate": lambda: h.certify((-1, 1), (0, 9)),
     "Chain": lambda: h.chains()[0],
@@ -53,12 +53,12 @@ MADE = {
         LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9
     ),
     "FirstOrder": lambda: dtm.FirstOrder(1.0, 0.3),
-    "Flight": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)).flights[0],
+    "FittedRun": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)).runs[0],
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
     "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
     "Margins": CONTINUOUS.margin,
-    "MonteCarlo": lambda: planned().monte_carlo(3, processes=1, circulates=False),
+    "MonteCarlo": lambda: planned().monte_carlo(3, processes=1, noise_in_loop=False),
     "P": lambda: dtm.P(2.0),
     "PD": lambda: dtm.PD(2.0, 0.1),
     "PI": lambda: dtm.PI(2.0, 0.1),
@@ -83,7 +83,7 @@ MADE = {
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
     "Sweep": lambda: dtm.sweep(LOOP, {"Kp": np.array([1.0, 2.0])}),
-    "SystemResponse": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
+    "Response of a system": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
     "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
     "TransferFunction": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)),
     "Whiteness": lambda: dtm.estimation.Whiteness(1.0, 0.5, 3, 0.1),
@@ -110,8 +110,8 @@ def public_types():
             yield kind
 
 
-def test_the_list_of_types_is_whole():
-    # Bases that are never made, and tuples of arrays.
+def test_the_list_of_types_is_complete():
+    # Base classes that are never instantiated, and tuples of arrays.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW",
     }  # fmt: skip
@@ -133,7 +133,7 @@ def values_of(one):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_every_public_object_survives_copying_equal_to_itself(one, way):
-    # Solutions of delay equations did neither; a copied result was another than its origin.
+    # Solutions of delay equations could not be copied, and a copied result was not equal to it.
     other = WAYS[way](one)
     assert type(other) is type(one)
     assert repr(other) == repr(one)
@@ -143,7 +143,7 @@ def test_every_public_object_survives_copying_equal_to_itself(one, way):
 def test_no_comparison_raises(one):
     # `RootSet == array` raised where the lengths differ.
     if isinstance(one, tuple):
-        return  # a tuple is compared as one
+        return  # tuples compare as tuples
     for foreign in (None, 1, "a", np.zeros(2), np.zeros((3, 1)), [1.0], object()):
         assert not np.any(one == foreign)
     if isinstance(one, dtm.roots.RootSet):
@@ -153,7 +153,7 @@ def test_no_comparison_raises(one):
 
 
 def test_nothing_in_a_result_can_be_changed(one):
-    # The dicts of a fit could be written to, and the fit said something else from then on.
+    # The dicts of a fit could be changed once, which changed the fit.
     if not (dataclasses.is_dataclass(one) and hasattr(one, "_freeze")):
         return
     for way in (lambda it: it, *WAYS.values()):

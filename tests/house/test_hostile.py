@@ -1,4 +1,4 @@
-"""Arguments no one should give: each is refused by name, none hangs or comes back as nonsense."""
+"""Invalid arguments: each is refused by name, none hangs or gives a wrong result."""
 
 import json
 import os
@@ -57,7 +57,7 @@ def test_the_number_of_poles_is_whole(loop, n):
         {"steady_state": np.nan},
     ],
 )
-def test_figures_of_a_response_have_sensible_bounds(bad):
+def test_metrics_of_a_response_have_sensible_bounds(bad):
     response = LOOP.simulate(np.linspace(0.0, 10.0, 101))
     with pytest.raises((TypeError, ValueError), match=next(iter(bad))):
         response.info(**bad)
@@ -82,14 +82,14 @@ def test_algebra_takes_numbers_in_arrays_of_no_dimension():
 
 
 @pytest.mark.parametrize("one", [dtm.s + 1, dtm.parameters("K")[0]])
-def test_what_does_not_change_loses_nothing_either(one):
+def test_attributes_of_frozen_objects_cannot_be_deleted(one):
     with pytest.raises(AttributeError, match="does not change"):
         del one._native
 
 
 @pytest.mark.parametrize("threads", [-1, 10**6, 10**30, 2.5, "2"])
 def test_numbers_of_threads_that_no_machine_has(threads):
-    # A million threads once brought the whole machine to a standstill.
+    # A million threads once made the whole machine unusable.
     A, B = dtm.parameters("A B")
     ranges = {"A": (0, 1), "B": (0, 1)}
     with pytest.raises((TypeError, ValueError), match="threads="):
@@ -100,7 +100,7 @@ def test_numbers_of_threads_that_no_machine_has(threads):
 
 @pytest.mark.parametrize(("gain", "delay"), [(1e300, 0.36), (1e-300, 0.36), (2.0, 1e-200)])
 def test_numbers_near_the_ends_of_double_precision_do_not_hang(gain, delay):
-    # The bound of the roots once bisected for ever between numbers whose product overflows.
+    # The bisection for the bound of the roots did not end if a product overflowed.
     code = (
         "import deadtime as dtm\n"
         f"try: print(dtm.ControlLoop(dtm.Integrator(), dtm.P({gain}), delay={delay}).rightmost())\n"
@@ -113,13 +113,13 @@ def test_numbers_near_the_ends_of_double_precision_do_not_hang(gain, delay):
 
 
 def test_a_refused_abscissa_says_the_true_reason():
-    # It was once said to be a constant, or to need more lines than had been drawn.
+    # The message once said that it is a constant, or that it needs more lines.
     loops = {
         omega: LOOP.replace(controller=dtm.PV(2.0, 0.3, filter=dtm.DerivativeFilter(omega)))
         for omega in (1e20, 1e100, 1e153)
     }
     ideal = LOOP.replace(controller=dtm.PV(2.0, 0.3)).spectral_abscissa()
-    # As far as squares of omega are numbers, the filter is as good as none.
+    # As long as omega squared does not overflow, such a filter has no effect.
     assert abs(loops[1e20].spectral_abscissa() - ideal) < 1e-13
     assert abs(loops[1e100].spectral_abscissa() - ideal) < 1e-13
     with pytest.raises(ValueError, match="differ too much in size for double precision"):
@@ -151,7 +151,7 @@ def rows(sample="{t},{r},{y}", step=0.1, size=1.0):
         ("{t},{r},1_000", "time,reference,output", "'1_000'"),
     ],
 )
-def test_cells_that_are_not_what_they_seem(tmp_path, sample, head, words):
+def test_ambiguous_cells_of_a_table_are_refused(tmp_path, sample, head, words):
     listed = [one.replace("0.", "") for one in rows(sample)] if "0,{t}" in sample else rows(sample)
     with pytest.raises(dtm.RecordingError, match=words):
         dtm.read_recording(table(tmp_path, listed, head))
@@ -180,8 +180,8 @@ def test_fits_that_would_take_minutes_are_refused():
 
 
 @pytest.mark.parametrize("kind", ["noise", "wrong sign"])
-def test_outputs_that_answer_no_step_are_refused(kind):
-    # A gain at the end of its search once came back with adequate=True.
+def test_outputs_that_do_not_respond_to_a_step_are_refused(kind):
+    # A gain at the bound of its search was once returned with adequate=True.
     times = np.arange(150) * 0.065
     step = (times > 1.0).astype(float)
     output = {
@@ -237,7 +237,7 @@ def test_ctrl_c_ends_a_command_with_one_line(tmp_path):
         cwd=tmp_path,
     )
     assert process.stdout.readline() == "up\n"
-    time.sleep(0.2)  # wherever it then is: importing, reading options or counting
+    time.sleep(0.2)  # in any state: importing, reading options or counting
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -251,7 +251,7 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path):
     assert done.stderr == f"deadtime: {where}: No such file or directory\n"
 
 
-def test_figures_that_do_not_exist_are_words_in_print_and_null_in_json():
+def test_metrics_that_do_not_exist_are_words_in_print_and_null_in_json():
     slow = ["simulate", "--kp", "1e-6", "--delay", "0.36"]
     printed = command(*slow)
     assert printed.returncode == 0

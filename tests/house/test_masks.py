@@ -1,4 +1,4 @@
-"""What is under a mask is no number: it is left out where that has a meaning, refused elsewhere."""
+"""Masked entries are not used as numbers: they are missing rows, or they are refused."""
 
 import deadtime as dtm
 import numpy as np
@@ -39,8 +39,8 @@ TAKERS = {
     "DelaySystem matrix": lambda x: SYSTEM.characteristic_matrix(x),
     "DelaySystem frequency_response": lambda x: SYSTEM.frequency_response(x),
     "DelaySystem step_response": lambda x: SYSTEM.step_response(x),
-    "simulate time": lambda x: dtm.simulate(SYSTEM, x, 1.0),
-    "simulate inputs": lambda x: dtm.simulate(SYSTEM, TIME, x, input_time=TIME),
+    "simulate time": lambda x: SYSTEM.simulate(x, 1.0),
+    "simulate inputs": lambda x: SYSTEM.simulate(TIME, x, input_time=TIME),
     "ControlLoop simulate": lambda x: LOOP.simulate(x),
     "ControlLoop reference": lambda x: LOOP.simulate(TIME, x, reference_time=TIME),
     "ControlLoop reference_time": lambda x: LOOP.simulate(TIME, TIME, reference_time=x),
@@ -73,7 +73,7 @@ TAKERS = {
 }
 
 
-#: Those that hand the mask on to what they return.
+#: Functions whose result has the mask of the argument.
 UFUNCS = (
     "dde_roots",
     "lambertw",
@@ -86,7 +86,7 @@ UFUNCS = (
 
 @pytest.mark.parametrize("taker", TAKERS)
 def test_no_function_takes_what_is_under_a_mask(taker):
-    # NumPy drops the mask of what it makes an array of, and 1e6 here was taken for a number.
+    # NumPy drops the mask in a conversion, and the masked 1e6 was used as a number.
     values = np.array([0.1, 1e6, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
     masked = np.ma.array(values, mask=values > 1e5)
     if taker in UFUNCS:
@@ -98,12 +98,12 @@ def test_no_function_takes_what_is_under_a_mask(taker):
 
 
 @pytest.mark.parametrize("taker", ["ControlLoop simulate", "TransferFunction()", "sweep"])
-def test_a_mask_that_hides_nothing_is_no_matter(taker):
+def test_a_mask_without_masked_entries_has_no_effect(taker):
     TAKERS[taker](np.ma.array(np.linspace(0.1, 0.9, 9), mask=False))
 
 
 class Missing:
-    """What pandas has for a missing value in nullable columns: no number."""
+    """The missing value of pandas in nullable columns, which is not a number."""
 
     def __float__(self):
         raise TypeError("float() argument must be a string or a real number, not 'NAType'")
@@ -147,7 +147,7 @@ def test_masked_rows_of_a_recording_are_left_out(column, rows):
 @pytest.mark.parametrize("rows", [(10,), (9, 10), (10, 11)])
 @pytest.mark.parametrize("column", [1, 2])
 def test_a_masked_row_that_hides_a_step_is_refused(column, rows):
-    # The step would seem to come a row later, and the delay a row shorter.
+    # The step would appear a row later, and the delay a row shorter.
     columns = [ROWS, STEP, OUTPUT]
     columns[column] = masked(columns[column], *rows)
     with pytest.raises(dtm.RecordingError, match="the reference changes there"):

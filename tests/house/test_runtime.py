@@ -1,4 +1,4 @@
-"""The seam: threads, interpreter lock, fork, Ctrl-C, progress."""
+"""Calls into the kernel: threads, interpreter lock, fork, Ctrl-C, progress."""
 
 import inspect
 import os
@@ -58,7 +58,7 @@ def test_the_number_of_threads_is_the_argument_then_the_environment():
 
 
 @pytest.mark.parametrize("value", ["two", "-1", "1.5"])
-def test_nonsense_in_the_environment_is_named(value):
+def test_invalid_environment_variables_are_named(value):
     result = run_python("judge(20)", DEADTIME_NUM_THREADS=value)
     assert result.returncode != 0
     assert "DEADTIME_NUM_THREADS" in result.stderr
@@ -71,7 +71,7 @@ def test_zero_threads_are_refused():
 
 
 def test_a_forked_child_works_and_does_not_hang():
-    # The pool's threads do not exist in the child; using them would wait for ever.
+    # The threads of the pool do not exist in the child; waiting for them would not end.
     result = run_python(
         """
         import os, sys, warnings
@@ -125,7 +125,7 @@ def test_a_fork_in_the_middle_of_a_computation_does_not_hang():
 
 @pytest.mark.usefixtures("listens_to_ctrl_c")
 def test_ctrl_c_stops_a_long_call():
-    # The promise is 0.2 s on an idle machine; the bound here only tells stopping from not stopping.
+    # It takes 0.2 s on an idle machine; the bound here only distinguishes it from not stopping.
     threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
@@ -134,7 +134,7 @@ def test_ctrl_c_stops_a_long_call():
 
 
 def test_two_python_threads_run_two_kernels_at_once():
-    # Each call waits for the other to have made progress: one after the other, they would never.
+    # Each call waits for progress of the other, so they end only if they run at the same time.
     started = [threading.Event(), threading.Event()]
     outcomes = []
 
@@ -166,7 +166,7 @@ def test_the_interpreter_runs_on_while_a_kernel_works():
     while worker.is_alive():
         ticks += 1
         time.sleep(0.001)
-    # Holding the lock would leave this loop a handful of turns.
+    # With the lock held, this loop would run only a few times.
     assert ticks > 50
 
 

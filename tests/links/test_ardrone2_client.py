@@ -97,7 +97,7 @@ def test_speed_is_a_share_of_what_was_read_back():
             sent = watch_datagrams(drone)
             drone.command(0.4)
             await asyncio.sleep(0.275)  # the emulator's transport delay is 0.26 s
-            assert emulated.truth().demand == pytest.approx(0.4, abs=1e-6)
+            assert emulated.truth().setpoint == pytest.approx(0.4, abs=1e-6)
             moves = [c for _, commands in sent for _, c in commands if hasattr(c, "gaz")]
             assert moves[0].gaz == pytest.approx(0.4, abs=1e-6)
 

@@ -51,16 +51,16 @@ def test_options_of_short_packets_can_be_chosen():
     assert pilot.last.clock is None
 
 
-def test_the_demand_is_echoed_when_it_reaches_the_vehicle():
+def test_the_setpoint_is_echoed_when_it_reaches_the_vehicle():
     pilot = Pilot().connect(demo=False).fly()
     asked = pilot.time
     pilot.sent.clear()
     pilot.wait(1.0, UP, Move(gaz=0.5), every=0.02)
     told = [parse_navdata(packet) for packet in pilot.sent]
-    follows = [one.clock for one in told if one.climb_demand > 0.0]
+    follows = [one.clock for one in told if one.climb_setpoint > 0.0]
     assert min(follows) == pytest.approx(asked + 0.02 + 0.26, abs=0.005)
     last = told[-1]
-    assert last.climb_demand == pytest.approx(0.35)
+    assert last.climb_setpoint == pytest.approx(0.35)
     assert last.climb == pytest.approx(pilot.truth.climb, abs=1e-4)
     assert last.altitude.altitude_vz == pytest.approx(-last.kalman_pressure.est_zdot)
     assert last.height == pytest.approx(pilot.truth.height, abs=6e-4)
@@ -164,12 +164,12 @@ def test_jitter_delays_and_never_reorders():
         pilot.send(UP, Move(gaz=k / 200))
         pilot.wait(0.01)
     echoes = [parse_navdata(packet) for packet in pilot.sent]
-    demands = [echo.climb_demand for echo in echoes]
-    assert demands == sorted(demands)
+    setpoints = [echo.climb_setpoint for echo in echoes]
+    assert setpoints == sorted(setpoints)
     late = [
-        echo.clock - sent[round(echo.climb_demand / 0.7 * 200)]
+        echo.clock - sent[round(echo.climb_setpoint / 0.7 * 200)]
         for before, echo in pairwise(echoes)
-        if echo.climb_demand != before.climb_demand
+        if echo.climb_setpoint != before.climb_setpoint
     ]
     assert min(late) >= 0.1 - 1e-6
     assert max(late) <= 0.155 + 1e-6  # packets are 5 ms apart
@@ -185,7 +185,7 @@ def test_a_linear_plant_is_stepped_exactly(name):
     times = np.arange(1, 60) * 0.137
     motion = LinearMotion(plant)
     motion.settle(0, 0.0)
-    motion.demand(0, 0.4)
+    motion.follow(0, 0.4)
     heights = [motion.at(round(1e6 * t))[0] for t in times]
     exact = plant.transfer_function().step_response(np.concatenate([[0.0], times]))
     assert np.allclose(heights, 0.4 * np.ravel(exact.outputs)[1:], rtol=0.0, atol=1e-13)
@@ -221,7 +221,7 @@ def test_thrust_near_hover_is_two_equal_lags():
     motion = ThrustMotion(thruster)
     motion.settle(0, 1.0)
     small = 1e-4
-    motion.demand(0, small)
+    motion.follow(0, small)
     times = np.arange(1, 100) * 0.01
     climbs = [motion.at(round(1e6 * t))[1] for t in times]
     rate = 0.5 / thruster.motor_lag
@@ -237,15 +237,15 @@ def test_thrust_is_that_of_the_equations():
     down, up = thruster.accelerations
     assert down == pytest.approx(-8.513, abs=0.01)
     assert up == pytest.approx(10.887, abs=0.01)
-    # A demand far beyond what the rotors give: their limits accelerate the drone.
+    # A setpoint far beyond what the rotors give: their limits accelerate the drone.
     motion = ThrustMotion(thruster)
     motion.settle(0, 0.0)
-    motion.demand(0, 50.0)
+    motion.follow(0, 50.0)
     early, late = motion.at(400_000)[1], motion.at(500_000)[1]
     assert (late - early) / 0.1 == pytest.approx(up, rel=1e-3)
     # Tilted, thrust carries less: m z'' = T cos(roll) cos(pitch) - m g, held by the speed loop.
     motion.settle(1_000_000, 5.0)
-    motion.demand(1_000_000, 0.0)
+    motion.follow(1_000_000, 0.0)
     motion.tilt(1_000_000, math.cos(0.2))
     lost = GRAVITY * (1.0 / math.cos(0.2) - 1.0) / thruster.speed_gain
     assert motion.at(4_000_000)[1] == pytest.approx(-lost, rel=1e-3)
@@ -255,7 +255,7 @@ def test_thrust_is_the_same_whoever_looks():
     seldom, often = (ThrustMotion(Thruster()) for _ in "ab")
     for motion in (seldom, often):
         motion.settle(0, 1.0)
-        motion.demand(1234, 0.7)
+        motion.follow(1234, 0.7)
     for time in range(1300, 900_000, 777):
         often.at(time)
     assert seldom.at(900_000) == often.at(900_000)

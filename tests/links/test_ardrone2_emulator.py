@@ -326,13 +326,13 @@ def test_a_forgiving_drone_hovers_a_quarter_of_a_second_after_its_last_motion_co
     pilot = Pilot(delay=0.1, worst_case=False).fly()
     pilot.wait(1.0, UP, Move(gaz=0.5))
     last = pilot.time
-    assert pilot.truth.demand == pytest.approx(0.35)
+    assert pilot.truth.setpoint == pytest.approx(0.35)
     # A thread that keeps the link alive does not keep the motion alive.
     pilot.wait(0.249, Watchdog(), every=0.01)
-    assert pilot.truth.demand == pytest.approx(0.35)
+    assert pilot.truth.setpoint == pytest.approx(0.35)
     pilot.wait(0.000999)
-    assert pilot.drone.truth(last + 0.249999).demand != 0.0
-    assert pilot.drone.truth(last + 0.25).demand == 0.0
+    assert pilot.drone.truth(last + 0.249999).setpoint != 0.0
+    assert pilot.drone.truth(last + 0.25).setpoint == 0.0
     assert pilot.drone.truth(last + 0.25).phase is Phase.FLYING
 
 
@@ -341,7 +341,7 @@ def test_commands_under_way_are_forgotten_with_the_motion():
     pilot.send(UP, Move(gaz=1.0))
     for _ in range(100):
         pilot.wait(0.01)
-        assert pilot.truth.demand == 0.0
+        assert pilot.truth.setpoint == 0.0
 
 
 @pytest.mark.parametrize("kept_alive", [False, True])
@@ -352,12 +352,12 @@ def test_in_the_worst_case_a_motion_holds_until_the_link_is_lost(kept_alive):
     last = pilot.time
     if kept_alive:
         pilot.wait(6.0, Watchdog(), every=0.1)
-        assert pilot.truth.demand == pytest.approx(0.14)
+        assert pilot.truth.setpoint == pytest.approx(0.14)
         last = pilot.time
-    assert pilot.drone.truth(last + 1.999999).demand == pytest.approx(0.14)
+    assert pilot.drone.truth(last + 1.999999).setpoint == pytest.approx(0.14)
     truth = pilot.drone.truth(last + 2.0)
     assert truth.phase is Phase.LANDING
-    assert truth.demand < 0.0
+    assert truth.setpoint < 0.0
 
 
 def test_commands_under_way_are_forgotten_with_the_link():
@@ -367,7 +367,7 @@ def test_commands_under_way_are_forgotten_with_the_link():
     assert pilot.truth.phase is Phase.LANDED
     for _ in range(300):
         pilot.wait(0.02, UP)
-        assert pilot.truth.phase is not Phase.FLYING or pilot.truth.demand == 0.0
+        assert pilot.truth.phase is not Phase.FLYING or pilot.truth.setpoint == 0.0
     assert pilot.truth.phase is Phase.FLYING
 
 
@@ -380,7 +380,7 @@ def test_landing_begins_two_seconds_after_the_last_command():
     truth = pilot.drone.truth(last + 2.0)
     assert truth.phase is Phase.LANDING
     assert truth.link_lost
-    assert truth.demand < 0.0
+    assert truth.setpoint < 0.0
     assert pilot.drone.truth(last + 12.0).phase is Phase.LANDED
 
 
@@ -546,7 +546,7 @@ def test_no_datagrams_break_the_drone_or_make_it_talk(datagrams):
             configured_at = now
         truth = drone.truth(now)
         assert math.isfinite(truth.height)
-        assert abs(truth.demand) <= 2.0
+        assert abs(truth.setpoint) <= 2.0
     if configured_at is None:  # nobody got through the handshake
         assert len(sent) <= received
     drone.advance(now + 30.0)

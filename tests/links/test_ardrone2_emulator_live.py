@@ -163,8 +163,8 @@ def test_pyardrone_flies_it(flown):
 
 def test_a_drone_whose_client_was_killed_lands(flown):
     seen = flown[0]
-    assert seen[0][1].demand == pytest.approx(0.35)
-    flying = [truth.demand for _, truth in seen if truth.phase is Phase.FLYING]
+    assert seen[0][1].setpoint == pytest.approx(0.35)
+    flying = [truth.setpoint for _, truth in seen if truth.phase is Phase.FLYING]
     assert flying == pytest.approx([0.35] * len(flying))  # in the worst case its last wish holds
     begun = min(late for late, truth in seen if truth.phase is Phase.LANDING)
     assert 1.9 - SLACK < begun < 2.5 + SLACK
@@ -379,7 +379,7 @@ def test_the_command_tells_its_ports_works_and_ends_with_its_input(tmp_path):
         assert process.wait(20.0) == 0
         assert process.stderr.read() == ""
     lines = truth.read_text().splitlines()
-    assert lines[0].startswith("time_s,height_m,climb_m_s,demand_m_s")
+    assert lines[0].startswith("time_s,height_m,climb_m_s,setpoint_m_s")
     assert len(lines) > 1
 
 

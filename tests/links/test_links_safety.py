@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from deadtime import FlightAbortedError
 from deadtime.links import Journal, Limits, UnitCommand, VehicleState, Watch, largest_gain
+from deadtime.links.safety import jumps
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -110,6 +111,32 @@ def test_a_height_that_jumps_is_not_believed():
     jumped = replace(STATE, time=10.01, sequence=8, vehicle_time=3.01, height=1.2)
     with pytest.raises(FlightAbortedError, match=r"jumps from 1\.00 to 1\.20 m within 10 ms"):
         watch.check(jumped, now=10.01)
+
+
+@pytest.mark.parametrize(("passed", "most"), [(0.0, 0.1), (0.02, 0.2), (0.2, 1.1)])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_height_may_change_by_the_fastest_climb_and_a_bump(passed, most, sign):
+    # A bump that was taken off instead of added failed no test.
+    for share, believed in ((0.99, True), (1.01, False)):
+        watch = Watch(Limits())
+        start = replace(STATE, height=1.5)
+        watch.check(start, now=10.0)
+        later = replace(later_by(passed, sequence=8), height=1.5 + sign * share * most)
+        assert jumps(1.5, later.height, passed, 5.0) is not believed
+        if believed:
+            watch.check(later, now=10.0 + passed)
+        else:
+            with pytest.raises(FlightAbortedError, match="jumps"):
+                watch.check(later, now=10.0 + passed)
+
+
+def test_a_clock_that_runs_backwards_allows_no_larger_jump():
+    watch = Watch(Limits())
+    watch.check(replace(STATE, vehicle_time=None), now=10.0)
+    later = replace(STATE, time=9.9, sequence=8, vehicle_time=None)
+    watch.check(replace(later, height=1.09), now=10.0)
+    with pytest.raises(FlightAbortedError, match="within 0 ms"):
+        watch.check(replace(later, sequence=9, time=9.8, height=1.2), now=10.0)
 
 
 def test_messages_that_arrive_in_a_burst_are_judged_by_the_clock_of_the_vehicle():

@@ -115,7 +115,9 @@ def check(report, came):
     assert link.round_trip.count > 0
     assert 0.0 <= link.round_trip.p50 <= link.round_trip.largest <= DURATION
     assert all(math.isfinite(edge) for edge in link.round_trip_histogram[0])
-    assert all(math.isfinite(bound) for bound in (*link.there, *link.back, link.jitter))
+    assert all(
+        math.isfinite(bound) for bound in (*link.forward_delay, *link.return_delay, link.jitter)
+    )
     assert 0.0 <= report.largest_command <= LIMIT
     assert all(math.isfinite(packet.value) for packet in came)
 
@@ -160,7 +162,7 @@ def test_a_controller_believes_no_echo_that_the_plant_would_not(change):
     # The true packet of the same number comes after it, as a duplicate.
     assert report.link.round_trip.count == true.link.round_trip.count - 2
     assert report.link.round_trip.largest == pytest.approx(true.link.round_trip.largest, abs=1e-9)
-    assert report.link.there == pytest.approx(true.link.there, abs=1e-9)
+    assert report.link.forward_delay == pytest.approx(true.link.forward_delay, abs=1e-9)
     assert (
         report.answered == true.answered
     )  # what it measures is: the plant may have been restarted
@@ -207,7 +209,7 @@ def step(controller_host, listen="::1", plant=None):
 def test_an_address_of_ipv6_may_be_spelled_in_any_way():
     """With ``[0::1]`` every answer was a stranger's, and the run ended as if all were well."""
     plant, controller = virtual_time.run(step("0::1"))
-    assert (plant.link.strangers, controller.link.strangers) == (0, 0)
+    assert (plant.link.foreign, controller.link.foreign) == (0, 0)
     assert plant.applied > 30
 
 
@@ -222,7 +224,7 @@ def with_ipv6():
 def test_on_real_sockets_too():
     with_ipv6()
     plant, _ = asyncio.run(step("0:0:0:0:0:0:0:1"))
-    assert plant.link.strangers == 0
+    assert plant.link.foreign == 0
     assert plant.applied > 0
 
 
@@ -245,5 +247,5 @@ def test_a_controller_on_a_socket_of_ipv6_answers_a_plant_of_ipv4():
             return await run_plant(plant)
 
     report = asyncio.run(run())
-    assert report.link.strangers == 0
+    assert report.link.foreign == 0
     assert report.applied > 0

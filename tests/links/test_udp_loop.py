@@ -88,7 +88,7 @@ def loop_of(trial, delay):
 
 @pytest.mark.parametrize("lag", [0.0, 0.05])
 def test_with_constant_delays_it_is_the_sampled_loop(lag):
-    trial = Trial(gain=8.0, there=WAY, back=WAY, lag=lag, limit=5.0)
+    trial = Trial(gain=8.0, forward_path=WAY, return_path=WAY, lag=lag, limit=5.0)
     recording = run(trial).plant.recording
     model = loop_of(trial, 0.1).simulate(
         recording.time, recording.reference, reference_time=recording.time
@@ -97,7 +97,7 @@ def test_with_constant_delays_it_is_the_sampled_loop(lag):
 
 
 def test_what_is_measured_is_exact():
-    report = run(Trial(gain=8.0, there=Network(0.03), back=Network(0.07)))
+    report = run(Trial(gain=8.0, forward_path=Network(0.03), return_path=Network(0.07)))
     link = report.plant.link
     assert link.round_trip.p50 == pytest.approx(0.1, abs=1e-9)
     assert link.round_trip.largest == pytest.approx(0.1, abs=1e-9)
@@ -106,8 +106,8 @@ def test_what_is_measured_is_exact():
     assert report.plant.period.largest == pytest.approx(0.01, abs=1e-9)
     assert (link.lost, link.late, link.reordered, report.plant.trips) == (0, 0, 0, 0)
     # how the round trip divides cannot be measured, but the bounds hold
-    assert link.there[0] <= 0.03 <= link.there[1]
-    assert link.back[0] <= 0.07 <= link.back[1]
+    assert link.forward_delay[0] <= 0.03 <= link.forward_delay[1]
+    assert link.return_delay[0] <= 0.07 <= link.return_delay[1]
     assert abs(link.offset) <= link.offset_uncertainty
 
 
@@ -115,7 +115,9 @@ def test_a_run_follows_from_its_seed_to_the_byte(tmp_path):
     way = Network(delay=Normal(0.05, 0.01), loss=0.05, duplication=0.1)
 
     def written(seed, folder):
-        report = run(Trial(gain=8.0, there=way, back=way, seed=seed), folder=tmp_path / folder)
+        report = run(
+            Trial(gain=8.0, forward_path=way, return_path=way, seed=seed), folder=tmp_path / folder
+        )
         files = sorted((tmp_path / folder).iterdir())
         return [file.read_bytes() for file in files], repr(report.to_dict())
 
@@ -170,21 +172,21 @@ def test_an_end_that_cannot_record_leaves_its_port(tmp_path):
 def test_losses_are_counted_as_they_happened():
     relays = []
     way = Network(delay=0.05, loss=0.1, duplication=0.1)
-    trial = Trial(gain=6.0, there=way, back=way, seed=5)
+    trial = Trial(gain=6.0, forward_path=way, return_path=way, seed=5)
     report = run(trial, meanwhile=lambda relay, controller: relays.append(relay))
     (relay,) = relays
     # what is still under way at the end, or lost after the last one that came, is not counted
-    assert report.controller.link.lost == pytest.approx(relay.there.lost, abs=3)
-    assert report.plant.link.lost == pytest.approx(relay.back.lost, abs=3)
-    assert report.controller.link.duplicates == pytest.approx(relay.there.duplicated, abs=3)
+    assert report.controller.link.lost == pytest.approx(relay.forward_path.lost, abs=3)
+    assert report.plant.link.lost == pytest.approx(relay.return_path.lost, abs=3)
+    assert report.controller.link.duplicates == pytest.approx(relay.forward_path.duplicated, abs=3)
     assert report.plant.link.reordered == 0
     assert report.plant.link.loss == pytest.approx(0.1, abs=0.04)
 
 
 def test_a_jitter_buffer_makes_a_random_delay_constant():
     way = Network(delay=Normal(0.05, 0.01))
-    wild = Trial(gain=6.0, there=way, back=way, seed=2)
-    tame = Trial(gain=6.0, there=way, back=way, seed=2, policy=JitterBuffer(0.16))
+    wild = Trial(gain=6.0, forward_path=way, return_path=way, seed=2)
+    tame = Trial(gain=6.0, forward_path=way, return_path=way, seed=2, policy=JitterBuffer(0.16))
     assert run(wild).plant.age_when_applied.p95 > run(wild).plant.age_when_applied.p50 + 0.01
     report = run(tame)
     ages = report.plant.age_when_applied
@@ -199,7 +201,9 @@ def test_a_jitter_buffer_makes_a_random_delay_constant():
 
 def test_answers_may_take_as_long_as_the_watchdog_allows():
     way = Network(delay=2.4)
-    trial = Trial(gain=0.1, there=way, back=way, sample_time=1e-3, watchdog=5.0, duration=6.0)
+    trial = Trial(
+        gain=0.1, forward_path=way, return_path=way, sample_time=1e-3, watchdog=5.0, duration=6.0
+    )
     report = run(trial)
     assert report.plant.link.invalid == 0
     assert report.plant.applied > 1000
@@ -208,7 +212,7 @@ def test_answers_may_take_as_long_as_the_watchdog_allows():
 
 def test_late_commands_are_dropped_where_asked_for():
     way = Network(delay=ShiftedGamma(0.03, 0.05, 0.02))
-    report = run(Trial(gain=6.0, there=way, back=way, policy=DropLate(0.1)))
+    report = run(Trial(gain=6.0, forward_path=way, return_path=way, policy=DropLate(0.1)))
     assert report.plant.age_when_applied.largest <= 0.1
     assert report.plant.link.late > 20
     assert report.plant.link.lateness.largest > 0.0
@@ -219,7 +223,7 @@ def test_late_commands_are_dropped_where_asked_for():
 
 def test_a_command_without_successor_is_let_go():
     back = Network(delay=0.05, blackouts=((1.2, 3.0),))
-    trial = Trial(gain=2.0, there=WAY, back=back, policy=HoldThenZero(5))
+    trial = Trial(gain=2.0, forward_path=WAY, return_path=back, policy=HoldThenZero(5))
     recording = run(trial).plant.recording
     # what left before the blackout arrives until 1.25 s, and holds for five samples of 10 ms
     held = (recording.time > 1.20) & (recording.time < 1.29)
@@ -230,7 +234,7 @@ def test_a_command_without_successor_is_let_go():
 
 def test_the_watchdog_applies_the_safe_command_in_time_and_lets_go_of_it_again():
     back = Network(delay=0.05, blackouts=((1.2, 3.0),))
-    trial = Trial(gain=2.0, there=WAY, back=back, watchdog=0.3, safe=-0.1)
+    trial = Trial(gain=2.0, forward_path=WAY, return_path=back, watchdog=0.3, safe=-0.1)
     report = run(trial)
     recording = report.plant.recording
     safe = recording.time[recording.command == -0.1]
@@ -243,7 +247,7 @@ def test_the_watchdog_applies_the_safe_command_in_time_and_lets_go_of_it_again()
 
 def test_a_controller_that_hears_nothing_tells_the_plant_to_be_safe():
     there = Network(delay=0.05, blackouts=((1.2, 9.0),))
-    trial = Trial(gain=2.0, there=there, back=WAY, watchdog=0.4, safe=0.25)
+    trial = Trial(gain=2.0, forward_path=there, return_path=WAY, watchdog=0.4, safe=0.25)
     report = run(trial)
     recording = report.plant.recording
     safe = recording.time[(recording.command == 0.25) & (recording.time > 1.0)]
@@ -281,7 +285,13 @@ def test_no_fault_of_the_relay_makes_the_plant_unsafe(fault, policy):
     for seed in range(8):
         way = FAULTS[fault]
         trial = Trial(
-            gain=8.0, there=way, back=way, seed=seed, limit=LIMIT, watchdog=WATCHDOG, policy=policy
+            gain=8.0,
+            forward_path=way,
+            return_path=way,
+            seed=seed,
+            limit=LIMIT,
+            watchdog=WATCHDOG,
+            policy=policy,
         )
         check_safety(trial, run(trial))
 
@@ -313,8 +323,8 @@ def test_no_schedule_of_faults_makes_the_plant_unsafe(
     )
     trial = Trial(
         gain=gain,
-        there=way,
-        back=way,
+        forward_path=way,
+        return_path=way,
         seed=seed,
         limit=LIMIT,
         watchdog=WATCHDOG,
@@ -337,7 +347,7 @@ def check_safety(trial, report):
     )
     # a plant that was told nothing new has not moved on: its speed is bounded, so is its way
     assert np.abs(np.diff(recording.output)).max() <= LIMIT * trial.sample_time + 1e-9
-    for start, stop in trial.back.blackouts:
+    for start, stop in trial.return_path.blackouts:
         silent = (recording.time > start + 2.0 * WATCHDOG) & (recording.time < stop)
         assert (recording.command[silent] == trial.safe).all()
 
@@ -345,7 +355,7 @@ def check_safety(trial, report):
 def test_twenty_seeds_of_a_bad_network_leave_the_output_bounded():
     way = Network(delay=Normal(0.05, 0.01), loss=Bursts.of(0.05, 4.0))
     for seed in range(20):
-        report = run(Trial(gain=6.0, there=way, back=way, seed=seed))
+        report = run(Trial(gain=6.0, forward_path=way, return_path=way, seed=seed))
         assert report.plant.largest_output < 2.0
         assert abs(report.plant.recording.output[-1] - 1.0) < 0.5
 
@@ -400,7 +410,7 @@ def test_packets_from_elsewhere_are_not_obeyed():
         return [LoopPacket(1, sent, echo_sequence=number, echo_sent=sent, value=3.0).encode()] * 5
 
     report = in_virtual_time(attacked(forged, from_the_peer=False))
-    assert report.link.strangers == 5
+    assert report.link.foreign == 5
     assert report.applied == 0
 
 

@@ -136,7 +136,7 @@ def test_a_short_packet_is_read():
     navdata = parse_navdata(packet)
     assert (len(packet), navdata.height, navdata.battery) == (172, 0.995, 68)
     assert navdata.demo_mode
-    assert (navdata.climb, navdata.climb_demand, navdata.clock) == (None, None, None)
+    assert (navdata.climb, navdata.climb_setpoint, navdata.clock) == (None, None, None)
     assert build_navdata(navdata) == packet
 
 
@@ -156,7 +156,7 @@ def test_packets_have_the_sizes_of_the_drone():
     assert (read.height, read.battery, read.demo.major) == (1.104, 68, 3)
     assert read.clock == 680.63446
     assert read.climb == pytest.approx(0.237)
-    assert read.climb_demand == pytest.approx(-0.0505)
+    assert read.climb_setpoint == pytest.approx(-0.0505)
     assert read.yaw == pytest.approx(-0.7)
     assert (read.state, read.sequence, read.vision) == (0x0F8000D5, 308119, 1)
 
@@ -312,7 +312,7 @@ def test_damaged_packets_are_read_or_refused(packet, data):
     except PacketError:
         return
     assert build_navdata(navdata) == packet
-    for number in (navdata.roll, navdata.pitch, navdata.climb, navdata.climb_demand):
+    for number in (navdata.roll, navdata.pitch, navdata.climb, navdata.climb_setpoint):
         assert number is None or math.isfinite(number)
 
 

@@ -1,4 +1,4 @@
-"""The stepper of linear loops against exact solutions made in other ways."""
+"""The simulation of linear loops against exact solutions found in other ways."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_overshoot_table(x, overshoot):
     ],
 )
 def test_overshoot_under_a_limit(delay, overshoot):
-    """Armah & Yi, Table 2, with a converged solution in place of their fixed step."""
+    """Armah & Yi, Table 2, with a converged solution instead of their fixed steps."""
     loop = dtm.ControlLoop(DRONE, dtm.P(1.31), delay=delay, limit=1.0)
     info = loop.simulate(np.linspace(0.0, 6.0, 121)).info()
     assert info["overshoot"] == pytest.approx(overshoot, abs=6e-4)
@@ -234,7 +234,7 @@ def test_a_sampled_loop_by_hand():
 
 
 def test_a_long_limit_cycle_stays_exact():
-    """Far beyond stability the limited loop cycles: a parallelogram whose period solves itself."""
+    """Far beyond its stability limit the limited loop has a limit cycle with a closed form."""
     loop = dtm.ControlLoop(DRONE, dtm.P(1000.0), delay=0.25, limit=1.0)
     found = loop.simulate(np.linspace(0.0, 200.0, 4001), 0.0, initial_output=0.1)
     tail = found.outputs[found.time > 100.0]

@@ -1,4 +1,4 @@
-"""A derivative filter that runs on samples, by the rule that is named."""
+"""A derivative filter that runs on samples, for each discretisation rule."""
 
 import deadtime as dtm
 import numpy as np

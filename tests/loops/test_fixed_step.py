@@ -1,4 +1,4 @@
-"""Loops in fixed steps: the figures of block diagrams, and how far they are from the truth."""
+"""Loops in fixed steps: the results of block diagrams, and their errors."""
 
 import deadtime as dtm
 import numpy as np

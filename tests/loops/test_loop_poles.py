@@ -1,4 +1,4 @@
-"""Poles of control loops, continuous and sampled: decay, stability, ranges of numbers."""
+"""Poles of control loops, continuous and sampled: decay, stability, ranges of parameters."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_sampled_poles_carry_their_rounding_error():
     assert pair[0].imag > 0.0
 
 
-def test_a_sampled_loop_without_delay_subtracted_infinities():
+def test_a_sampled_loop_without_delay_has_a_pole_at_minus_infinity():
     # Its one held command is an eigenvalue of zero beside 1 - 2 Ts: a pole at minus infinity.
     found = dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.0, sample_time=0.1).rightmost(2)
     assert found[0].real == pytest.approx(math.log(0.8) / 0.1, rel=1e-12)
@@ -177,7 +177,7 @@ def test_ranges_of_continuous_loops(loop, name, high):
     ("derivative_filter", "high"), [(None, 0.9685), (dtm.DerivativeFilter(38.0), 0.890)]
 )
 def test_velocity_gain_of_the_paper(derivative_filter, high):
-    """Armah & Yi: the largest Kv at Kp = 2, and what their filter costs."""
+    """Armah & Yi: the largest Kv at Kp = 2, without and with their filter."""
     loop = dtm.ControlLoop(INTEGRATOR, dtm.PV(2.0, 0.3, derivative_filter), delay=0.36)
     assert loop.stable_range("Kv")[1] == pytest.approx(high, abs=5e-4)
     abscissa = {None: -3.3168, dtm.DerivativeFilter(38.0): -2.197}[derivative_filter]
@@ -211,7 +211,7 @@ def test_fast_sampling_has_the_poles_of_continuous_time(kp, lag):
 @given(plants, controllers)
 @settings(deadline=None, max_examples=30)
 def test_numbers_may_be_symbols(plant, controller):
-    """Constant quasi-polynomials stand in for symbols: algebra is all they have."""
+    """Constant quasi-polynomials replace symbols: they support algebra only."""
     loop = dtm.ControlLoop(plant, controller, delay=0.3)
     symbols = {
         name: value if name == "delay" else dtm.QuasiPolynomial([[value]], [0.0])

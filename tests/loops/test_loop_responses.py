@@ -1,4 +1,4 @@
-"""Responses of control loops: their figures, and truths for hard ones."""
+"""Responses of control loops: their metrics, and reference solutions for hard ones."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.loops._plants import realise, rest
 from loops import INTEGRATOR, TIMES
 from scipy.integrate import solve_ivp
 
@@ -52,6 +53,30 @@ def test_info_does_not_depend_on_the_output_grid():
         assert coarse[name] == pytest.approx(fine[name], rel=1e-6, abs=1e-9)
 
 
+FEEDTHROUGH = [
+    ([0.5, 3.0], [1.0, 1.5]),
+    ([0.3, 1.2, 3.0], [1.0, 0.8, 2.0]),
+    ([-0.4, 1.0, 2.0, 1.5], [2.0, 3.0, 4.0, 1.0]),
+]
+
+
+@pytest.mark.parametrize(("num", "den"), FEEDTHROUGH)
+def test_a_plant_with_direct_feedthrough_rests_at_an_output_that_is_not_zero(num, den):
+    # x' = A x + B u = 0 and y = C x + D u; the sign of D u failed no test.
+    state, command = rest(num, den, 0.8)
+    plant = realise(num, den)
+    assert command == pytest.approx(0.8 * den[-1] / num[-1], rel=1e-15)
+    np.testing.assert_allclose(plant.A @ state + plant.B * command, 0.0, atol=1e-14)
+    assert plant.C @ state + plant.D * command == pytest.approx(0.8, rel=1e-14)
+    for sample_time in (None, 0.05):
+        loop = dtm.ControlLoop(
+            dtm.RationalPlant(num, den), dtm.PI(0.1, 0.2), delay=0.3, sample_time=sample_time
+        )
+        stays = loop.simulate(np.linspace(0.0, 3.0, 31), 0.8, initial_output=0.8)
+        np.testing.assert_allclose(stays.outputs, 0.8, rtol=1e-12)
+        np.testing.assert_allclose(stays.inputs, command, rtol=1e-12)
+
+
 def test_a_step_response_finds_its_own_time():
     response = dtm.ControlLoop(INTEGRATOR, dtm.P(1.31), delay=0.36, limit=0.1).step_response()
     # Ten seconds at the limit before it settles.
@@ -68,13 +93,13 @@ def test_plot_draws_output_reference_and_command():
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("agg")
     response = dtm.ControlLoop(INTEGRATOR, dtm.P(1.0), delay=0.1).simulate(TIMES)
-    axes = response.plot(command=True)
+    axes = response.plot(inputs=True)
     assert len(axes.lines) == 3
     matplotlib.pyplot.close(axes.figure)
 
 
 def test_many_jumps_are_the_sum_of_their_steps():
-    """Breaks that have faded are forgotten, without a trace in the response."""
+    """Breaking points that are ignored after their decay have no effect on the response."""
     rng = np.random.default_rng(1)
     loop = dtm.ControlLoop(dtm.Integrator(lag=0.05), dtm.P(1.5), delay=0.36)
     jumps = np.sort(rng.uniform(0.0, 40.0, 150))
@@ -125,7 +150,7 @@ def test_a_jump_before_the_start_is_no_impulse():
     np.testing.assert_array_equal(found.outputs, pv.outputs)
 
 
-def test_limit_and_hold_do_not_see_the_impulse():
+def test_limit_and_hold_suppress_the_impulse():
     pd = dtm.ControlLoop(INTEGRATOR, dtm.PD(1.6, 0.2), delay=0.36)
     pv = pd.replace(controller=dtm.PV(1.6, 0.2))
     for fields in ({"limit": 1.0}, {"sample_time": 0.065}):
@@ -136,7 +161,7 @@ def test_limit_and_hold_do_not_see_the_impulse():
     assert np.abs(pd.simulate(TIMES).outputs - pv.simulate(TIMES).outputs).max() > 0.1
 
 
-def test_a_slow_crossing_of_the_limit_is_passed():
+def test_a_slow_crossing_of_the_limit_is_simulated():
     # The integral takes the command through its limit again and again, rounding made each of
     # these crossings look like many, in steps too short to change the state.
     plant, limit = dtm.RationalPlant([1.0], [1.0, 0.4, 4.0]), 1.0

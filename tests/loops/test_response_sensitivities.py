@@ -60,7 +60,7 @@ def test_neutral_loop_whose_jumps_travel_on():
         np.testing.assert_allclose(found[name], truth, atol=1e-11, err_msg=name)
 
 
-def test_the_gain_of_a_linear_loop_and_the_height_of_its_step_answer_alike():
+def test_the_gain_of_a_linear_loop_and_the_height_of_its_step_have_the_same_effect():
     loop = dtm.ControlLoop(dtm.FirstOrder(2.0, 0.5), dtm.P(1.3), delay=0.2)
     found = loop.simulate(TIMES, sensitivities=("gain", "Kp"))
     # y depends on gain * Kp alone.
@@ -70,7 +70,7 @@ def test_the_gain_of_a_linear_loop_and_the_height_of_its_step_answer_alike():
 
 
 @pytest.mark.parametrize("controller", [dtm.PV(1.0, 0.4), dtm.PI(1.0, 0.4), dtm.PD(1.0, 0.2)])
-def test_jumps_that_meet_but_move_apart_are_two(controller):
+def test_jumps_that_coincide_but_move_differently_are_separate(controller):
     # The second step comes just when the first one comes back, for this delay only.
     delay = 0.25
     loop = dtm.ControlLoop(dtm.Integrator(), controller, delay=delay)
@@ -169,7 +169,7 @@ def test_every_number_of_a_loop_against_differences(loop):
 
 
 def stretches_at_the_limit(loop):
-    """Which samples are limited, or how often a continuous command meets its limit."""
+    """Which samples are limited, or how often a continuous command reaches its limit."""
     if loop.limit is None:
         return 0
     if loop.sample_time is None:
@@ -225,7 +225,7 @@ def test_the_start_depends_on_the_numbers_too():
         )
 
 
-def test_the_command_has_slopes_as_well():
+def test_the_command_has_derivatives_as_well():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36)
     found = loop.simulate(TIMES, sensitivities=("delay", "Kp"))
     np.testing.assert_allclose(
@@ -238,7 +238,7 @@ def test_the_command_has_slopes_as_well():
     )
 
 
-def test_outputs_do_not_depend_on_whether_slopes_are_asked_for():
+def test_outputs_do_not_depend_on_whether_derivatives_are_asked_for():
     loop = CASES[1]
     plain, with_slopes = loop.simulate(TIMES), loop.simulate(TIMES, sensitivities=("delay",))
     assert np.array_equal(plain.outputs, with_slopes.outputs)
@@ -254,13 +254,13 @@ def test_outputs_do_not_depend_on_whether_slopes_are_asked_for():
         (("lag",), ValueError, "lag=0"),
     ],
 )
-def test_what_has_no_slope_is_refused(names, error, words):
+def test_what_has_no_derivative_is_refused(names, error, words):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.3)
     with pytest.raises(error, match=words):
         loop.simulate([0.0, 1.0], sensitivities=names)
 
 
-def test_no_delay_has_no_slope_with_respect_to_it():
+def test_a_delay_of_zero_has_no_derivative():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.0)
     with pytest.raises(ValueError, match="delay=0"):
         loop.simulate([0.0, 1.0], sensitivities=("delay",))

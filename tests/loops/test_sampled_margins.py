@@ -34,7 +34,7 @@ LOOPS = [
 
 
 def cut(loop):
-    """Transition matrix with the command cut, where the command goes in and where it comes out."""
+    """Transition matrix with the loop opened at the command, and its input and output vectors."""
     model = loop.specification.model
     matrices = [
         replace(model, K=np.zeros_like(model.K), L=direct)

@@ -1,4 +1,4 @@
-"""Settling times for ever: designs and sweeps against long runs of a simulator of their own."""
+"""Settling times of designs and sweeps against long runs of an independent simulation."""
 
 import deadtime as dtm
 import numpy as np

@@ -1,4 +1,4 @@
-"""Ranges of a loop's numbers, held against eigenvalues, proved counts and closed forms."""
+"""Stable ranges of a loop's parameters against eigenvalues, proved counts and closed forms."""
 
 import math
 import tracemalloc
@@ -34,7 +34,7 @@ def radius(loop, **changes):
 
 @pytest.mark.parametrize("factor", [1.003, 1.01, 1.00001, 1.0000001])
 def test_a_window_of_instability_ends_the_range_of_the_delay(factor):
-    """The walk stepped over it: 82.67 s where the loop is unstable from 0.7987 s to 0.9."""
+    """The search missed it once: 82.67 s, though the loop is unstable from 0.7987 s to 0.9."""
     loop = resonant(factor)
     high = loop.stable_range("delay")[1]
     assert high == pytest.approx(first_crossing(factor), rel=1e-7)
@@ -64,7 +64,7 @@ def test_a_sampled_loop_meets_the_same_window(factor, window):
 
 
 def test_delays_of_many_samples():
-    """Beyond 200 samples the margin was infinite: the unsafe side."""
+    """With more than 200 samples the margin was infinite once: the unsafe side."""
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.001)
     high = loop.stable_range("delay")[1]
     assert high - 0.36 == pytest.approx(0.4249, abs=5e-5)
@@ -150,7 +150,7 @@ def choose(draw, sample_time):
 
 
 def inside(low, high, value):
-    """Points of a range, crowded towards its ends."""
+    """Points of a range, denser towards its ends."""
     low, high = max(low, -9.0 * abs(value) - 1.0), min(high, 9.0 * abs(value) + 1.0)
     share = np.concatenate([np.linspace(0.01, 0.99, 25), np.geomspace(1e-5, 0.01, 4)])
     return np.concatenate([low + share * (high - low), high - np.geomspace(1e-5, 0.01, 4)])

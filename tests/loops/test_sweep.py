@@ -1,4 +1,4 @@
-"""Sweeps against one simulation a set, and the status, shapes and bits of their results."""
+"""Sweeps against one simulation per set, and the status, shapes and bits of their results."""
 
 import doctest
 import os

@@ -13,6 +13,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import paper
+from deadtime.estimation import Overshoot
 from deadtime.paper import Comparison, Verdict, agreeing_digits, printed_digits
 from deadtime.paper._page import render_reproduction
 from hypothesis import given
@@ -273,7 +274,7 @@ def test_jitter_and_loss_are_seeded_and_change_the_run():
 def test_the_delay_of_a_trial_by_the_method_of_table_1():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=9.0), sample_time=0.002)
     trial = paper.internet_loop(9.0, 0.11, sample_time=0.002)
-    fit = dtm.estimate_delay(trial, loop, method="overshoot", map="exact")
+    fit = dtm.estimate_delay(trial, loop, method=Overshoot(map="exact"))
     # A hold acts like half its length.
     assert fit.delay == pytest.approx(0.111, abs=3e-4)
 
@@ -387,7 +388,7 @@ def test_the_manual_shows_these_numbers(found):
     shown = (ROOT / "docs" / "paper/reproduction-numbers.md").read_text(encoding="utf-8")
     assert found.summary() in shown
     for one in found.comparisons:
-        row = f"| {one.quantity} | {one.printed} | {one.shown} | {one.told} |"
+        row = f"| {one.quantity} | {one.printed} | {one.shown} | {one.outcome} |"
         assert row.replace("<", "&lt;") in shown, "make it anew: python docs/pictures.py"
 
 

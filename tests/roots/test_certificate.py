@@ -1,4 +1,4 @@
-"""Certificates: they verify, twice and independently, and false ones do not."""
+"""Certificates are verified by two independent checkers; false ones are refused."""
 
 import ast
 import dataclasses
@@ -128,7 +128,7 @@ def assert_false(certificate, what):
 
 
 def mutations(proof):
-    """Certificates that claim what is not so, each with its name."""
+    """Certificates with a false claim, each with a name."""
     contour = proof.contours[0]
     segments = contour.segments
     middle = len(segments) // 2
@@ -262,7 +262,7 @@ def test_false_statements_about_the_real_axis_fail():
         assert_false(dataclasses.replace(proof, real=real), real)
 
 
-def test_a_root_at_0_is_not_cut_off_with_the_rest():
+def test_a_root_at_0_is_not_excluded_by_the_bound():
     """Beyond |s| = 0 a single power of s has no roots, but at 0 it has."""
     proof = (s**4).certify()
     assert proof.verify() == 4
@@ -273,7 +273,7 @@ def test_a_root_at_0_is_not_cut_off_with_the_rest():
 
 
 def test_a_true_change_of_a_certificate_is_accepted():
-    """A checker that refused everything would pass the tests above."""
+    """A checker that refused everything would pass the tests above, but not this one."""
     proof = certify("armah_K2")
     contour = proof.contours[0]
     looser = tuple(
@@ -397,7 +397,7 @@ def test_reference_cases_verify_in_ball_arithmetic(name):
     assert ball_count(proof) == CASES[name]["certified_winding_count"]
 
 
-def test_a_picture_of_the_contour_turns_once_for_every_root():
+def test_the_plot_of_the_contour_turns_once_for_every_root():
     figures = pytest.importorskip("matplotlib.figure")
     proof = (s + delay(1.0)).certify(re=(-3, 1), im=(-30, 30))
     axes = proof.plot(figures.Figure().subplots())

@@ -1,4 +1,4 @@
-"""The laws of chains of roots, against the roots themselves."""
+"""The asymptotic laws of chains of roots, against the roots themselves."""
 
 import math
 
@@ -91,6 +91,21 @@ def test_the_scalar_chain_is_the_closed_form():
     np.testing.assert_allclose(chain.real_part(exact.imag[5:]), exact.real[5:], rtol=1e-12)
 
 
+def test_an_edge_that_is_almost_straight_has_the_starts_of_the_straight_one():
+    # Points within 1e-9 of an edge lie on it, and then its delays have no common base: roots of
+    # the difference part are counted from where Im s = 0, half a turn of mu up.
+    straight, almost = (
+        s**2 + 0.5 * s * delay(1.0 + off) + 3.0 * delay(2.0) for off in (0.0, 2e-10)
+    )
+    (one,) = almost.chains()
+    assert not one.periodic
+    assert one.bend == pytest.approx(1.0)
+    n = np.arange(30)
+    expected = np.concatenate([chain.starts(n) for chain in straight.chains()])
+    expected = expected[np.argsort(expected.imag)][: len(n)]
+    np.testing.assert_allclose(one.starts(n), expected, rtol=1e-7)
+
+
 def test_the_neutral_chain_runs_along_its_line():
     h = s + (2.0 + 0.3 * s) * delay(0.36)
     (chain,) = h.chains()
@@ -102,7 +117,7 @@ def test_the_neutral_chain_runs_along_its_line():
     assert np.abs(chain.real_part(0.0) - chain.offset) == 0
 
 
-def test_a_double_chain_is_told_once_with_its_multiplicity():
+def test_a_double_chain_is_listed_once_with_its_multiplicity():
     chains = ((s + delay(1.0)) ** 2).chains()
     assert [chain.multiplicity for chain in chains] == [2]
     chains = (s * (1.0 + 0.5 * delay(1.0)) ** 2 + 1.0).chains()

@@ -1,4 +1,4 @@
-"""Neutral equations whose delays are a hair apart.
+"""Neutral equations with almost equal delays.
 
 The truth is the argument principle on a function without cancellation: for delays tau + d with a
 tiny d the moments sum b_j d_j^i are summed in fractions, and e^(-sd) is its Taylor series.
@@ -85,7 +85,7 @@ SEEDS = [0, 1, 2, 3, 4, 5]
 
 @pytest.mark.parametrize("strong", [True, False])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_abscissa_is_never_below_a_root_that_can_be_seen(seed, strong):
+def test_the_abscissa_is_never_below_a_root_that_can_be_found(seed, strong):
     # The search gave up after three lines and took the chains, far left, for the answer.
     rows, delays = close_case(np.random.default_rng(seed))
     h = QuasiPolynomial(rows, delays)

@@ -1,4 +1,4 @@
-"""Values in two words and their bounds, against ball arithmetic."""
+"""Values in double-double arithmetic and their bounds, against ball arithmetic."""
 
 import numpy as np
 import pytest
@@ -71,7 +71,7 @@ def test_the_logarithmic_derivative(h, place):
     assert float(off.mid()) <= 1e-8 * size
 
 
-def test_two_words_see_what_double_precision_does_not():
+def test_double_double_resolves_what_double_precision_does_not():
     h = (s + 1) ** 6
     near = h.expansion(-1 + 1e-4, 6)
     # Double precision loses (1e-4)^6 among terms of 64.

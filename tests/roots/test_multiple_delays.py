@@ -38,7 +38,7 @@ def test_halves_and_a_constant_delay():
     st.floats(0.0, 1.5),
 )
 def test_counts_of_the_matrix_change_as_the_crossings_say(entries, damping):
-    """A delayed matrix of rank two brings T and 2T; such crossings were refused."""
+    """A delayed matrix of rank two gives terms in T and 2T; such crossings were refused once."""
     now, late = np.reshape(entries, (2, 2, 2))
     now = now - damping * np.eye(2)
     found = dtm.crossings(dtm.DelaySystem({0.0: now, 1.0: late}), {"delay": (0.02, 4.0)})
@@ -88,7 +88,7 @@ def test_a_system_with_two_delays_keeps_their_ratio():
 
 
 def test_a_gain_is_listed_outside_of_where_chains_reach_the_axis():
-    """A part of the range that is neutrally unstable had the whole of it refused."""
+    """The whole range was refused once because chains are unstable in a part of it."""
     # s (1 + K e^(-0.3 s)) + 3 e^(-0.5 s): chains reach the axis from |K| = 1 on.
     found = dtm.crossings(s * (1.0 + K * delay(0.3)) + 3.0 * delay(0.5), {"K": (-2, 2)})
     (first, second) = found.unlisted

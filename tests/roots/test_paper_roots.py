@@ -1,4 +1,4 @@
-"""Root sets that other programs get wrong, and those the figures of Armah and Yi show.
+"""Root sets that other programs get wrong, and those in the figures of Armah and Yi.
 
 What is known here that is in no table: every disc is counted in ball arithmetic, every branch of
 Lambert W is compared. The certified table itself is in test_root_cases.
@@ -21,7 +21,7 @@ def loop_roots(a, T, numbers):
 
 
 def assert_each_is(found, wanted):
-    """One disc for each of the wanted roots and none else."""
+    """One disc for each of the expected roots and no other disc."""
     assert len(found) == len(wanted) == found.counted
     left = sorted(wanted, key=lambda w: (w.imag, w.real))
     order = np.lexsort((found.roots.real, found.roots.imag))
@@ -44,14 +44,14 @@ def assert_discs_hold_what_they_say(h, found, every=1):
 
 
 def test_a_delay_of_ten_nanoseconds():
-    """Returned empty."""
+    """The result was empty once."""
     h = QuasiPolynomial([[0, 1], [1e8, 0]], [0, 1e-8])
     found = h.roots(re=(-1e9, 2e8), im=(0, 3e9))
     assert_each_is(found, loop_roots(1e8, 1e-8, range(5)))
 
 
 def test_more_than_three_thousand_roots_of_one_chain():
-    """2899 of 3183 roots, the others left out without a word."""
+    """2899 of 3183 roots were returned once, without an error."""
     found = (s + delay(1.0)).roots(re=(-14, 2), im=(0, 20000))
     assert len(found) == 3183
     assert_each_is(found, loop_roots(1, 1, range(3183)))
@@ -107,7 +107,7 @@ EIGHT_DELAYS = QuasiPolynomial(
 
 
 def test_every_root_of_eight_delays():
-    """A hundred seconds and more. Degree 8, Vyhlídal and Zítek (2009)."""
+    """It once took more than a hundred seconds. Degree 8, Vyhlídal and Zítek (2009)."""
     found = EIGHT_DELAYS.roots(re=(-4.5, 2.5), im=(-100, 100))
     assert found.counted == found.multiplicities.sum() == 800
     assert found.resolved.all()
@@ -115,7 +115,7 @@ def test_every_root_of_eight_delays():
 
 
 def test_far_to_the_left_of_a_neutral_equation():
-    """e^(6.3 · 130) is beyond double precision, and the answer was lost."""
+    """e^(6.3 · 130) exceeds the range of doubles, and the answer was lost once."""
     h = QuasiPolynomial(
         [
             [2.1, 5, 0, 0.2, 1],

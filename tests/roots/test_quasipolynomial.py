@@ -162,7 +162,7 @@ def test_quotients_are_transfer_functions(quotient):
     assert isinstance(quotient(), dtm.TransferFunction)
 
 
-def test_foreign_types_have_their_turn():
+def test_operators_of_foreign_types_are_tried():
     class Parameter:
         def __radd__(self, other):
             return "added"

@@ -63,8 +63,8 @@ def test_roots_on_the_edge_are_classified(name):
         h.count(**where, edge="both")
 
 
-def test_an_edge_next_to_a_root_is_proved_in_two_words():
-    """Double precision cannot walk this close; the side of the root is certain all the same."""
+def test_an_edge_next_to_a_root_is_proved_in_double_double():
+    """Double precision cannot prove an edge this close; double-double arithmetic does."""
     h = (s + 2) * (s + delay(1.0))
     root = -0.3181315052047641353 + 1.3372357014306894089j
     for gap in (1e-9, 1e-12, 1e-14):
@@ -105,7 +105,7 @@ def test_all_roots_within_their_radii(name):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_radii_are_no_excuse(name):
+def test_radii_are_not_larger_than_rounding_requires(name):
     """No larger, relative to the set, than 1000 times what one rounding must cost.
 
     The bounds add up some 60 roundings and take all of them for aligned.
@@ -130,7 +130,7 @@ def test_rightmost_is_the_certified_one(name):
 
 
 @pytest.mark.parametrize("name", sorted(CHAINS_LEAD))
-def test_where_chains_lead_no_root_is_rightmost(name):
+def test_right_of_the_chains_there_can_be_no_root(name):
     h = make(CASES[name])
     assert len(h.rightmost()) == 0
     assert h.spectral_abscissa() == h.chain_abscissa()

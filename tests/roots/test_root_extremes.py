@@ -1,4 +1,4 @@
-"""Delays, coefficients and regions of extreme size: right answers, or a refusal with its reason.
+"""Delays, coefficients and regions of extreme size: correct results, or a refusal with its reason.
 
 Truth is an exact scaling (s → c s, h → c h with powers of two), Lambert W, or ball arithmetic.
 """
@@ -179,8 +179,8 @@ def test_tiny_regions(size):
     assert h.count(**beside) == 0
 
 
-def test_a_region_smaller_than_the_doubt():
-    """A square of 1e-17 about a root: refused at the root, with a way out that works."""
+def test_a_region_smaller_than_rounding_resolves():
+    """A square of 1e-17 about a root: the error names the root and a distance that helps."""
     h = s + delay(1.0)
     z = h.rightmost()[0]
 
@@ -232,7 +232,7 @@ def test_bad_input_is_refused_by_value(ask, words):
 
 
 def test_an_advanced_equation_has_roots_in_a_box():
-    """1 + s e^(−s): −W_k(1) are its roots, to the right for ever."""
+    """1 + s e^(−s): its roots −W_k(1) have arbitrarily large real parts."""
     h = 1 + s * delay(1.0)
     found = h.roots(re=(-3, 3), im=(-20, 20))
     with mp.workdps(30):
@@ -246,7 +246,7 @@ def test_an_advanced_equation_has_roots_in_a_box():
 @pytest.mark.parametrize("root", [1.0, 2.0**-27, 2.0**27])
 @pytest.mark.parametrize("edge", ["left", "right", "top"])
 def test_a_refusal_names_the_root_on_the_edge(root, edge):
-    """Exactly on it: the place is the root, and to move the edge by the distance helps."""
+    """The place is the root, and the count succeeds when the edge is moved by the distance."""
     h = s**2 + root**2
     if edge == "top":
         box = {"re": (-root, root), "im": (-2 * root, root)}
@@ -259,7 +259,7 @@ def test_a_refusal_names_the_root_on_the_edge(root, edge):
 
 
 def ask_where(h, box, side, index):
-    """Where a count is refused; outside and inside of the edge, moved, the counts differ by one."""
+    """The place of a refused count; counts with the edge moved to either side differ by one."""
     with pytest.raises(ContourError, match="move the edge") as error:
         h.count(**box)
     counts = []
@@ -274,8 +274,8 @@ def ask_where(h, box, side, index):
 @pytest.mark.parametrize(
     ("a", "b"), [(1.0, 1e100), (1e-100, 1e100), (1e-200, 1e200), (1e100, 1e-200)]
 )
-def test_what_leaves_the_range_of_doubles_is_told(a, b):
-    """Nothing wrong and no warning: the rightmost root or the reason."""
+def test_results_beyond_the_range_of_doubles_are_refused(a, b):
+    """The rightmost root or the reason for a refusal, without a warning."""
     h = QuasiPolynomial([[0.0, a], [b, 0.0]], [0.0, 1.0])
     words = "range of double precision|infinitely many|evaluations|no line that could be counted"
     roots = []
@@ -290,7 +290,7 @@ def test_what_leaves_the_range_of_doubles_is_told(a, b):
 
 
 def test_loops_of_extreme_gain_agree_with_lambert_w():
-    """One delay through the loop's own door."""
+    """Integrators with one delay, as control loops."""
     for gain, tau in ((1e-9, 1e4), (1e9, 1e-9), (1e5, 1e4), (1e-200, 1.0)):
         root = dtm.ControlLoop(dtm.Integrator(), dtm.P(gain), delay=tau).rightmost()[0]
         with mp.workdps(30):
@@ -315,7 +315,7 @@ def test_the_second_root_of_a_loop_of_almost_no_gain():
     assert BallCounter(h.coefficients, h.delays).rectangle((-1e3, 1.0), (-10.0, 10.0)) == 4
     assert h.count(re=(-1e3, 1), im=(-10, 10)) == 4
     # A gain of 1e-400 is none of double precision's numbers: refused, and where.
-    with pytest.raises(ContourError, match="double precision can tell"):
+    with pytest.raises(ContourError, match="double precision can resolve"):
         QuasiPolynomial([[0.0, 1e200], [1e-200, 0.0]], [0.0, 1.0]).count(re=(-1e3, 1), im=(-10, 10))
 
 
@@ -327,7 +327,7 @@ def test_degree_8_in_a_unit_of_time_of_1e24():
 
 
 def test_a_lag_of_a_microsecond_beside_a_delay_of_a_minute():
-    """A retarded equation has a rightmost root; its set comes empty.
+    """A retarded equation has a rightmost root, but the set was empty.
 
     W₀ of −4e4 · 65 e^(65 · 6e5) by w + log w = log of that: real part −0.0417.
     """

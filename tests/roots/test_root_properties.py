@@ -24,7 +24,7 @@ def loops(draw):
 
 @settings(deadline=None, max_examples=50)
 @given(loops(), st.floats(-2, 1), st.floats(-15, 15))
-def test_the_whole_is_the_sum_of_its_parts(h, x, y):
+def test_the_count_of_a_region_is_the_sum_over_its_parts(h, x, y):
     # Real roots belong to either side of an edge on the real axis.
     assume(y != 0)
     try:

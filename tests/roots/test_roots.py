@@ -60,7 +60,7 @@ def test_a_double_root_that_rounding_cannot_split():
 
 @pytest.mark.parametrize("m", [3, 4, 6, 9])
 def test_many_roots_in_one_point(m):
-    """A disc for all of them: what two words leave of an m-fold root is (2^-95)^(1/m)."""
+    """One disc for all: double-double arithmetic resolves an m-fold root to (2^-95)^(1/m)."""
     h = (s + 1) ** m * (s + 2.0 * delay(0.5))
     found = h.roots(re=(-2, 1), im=(-3, 3))
     many = int(np.argmax(found.multiplicities))
@@ -81,7 +81,7 @@ def test_a_polynomial_has_all_its_roots():
 
 
 def test_common_powers_of_s_are_exact_roots():
-    """Roots at 0 that stand in the coefficients are no matter of rounding."""
+    """Roots at 0 that follow from zero coefficients are exact."""
     h = s**3 * (s + delay(1.0))
     found = h.roots(re=(-1, 1), im=(-5, 5))
     assert found.multiplicities.tolist() == [3, 1, 1]
@@ -102,8 +102,8 @@ def test_common_powers_of_s_are_exact_roots():
     assert np.allclose((s * (1 - 0.5 * delay(1.0))).rightmost(), [0])
 
 
-def test_the_rightmost_roots_run_out_at_the_chains():
-    """Newton's iteration once stopped short of a root and its wide disc crossed the line."""
+def test_rightmost_roots_close_to_the_chains():
+    """Newton's iteration once stopped too early, and the disc of its root crossed the line."""
     rows = [
         [-0.073, 4.34, -6.29, 0.0, 0.036, -0.344],
         [-0.035, 0.03, 28.65, -0.34, 0.49, -0.537],
@@ -241,7 +241,7 @@ def test_exact_delays_can_be_stable_where_perturbed_ones_are_not():
     assert not moved.is_stable()
 
 
-def test_silly_questions():
+def test_invalid_arguments_are_refused():
     for bad in (0, -1):
         with pytest.raises(ValueError, match="n="):
             s.rightmost(bad)
@@ -315,7 +315,7 @@ def test_the_rightmost_root_of_a_loop_with_a_fast_filter(omega):
     ("kv", "tau"), [(0.3, 0.36), (-0.3, 0.36), (0.9, 0.36), (0.999, 1.0), (0.5, 2.0)]
 )
 def test_lines_close_to_the_chains_count_every_root(kv, tau):
-    """The bound along the chains against a count in a box far taller than it says."""
+    """The bound along the chains against a count in a box much taller than the bound."""
     h = s**2 + 0.3 * s + 1.0 + (2.0 + 0.7 * s + kv * s**2) * delay(tau)
     chain = h.chain_abscissa()
     for distance in (1.0, 0.1, 0.01, 0.001):
@@ -324,7 +324,7 @@ def test_lines_close_to_the_chains_count_every_root(kv, tau):
 
 
 def test_lines_where_one_row_dominates_count_every_root():
-    """Long steps down a line against a count in a box, whose edges know nothing of them."""
+    """Counts with long steps down a line against a count in a box, which does not use them."""
     rng = np.random.default_rng(7)
     for _ in range(60):
         m, d = rng.integers(2, 5), rng.integers(1, 5)
@@ -338,7 +338,7 @@ def test_lines_where_one_row_dominates_count_every_root():
 
 
 def test_exact_delays_have_chains_of_their_own():
-    """Michiels and Niculescu: delays 1 and 2 are stable while exact, not beside that."""
+    """Michiels and Niculescu: stable for delays of exactly 1 and 2, not close to these."""
     h = s - 0.25 + (1 / 3 - 0.75 * s) * delay(1.0) + 0.5 * s * delay(2.0)
     assert h.base_delay == 1.0
     # z^2 / 2 - 3 z / 4 + 1 has |z| = sqrt 2; 3 x / 4 + x^2 / 2 = 1 for free delays.
@@ -362,7 +362,7 @@ def test_exact_delays_have_chains_of_their_own():
 
 @pytest.mark.parametrize("omega", [0.21666740597802447, 1.0, 2.7298599562231607])
 def test_the_rightmost_root_may_lie_within_rounding_of_the_axis(omega):
-    """A line at 0 is counted in two words, but no disc about the pair is clear of it."""
+    """A line at 0 is counted in double-double arithmetic, but discs about the pair cross it."""
     h = (s**2 + omega**2) * (s + 0.3 + (0.2 + 0.1 * s) * delay(1.0))
     first = h.rightmost()
     assert np.allclose(first, [1j * omega, -1j * omega], rtol=0, atol=1e-14)

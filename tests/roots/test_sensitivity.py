@@ -1,4 +1,4 @@
-"""How roots move: against differences at high precision, and closed forms."""
+"""Derivatives of roots, against differences at high precision, and closed forms."""
 
 import json
 import math
@@ -34,7 +34,7 @@ def moved(coefficients, delays, root):
 
 
 def slope(change, root):
-    """Central difference of the root that `change(step)` gives a place for; error 1e-24."""
+    """Central difference of the root of the function that `change(step)` returns; error 1e-24."""
     with mp.workdps(60):
         step = mp.mpf(10) ** -12
         up, down = (moved(*change(sign * step), root) for sign in (1, -1))

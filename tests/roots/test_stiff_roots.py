@@ -1,6 +1,6 @@
 """Equations with numbers many decades apart, and edges beside clusters, against ball arithmetic.
 
-Each was refused once although balls decide.
+Each was refused once although ball arithmetic decides it.
 """
 
 import deadtime as dtm
@@ -41,14 +41,14 @@ def test_counts_beside_clusters(number):
     assert verdicts["count"] == verdicts["sum of roots"] == verdicts["discs"] == "equal"
 
 
-def test_half_planes_of_stiff_equations_are_counted_in_no_time():
-    """A delayed term beside it: the chord is 1e25 high, and one row leads all along it."""
+def test_half_planes_of_stiff_equations_are_counted():
+    """The line to be counted is 1e25 high, and one row dominates on all of it."""
     h = s**2 + 2.6e25 * s + 1e50 + 3.0 * s * delay(20.0)
     assert [h.count(re=(sigma, None)) for sigma in (0.0, -1.0)] == [0, 0]
 
 
-def test_what_no_line_decides_is_refused_with_the_reason():
-    """Millions of roots tie: |s + 1e8 e^(−1e-8 s)| is the same to 15 digits along their chain."""
+def test_roots_that_no_line_separates_are_refused_with_the_reason():
+    """Along a chain of millions of roots, |s + 1e8 e^(−1e-8 s)| is equal to 15 digits."""
     h = s + 1e8 * delay(1e-8) + delay(1.0)
     with pytest.raises(ValueError, match="differ too much in size"):
         h.rightmost()

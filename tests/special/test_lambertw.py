@@ -124,7 +124,7 @@ branches = st.one_of(st.integers(-2, 2), st.integers(-1000, 1000), st.integers(-
 
 
 @given(points, branches)
-def test_conjugates_belong_together(z, k):
+def test_conjugate_arguments_give_conjugate_values(z, k):
     left = dtm.lambertw(z.conjugate(), -k)
     right = np.conj(dtm.lambertw(z, k))
     assert (bits(left) == bits(right)).all()
@@ -239,7 +239,7 @@ def test_the_real_branch_below_starts_like_a_square_root():
     assert w == pytest.approx(-1.0000737348695, abs=1e-13)
 
 
-def test_both_sides_of_the_segment_are_told_apart():
+def test_the_sides_of_the_branch_cut_are_distinguished():
     # scipy 1.17 ignores the sign of zero on k = -1.
     above, below = dtm.lambertw(pair([-0.2, -0.2], [0.0, -0.0]), -1)
     assert above.imag == 0
@@ -373,7 +373,7 @@ def test_the_outermost_branches_work(k):
     assert w.real == pytest.approx(-math.log(2 * math.pi * abs(int(k))), rel=4 * EPS)
 
 
-def test_threads_and_position_leave_the_bits_alone():
+def test_bits_do_not_depend_on_threads_and_position():
     generator = np.random.default_rng(9)
     n = 25_000
     z = 10 ** generator.uniform(-20, 20, n) * np.exp(2j * np.pi * generator.random(n))

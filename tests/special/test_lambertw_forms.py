@@ -155,7 +155,7 @@ cancelling = st.builds(
 @given(cancelling)
 @settings(max_examples=200)
 @example((37169030j, -5261527))
-def test_turns_that_cancel_in_the_log_form(case):
+def test_multiples_of_two_pi_that_cancel_in_the_log_form(case):
     log_z, k = case
     check_log_form(complex(dtm.special.lambertw_log(log_z, k)), log_z, k)
 
@@ -206,7 +206,7 @@ offsets = st.one_of(
 
 @given(offsets, st.sampled_from([-2, -1, 0, 1, 2]))
 @settings(max_examples=500)
-def test_the_offset_form_knows_both_w_and_one_plus_w(delta, k):
+def test_the_offset_form_gives_both_w_and_one_plus_w(delta, k):
     w, one_plus_w = (complex(part) for part in dtm.special.lambertw_offset(delta, k))
     digits = 60 + 2 * max(0, -int(math.log10(abs(delta))))
     with mpmath.workdps(min(digits, 700)):
@@ -221,7 +221,7 @@ def test_the_offset_form_knows_both_w_and_one_plus_w(delta, k):
             assert abs(side - 2 * mpmath.pi * mpmath.mpc(0, k)) < 1e-9
 
 
-def test_at_no_offset_the_sheets_meet():
+def test_at_zero_offset_the_branches_meet():
     for k in (0, -1):
         w, one_plus_w = dtm.special.lambertw_offset(0.0, k)
         assert w == -1

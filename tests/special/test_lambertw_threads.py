@@ -1,4 +1,4 @@
-"""Lambert W in threads: bits, callbacks, forks and Ctrl-C."""
+"""Lambert W in threads: equal bits, callbacks, forks and Ctrl-C."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from deadtime import _deadtime as native
 from lambertw_points import LARGE, one_by_one, points, same_bits
 
 
-def test_an_element_does_not_know_its_neighbours():
+def test_an_element_does_not_depend_on_its_neighbours():
     z, k = points(LARGE, 5), np.random.default_rng(6).integers(-4, 5, LARGE)
     whole = dtm.lambertw(z, k)
     for threads in (1, 2, 3):
@@ -33,7 +33,7 @@ def test_an_element_does_not_know_its_neighbours():
 
 
 @pytest.mark.parametrize("name", ["lambertw0", "lambertwm1"])
-def test_real_elements_do_not_either(name):
+def test_real_elements_do_not_depend_on_their_neighbours(name):
     function = getattr(dtm, name)
     x = np.random.default_rng(8).uniform(-0.4, 0.1, LARGE)
     whole = function(x)
@@ -85,7 +85,7 @@ def test_the_interpreter_runs_on_while_a_loop_works():
     while worker.is_alive():
         ticks += 1
         time.sleep(0.001)
-    # Holding the lock would leave this loop a handful of turns.
+    # With the lock held, this loop would run only a few times.
     assert ticks > 20
 
 
@@ -135,7 +135,7 @@ def test_a_forked_child_works_and_does_not_hang():
     assert result.stdout.split() == ["7", "True"], result.stderr
 
 
-def test_nonsense_in_the_environment_is_named():
+def test_invalid_environment_variables_are_named():
     code = """
         import deadtime as dtm
         import numpy as np

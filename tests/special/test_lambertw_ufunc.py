@@ -1,4 +1,4 @@
-"""Lambert W as ufuncs: out, where and dtype, memory, scalars, objects of others, flags."""
+"""Lambert W as ufuncs: out, where and dtype, memory, scalars, foreign objects, flags."""
 
 import math
 
@@ -12,7 +12,7 @@ from lambertw_points import BRANCH_POINT, LARGE, points, same_bits
 
 
 @pytest.mark.parametrize("n", [3, LARGE])
-def test_the_result_goes_where_it_is_told(n):
+def test_the_result_is_written_to_out(n):
     z = points(n)
     out = np.empty(n, complex)
     assert dtm.lambertw(z, out=out) is out
@@ -22,7 +22,7 @@ def test_the_result_goes_where_it_is_told(n):
     assert same_bits(other, out)
 
 
-def test_a_number_goes_to_an_array_too():
+def test_the_result_of_a_scalar_is_written_to_out():
     out = np.empty((2, 3), complex)
     assert dtm.lambertw(1.0, out=out) is out
     assert (out == dtm.lambertw(1.0)).all()
@@ -54,7 +54,7 @@ def test_a_result_that_does_not_fit_is_refused():
 
 
 @pytest.mark.parametrize("n", [7, 5_000, LARGE])
-def test_where_leaves_the_rest_alone(n):
+def test_where_leaves_the_other_elements_unchanged(n):
     z = points(n)
     where = np.random.default_rng(1).random(n) < 0.5
     out = np.full(n, 3 + 4j)
@@ -65,7 +65,7 @@ def test_where_leaves_the_rest_alone(n):
     assert same_bits(out[where], dtm.lambertw(z[where], -1))
 
 
-def test_where_spares_arguments_that_would_be_refused():
+def test_where_skips_arguments_that_would_be_refused():
     delay = np.array([1.0, -1.0, np.nan])
     out = np.zeros(3, complex)
     dtm.dde_roots(-1.0, -0.5, delay, out=out, where=delay > 0)
@@ -105,7 +105,7 @@ def test_every_type_of_integer_is_a_branch(dtype):
 
 
 @pytest.mark.parametrize("keywords", [{"casting": "unsafe"}, {"dtype": complex}, {"out": ...}])
-def test_no_cast_bends_a_branch(keywords):
+def test_no_cast_changes_a_branch(keywords):
     if "out" in keywords:
         keywords = {"out": np.empty(2, complex)}
     for k in ([1.5, 2.0], [True, False], np.float32(1)):
@@ -180,7 +180,7 @@ LAYOUTS = {
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_layout_leaves_the_bits_alone(layout):
+def test_bits_do_not_depend_on_the_memory_layout(layout):
     z = LAYOUTS[layout](points(9_001))
     w = dtm.lambertw(z, 2)
     plain = dtm.lambertw(z.astype(complex).ravel(), 2).reshape(z.shape)
@@ -213,7 +213,7 @@ def test_branches_broadcast_against_points():
 # --- scalars, subclasses, objects of others -----------------------------------------------
 
 
-def test_numbers_take_a_short_way_to_the_same_bits():
+def test_scalars_have_the_same_bits_as_arrays():
     numbers = [1, -1, 0.0, -0.0, -0.2, 1e300, math.inf, 2 + 3j, complex(-1, -0.0), BRANCH_POINT]
     for number in numbers:
         for z in (number, np.complex128(number)):
@@ -239,11 +239,11 @@ def test_an_int_is_taken_as_in_an_array():
 
 
 class Tagged(np.ndarray):
-    """A subclass of arrays that does nothing of its own."""
+    """A subclass of arrays without methods of its own."""
 
 
 class Length(float):
-    """A subclass of numbers that wants its own way with ufuncs."""
+    """A subclass of numbers with its own ``__array_ufunc__``."""
 
     def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
         return ufunc.__name__, method, len(inputs), sorted(keywords)
@@ -275,7 +275,7 @@ def test_series_keep_their_index():
     assert dtm.dde_roots(0.0, -z, 1.0)["a"] == dtm.dde_roots(0.0, -0.5, 1.0)
 
 
-def test_objects_with_an_array_ufunc_are_asked():
+def test_array_ufunc_of_other_objects_is_called():
     assert dtm.lambertw(Length(1.0)) == ("lambertw", "__call__", 2, [])
     assert dtm.lambertw(1.0, Length(1.0)) == ("lambertw", "__call__", 2, [])
     answer = dtm.lambertw(Length(1.0), 0, np.zeros(1, complex), where=[True], dtype="F", order="C")
@@ -291,7 +291,7 @@ def test_they_are_ufuncs():
         assert (ufunc.__name__, ufunc.nin, ufunc.nout) == (name, nin, 1)
 
 
-def test_methods_of_ufuncs_work_or_say_no():
+def test_methods_of_ufuncs_work_or_are_refused():
     z = points(4)
     work = z.copy()
     native.lambertw.at(work, [0, 2, 2], -1)
@@ -307,7 +307,7 @@ def test_methods_of_ufuncs_work_or_say_no():
 
 
 @pytest.mark.parametrize("n", [1, 40, LARGE])
-def test_no_warning_comes_of_hard_arguments(n):
+def test_hard_arguments_cause_no_warning(n):
     parts = [0.0, -0.0, 5e-324, 1e-308, BRANCH_POINT, -0.2, 1.8e308, math.inf, -math.inf, math.nan]
     z = np.array([complex(a, b) for a in parts for b in parts])
     x = np.resize(np.array(parts), max(n, len(parts)))
@@ -324,7 +324,7 @@ def test_no_warning_comes_of_hard_arguments(n):
         dtm.dde_roots(1.7e308, -1.7e308, np.resize([0.0, 1e-300, 1e300], n), [[0], [3]])
 
 
-def test_casts_are_not_blamed_for_what_a_kernel_does():
+def test_flags_of_a_kernel_are_not_reported_as_those_of_a_cast():
     # NumPy looks at the flags after a cast, and once found an underflow inside the kernel there.
     parts = [5e-324, 1e-308, -0.2, 1.8e308, 1e-160, math.inf, math.nan, 1e38]
     z = np.array([complex(a, b) for a in parts for b in parts])

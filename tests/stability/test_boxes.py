@@ -30,7 +30,7 @@ def velocity_by_hand(kp, kv, time=0.36):
 
 
 def sampled(boxes, number, seed=0):
-    """Random points of the ranges and what the boxes say there."""
+    """Random points of the ranges and the counts of the boxes there."""
     rng = np.random.default_rng(seed)
     ends = np.array([boxes.ranges[name] for name in boxes.names])
     points = rng.uniform(ends[:, 0], ends[:, 1], size=(number, len(ends)))
@@ -398,7 +398,7 @@ def test_robust_map_is_that_of_the_worst_delay():
     assert "for all T 0.2 to 0.45" in repr(chart)
 
 
-def test_robust_map_sees_what_happens_between_the_ends():
+def test_robust_map_includes_delays_between_the_ends():
     # An undamped oscillator under late feedback is stable and unstable by turns as T grows.
     family = s**2 + 0.05 * s + 4.0 + Kp * delay(T) + 0.0 * Kv
     axes = {"Kp": [0.5], "Kv": [0.0]}

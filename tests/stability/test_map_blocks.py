@@ -60,7 +60,7 @@ def test_every_cell_is_the_one_counted_alone(name, shape):
         {"decay": 0.1, "damping": (0.5, 0.6)},
     ],
 )
-def test_so_it_is_for_decay_and_damping(name, options):
+def test_every_cell_with_decay_and_damping_is_the_one_counted_alone(name, options):
     assert_same(*FAMILIES[name], (23, 22), **options)
 
 

@@ -37,7 +37,7 @@ def test_every_cell_is_the_one_counted_alone(name, shape):
 
 @names
 @pytest.mark.parametrize("options", [{"decay": 0.3}, {"decay": -0.4}, {"damping": (0.5, 3.0)}])
-def test_so_it_is_for_decay_and_damping(name, options):
+def test_every_cell_with_decay_and_damping_is_the_one_counted_alone(name, options):
     family, ranges = FAMILIES[name]
     assert_same(*both(family, ranges, (31, 30), **options))
 
@@ -107,7 +107,7 @@ def test_boundaries_are_roots_on_the_axis(name):
 
 
 @pytest.mark.parametrize("decay", [0.0, 0.4])
-def test_boundaries_part_different_counts(decay):
+def test_boundaries_separate_different_counts(decay):
     family, ranges = FAMILIES["two delays"]
     chart = dtm.stability_map(family, ranges, (60, 60), abscissa=False, decay=decay)
     step = 1e-4
@@ -124,7 +124,7 @@ def test_boundaries_part_different_counts(decay):
             assert sides[1] - sides[0] == curve.crossing[index]
 
 
-def test_cells_on_the_boundary_say_so():
+def test_cells_on_the_boundary_have_their_own_status():
     family, ranges = FAMILIES["velocity"]
     chart = dtm.stability_map(family, ranges, (21, 21), abscissa=False)
     on_it = chart.status == MapStatus.BOUNDARY
@@ -244,7 +244,7 @@ def test_pickled_maps_keep_their_boundaries():
         ({"damping": (0.5, 1.0), "decay": 2.0}, ValueError, "beyond the decay"),
     ],
 )
-def test_demands_that_make_no_sense_are_refused(options, error, word):
+def test_invalid_requirements_are_refused(options, error, word):
     family, ranges = FAMILIES["velocity"]
     with pytest.raises(error, match=word):
         dtm.stability_map(family, ranges, (3, 3), **options)

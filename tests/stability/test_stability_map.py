@@ -328,7 +328,7 @@ def test_to_xarray_names_the_axes():
 # Long maps
 
 
-def test_progress_is_told_and_ends_with_all_cells():
+def test_progress_is_reported_and_ends_with_all_cells():
     told = []
     ranges = {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}
     dtm.stability_map(VELOCITY, ranges, shape=(300, 200), proof="cells", progress=told.append)

@@ -1,4 +1,4 @@
-"""Flights of the estimation benchmark: one step of an integrator, its sensor noisy."""
+"""Recordings of the estimation benchmark: one step of an integrator with sensor noise."""
 
 import deadtime as dtm
 import numpy as np
@@ -19,9 +19,9 @@ def fly(
     duration=5.0,
     rest=0.5,
     size=1.0,
-    circulates=True,
+    noise_in_loop=True,
 ):
-    """A flight with its command logged, and what is known of its loop."""
+    """A recording with its command logged, and its loop without the delay."""
     loop = dtm.ControlLoop(
         dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=ts, limit=limit
     )
@@ -29,25 +29,25 @@ def fly(
     time = np.arange(round((duration + rest) / step)) * step
     reference = np.where(time < rest - 1e-9, 0.0, size)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
-    seen = reference - error if circulates else reference
+    seen = reference - error if noise_in_loop else reference
     flown = loop.simulate(time, seen, reference_time=time, initial_output=0.0, reference_before=0.0)
     known = loop.replace(delay=None, lag=0.0)
     return dtm.Recording(time, reference, flown.outputs + error, flown.inputs), known
 
 
 def swapped(recording, **signals):
-    """The recording with other signals in it."""
+    """The recording with other signals."""
     parts = {name: getattr(recording, name) for name in ("time", "reference", "output", "command")}
     return dtm.Recording(**parts | signals)
 
 
 def noise_for_output(recording, seed=0):
-    """The recording with nothing but noise as its output."""
+    """The recording with noise alone as its output."""
     random = np.random.default_rng(seed)
     return swapped(recording, output=random.normal(size=len(recording)))
 
 
-#: The rows of the benchmark: what each flight is like.
+#: The rows of the benchmark: the parameters of each recording.
 CASES = {
     "continuous, Kp 1.31": {"ts": None, "dt": 0.01, "limit": None, "noise": 0.01},
     "continuous, Kp 3": {"ts": None, "dt": 0.01, "limit": None, "noise": 0.01, "Kp": 3.0},
@@ -63,13 +63,15 @@ CASES = {
 
 
 def errors_of(case, runs, method, **options):
-    """Errors of the delay in ms over flights with different noise, and the estimates."""
+    """Errors of the delay in ms over recordings with different noise, and the estimates."""
     what = CASES[case]
-    circulates = what.get("ts", TS) is not None
+    noise_in_loop = what.get("ts", TS) is not None
     found, errors = [], []
     for seed in range(runs):
-        flight, known = fly(seed=seed, rest=options.get("rest", 0.0), circulates=circulates, **what)
-        keywords = {name: value for name, value in options.items() if name != "rest"}
+        flight, known = fly(
+            seed=seed, rest=options.get("rest", 0.0), noise_in_loop=noise_in_loop, **what
+        )
+        keywords = {name: value for name, value in options.items() if name == "free"}
         fit = dtm.estimate_delay(flight, known, method=method, **{"free": ("delay",)} | keywords)
         found.append(fit)
         errors.append(1e3 * (fit.delay - what.get("delay", 0.36)))

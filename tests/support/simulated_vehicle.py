@@ -1,4 +1,4 @@
-"""A vehicle that is nothing but a height model, for tests in virtual time."""
+"""A vehicle that consists of a height model only, for tests in virtual time."""
 
 import asyncio
 
@@ -9,7 +9,7 @@ KIT = (0.15265, 5.1529, 5.820)
 
 
 class SimulatedVehicle:
-    """Flies the kit's height model behind a delay; `trouble` may change any state it reports."""
+    """The kit's height model with a delay; `trouble` may change any state that it reports."""
 
     def __init__(self, delay=0.26, noise=0.0, random=None, trouble=None, tells_climb=True):
         self.delay, self.noise, self.random = delay, noise, random
@@ -66,21 +66,21 @@ class SimulatedVehicle:
     async def __aexit__(self, *reason):
         await self.close()
 
-    def _demand(self, now):
+    def _setpoint(self, now):
         late = [value for time, value in self.commands if time <= now - self.delay + 1e-9]
         self.commands = self.commands[max(0, len(late) - 1) :]
         return late[-1] if late else 0.0
 
     async def _fly(self):
-        """5 ms at a time, exact for a held demand but for where in them it changes."""
+        """Steps of 5 ms, exact for a setpoint that changes between steps only."""
         b1, b0, a = KIT
         step, slow, began = 0.005, 0.0, self.clock()
         while True:
             self.sequence += 1
             await asyncio.sleep(max(0.0, began + self.sequence * step - self.clock()))
-            demand = self._demand(self.clock()) if self.flying else 0.0
-            slow += step * (-a * slow + (b0 - a * b1) * demand)
-            self.speed = slow + b1 * demand
+            setpoint = self._setpoint(self.clock()) if self.flying else 0.0
+            slow += step * (-a * slow + (b0 - a * b1) * setpoint)
+            self.speed = slow + b1 * setpoint
             if self.flying:
                 self.height += step * self.speed
             error = self.random.normal(0.0, self.noise) if self.noise else 0.0
@@ -92,7 +92,7 @@ class SimulatedVehicle:
                 sequence=self.sequence,
                 vehicle_time=self.sequence * step,
                 climb=self.speed if self.tells_climb else None,
-                climb_demand=demand if self.tells_climb else None,
+                climb_setpoint=setpoint if self.tells_climb else None,
                 battery=80.0,
             )
             since = self.clock() - self.began if self.flying else -1.0

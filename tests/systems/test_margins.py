@@ -1,4 +1,4 @@
-"""Margins of loops: closed forms, and stability that is lost where they say."""
+"""Margins of loops: closed forms, and loss of stability exactly there."""
 
 import math
 import pickle
@@ -184,7 +184,7 @@ def test_loops_without_margins_are_refused(G, message):
         G.margin()
 
 
-def test_long_and_short_delays_are_no_trouble():
+def test_margins_with_long_and_short_delays():
     found = (2 / s * delay(1e-6)).margin()
     assert found.gain_margin == pytest.approx(math.pi / 4e-6, rel=1e-9)
     found = (1e-4 / s * delay(1e4)).margin()

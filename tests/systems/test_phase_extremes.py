@@ -1,4 +1,4 @@
-"""Frequency responses from 5e-324 to 1.7e308 rad/s: right, or refused with the reason, and soon."""
+"""Frequency responses from 5e-324 to 1.7e308 rad/s are correct, or refused quickly."""
 
 import math
 

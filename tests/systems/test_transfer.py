@@ -1,4 +1,4 @@
-"""Transfer functions: what they are, their algebra, their values."""
+"""Transfer functions: construction, algebra, values."""
 
 import cmath
 import copy
@@ -45,7 +45,7 @@ def test_common_delays_cancel_where_that_is_exact():
     assert TransferFunction(delay(tau), delay(0.1) * s).den == delay(0.1) * s
 
 
-def test_common_roots_stay_and_are_told():
+def test_common_roots_are_kept_and_listed():
     G = s / (s * (s + 1))
     assert G.den == s**2 + s
     assert G.minreal() == 1 / (s + 1)
@@ -68,7 +68,7 @@ def test_common_roots_stay_and_are_told():
         (TransferFunction(0.0, s * delay(0.5)), True, True),
     ],
 )
-def test_properness_and_causality_are_told(G, proper, causal):
+def test_properness_and_causality_are_reported(G, proper, causal):
     assert (G.is_proper, G.is_causal) == (proper, causal)
 
 

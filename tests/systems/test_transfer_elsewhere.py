@@ -1,4 +1,4 @@
-"""Transfer functions of control loops, to and from other packages, and their pictures."""
+"""Transfer functions of control loops, conversion to and from other packages, plots."""
 
 import cmath
 import importlib
@@ -56,7 +56,7 @@ def test_the_closed_loop_is_the_transform_of_its_step_response(path):
     assert loop.closed_loop().dcgain() == pytest.approx(1.0)
 
 
-def test_sampled_loops_do_not_pretend():
+def test_sampled_loops_have_no_transfer_function():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
     for ask in (loop.open_loop, loop.closed_loop):
         with pytest.raises(ValueError, match=r"sample_time=0.065 .* continuous\(\)"):
@@ -209,10 +209,10 @@ def test_pictures_are_labelled(pyplot, G):
     upper.figure.canvas.draw()
 
 
-def test_pictures_go_where_they_are_told(pyplot):
+def test_plots_use_the_axes_that_are_given(pyplot):
     _, axes = pyplot.subplots(2, 1)
-    assert TransferFunction(s * delay(0.1)).bode([0.1, 1.0, 10.0], axes=axes) is axes
+    assert TransferFunction(s * delay(0.1)).bode([0.1, 1.0, 10.0], ax=axes) is axes
     _, ax = pyplot.subplots()
     assert (1 / (s + 1)).nyquist([0.1, 1.0], ax=ax) is ax
-    with pytest.raises(ValueError, match="axes has 1"):
-        (1 / s).bode(axes=[ax])
+    with pytest.raises(ValueError, match="ax has 1"):
+        (1 / s).bode(ax=[ax])

@@ -1,4 +1,4 @@
-"""The filter of the derivative: noise against what it costs, by closed forms and by simulation."""
+"""The filter of the derivative: noise and loss, against closed forms and simulation."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_design_chooses_a_filter_itself(choice):
     best = dtm.design(LOOP, fixed={"Kp": 2.0}, filter="auto")
     assert best.filter_choice.omega == choice.omega
     assert best.gains == choice.design.gains
-    assert best.traded[-1].demand == "filter"
+    assert best.traded[-1].requirement == "filter"
     assert "filter at" in best.summary()
 
 

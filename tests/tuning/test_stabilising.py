@@ -1,4 +1,4 @@
-"""Gains that stabilise: closed forms, gains one by one, and designs of plants that need care."""
+"""Stabilising gains: closed forms, gains one by one, and designs for difficult plants."""
 
 import math
 
@@ -42,7 +42,7 @@ def test_an_unstable_first_order_plant_is_stabilised_below_a_delay_of_its_time_c
         assert best.abscissa == pytest.approx(1.0 - 5.0, rel=1e-3)
 
 
-def test_little_room_far_from_zero_is_found():
+def test_a_narrow_stable_interval_far_from_zero_is_found():
     # Between 1 and 1.0013 lies one cell of the map from 0.02 to 1.25 times the critical gain.
     best = dtm.design(unstable(0.99), controller=dtm.P)
     assert best.abscissa == pytest.approx(1.0 - 1.0 / 0.99, rel=1e-2)
@@ -82,7 +82,7 @@ def test_a_double_integrator_has_no_proportional_gain_but_a_design(gain, sample_
     assert best.gains["Kp"] * gain > 0.0
 
 
-def test_what_is_not_found_is_not_called_impossible():
+def test_a_search_without_result_does_not_claim_impossibility():
     plant = dtm.RationalPlant([1.0], [1.0, 0.0, 0.0, 0.0])
     loop = dtm.ControlLoop(plant, P1, delay=0.2)
     with pytest.raises(ValueError, match=r"tried in Kp from .* nor in .* proves nothing"):

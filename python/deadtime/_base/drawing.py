@@ -76,12 +76,16 @@ def shown_axes(ax: Axes | None) -> Axes:
     return pyplot.subplots(layout="constrained")[1]
 
 
-def shown_rows(axes: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
+def shown_rows(ax: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
     """The given axes, or those of a new pyplot figure below one another."""
-    if axes is not None:
-        if len(axes) != rows:
-            raise ValueError(f"axes has {len(axes)} of them: give {rows}")
-        return axes
+    if ax is not None:
+        try:
+            given = len(ax)
+        except TypeError as error:
+            raise TypeError(f"ax={ax!r}: give a sequence of {rows} axes") from error
+        if given != rows:
+            raise ValueError(f"ax has {given} axes: give {rows}")
+        return ax
     check_matplotlib()
     from matplotlib import pyplot
 

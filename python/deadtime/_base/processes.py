@@ -9,18 +9,15 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
-from deadtime._base.errors import MissingExtraError, WorkerError
+from deadtime._base.errors import WorkerError
+from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.validation import whole_number
 
-__all__ = ["Progress", "shared_out"]
+__all__ = ["shared_out"]
 
 T = TypeVar("T")
-
-#: Called with the numbers of items that are done and of all items; True for a bar.
-Report: TypeAlias = Callable[[int, int], object]
-Progress: TypeAlias = bool | Report
 
 #: Fewer items than this are done before other processes have started.
 FEW = 100
@@ -40,24 +37,23 @@ def shared_out(
         workers = 1
     size = max(1, min(BATCH, count // (4 * workers)))
     batches = [range(start, min(start + size, count)) for start in range(0, count, size)]
-    with _reporting(progress, count) as report:
+    with reported(progress, count) as report:
         if workers == 1:
-            return _here(task, batches, report, count)
-        return _elsewhere(task, batches, report, count, workers)
+            return _here(task, batches, report)
+        return _elsewhere(task, batches, report, workers)
 
 
-def _here(
-    task: Callable[[range], list[T]], batches: list[range], report: Report, count: int
-) -> list[T]:
+def _here(task: Callable[[range], list[T]], batches: list[range], report: Report | None) -> list[T]:
     results: list[T] = []
     for batch in batches:
         results += task(batch)
-        report(len(results), count)
+        if report is not None:
+            report(len(results))
     return results
 
 
 def _elsewhere(
-    task: Callable[[range], list[T]], batches: list[range], report: Report, count: int, workers: int
+    task: Callable[[range], list[T]], batches: list[range], report: Report | None, workers: int
 ) -> list[T]:
     """Batches on other processes; an interrupt waits for those that are at work and no others."""
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _left_to_the_parent)
@@ -69,7 +65,8 @@ def _elsewhere(
         for future in as_completed(futures):
             found[futures[future]] = future.result()
             done += len(found[futures[future]])
-            report(done, count)
+            if report is not None:
+                report(done)
     except BrokenProcessPool as error:
         raise WorkerError(
             "the other processes cannot start or were killed: in a script, keep what it "
@@ -100,24 +97,3 @@ def _interrupts_held_back() -> Iterator[None]:
 def _left_to_the_parent() -> None:
     """Where nothing can be blocked, leave Ctrl-C to the parent from the first batch on."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-@contextmanager
-def _reporting(progress: Progress, count: int) -> Iterator[Report]:
-    """What to call with the numbers of items done and of all items."""
-    if callable(progress):
-        yield progress
-        return
-    if not progress:
-        yield lambda done, total: None
-        return
-    try:
-        from rich import progress as bars
-    except ImportError as error:
-        raise MissingExtraError(
-            "a progress bar needs rich: install it with pip install 'deadtime[cli]', or give a "
-            "function as progress"
-        ) from error
-    with bars.Progress(transient=True) as bar:
-        task = bar.add_task("done", total=count)
-        yield lambda done, total: bar.update(task, completed=done)

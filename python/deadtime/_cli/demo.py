@@ -11,10 +11,11 @@ import typer
 
 from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, estimates_table, print_json, print_table, stages
+from deadtime._cli.comparisons import estimates_table
+from deadtime._cli.show import console, print_json, print_table, stages
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-from deadtime.reports import demo_flight, study
+from deadtime.reports import demo_recording, study
 from deadtime.reports._page import write_report
 
 __all__ = ["show_demo"]
@@ -31,7 +32,7 @@ def show_demo(
     check_matplotlib()
     with stages(6, quiet=as_json) as begin:
         begin("flying the simulated loop")
-        flight = demo_flight(seed)
+        flight = demo_recording(seed)
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / "flight.csv"
         _write_flight(flight.recording, file)

@@ -10,6 +10,7 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -96,8 +97,8 @@ def run_loop(
     gains = tuple(gain) if gain else GAINS
     trial = Trial(
         gain=gains[0],
-        there=way,
-        back=way,
+        forward_path=way,
+        return_path=way,
         seed=seed,
         sample_time=sample_time,
         duration=duration,
@@ -124,7 +125,9 @@ def run_loop(
         for one, percent in PRINTED_OVERSHOOTS.items()
     }
     if plot is not None:
-        save_figure(plot_internet_loop(found, printed), plot)
+        figure, axes = new_figure(10.0, 4.2, columns=2)
+        plot_internet_loop(found, printed, axes)
+        save_figure(figure, plot)
     if as_json:
         print_json({**found.to_dict(), "table_1": printed})
         return

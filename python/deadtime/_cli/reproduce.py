@@ -74,7 +74,7 @@ def _show(title: str, part: Part) -> None:
         for head in ("where", "what", "printed", "ours", "verdict"):
             table.add_column(head, justify="right" if head in ("printed", "ours") else "left")
         for one in part.comparisons:
-            verdict = f"[{STYLES[one.verdict]}]{one.told}[/]"
+            verdict = f"[{STYLES[one.verdict]}]{one.outcome}[/]"
             table.add_row(one.where, one.quantity, one.printed, one.shown, verdict)
         print_table(table)
     for grid in part.grids():

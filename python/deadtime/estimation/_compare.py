@@ -1,36 +1,40 @@
-"""Several methods on one recording, and in words why they differ."""
+"""`compare_methods`: estimates of one delay by several methods, and why they differ."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.ranges import OpenRange
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._evidence import check_setpoint_active
-from deadtime.estimation.methods._decay import estimate_by_decay
-from deadtime.estimation.methods._decrement import estimate_by_decrement
-from deadtime.estimation.methods._output_error import estimate_by_output_error
-from deadtime.estimation.methods._overshoot import estimate_by_overshoot
-from deadtime.estimation.methods._waveform import estimate_by_waveform
+from deadtime.estimation.data._runs import paired_runs
+from deadtime.estimation.methods._decay import Decay
+from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
+from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 __all__ = ["Comparison", "compare_methods"]
 
-#: Heads of the columns that `Comparison.rows` fills.
+#: Headings of the columns of `Comparison.rows`.
 COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
 
-#: Two delays closer than this share of their mean are called the same.
-AGREE = 0.03
+#: Largest relative difference of two delays that agree.
+AGREEMENT = 0.03
 
 LABELS = {
     "dominant": "paper's overshoot",
     "exact": "exact overshoot",
-    "saturated": "overshoot as flown",
+    "saturated": "overshoot with limit",
     "decrement": "decrement",
     "decay": "decay",
     "waveform": "waveform",
@@ -39,8 +43,8 @@ LABELS = {
     "output_error with lag": "output error with lag",
 }
 
-#: What the fits of all samples are called in a sentence.
-TOLD = {
+#: Names of the fits of all samples within a sentence.
+IN_WORDS = {
     "waveform": "the fit of the whole waveform",
     "output_error": "the fit to the logged command",
 }
@@ -55,9 +59,9 @@ class Comparison:
     estimates : dict of str to DelayEstimate
         By name: ``dominant``, ``exact``, ``saturated``, ``waveform``, ``waveform with lag``; where
         a command was logged ``output_error`` and ``output_error with lag``; ``decrement`` and
-        ``decay`` where they have an answer.
+        ``decay`` where they give an estimate.
     refusals : dict of str to str
-        The other methods that could not answer, and why.
+        The reasons of the other methods that gave no estimate.
     """
 
     estimates: Mapping[str, DelayEstimate]
@@ -65,16 +69,16 @@ class Comparison:
 
     @property
     def trusted(self) -> str:
-        """Name of the method to go by: the command as logged tells more than the loop does."""
+        """Name of the preferred method: the logged command holds more information than the loop."""
         return "output_error" if "output_error" in self.estimates else "waveform"
 
     @property
     def best(self) -> DelayEstimate:
-        """The estimate to go on with.
+        """The preferred estimate.
 
-        The fit with a lag if the lag is above zero and the Bayesian information criterion
-        pays for it, on as many independent samples as the residuals' colour leaves; else the
-        fit of delay and gain.
+        The fit with a lag if the lag is above zero and the Bayesian information criterion favours
+        it, for the number of independent samples that the autocorrelation of the residuals gives;
+        otherwise the fit of delay and gain.
         """
         plain, lagged = self._fits()
         if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
@@ -89,7 +93,7 @@ class Comparison:
         return self.estimates[self.trusted], self.estimates.get(f"{self.trusted} with lag")
 
     def pictured(self) -> dict[str, DelayEstimate]:
-        """The estimates that one picture has room for, by what stands in its legend."""
+        """The estimates for one plot, by their labels in its legend."""
         names = ("dominant", self.trusted, f"{self.trusted} with lag")
         return {
             f"{LABELS[name]}: {self.estimates[name].delay:.3f} s": self.estimates[name]
@@ -98,10 +102,10 @@ class Comparison:
         }
 
     def rows(self) -> list[list[str]]:
-        """The estimates as cells of a table with the heads `COLUMNS`.
+        """The estimates as cells of a table with the headings `COLUMNS`.
 
-        What was not fitted but taken as given stands in brackets. A method that refused has one
-        cell with its reason.
+        Values that were given, not fitted, are in brackets. A method that refused has one cell with
+        its reason.
         """
         rows = []
         for name, fit in self.estimates.items():
@@ -124,31 +128,34 @@ class Comparison:
         return rows
 
     def explanation(self) -> list[str]:
-        """Why the methods differ, a sentence or two each."""
+        """Why the methods differ, in sentences."""
         plain, lagged = self._fits()
         dominant = self.estimates.get("dominant")
-        said = []
+        sentences = []
         if dominant is None:
-            said.append(f"The overshoot method does not answer: {self.refusals['dominant']}.")
+            sentences.append(
+                f"The overshoot method gives no estimate: {self.refusals['dominant']}."
+            )
         else:
-            said += _overshoot_against_fit(dominant, plain, TOLD[self.trusted])
+            sentences += _overshoot_against_fit(dominant, plain, IN_WORDS[self.trusted])
         if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
-            said.append(
-                f"The vehicle lags: with a lag fitted too the misfit falls from {plain.rms:.3g} to "
-                f"{lagged.rms:.3g} rms, at {lagged.delay:.3f} s of delay and {lagged.lag:.3f} s of "
-                f"lag. Part of what looks like dead time is the vehicle's own response; the sum, "
-                f"{lagged.delay_plus_lag:.3f} s, is what the recording determines well."
+            sentences.append(
+                "The vehicle has a lag: with it fitted too, the residuals fall from "
+                f"{plain.rms:.3g} to {lagged.rms:.3g} rms, at {lagged.delay:.3f} s of delay and "
+                f"{lagged.lag:.3f} s of lag. Part of what looks like dead time is the dynamics of "
+                f"the vehicle; the sum, {lagged.delay_plus_lag:.3f} s, is what the recording "
+                "determines well."
             )
         if not plain.adequate:
-            said.append(
-                "The residuals of the fit without lag are coloured: that model is an equivalent of "
-                "the vehicle rather than the vehicle, and its interval is the robust one."
+            sentences.append(
+                "The residuals of the fit without lag are coloured: that model only approximates "
+                "the vehicle, and its interval is the robust one."
             )
-        return said
+        return sentences
 
 
 def truth_row(numbers: Mapping[str, float]) -> list[str]:
-    """The true numbers of a simulated flight, as a row under those of `Comparison.rows`."""
+    """The true parameters of a simulated run, as a further row of `Comparison.rows`."""
     return [
         "the truth",
         f"{numbers['delay']:.3f}",
@@ -168,38 +175,38 @@ def _number(value: float | None, fitted: bool) -> str:
 
 def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: str) -> list[str]:
     difference = plain.delay - dominant.delay
-    if abs(difference) <= AGREE * plain.delay:
+    if abs(difference) <= AGREEMENT * plain.delay:
         return [
             f"The paper's overshoot method ({dominant.delay:.3f} s) and {fit} "
             f"({plain.delay:.3f} s) agree."
         ]
-    said = [
+    sentences = [
         f"The paper's overshoot method says {dominant.delay:.3f} s, {fit} {plain.delay:.3f} s: "
         f"they differ by {abs(difference):.3f} s."
     ]
     assumed, gain = dominant.gain, plain.gain
     if assumed is None or gain is None or "gain" not in plain.stderr:
-        return said
+        return sentences
     low, high = plain.ci(0.95, "gain")
     if not low <= assumed <= high:
         weaker = "weaker" if gain < assumed else "stronger"
         less = "less" if gain < assumed else "more"
         short = "too short" if gain < assumed else "too long"
-        said.append(
-            f"The gain is not {assumed:g}, as the overshoot method takes it to be, but {gain:.3f} "
-            f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the delay is read "
-            f"{short}. With this gain the same overshoot would mean "
+        sentences.append(
+            f"The gain is not {assumed:g}, as the overshoot method assumes, but {gain:.3f} "
+            f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the "
+            f"estimated delay is {short}. With this gain the same overshoot would mean "
             f"{dominant.delay * assumed / gain:.3f} s."
         )
-    return said
+    return sentences
 
 
 def compare_methods(
     recording: Recording,
     loop: ControlLoop,
-    window: tuple[float | None, float | None] | None = None,
+    window: OpenRange | None = None,
 ) -> Comparison:
-    """Estimate the delay by every method that applies.
+    """Estimate the delay of a recording by every method that applies.
 
     Parameters
     ----------
@@ -213,33 +220,38 @@ def compare_methods(
     Raises
     ------
     NotIdentifiableError
-        When no fit of delay and gain has an answer.
+        When no fit of delay and gain has a result.
     """
-    check_setpoint_active(recording.window(*(window or (None, None))))
+    runs = paired_runs(recording, loop, window)
+    check_setpoint_active(recording.window(*runs[0].window))
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
-    named = [name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")]
+    named: list[str] = [
+        name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")
+    ]
     plain = [name for name in named if name != "lag"]
-    for name in ("dominant", "exact", "saturated"):
+    for name in get_args(OvershootMap):
         try:
-            estimates[name] = estimate_by_overshoot(recording, loop, window, map=name)
+            estimates[name] = Overshoot(map=name).estimate(runs, plain)
         except (NotIdentifiableError, ValueError) as error:
             refusals[name] = str(error).rstrip(".")
-    # Each is for steps that the other is not for, most recordings for neither: nothing to explain.
-    with suppress(NotIdentifiableError, ValueError):
-        estimates["decrement"] = estimate_by_decrement(recording, loop, window, plain)
-    with suppress(NotIdentifiableError, ValueError):
-        estimates["decay"] = estimate_by_decay(recording, loop, window)
-    fits: dict[str, Callable[..., DelayEstimate]] = {"waveform": estimate_by_waveform}
+    # One is for steps with overshoot, the other for steps without; their refusals need no report.
+    readings: list[Method] = [Decrement(), Decay()]
+    for method in readings:
+        with suppress(NotIdentifiableError, ValueError):
+            estimates[method.name] = method.estimate(runs, plain)
+    fits: list[Method] = [Waveform()]
     if recording.command is not None:
-        fits["output_error"] = estimate_by_output_error
-    for method, fit in fits.items():
-        frees = {method: plain} if named == plain else {method: plain, f"{method} with lag": named}
+        fits.append(OutputError())
+    for method in fits:
+        frees = {method.name: plain}
+        if named != plain:
+            frees[f"{method.name} with lag"] = named
         for name, free in frees.items():
             try:
-                estimates[name] = fit(recording, loop, window, free)
+                estimates[name] = method.estimate(runs, free)
             except NotIdentifiableError as error:
                 refusals[name] = str(error).rstrip(".")
-    if not fits.keys() & estimates.keys():
+    if not any(method.name in estimates for method in fits):
         raise NotIdentifiableError(refusals["waveform"])
     return Comparison(estimates, refusals)

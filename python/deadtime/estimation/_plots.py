@@ -1,12 +1,12 @@
-"""Drawings of fits. Matplotlib is imported when something is drawn."""
+"""Plots of fits. Matplotlib is imported when something is drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from deadtime._base.drawing import COLOURS, DATA, REFERENCE, bare_axes, empty_figure
-from deadtime.estimation._result import DelayEstimate, Flight
+from deadtime._base.drawing import COLOURS, DATA, REFERENCE, bare_axes, check_matplotlib
+from deadtime.estimation._result import DelayEstimate, FittedRun
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-__all__ = ["plot_estimate", "plot_fits"]
+__all__ = ["estimate_axes", "plot_estimate", "plot_fits", "shown_figure"]
 
 
 def plot_fits(
     ax: Axes, recording: Recording, fits: Mapping[str, DelayEstimate], unit: str = "m"
-) -> None:
-    """Recorded output with the fitted ones over it."""
+) -> Axes:
+    """Draw the recorded output with the fitted ones over it."""
     ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
     ax.plot(recording.time, recording.output, label="recorded", **DATA)
     for colour, (label, fit) in zip(COLOURS, fits.items(), strict=False):
@@ -28,45 +28,69 @@ def plot_fits(
         ax.plot(window.time, window.output - fit.residuals, color=colour, lw=1.6, label=label)
     ax.set(xlabel="time / s", ylabel=f"output / {unit}")
     ax.legend(frameon=False, fontsize="small")
+    return ax
 
 
-def plot_estimate(fit: DelayEstimate) -> Figure:
-    """Fit over data, below it the residuals, beside it the profile of the delay if it has one."""
-    flights = fit.flights
-    profiled = fit.has_profile and "delay" in fit.stderr
-    width = max(7.0, 3.5 * len(flights)) + 2.6 * profiled
-    figure = empty_figure(width, 4.6)
-    across = len(flights) + int(profiled)
-    ratios = [2.2] * len(flights) + [1.5] * int(profiled)
-    grid = figure.add_gridspec(2, across, height_ratios=[3.0, 1.0], width_ratios=ratios)
-    for column, flight in enumerate(flights):
-        upper = bare_axes(figure.add_subplot(grid[0, column]))
-        lower = bare_axes(figure.add_subplot(grid[1, column], sharex=upper))
-        _plot_flight(upper, lower, flight, f"{fit.method}, delay {fit.delay:.3f} s")
+def estimate_axes(fit: DelayEstimate, figure: Figure | None = None) -> list[Axes]:
+    """Lay out the axes of `plot_estimate` on a figure, by default a new one of pyplot."""
+    profiled, across = _has_profile(fit), len(fit.runs)
+    if figure is None:
+        figure = shown_figure(max(7.0, 3.5 * across) + 2.6 * profiled, 4.6)
+    ratios = [2.2] * across + [1.5] * profiled
+    grid = figure.add_gridspec(2, len(ratios), height_ratios=[3.0, 1.0], width_ratios=ratios)
+    axes = []
+    for column in range(across):
+        upper = figure.add_subplot(grid[0, column])
+        axes += [upper, figure.add_subplot(grid[1, column], sharex=upper)]
+    return [*axes, figure.add_subplot(grid[:, -1])] if profiled else axes
+
+
+def plot_estimate(fit: DelayEstimate, axes: Sequence[Axes] | None = None) -> list[Axes]:
+    """Draw the fit over the data and the residuals of each run, then the profile of the delay."""
+    count = 2 * len(fit.runs) + _has_profile(fit)
+    axes = estimate_axes(fit) if axes is None else list(axes)
+    if len(axes) != count:
+        raise ValueError(f"ax holds {len(axes)} axes: give {count}")
+    for one in axes:
+        bare_axes(one)
+    for column, run in enumerate(fit.runs):
+        upper, lower = axes[2 * column : 2 * column + 2]
+        _plot_run(upper, lower, run, f"{fit.method}, delay {fit.delay:.3f} s")
+        upper.tick_params(labelbottom=False)
         if column == 0:
             upper.legend(frameon=False, fontsize="small")
-        upper.tick_params(labelbottom=False)
-        kind = "white" if fit.whiteness.white else "coloured"
-        upper.set_ylabel("output" if column == 0 else "")
-        lower.set_ylabel(f"residual\n({kind})" if column == 0 else "")
-    if profiled:
-        _plot_profile(bare_axes(figure.add_subplot(grid[:, -1])), fit)
-    return figure
+            upper.set_ylabel("output")
+            lower.set_ylabel(f"residual\n({'white' if fit.whiteness.white else 'coloured'})")
+    if _has_profile(fit):
+        _plot_profile(axes[-1], fit)
+    return axes
 
 
-def _plot_flight(upper: Axes, lower: Axes, flight: Flight, label: str) -> None:
-    recording = flight.recording
+def shown_figure(width: float, height: float) -> Figure:
+    """A new figure of pyplot."""
+    check_matplotlib()
+    from matplotlib import pyplot
+
+    return pyplot.figure(figsize=(width, height), layout="constrained")
+
+
+def _has_profile(fit: DelayEstimate) -> bool:
+    return fit.has_profile and "delay" in fit.stderr
+
+
+def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
+    recording = run.recording
     upper.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
     upper.plot(recording.time, recording.output, label="recorded", **DATA)
-    fitted = recording.output - flight.residuals
+    fitted = recording.output - run.residuals
     upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
-    lower.plot(recording.time, flight.residuals, **DATA)
+    lower.plot(recording.time, run.residuals, **DATA)
     lower.axhline(0.0, color="0.6", lw=0.8)
     lower.set(xlabel="time / s")
 
 
 def _plot_profile(ax: Axes, fit: DelayEstimate) -> None:
-    """The t of every delay, with the 95 % interval where it crosses its level."""
+    """The profile t over the delay, with the 95 % interval where it crosses 1.96."""
     values, t = fit.profile("delay")
     ax.plot(values, t, color=COLOURS[0], lw=1.6)
     for end in fit.ci(0.95):

@@ -1,15 +1,14 @@
-"""What an estimator found, and how far to believe it."""
+"""Results of an estimation, with their uncertainty."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array
@@ -19,13 +18,13 @@ from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
-__all__ = ["CramerRaoBound", "DelayEstimate", "Flight"]
+__all__ = ["CramerRaoBound", "DelayEstimate", "FittedRun"]
 
 Array = NDArray[np.float64]
 
-#: Quantities that are no times; a limit and a gain have the unit of command and output.
+#: Quantities that are not times; a limit has the unit of the command.
 UNITLESS = ("gain", "limit")
 
 
@@ -36,7 +35,7 @@ class CramerRaoBound(ReadOnlyArrays):
     Attributes
     ----------
     free : tuple of str
-        What is taken as unknown; a bound without this says nothing.
+        The parameters that are taken as unknown; the bound depends on them.
     noise : float
         Standard deviation of the white measurement noise it is for, in the output's unit.
     stderr : dict of str to float
@@ -49,15 +48,15 @@ class CramerRaoBound(ReadOnlyArrays):
 
 
 @dataclass(frozen=True, eq=False)
-class Flight(ReadOnlyArrays):
-    """One of the recordings of a fit.
+class FittedRun(ReadOnlyArrays):
+    """One of the recordings of a fit, with its fitted loop.
 
     Attributes
     ----------
     recording : Recording
-        The window of it that was fitted.
+        The fitted window.
     loop : ControlLoop
-        The loop that flew it, with the fitted numbers put in.
+        The recorded loop with the fitted parameters.
     residuals : ndarray, shape (n,)
         Recorded minus simulated output.
     """
@@ -69,40 +68,40 @@ class Flight(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DelayEstimate(ReadOnlyArrays):
-    """A loop with its delay, and the uncertainty of every number that was fitted.
+    """An estimated delay, with the fitted loop and the uncertainty of every fitted parameter.
 
     Attributes
     ----------
     method : str
         Name of the method.
     loop : ControlLoop
-        The loop with the fitted numbers put in.
+        The loop with the fitted parameters.
     free : tuple of str
-        What was fitted.
+        Names of the fitted parameters.
     stderr : dict of str to float
-        Standard errors of the free quantities, s or the unit of the gain; ``delay+lag`` is there
-        whenever the delay is. They are robust ones when the residuals are not white, and NaN
-        where the method has none (`uncalibrated` says why).
+        Standard errors of the free quantities, s or the unit of the gain, and of ``delay+lag``
+        where the delay is free. They are robust ones where the residuals are not white, and NaN
+        where the method has none (see `uncalibrated`).
     cov : ndarray, shape (len(free), len(free))
         Their covariance.
     crb : CramerRaoBound or None
-        The Cramér-Rao bound, naming what it takes as free.
+        The Cramér-Rao bound, with the parameters it takes as free.
     recording : Recording
-        The window the fit was made on.
+        The fitted window.
     residuals : ndarray
         Recorded minus simulated output.
     whiteness : Whiteness
         Test of the residuals.
     adequate : bool
         Whether the model explains the recording up to white noise. If not, the intervals are
-        the robust ones, and the model is an equivalent of the vehicle, not the vehicle.
+        the robust ones, and the model only approximates the vehicle.
     message : str
-        What the method has to say, in words.
+        Description of the fit and remarks on it.
     uncalibrated : str
         Why there is no interval; empty where there is one.
     details : dict
-        Quantities of the method alone, such as the overshoot.
-    others : tuple of Flight
+        Further results of the method, such as the overshoot.
+    others : tuple of FittedRun
         The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
         the first.
     """
@@ -120,13 +119,13 @@ class DelayEstimate(ReadOnlyArrays):
     message: str
     uncalibrated: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
-    others: tuple[Flight, ...] = ()
+    others: tuple[FittedRun, ...] = ()
     _profile: Profile | None = None
 
     @property
-    def flights(self) -> tuple[Flight, ...]:
+    def runs(self) -> tuple[FittedRun, ...]:
         """All recordings that were fitted together, the first one included."""
-        return (Flight(self.recording, self.loop, self.residuals), *self.others)
+        return (FittedRun(self.recording, self.loop, self.residuals), *self.others)
 
     @property
     def delay(self) -> float:
@@ -135,33 +134,33 @@ class DelayEstimate(ReadOnlyArrays):
 
     @property
     def gain(self) -> float | None:
-        """Gain of the plant: fitted, or as it was given; None if the plant has none to name."""
+        """Gain of the plant, fitted or as given; None if the plant has no such parameter."""
         return self.loop.parameters.get("gain")
 
     @property
     def lag(self) -> float | None:
-        """Lag of the plant, s: fitted, or as it was given; None if the plant has none to name."""
+        """Lag of the plant, s, fitted or as given; None if the plant has no such parameter."""
         return self.loop.parameters.get("lag")
 
     @property
     def delay_plus_lag(self) -> float:
-        """The sum of delay and lag, s: well determined also when its parts are not."""
+        """The sum of delay and lag, s, which is well determined also where its parts are not."""
         return self.delay + (self.lag or 0.0)
 
     @property
     def calibrated(self) -> bool:
-        """Whether the method can give an interval that covers what it says."""
+        """Whether the method has confidence intervals with the stated coverage."""
         return not self.uncalibrated
 
     @property
     def has_profile(self) -> bool:
-        """Whether `profile` has an answer."""
+        """Whether the method has a profile."""
         return self._profile is not None
 
     @property
     def rms(self) -> float:
         """Root mean square of the residuals of all recordings, in the unit of the output."""
-        squares = [flight.residuals**2 for flight in self.flights]
+        squares = [run.residuals**2 for run in self.runs]
         return float(np.sqrt(np.mean(np.concatenate(squares))))
 
     def ci(self, level: float = 0.95, name: str = "delay") -> tuple[float, float]:
@@ -177,7 +176,7 @@ class DelayEstimate(ReadOnlyArrays):
         Returns
         -------
         (float, float)
-            In seconds for a delay or lag; cut off at zero, below which none of them can be.
+            In seconds for a delay or lag, and not below zero for these.
 
         Raises
         ------
@@ -185,6 +184,8 @@ class DelayEstimate(ReadOnlyArrays):
             When the method cannot give an interval (the message says why), the level is not
             between 0 and 1, or the quantity was not fitted.
         """
+        from scipy import special
+
         if not 0.0 < level < 1.0:
             raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
         if not self.calibrated:
@@ -196,26 +197,26 @@ class DelayEstimate(ReadOnlyArrays):
         value = self._value(name)
         if self._profile is not None and self._profile.preferred:
             return self._profile.interval(name, value, self._reach(name), level)
-        freedom = max(1, sum(one.residuals.size for one in self.flights) - len(self.free))
+        freedom = max(1, sum(one.residuals.size for one in self.runs) - len(self.free))
         reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
         low = value - reach
         return (max(low, floor_of(name)), value + reach)
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
-        """How much worse the best fit gets when one quantity is held.
+        """Profile likelihood: the increase of the cost when one quantity is held.
 
         Parameters
         ----------
         name : str
             One of `free`, or ``"delay+lag"``.
         values : array_like, shape (n,), optional
-            Where to hold it; by default 41 values, four standard errors to either side.
+            Values at which it is held; by default 41, four standard errors to either side.
 
         Returns
         -------
         values, t : ndarray, shape (n,)
-            At each value the t at which a confidence interval would end there, so that it is 1.96
-            at the ends of a 95 % interval of many samples, and 0 at the fitted value.
+            At each value the quantile t of the confidence interval that ends there: 1.96 at the
+            ends of a 95 % interval of many samples, and 0 at the fitted value.
 
         Raises
         ------
@@ -244,13 +245,13 @@ class DelayEstimate(ReadOnlyArrays):
         return float(sum(known.get(part, 0.0) for part in name.split("+")))
 
     def _reach(self, name: str) -> float:
-        """About one standard error; where a quantity is at its bound, that of its like."""
+        """About one standard error; for a quantity at its bound, the largest of the other times."""
         return self.stderr[name] or max(
             (error for other, error in self.stderr.items() if other not in UNITLESS), default=0.0
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the arrays, as plain values for JSON."""
+        """All results but the arrays, as plain values for JSON."""
         found: dict[str, Any] = {
             "method": self.method,
             "delay": self.delay,
@@ -278,8 +279,8 @@ class DelayEstimate(ReadOnlyArrays):
         """The result as a few lines of text."""
         lines = [f"{self.method}: {self.message}"]
         if self.others:
-            rows = " + ".join(str(len(flight.recording)) for flight in self.flights)
-            lines.append(f"  {len(self.flights)} recordings together, {rows} samples")
+            rows = " + ".join(str(len(run.recording)) for run in self.runs)
+            lines.append(f"  {len(self.runs)} recordings together, {rows} samples")
         width = max((len(name) for name in self.stderr), default=0) + 1
         for name, stderr in self.stderr.items():
             unit = "" if name in UNITLESS else "s"
@@ -303,11 +304,29 @@ class DelayEstimate(ReadOnlyArrays):
         )
         return "\n".join(lines)
 
-    def plot(self) -> Figure:
-        """Fit over data, the residuals, and the profile of the delay; needs matplotlib."""
+    def plot(self, ax: Sequence[Axes] | None = None) -> list[Axes]:
+        """Draw the fit over the data, the residuals, and the profile of the delay.
+
+        Needs matplotlib.
+
+        Parameters
+        ----------
+        ax : sequence of matplotlib.axes.Axes, optional
+            For each recording one for the output and one for the residuals, then one for the
+            profile where there is one. By default those of a new figure.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            If `ax` holds another number of axes.
+        """
         from deadtime.estimation._plots import plot_estimate
 
-        return plot_estimate(self)
+        return plot_estimate(self, ax)
 
     def __repr__(self) -> str:
         spread = f" ± {self.stderr['delay']:.3g}" if self.calibrated else ""

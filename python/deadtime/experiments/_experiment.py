@@ -1,10 +1,10 @@
-"""What is flown to learn a loop: a reference over time, or a relay in the controller's place."""
+"""Experiments that identify a loop: a reference over time, or a relay for the controller."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,8 @@ from deadtime._base.validation import (
     positive,
     whole_number,
 )
-from deadtime.experiments._noise_in_loop import seen_by
+from deadtime.experiments._noise import Noise, Seed, noise_model
+from deadtime.experiments._noise_in_loop import reference_shift
 from deadtime.experiments._waves import (
     ON_A_SAMPLE,
     binary_sequence,
@@ -35,30 +36,30 @@ from deadtime.recordings._recording import MINIMUM_SAMPLES
 __all__ = ["Experiment"]
 
 Array = NDArray[np.float64]
-Seed: TypeAlias = int | np.random.SeedSequence
 
-#: A relay is a gain this large, in 1/s and its amplitude, with the amplitude as limit; where the
-#: error is zero it switches up, as if the reference were this share of a second of it higher.
+#: A relay is simulated as a P controller with this gain (1/s, times the amplitude) and the
+#: amplitude as its limit. The reference is higher by this share (s, times the amplitude), so that
+#: the relay is up at zero error.
 RELAY_GAIN, RELAY_SHIFT = 1e12, 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Experiment(ReadOnlyArrays):
-    """A planned flight: the reference over time, or a relay in the place of the controller.
+    """A planned experiment: the reference over time, or a relay in the place of the controller.
 
     Parameters
     ----------
     time : array_like, shape (n,)
-        Sample times in s, increasing. The vehicle is at rest before the first of them.
+        Sample times in s, increasing. The loop is at rest before the first of them.
     reference : array_like, shape (n,)
-        The reference from each of them on.
+        The reference from each sample time on.
     relay_amplitude : float, optional
         Amplitude of a relay that replaces the controller: the command is plus or minus this, with
         the sign of reference minus output.
     name : str
-        What it is, for tables and labels.
+        Name for tables and labels.
     period : float, optional
-        Period of the reference in s where it repeats itself, a whole number of samples.
+        Period of the reference in s if it is periodic, a whole number of samples.
 
     Raises
     ------
@@ -72,11 +73,11 @@ class Experiment(ReadOnlyArrays):
     >>> loop = dtm.ControlLoop(
     ...     dtm.Integrator(), dtm.P(1.31), delay=0.36, sample_time=0.065, limit=1.0
     ... )
-    >>> flight = dtm.Experiment.step(duration=5.0).fly(loop, noise=0.01, seed=1)
-    >>> flight
+    >>> recording = dtm.Experiment.step(duration=5.0).run(loop, noise=0.01, seed=1)
+    >>> recording
     <Recording from step of 1: 77 samples, 0 to 4.94 s, reference, output, command>
     >>> known = loop.replace(delay=None)
-    >>> dtm.estimate_delay(flight, known, free=("delay",)).ci(0.95)[0] < 0.36
+    >>> dtm.estimate_delay(recording, known, free=("delay",)).ci(0.95)[0] < 0.36
     True
     """
 
@@ -144,7 +145,7 @@ class Experiment(ReadOnlyArrays):
         sample_time : float
             s.
         rest : float
-            Time of the step in s; with 0 the reference is there at the first sample already.
+            Time of the step in s; with 0 the first sample has the new reference already.
 
         Returns
         -------
@@ -159,7 +160,9 @@ class Experiment(ReadOnlyArrays):
         time = sample_times(duration, sample_time)
         begin = non_negative("rest", rest)
         if begin >= time[-1]:
-            raise ValueError(f"rest={begin} s: the step comes after the end, at {time[-1]:g} s")
+            raise ValueError(
+                f"rest={begin} s: the step is after the end at {time[-1]:g} s; give a shorter rest"
+            )
         height = finite("amplitude", amplitude)
         reference = np.where(time < begin - ON_A_SAMPLE * sample_time, 0.0, height)
         return cls(time, reference, name=f"step of {height:g}")
@@ -178,7 +181,7 @@ class Experiment(ReadOnlyArrays):
             The wave begins with plus this.
         hold : float
             Time between changes of sign in s, half of the period. Where it is no whole number of
-            samples, each change takes place at the first sample after its time.
+            samples, each change is at the first sample after its time.
         sample_time : float
             s.
 
@@ -221,9 +224,9 @@ class Experiment(ReadOnlyArrays):
             Half of the way between the two levels.
         hold : float
             Shortest time between changes of sign in s. Where it is no whole number of samples,
-            each change takes place at the first sample after its time.
+            each change is at the first sample after its time.
         seed : int
-            Where in the sequence the flight begins.
+            Determines where in the sequence the experiment begins.
         sample_time : float
             s.
 
@@ -260,7 +263,7 @@ class Experiment(ReadOnlyArrays):
         odd: bool = False,
         phases: Literal["random", "schroeder"] = "random",
     ) -> Experiment:
-        """A sum of harmonics of one period, of equal amplitude.
+        """A sum of harmonics of one period, with equal amplitudes.
 
         Parameters
         ----------
@@ -269,17 +272,17 @@ class Experiment(ReadOnlyArrays):
         period : float
             s, a whole number of samples.
         lines : int or sequence of int
-            The excited harmonics, 1 being one oscillation a period; a number: all up to it.
+            The excited harmonics, 1 being one oscillation a period; a number excites all up to it.
         periods : int
-            How often it is repeated.
+            Number of periods.
         seed : int
-            Of random phases.
+            Seed of random phases.
         sample_time : float
             s.
         odd : bool
-            Leave the even ones of `lines` out: what shows on them is a nonlinearity.
+            Leave out the even ones of `lines`: a response at these shows a nonlinearity.
         phases : {"random", "schroeder"}
-            How the phases are chosen.
+            Choice of the phases.
 
         Returns
         -------
@@ -297,7 +300,7 @@ class Experiment(ReadOnlyArrays):
             near = max(1, round(period / sample)) * sample
             raise ValueError(
                 f"period={period} s is no whole number of samples of {sample} s, so the wave would "
-                f"not repeat itself: give {near:.10g}, for example"
+                f"not be periodic: give {near:.10g}, for example"
             )
         count = round(period / sample)
         excited = excited_lines(lines, count, odd)
@@ -318,19 +321,19 @@ class Experiment(ReadOnlyArrays):
         sample_time: float = 0.065,
         reference: float = 0.0,
     ) -> Experiment:
-        """A relay in the place of the controller, which makes the loop oscillate by itself.
+        """A relay in the place of the controller, which causes a limit cycle.
 
         Parameters
         ----------
         duration : float
             s.
         amplitude : float
-            The command is plus or minus this, above zero. It is plus where the output is at the
-            reference, as it is at the start.
+            The command is plus or minus this, above zero. It is plus where the output equals the
+            reference, as at the start.
         sample_time : float
             s.
         reference : float
-            What the output oscillates around.
+            Centre of the oscillation of the output.
 
         Returns
         -------
@@ -338,12 +341,12 @@ class Experiment(ReadOnlyArrays):
 
         Examples
         --------
-        An integrator behind a delay oscillates with four times the delay as its period:
+        The period of an integrator with delay is four times the delay:
 
         >>> import deadtime as dtm
         >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
-        >>> flight = dtm.Experiment.relay(10.0, 0.5, sample_time=0.01).fly(loop)
-        >>> ups = flight.time[1:][(flight.command[1:] > 0) & (flight.command[:-1] < 0)]
+        >>> found = dtm.Experiment.relay(10.0, 0.5, sample_time=0.01).run(loop)
+        >>> ups = found.time[1:][(found.command[1:] > 0) & (found.command[:-1] < 0)]
         >>> round(float((ups[-1] - ups[0]) / (len(ups) - 1)), 3)
         1.44
         """
@@ -355,16 +358,16 @@ class Experiment(ReadOnlyArrays):
             name=f"relay of {amplitude:g}",
         )
 
-    def flown_loop(self, loop: ControlLoop) -> ControlLoop:
-        """The loop as it is flown and logged.
+    def loop_in_run(self, loop: ControlLoop) -> ControlLoop:
+        """The loop as it runs and is logged.
 
-        With the relay in the controller's place, where there is one. The output is that which
-        arrives where the controller runs, so the whole delay counts as one of the command.
+        With the relay in the place of the controller, where there is one. The output is the one
+        that arrives where the controller runs, so the whole delay counts as one of the command.
 
         Parameters
         ----------
         loop : ControlLoop
-            The loop as it is otherwise.
+            The loop outside this experiment.
 
         Returns
         -------
@@ -395,8 +398,8 @@ class Experiment(ReadOnlyArrays):
         gain = RELAY_GAIN * self.relay_amplitude
         return loop.replace(controller=P(gain), limit=self.relay_amplitude)
 
-    def flown_reference(self) -> Array:
-        """The reference as it is flown: a relay's so much higher that it goes up at no error.
+    def reference_in_run(self) -> Array:
+        """The reference that is simulated: shifted for a relay, so that it is up at zero error.
 
         Returns
         -------
@@ -406,26 +409,26 @@ class Experiment(ReadOnlyArrays):
             return self.reference
         return self.reference + RELAY_SHIFT * self.relay_amplitude
 
-    def fly(
+    def run(
         self,
         loop: ControlLoop,
-        noise: float = 0.0,
+        noise: Noise = 0.0,
         seed: Seed = 0,
-        circulates: bool = True,
+        noise_in_loop: bool = True,
     ) -> Recording:
-        """Fly it on paper: simulate the loop and log what a ground station would.
+        """Simulate the loop under this experiment, and log what a ground station would.
 
         Parameters
         ----------
         loop : ControlLoop
             The true loop, at rest at zero before the first sample.
-        noise : float
-            Standard deviation of white noise on the measured output.
+        noise : float or NoiseModel
+            Noise of the measured output: the standard deviation of white noise, or a model.
         seed : int
             Seed of the noise.
-        circulates : bool
-            Whether the noise is in the measurement the controller acts on, as sensor noise is, or
-            only in the log.
+        noise_in_loop : bool
+            Whether the controller acts on the noise, as on that of a sensor; otherwise the noise
+            is in the log only.
 
         Returns
         -------
@@ -438,25 +441,21 @@ class Experiment(ReadOnlyArrays):
         ------
         ValueError
             If the delay of the loop is None, its samples are not those of the experiment, or
-            noise cannot circulate: an ideal derivative of it does not exist.
+            the controller takes an ideal derivative of the noise, which does not exist.
 
         Examples
         --------
         >>> import deadtime as dtm
         >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
-        >>> dtm.Experiment.prbs(20.0, 0.4, hold=0.4).fly(loop).command[:3]
+        >>> dtm.Experiment.prbs(20.0, 0.4, hold=0.4).run(loop).command[:3]
         array([...])
         """
-        flown = self.flown_loop(loop)
-        reference = self.flown_reference()
-        error = np.zeros(len(self))
-        if non_negative("noise", noise) > 0.0:
-            error = np.random.default_rng(seed).normal(0.0, noise, len(self))
-            if circulates:
-                reference = reference - seen_by(error, flown)
-        response = flown.simulate(
-            self.time, reference, reference_time=self.time, initial_output=0.0
-        )
+        loop = self.loop_in_run(loop)
+        reference = self.reference_in_run()
+        error = noise_model(noise).sample(self.time, seed)
+        if noise_in_loop and error.any():
+            reference = reference - reference_shift(error, loop)
+        response = loop.simulate(self.time, reference, reference_time=self.time, initial_output=0.0)
         return Recording(
             self.time, self.reference, response.outputs + error, response.inputs, source=self.name
         )

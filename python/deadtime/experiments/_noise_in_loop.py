@@ -1,4 +1,4 @@
-"""Sensor noise that circulates in a loop, as a change of its reference.
+"""Sensor noise that the controller acts on, as an equivalent change of the reference.
 
 Where a controller acts on the error r - y alone, noise on the output is noise on the reference
 with the other sign, limit and hold included. Where it differentiates the output alone, as PV
@@ -10,18 +10,17 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from deadtime.loops import PV, ControlLoop, DerivativeFilter
 from deadtime.loops._derivative_filter import discretised
 
-__all__ = ["seen_by"]
+__all__ = ["reference_shift"]
 
 Array = NDArray[np.float64]
 
 
-def seen_by(error: Array, loop: ControlLoop) -> Array:
-    """What noise on the output takes away from the reference."""
+def reference_shift(error: Array, loop: ControlLoop) -> Array:
+    """What the reference has to be lowered by to have the effect of noise on the output."""
     controller = loop.controller
     gains, smooth = controller.gains, controller._filter
     slope = gains.get("Kd", gains.get("Kv", 0.0))
@@ -29,20 +28,20 @@ def seen_by(error: Array, loop: ControlLoop) -> Array:
         return error
     if smooth is None:
         raise ValueError(
-            "noise has no ideal derivative: give the controller a DerivativeFilter, or let the "
-            "noise not circulate (circulates=False)"
+            "noise has no ideal derivative: give the controller a DerivativeFilter, or keep the "
+            "noise out of the loop (noise_in_loop=False)"
         )
     if not isinstance(controller, PV):
         return error
     if loop.sample_time is None:
         raise ValueError(
             "noise through the filter of a PV controller is computed on samples: give the loop a "
-            "sample_time, or let the noise not circulate (circulates=False)"
+            "sample_time, or keep the noise out of the loop (noise_in_loop=False)"
         )
     if controller.Kp == 0.0:
         raise ValueError(
-            "Kp=0: the reference does not enter, so noise cannot be flown through it; give a Kp "
-            "other than zero, or let the noise not circulate (circulates=False)"
+            "Kp=0: the reference does not enter, so noise cannot be added to it; give a Kp other "
+            "than zero, or keep the noise out of the loop (noise_in_loop=False)"
         )
     return error + slope / controller.Kp * _derivative(error, smooth, loop.sample_time)
 
@@ -50,9 +49,11 @@ def seen_by(error: Array, loop: ControlLoop) -> Array:
 def _derivative(error: Array, smooth: DerivativeFilter, sample_time: float) -> Array:
     """The filtered derivative of noise at the samples.
 
-    A continuous filter sees the noise held from sample to sample, for which the rule of the hold
-    is exact.
+    The noise is held from sample to sample, for which the hold discretisation of a continuous
+    filter is exact.
     """
+    from scipy import signal
+
     omega, damping = smooth.omega, smooth.damping
     found = discretised(
         np.array([[0.0, omega], [-omega, -2.0 * damping * omega]]),

@@ -1,4 +1,4 @@
-"""References on samples: when they change, and what they are made of.
+"""Reference signals on samples: steps, binary sequences and multisines.
 
 A pseudo-random binary sequence is a maximum-length one of a shift register (Golomb 1967; SciPy's
 `max_len_seq`); a multisine is a sum of harmonics of one period with equal amplitudes and phases
@@ -12,7 +12,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from deadtime._base.validation import positive, whole_number
 from deadtime.recordings._recording import MINIMUM_SAMPLES
@@ -30,18 +29,18 @@ __all__ = [
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
-#: Times are multiples of the sample time if they miss one by this share of it.
+#: Largest deviation of a time from a multiple of the sample time, as a share of the sample time.
 ON_A_SAMPLE = 1e-6
 
-#: Nobody flies more samples than this.
+#: Upper limit of the samples of an experiment (finds times that are not in seconds; bounds memory).
 MOST_SAMPLES = 10_000_000
 
-#: Longest register whose sequence is known to `max_len_seq`.
+#: Longest shift register of `scipy.signal.max_len_seq`.
 MOST_BITS = 32
 
 
 def sample_times(duration: float, sample_time: float) -> Array:
-    """Samples from zero on, the last before `duration`."""
+    """Sample times from zero to the last one before `duration`."""
     sample = positive("sample_time", sample_time)
     count = positive("duration", duration) / sample
     if count < MINIMUM_SAMPLES:
@@ -58,20 +57,20 @@ def sample_times(duration: float, sample_time: float) -> Array:
 
 
 def hold_numbers(time: Array, hold: float, sample_time: float) -> Whole:
-    """Number of the hold that each sample lies in."""
+    """Index of the hold interval of each sample."""
     if positive("hold", hold) < sample_time * (1.0 - ON_A_SAMPLE):
         raise ValueError(f"hold={hold} s is shorter than a sample of {sample_time} s")
     return np.floor((time + ON_A_SAMPLE * sample_time) / hold).astype(np.int64)
 
 
 def whole_period(period: float, sample_time: float) -> float | None:
-    """The period where it is a whole number of samples."""
+    """The period if it is a whole number of samples, else None."""
     count = period / sample_time
     return period if count >= 1.0 and abs(count - round(count)) <= ON_A_SAMPLE else None
 
 
 def excited_lines(lines: int | Sequence[int], count: int, odd: bool) -> Whole:
-    """Harmonics to excite of a period of `count` samples, checked."""
+    """The excited harmonics of a period of `count` samples, checked."""
     if np.ndim(lines) == 0:
         lines = range(1, whole_number("lines", cast(int, lines)) + 1)
     found = np.unique(np.asarray(lines))
@@ -90,11 +89,13 @@ def excited_lines(lines: int | Sequence[int], count: int, odd: bool) -> Whole:
 
 
 def binary_sequence(needed: int, seed: int) -> tuple[Array, int]:
-    """Signs of a maximum-length sequence from a random place on, and how many it has in all."""
+    """Signs of a maximum-length sequence from a random position on, and its whole length."""
+    from scipy import signal
+
     bits = max(2, needed.bit_length())
     if bits > MOST_BITS:
         raise ValueError(f"{needed} changes of sign are too many: give a longer hold")
-    # Any state of the register but all zeros is a place in the sequence.
+    # Each state of the register but zero is a position in the sequence.
     start = np.random.default_rng(seed).integers(1, 2**bits)
     register = (start >> np.arange(bits)) & 1
     sequence, _ = signal.max_len_seq(bits, state=register, length=needed)

@@ -1,4 +1,4 @@
-"""The experiment on a vehicle: fly steps, estimate the delay, choose gains, fly them."""
+"""The experiment with a vehicle: fly steps, estimate the delay, design gains, fly these."""
 
 from deadtime.flights._fly import FlightPlan, fly_experiment
 from deadtime.flights._learn import FlightStudy

@@ -1,8 +1,8 @@
-"""The paper's experiment from end to end: fly P, learn the delay, design PV for it, fly that.
+"""`fly_experiment`: fly under P control, estimate the delay, design PV gains for it, and fly these.
 
-The vehicle takes off and lands once for each flight. Between learning and checking the link is
-closed: what computes for seconds cannot answer a vehicle's watchdogs, and no vehicle waits in the
-air for it.
+The vehicle takes off and lands once for each flight. The link is closed while the gains are
+designed: that computation takes seconds, in which the watchdogs of the vehicle are not served, and
+no vehicle should wait in the air for it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from deadtime.loops import PV, P
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.recordings import read_recording
 
-__all__ = ["Connect", "FlightPlan", "TellsAll", "fly_all", "fly_experiment"]
+__all__ = ["Connect", "FlightPlan", "PassesMessages", "fly_all", "fly_experiment"]
 
 Connect: TypeAlias = Callable[[], AbstractAsyncContextManager[Vehicle]]
 
@@ -39,46 +39,46 @@ MESSAGE = (
     "sequence",
     "height_m",
     "climb_m_s",
-    "climb_demand_m_s",
+    "climb_setpoint_m_s",
 )
 
 
-#: Smallest step, m: several times the noise of a height.
+#: Smallest step, m: several times the noise of the height.
 LEAST_STEP = 0.02
 
 
 @runtime_checkable
-class TellsAll(Protocol):
-    """A vehicle that hands on each of its messages, not only the newest."""
+class PassesMessages(Protocol):
+    """A vehicle that passes on every message, not only the newest."""
 
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
-        """Call `listener` with each message from now on; None: no longer."""
+        """Register `listener` for every message; None removes it."""
 
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """What is to be flown.
+    """The plan of a flight experiment.
 
     Attributes
     ----------
     gains : tuple of float
-        Proportional gains to learn from, 1/s, a flight each.
+        Proportional gains of the first flights, 1/s, one flight each.
     step : float
-        m.
+        Size of the steps, m.
     base : float
-        Height from which the steps go up, m.
+        Height before the steps, m.
     settle, hold : float
         Time at the base before the first step, and on each step, s.
     checked_hold : float
-        Time on each step when what was designed is flown, s.
+        Time on each step of the flights with designed gains, s.
     sample_time : float
-        s.
+        Time between two commands, s.
     limits : Limits
-        Of every flight.
+        Limits of every flight.
     prior_delay, prior_gain : float
-        What delay (s, lags included) and gain are believed to be: they bound `gains`.
+        Assumed delay (s, lags included) and gain of the vehicle, which bound `gains`.
     gain_margin : float
-        Least gain margin of what is designed.
+        Least gain margin of the designed gains.
 
     Examples
     --------
@@ -86,7 +86,8 @@ class FlightPlan:
     4
     >>> FlightPlan(gains=(4.0,)).check()
     Traceback (most recent call last):
-    ValueError: Kp = 4 is above 2.47, half of what is stable with a delay of 0.36 s and a gain of \
+    ValueError: Kp = 4 is above 2.47, half of the stability limit with a delay of 0.36 s and a gain
+    of \
 0.885: fly a smaller gain
     """
 
@@ -103,18 +104,18 @@ class FlightPlan:
     gain_margin: float = 2.5
 
     def programme(self, hold: float) -> StepProgramme:
-        """At the base, a step up, a step down."""
+        """The references: at the base, a step up, a step down."""
         heights = (self.base, self.base + self.step, self.base)
         return StepProgramme(heights, (self.settle, hold, hold), self.sample_time)
 
     @property
     def flights(self) -> int:
-        """How many there are: one for each gain, then the best P, then PV."""
+        """Number of flights: one for each gain, then the best P, then PV."""
         return len(self.gains) + 2
 
     @property
     def duration(self) -> float:
-        """Time under control in all flights, s; taking off and landing come on top."""
+        """Time under control in all flights, s, without take-off and landing."""
         learning = len(self.gains) * self.programme(self.hold).duration
         return learning + 2.0 * self.programme(self.checked_hold).duration
 
@@ -124,14 +125,14 @@ class FlightPlan:
         Raises
         ------
         ValueError
-            For no or too large a gain, a step that is too small to be seen, or a programme that
-            the limits would end.
+            For no gain, a gain that is too large, a step below the noise, or a programme that
+            would exceed the limits.
         """
         if not self.gains:
             raise ValueError("no gains to fly: give at least one")
         if positive("step", self.step) < LEAST_STEP:
             raise ValueError(
-                f"step={self.step:g} m is lost in the noise of a height: fly {LEAST_STEP:g} m or "
+                f"step={self.step:g} m is within the noise of the height: fly {LEAST_STEP:g} m or "
                 "more"
             )
         for Kp in self.gains:
@@ -154,26 +155,27 @@ def fly_experiment(
     folder: Path,
     progress: Callable[[str], None] = lambda stage: None,
     run: Callable[[Coroutine[Any, Any, list[FlownSteps]]], list[FlownSteps]] = asyncio.run,
-    warn: Callable[[str], None] = lambda doubt: None,
+    warn: Callable[[str], None] = lambda warning: None,
 ) -> FlightStudy:
-    """Fly the plan.
+    """Fly a plan: the given gains, then gains designed for the estimated delay.
 
     Parameters
     ----------
     connect : callable
-        Makes an asynchronous context manager whose value is a connected vehicle, and that lands it.
+        Returns an asynchronous context manager whose value is a connected vehicle, and that lands
+        it on exit.
     plan : FlightPlan
-        What to fly.
+        The plan.
     folder : Path
-        Recordings are saved there as they come.
+        Folder for the recordings, which are written during the flights.
     progress : callable
         Called with the name of each stage as it begins: one for each flight, and two between.
     run : callable
         Runs a coroutine to its end: `asyncio.run`, or `deadtime.links.run` in virtual time. It is
-        called once to learn and once to check.
+        called once before the design and once after it.
     warn : callable
-        Called with what is to be said of the gains before they are flown, if the fit that they were
-        designed from is not adequate.
+        Called with a warning before the designed gains are flown, if the fit on which they are
+        based is not adequate.
 
     Returns
     -------
@@ -190,7 +192,7 @@ def fly_experiment(
     LinkError
         If the link cannot be made or is lost.
     NotIdentifiableError
-        If the flights do not tell the delay.
+        If the flights do not determine the delay.
     """
     plan.check()
     _check_folder(folder)
@@ -198,18 +200,18 @@ def fly_experiment(
     flown = run(fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
     progress("estimating the delay")
     learned = learn(flown, plan.limits.max_climb, plan.step, plan.gain_margin, progress)
-    for doubt in learned.doubts():
-        warn(doubt)
-    # The best P first: if it does not fly as it should, PV had better not be tried.
-    made = [design.loop.controller for design in (learned.proportional, learned.designed)]
-    designed = [one for one in made if isinstance(one, (P, PV))]
+    for warning in learned.warnings():
+        warn(warning)
+    # The best P first: if it does not perform as designed, PV should not be tried.
+    controllers = [design.loop.controller for design in (learned.proportional, learned.designed)]
+    designed = [one for one in controllers if isinstance(one, (P, PV))]
     hold = plan.checked_hold
     checked = run(fly_all(connect, designed, plan, hold, folder, len(flown) + 1, progress))
     return FlightStudy(plan.step, plan.limits.max_climb, learned, tuple(checked))
 
 
 def _check_folder(folder: Path) -> None:
-    """Refuse a folder that no file can be made in, before anything is in the air."""
+    """Refuse a folder that cannot be written to, before the first take-off."""
     if not folder.exists():
         folder.mkdir(parents=True)
     try:
@@ -228,16 +230,16 @@ async def fly_all(
     number: int,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> list[FlownSteps]:
-    """One flight under each controller, over one link; `number` is that of the first."""
+    """Make one flight under each controller over one link; `number` is that of the first."""
     flown = []
-    # The journals are closed last: however slow the disk is, the vehicle is down by then.
+    # The journals are closed last, so that a slow disk does not keep the vehicle in the air.
     with ExitStack() as journals:
         async with connect() as vehicle:
             for place, controller in enumerate(controllers, number):
                 progress(f"flight {place} of {plan.flights}: {named(controller)}")
                 path = folder / f"flight-{place}-{type(controller).__name__}.csv"
-                told = await _fly_one(vehicle, controller, plan, hold, path, journals)
-                flown.append((controller, path, told))
+                messages = await _fly_one(vehicle, controller, plan, hold, path, journals)
+                flown.append((controller, path, messages))
     return [
         FlownSteps(
             controller,
@@ -249,11 +251,11 @@ async def fly_all(
                 command="command_m_s",
             ),
             path,
-            told,
+            messages,
             plan.sample_time,
             plan.settle,
         )
-        for controller, path, told in flown
+        for controller, path, messages in flown
     ]
 
 
@@ -265,27 +267,27 @@ async def _fly_one(
     path: Path,
     journals: ExitStack,
 ) -> Path | None:
-    """One flight, from taking off to landing; the file of its messages, if there is one."""
+    """Make one flight from take-off to landing; return the file of its messages, if any."""
     smoothing = getattr(controller, "filter", None) or PAPER_FILTER
     control = HeightControl(controller, plan.sample_time, smoothing)
     await vehicle.take_off()
     begin = now()
     journal = journals.enter_context(Journal(path, ROW))
-    told = None
-    if isinstance(vehicle, TellsAll):
-        told = path.with_suffix(".messages.csv")
-        _keep_messages(vehicle, journals.enter_context(Journal(told, MESSAGE)), begin)
+    messages = None
+    if isinstance(vehicle, PassesMessages):
+        messages = path.with_suffix(".messages.csv")
+        _keep_messages(vehicle, journals.enter_context(Journal(messages, MESSAGE)), begin)
     try:
         await fly_steps(vehicle, control, plan.programme(hold), plan.limits, journal, begin)
     finally:
-        if isinstance(vehicle, TellsAll):
+        if isinstance(vehicle, PassesMessages):
             vehicle.listen(None)
     await vehicle.land()
-    return told
+    return messages
 
 
-def _keep_messages(vehicle: TellsAll, journal: Journal, begin: float) -> None:
-    """Save every message that comes from now on."""
+def _keep_messages(vehicle: PassesMessages, journal: Journal, begin: float) -> None:
+    """Save every further message."""
 
     def save(state: VehicleState) -> None:
         journal.write(
@@ -295,7 +297,7 @@ def _keep_messages(vehicle: TellsAll, journal: Journal, begin: float) -> None:
                 state.sequence,
                 state.height,
                 state.climb,
-                state.climb_demand,
+                state.climb_setpoint,
             )
         )
 

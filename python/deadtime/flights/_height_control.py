@@ -1,4 +1,4 @@
-"""P and PV control of a height, one sample after the other, as it runs beside a vehicle."""
+"""P and PV control of a height, sample by sample, during a flight."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Velocity:
     Parameters
     ----------
     smoothing : DerivativeFilter
-        Its corner and damping.
+        Corner frequency and damping.
     sample_time : float
         s.
 
@@ -36,17 +36,17 @@ class Velocity:
         self._state: np.ndarray | None = None
 
     def next(self, height: float) -> float:
-        """The speed at the next sample, m/s; 0 at the first, which is taken to be at rest."""
-        rule = self._filter
+        """The speed at the next sample, m/s; 0 at the first, where rest is assumed."""
+        discrete = self._filter
         if self._state is None:
-            self._state = np.linalg.solve(np.eye(2) - rule.F, rule.G) * height
-        speed = float(rule.C @ self._state + rule.D * height)
-        self._state = rule.F @ self._state + rule.G * height
+            self._state = np.linalg.solve(np.eye(2) - discrete.F, discrete.G) * height
+        speed = float(discrete.C @ self._state + discrete.D * height)
+        self._state = discrete.F @ self._state + discrete.G * height
         return speed
 
 
 class HeightControl:
-    """What a P or PV controller commands at each sample, before any limit.
+    """The command of a P or PV controller at each sample, before any limit.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class HeightControl:
     sample_time : float
         s.
     smoothing : DerivativeFilter
-        Of the speed where the vehicle reports none.
+        Filter of the speed where the vehicle reports none.
 
     Examples
     --------
@@ -72,26 +72,26 @@ class HeightControl:
         smoothing: DerivativeFilter = PAPER_FILTER,
     ) -> None:
         if not isinstance(controller, (P, PV)):
-            raise TypeError(f"controller={controller!r}: a height is flown by P or PV")
+            raise TypeError(f"controller={controller!r}: give a P or PV controller")
         self.controller = controller
         self.sample_time = sample_time
         self._velocity = Velocity(smoothing, sample_time)
 
     def command(self, reference: float, height: float, climb: float | None) -> float:
-        """The vertical speed to ask for, m/s.
+        """The commanded vertical speed, m/s.
 
         Parameters
         ----------
         reference, height : float
             m.
         climb : float or None
-            Vertical speed as the vehicle reports it, m/s; None: taken from the heights.
+            Vertical speed reported by the vehicle, m/s; None to derive it from the heights.
         """
-        # The filter sees every height, so that it is in swing whenever a report is missing.
+        # The filter gets every height, so that its state is right whenever a report is missing.
         speed = self._velocity.next(height)
         if climb is not None:
             speed = climb
-        wanted = self.controller.Kp * (reference - height)
+        command = self.controller.Kp * (reference - height)
         if isinstance(self.controller, PV):
-            wanted -= self.controller.Kv * speed
-        return wanted
+            command -= self.controller.Kv * speed
+        return command

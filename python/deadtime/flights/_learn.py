@@ -1,4 +1,4 @@
-"""What flights under P control tell: the delay, its parts, and gains for it."""
+"""Estimate the delay and its parts from flights under P control, and design gains for it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from deadtime.tuning import Design, design
 
 __all__ = ["COLUMNS", "FlightStudy", "Learned", "learn"]
 
-#: Heads of the columns that `FlightStudy.rows` fills.
+#: Headings of the columns of `FlightStudy.rows`.
 COLUMNS = (
     "flight",
     "overshoot / %",
@@ -31,24 +31,24 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Learned:
-    """What was learnt from flights under P control.
+    """Results of flights under P control: estimates, and gains designed for them.
 
     Attributes
     ----------
     flights : tuple of FlownSteps
         The flights.
     overshoot : tuple of DelayEstimate or str
-        The delay of each by the paper's overshoot method, or why it has none.
+        The delay of each by the paper's overshoot method, or the reason why it gives none.
     fit : DelayEstimate
         Delay, gain and lag of all flights together, from the commands as they were sent.
     split : DelaySplit or None
-        Transport and the vehicle's own part, if the vehicle tells what that takes.
+        The parts of the link and of the vehicle, if the vehicle reports what this takes.
     unsplit : str
         Why there is no `split`; empty where there is one.
     designed : Design
         PV gains for the interval of the delay.
     proportional : Design
-        The best P gain under the same demands.
+        The best P gain under the same specifications.
     """
 
     flights: tuple[FlownSteps, ...]
@@ -59,32 +59,32 @@ class Learned:
     designed: Design
     proportional: Design
 
-    def doubts(self) -> list[str]:
-        """What is to be said of the gains if the fit does not explain the flights."""
+    def warnings(self) -> list[str]:
+        """Warnings about the gains if the fit does not explain the flights."""
         if self.fit.adequate:
             return []
         return [
-            "The fit is not adequate (adequate=False): what it leaves of the flights is more than "
-            "noise of the sensor, for example wind. Its intervals are an indication, and may be "
-            "too narrow; the gains were designed for them, so their margin is not assured. Fly "
-            "such gains with room around, and learn again in still air."
+            "The fit is not adequate (adequate=False): its residuals are more than noise of the "
+            "sensor, for example wind. Its intervals are an indication and may be too narrow; "
+            "the gains were designed for them, so their margin is not assured. Fly such gains "
+            "only with space around the vehicle, and repeat the experiment without wind."
         ]
 
 
 @dataclass(frozen=True)
 class FlightStudy:
-    """The whole experiment.
+    """Results of the whole experiment.
 
     Attributes
     ----------
     step : float
-        m.
+        Size of the steps, m.
     max_climb : float
-        m/s.
+        Limit of the commands, m/s.
     learned : Learned
-        What the first flights told.
+        Results of the first flights.
     checked : tuple of FlownSteps
-        The flights of what was designed: the best P, then PV.
+        The flights with designed gains: the best P, then PV.
     """
 
     step: float
@@ -94,7 +94,7 @@ class FlightStudy:
 
     @property
     def before(self) -> FlownSteps:
-        """The liveliest of the flights that were learnt from."""
+        """The one of the first flights with the largest gain."""
         return max(self.learned.flights, key=lambda one: one.controller.gains["Kp"])
 
     @property
@@ -104,33 +104,33 @@ class FlightStudy:
 
     @property
     def flights(self) -> tuple[FlownSteps, ...]:
-        """All of them, in the order they were flown in."""
+        """All flights, in order of time."""
         return (*self.learned.flights, *self.checked)
 
     def verdict(self) -> str:
         """The outcome in a few sentences."""
         fit = self.learned.fit
         low, high = fit.ci(0.95, "delay+lag")
-        said = [
-            f"The loop is {fit.delay_plus_lag:.3f} s late, between {low:.3f} and {high:.3f} s with "
-            f"95 % confidence: a delay of {fit.delay:.3f} s and a lag of {fit.lag or 0.0:.3f} s, "
-            f"at a gain of {fit.gain or 0.0:.3f}."
+        sentences = [
+            f"The delay of the loop, lag included, is {fit.delay_plus_lag:.3f} s, between "
+            f"{low:.3f} and {high:.3f} s with 95 % confidence: a delay of {fit.delay:.3f} s and a "
+            f"lag of {fit.lag or 0.0:.3f} s, at a gain of {fit.gain or 0.0:.3f}."
         ]
         split = self.learned.split
         if split is not None:
-            said.append(
-                f"By the vehicle's own word the link takes {split.transport.delay:.3f} s of it and "
-                f"the vehicle {split.vehicle_lateness:.3f} s."
+            sentences.append(
+                f"According to the vehicle's reports, {split.transport.delay:.3f} s of it is the "
+                f"link and {split.vehicle_delay:.3f} s the vehicle."
             )
         before, after = self.before, self.after
-        said.append(
+        sentences.append(
             f"A step {_did(before)} under {before.name}, and {_did(after)} under {after.name}."
         )
-        said += self.learned.doubts()
-        return " ".join(said)
+        sentences += self.learned.warnings()
+        return " ".join(sentences)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """A line for each flight, under the heads `COLUMNS`."""
+        """A row for each flight, with the headings `COLUMNS`."""
         found: list[tuple[str, ...]] = []
         methods = [*self.learned.overshoot, *([""] * len(self.checked))]
         for flight, paper in zip(self.flights, methods, strict=True):
@@ -150,7 +150,7 @@ class FlightStudy:
         return found
 
     def parts(self) -> list[tuple[str, ...]]:
-        """What the delay consists of: a name, a value and a 95 % interval, s, for each line."""
+        """The parts of the delay: a name, a value and a 95 % interval, s, for each row."""
         fit, split = self.learned.fit, self.learned.split
         lines: list[tuple[str, ...]] = [
             _part(fit, "delay", "delay, from command and height"),
@@ -158,13 +158,13 @@ class FlightStudy:
             _part(fit, "delay+lag", "together"),
         ]
         if split is not None:
-            lines.append(_part(split.transport, "delay", "link, from the demand it echoes"))
+            lines.append(_part(split.transport, "delay", "link, from the setpoint it echoes"))
             late = "delay+time_constant" if "delay" in split.vehicle.free else "time_constant"
-            lines.append(_part(split.vehicle, late, "vehicle, from demand to climb"))
+            lines.append(_part(split.vehicle, late, "vehicle, from setpoint to climb"))
         return lines
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the recordings, as plain values for JSON."""
+        """All results but the recordings, as plain values for JSON."""
         learned = self.learned
         split = learned.split
         return {
@@ -175,7 +175,7 @@ class FlightStudy:
             ],
             "transport": None if split is None else split.transport.to_dict(),
             "vehicle": None if split is None else split.vehicle.to_dict(),
-            "vehicle_lateness": None if split is None else split.vehicle_lateness,
+            "vehicle_delay": None if split is None else split.vehicle_delay,
             "no_split_because": learned.unsplit,
             "designed": learned.designed.gains,
             "designed_p": learned.proportional.gains,
@@ -222,9 +222,9 @@ def learn(
     flights : sequence of FlownSteps
         Of one vehicle, each under a P controller.
     max_climb : float
-        What commands were limited to, m/s.
+        Limit of the commands, m/s.
     step : float
-        Size of the steps that the gains are to be good for, m.
+        Size of the steps for which the gains are designed, m.
     gain_margin : float
         Least gain margin over the intervals of delay and gain.
     progress : callable
@@ -237,7 +237,7 @@ def learn(
     Raises
     ------
     NotIdentifiableError
-        If the flights do not tell the delay.
+        If the flights do not determine the delay.
     ValueError
         If no gains meet the margin.
     """
@@ -246,8 +246,8 @@ def learn(
         for one in flights
     ]
     overshoot = tuple(_by_overshoot(one, loop) for one, loop in zip(flights, known, strict=True))
-    # From the middle of the rest before the first step: taking off is over, and what was
-    # commanded until then is known.
+    # From the middle of the rest before the first step, where the effect of take-off has decayed
+    # and the earlier commands are known.
     fit = estimate_delay(
         [one.recording for one in flights],
         known,
@@ -288,13 +288,13 @@ def _by_overshoot(flight: FlownSteps, loop: ControlLoop) -> DelayEstimate | str:
 
 
 def _split(flights: Sequence[FlownSteps]) -> tuple[DelaySplit | None, str]:
-    """The parts of the delay, or why they are not known."""
-    told = [
+    """The parts of the delay, or the reason why they are unknown."""
+    read = [
         read_telemetry(one.telemetry, one.recording) for one in flights if one.telemetry is not None
     ]
-    messages = [one for one in told if one is not None]
+    messages = [one for one in read if one is not None]
     if not messages or len(messages) < len(flights):
-        return None, "the vehicle does not tell what demand it follows and how fast it climbs"
+        return None, "the vehicle does not report which setpoint it follows and how fast it climbs"
     try:
         return split_delay(messages), ""
     except NotIdentifiableError as refusal:

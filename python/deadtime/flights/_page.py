@@ -1,4 +1,4 @@
-"""One self-contained page about flights: what they told of the delay, and what came of it."""
+"""The page about a flight experiment: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from deadtime._base.drawing import new_figure
 from deadtime._base.page import escaped, page, picture, table, table_row, write_page
 from deadtime.flights._learn import COLUMNS, FlightStudy
-from deadtime.flights._plots import plot_checked, plot_learned, plot_told
+from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
 
 __all__ = ["write_flight_page"]
@@ -16,7 +16,7 @@ PARTS = ("what", "s", "95 % interval")
 
 
 def write_flight_page(study: FlightStudy, path: Path, vehicle: str) -> Path:
-    """Write the page to `path` and return it; `vehicle` says what was flown, in words."""
+    """Write the page to `path` and return it; `vehicle` is its name in words."""
     return write_page(render(study, vehicle), path)
 
 
@@ -31,13 +31,13 @@ def render(study: FlightStudy, vehicle: str) -> str:
         table(COLUMNS, [table_row(row, "td", len(COLUMNS)) for row in study.rows()]),
         "<p>Settled: the mean time until a step stays within 5 %, or within three times the noise "
         "of the height where that is more. The paper's delay is read from the overshoot, with a "
-        "gain of 1 and no lag; where the overshoot says nothing there is none. Missed: samples "
-        "that the control loop left out.</p>",
+        "gain of 1 and no lag; where it does not determine one, there is none. Missed: samples "
+        "that the control loop skipped.</p>",
         "<h2>What the delay consists of</h2>",
         table(PARTS, [table_row(row, "td", len(PARTS)) for row in study.parts()]),
         f"<p>{escaped(_fitted(study))}</p>",
         _learned(study),
-        _told(study),
+        _telemetry(study),
         "<h2>The gains</h2>",
         f"<pre>{escaped(learned.designed.summary())}</pre>",
     ]
@@ -57,18 +57,21 @@ def _described(study: FlightStudy, vehicle: str) -> str:
 def _checked(study: FlightStudy) -> str:
     figure, axes = new_figure(7.5, 4.6, rows=2)
     plot_checked(axes, [study.before, *study.checked])
-    return picture("checked", figure, "The first step of each flight, heights as they arrived.")
+    return picture(
+        "checked", figure, "The first step of each flight, with the heights as received."
+    )
 
 
 def _fitted(study: FlightStudy) -> str:
     learned = study.learned
     fit = learned.fit
     words = (
-        f"The fit of all flights together leaves {1e3 * fit.rms:.1f} mm (gain {fit.gain:.3f}); "
+        f"The residuals of the fit of all flights together are {1e3 * fit.rms:.1f} mm (gain "
+        f"{fit.gain:.3f}); "
         + (
-            "what is left is white noise."
+            "they are white noise."
             if fit.adequate
-            else "what is left is not white, so the intervals are an indication and no promise."
+            else "they are not white, so the intervals are an indication only."
         )
     )
     if learned.split is None:
@@ -81,20 +84,20 @@ def _learned(study: FlightStudy) -> str:
     figure, axes = new_figure(7.5, 0.6 + 2.0 * len(flights), rows=len(flights), even=True)
     shown = [axes] if len(flights) == 1 else list(axes)
     plot_learned(shown, flights, study.learned.fit)
-    return picture("learned", figure, "The flights the delay was learnt from.")
+    return picture("learned", figure, "The flights from which the delay was estimated.")
 
 
-def _told(study: FlightStudy) -> str:
+def _telemetry(study: FlightStudy) -> str:
     flight = study.before
     if study.learned.split is None or flight.telemetry is None:
         return ""
-    told = read_telemetry(flight.telemetry, flight.recording)
-    if told is None:
+    telemetry = read_telemetry(flight.telemetry, flight.recording)
+    if telemetry is None:
         return ""
     figure, axes = new_figure(7.5, 4.2, rows=2)
-    plot_told(axes, told, flight)
+    plot_telemetry(axes, telemetry, flight)
     caption = (
-        "One step as told by the vehicle: from the command to the demand that it echoes is the "
-        "link, from there to its climb the vehicle."
+        "One step as reported by the vehicle: the link from the command to the echoed setpoint, "
+        "the vehicle from there to its climb."
     )
-    return picture("told", figure, caption)
+    return picture("telemetry", figure, caption)

@@ -1,4 +1,4 @@
-"""Pictures of flights: steps as flown, with fits over them, and the parts of the delay."""
+"""Plots of flights: the steps with the fits, and the parts of the delay."""
 
 from __future__ import annotations
 
@@ -15,54 +15,65 @@ if TYPE_CHECKING:
 
     from deadtime.estimation import DelayEstimate
 
-__all__ = ["plot_checked", "plot_learned", "plot_told"]
+__all__ = ["plot_checked", "plot_learned", "plot_telemetry"]
 
-#: How much is shown around a step, s.
+#: Plotted time before and after a step, s.
 BEFORE, AFTER = 0.5, 4.5
 
 
-def plot_learned(axes: Sequence[Axes], flights: Sequence[FlownSteps], fit: DelayEstimate) -> None:
-    """Each flight that was learnt from, the fit to its commands over it."""
-    for ax, flight, fitted in zip(axes, flights, fit.flights, strict=True):
+def plot_learned(
+    axes: Sequence[Axes], flights: Sequence[FlownSteps], fit: DelayEstimate
+) -> Sequence[Axes]:
+    """Draw each of the first flights, with the fit to its commands."""
+    for ax, flight, fitted in zip(axes, flights, fit.runs, strict=True):
         shown, window = flight.recording, fitted.recording
         ax.step(shown.time, shown.reference, where="post", label="reference", **REFERENCE)
-        ax.plot(shown.time, shown.output, label="height as flown", **DATA)
+        ax.plot(shown.time, shown.output, label="height", **DATA)
         explained = window.output - fitted.residuals
         ax.plot(window.time, explained, color=COLOURS[0], lw=1.6, label="fit to its commands")
         ax.set(title=flight.name, ylabel="height / m")
         ax.title.set_fontsize("small")
     axes[0].legend(frameon=False, fontsize="small")
     axes[-1].set_xlabel("time / s")
+    return axes
 
 
-def plot_told(axes: Sequence[Axes], told: Telemetry, flight: FlownSteps) -> None:
-    """Command, the demand that the vehicle echoes and its climb, around the first step."""
+def plot_telemetry(
+    axes: Sequence[Axes], telemetry: Telemetry, flight: FlownSteps
+) -> Sequence[Axes]:
+    """Draw the command, the echoed setpoint and the climb around the first step."""
     upper, lower = axes
     at = flight.recording.steps()[0].time
     low, high = at - BEFORE, at + 2.0
-    sent = (told.command_time >= low) & (told.command_time <= high)
-    came = (told.time >= low) & (told.time <= high)
+    sent = (telemetry.command_time >= low) & (telemetry.command_time <= high)
+    came = (telemetry.time >= low) & (telemetry.time <= high)
     upper.step(
-        told.command_time[sent] - at,
-        told.command[sent],
+        telemetry.command_time[sent] - at,
+        telemetry.command[sent],
         where="post",
         color="0.35",
         lw=1.2,
-        label="command, as sent",
+        label="command sent",
     )
-    time = told.time[came] - at
+    time = telemetry.time[came] - at
     upper.step(
-        time, told.demand[came], where="post", color=COLOURS[1], lw=1.6, label="demand, as echoed"
+        time,
+        telemetry.setpoint[came],
+        where="post",
+        color=COLOURS[1],
+        lw=1.6,
+        label="echoed setpoint",
     )
-    upper.plot(time, told.climb[came], color=COLOURS[0], lw=1.0, label="climb, as reported")
+    upper.plot(time, telemetry.climb[came], color=COLOURS[0], lw=1.0, label="reported climb")
     upper.set(ylabel="vertical speed / (m/s)")
     upper.legend(frameon=False, fontsize="small")
-    lower.plot(time, told.height[came], color="0.35", lw=1.2)
+    lower.plot(time, telemetry.height[came], color="0.35", lw=1.2)
     lower.set(xlabel="time since the step / s", ylabel="height / m")
+    return axes
 
 
-def plot_checked(axes: Sequence[Axes], flights: Sequence[FlownSteps]) -> None:
-    """The first step of several flights over one another, and their commands below."""
+def plot_checked(axes: Sequence[Axes], flights: Sequence[FlownSteps]) -> Sequence[Axes]:
+    """Draw the first step of several flights, and their commands below."""
     upper, lower = axes
     for colour, flight in zip(COLOURS, flights, strict=False):
         step = flight.recording.steps()[0]
@@ -88,3 +99,4 @@ def plot_checked(axes: Sequence[Axes], flights: Sequence[FlownSteps]) -> None:
     upper.set(ylabel="height / m")
     upper.legend(frameon=False, fontsize="small", loc="lower right")
     lower.set(xlabel="time since the step / s", ylabel="command / (m/s)")
+    return axes

@@ -1,4 +1,4 @@
-"""Flights that were flown: their recordings, read back, and the figures of their steps."""
+"""Recorded flights: their recordings, telemetry, and the measures of their steps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from deadtime.recordings import Recording, Step
 __all__ = [
     "FlownSteps",
     "LoopTiming",
-    "StepFigures",
+    "StepMeasures",
     "Telemetry",
     "named",
     "read_telemetry",
@@ -26,14 +26,14 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Half width of the band a flown step settles into, as a part of it: noise of the height is no
-#: small part of the 2 % that are usual on paper. And as a multiple of that noise, at least.
+#: Half width of the settling band of a flown step, as a share of the step, and its least width as a
+#: multiple of the noise of the height. The usual 2 % are close to that noise.
 BAND, NOISES = 0.05, 3.0
 
 
 @dataclass(frozen=True)
-class StepFigures:
-    """What one flown step did.
+class StepMeasures:
+    """Measures of one flown step.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class LoopTiming:
     longest : float
         The longest.
     missed : int
-        Samples that were left out.
+        Samples that were skipped.
     """
 
     period: float
@@ -81,14 +81,14 @@ class Telemetry:
     ----------
     time : ndarray, shape (n,)
         Arrival of each message since the first sample of the controller, s.
-    demand, climb, height : ndarray, shape (n,)
+    setpoint, climb, height : ndarray, shape (n,)
         Vertical speed that the vehicle follows, its vertical speed (m/s), and height (m).
     command_time, command : ndarray, shape (m,)
-        When each command was given, s, and what it was, m/s.
+        Time of each command, s, and its value, m/s.
     """
 
     time: Array
-    demand: Array
+    setpoint: Array
     climb: Array
     height: Array
     command_time: Array
@@ -102,15 +102,15 @@ class FlownSteps:
     Attributes
     ----------
     controller : P or PV
-        What flew it.
+        The controller of the flight.
     recording : Recording
         Reference, height and command of each sample, read back from `path`.
     path : Path
         The file.
     telemetry : Path or None
-        File with every message of the vehicle, if it tells all.
+        File with every message of the vehicle, if it passes them on.
     sample_time : float
-        What it should have been, s.
+        Intended time between two samples, s.
     settle : float
         Time from the first sample to the first step, s.
     """
@@ -128,13 +128,13 @@ class FlownSteps:
         return named(self.controller)
 
     @cached_property
-    def steps(self) -> list[StepFigures]:
-        """Figures of every step."""
+    def steps(self) -> list[StepMeasures]:
+        """Measures of every step."""
         steps = self.recording.steps()
         ends = [step.index for step in steps[1:]] + [len(self.recording)]
-        return [self._figures(step, end) for step, end in zip(steps, ends, strict=True)]
+        return [self._measures(step, end) for step, end in zip(steps, ends, strict=True)]
 
-    def _figures(self, step: Step, end: int) -> StepFigures:
+    def _measures(self, step: Step, end: int) -> StepMeasures:
         height = self.recording.output[step.index : end]
         beyond = (height - step.after) / step.amplitude
         band = max(BAND, NOISES * self.noise / abs(step.amplitude))
@@ -143,11 +143,11 @@ class FlownSteps:
         if outside.size:
             last = step.index + int(outside[-1]) + 1
             settling = np.nan if last >= end else float(self.recording.time[last] - step.time)
-        return StepFigures(step, 100.0 * max(0.0, float(beyond.max())), settling)
+        return StepMeasures(step, 100.0 * max(0.0, float(beyond.max())), settling)
 
     @cached_property
     def noise(self) -> float:
-        """Standard deviation of the height's noise, m: of what no motion explains.
+        """Standard deviation of the height's noise, m: without the motion.
 
         From its second differences, to which motion adds little but around steps, by their median.
         """
@@ -189,16 +189,16 @@ def named(controller: P | PV) -> str:
 
 
 def read_telemetry(path: Path, recording: Recording) -> Telemetry | None:
-    """Every message of a flight, or None where the vehicle does not tell demand and climb.
+    """Every message of a flight, or None where the vehicle does not report setpoint and climb.
 
     Parameters
     ----------
     path : Path
-        As it was saved.
+        The saved messages.
     recording : Recording
-        The samples of the same flight, which tell the commands.
+        The recording of the same flight, which holds the commands.
     """
-    names = ("time_s", "climb_demand_m_s", "climb_m_s", "height_m")
+    names = ("time_s", "climb_setpoint_m_s", "climb_m_s", "height_m")
     with path.open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     cells = [[row[name] for name in names] for row in rows]
@@ -212,7 +212,9 @@ def read_telemetry(path: Path, recording: Recording) -> Telemetry | None:
 def telemetry_of(
     columns: Sequence[Array] | Array, command_time: Array, command: Array
 ) -> Telemetry:
-    """Columns of time, demand, climb and height without messages of the same instant."""
-    time, demand, climb, height = columns
+    """Columns of time, setpoint, climb and height without messages of the same instant."""
+    time, setpoint, climb, height = columns
     later = np.append(np.diff(time) > 0.0, True)
-    return Telemetry(time[later], demand[later], climb[later], height[later], command_time, command)
+    return Telemetry(
+        time[later], setpoint[later], climb[later], height[later], command_time, command
+    )

@@ -1,14 +1,14 @@
-"""Which part of the delay is the link, and which the vehicle, from what the vehicle tells.
+"""Divide the delay between link and vehicle, from the reports of the vehicle.
 
-A ground station's log cannot divide its loop's delay. A vehicle that echoes the demand it is
-following, and reports its vertical speed, divides it:
+The log of a ground station does not determine where in the loop the delay is. The reports of a
+vehicle that echoes its setpoint and its vertical speed do:
 
-    command --(transport)--> demand, as reported --(the vehicle's own loop)--> climb, as reported.
+    command --(transport)--> setpoint, as reported --(the vehicle's own loop)--> climb, as reported.
 
-The demand is a late copy of the command. Its integral over time is that of the late command, so
-that it is fitted as the output of an integrator behind a delay, in which the delay is found between
-the samples. The climb answers the demand as a first-order lag, with a delay of its own if need be.
-Both reports travel alike, so the way back counts to the transport.
+The setpoint is a delayed copy of the command. Its integral is that of the delayed command,
+so it is fitted as the output of an integrator behind a delay, and the delay is found between the
+samples. The climb follows the setpoint as a first-order lag, with a delay of its own where it needs
+one. Both reports take the same way back, whose delay counts to the transport.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ __all__ = ["DelaySplit", "split_delay"]
 
 Array = NDArray[np.float64]
 
-#: Messages are taken at this distance, s, if nothing happens: more of them know no more of a delay.
+#: Time between used messages, s, while the setpoint is constant: more of them hold no more
+#: information on the delay.
 SPARSE = 0.02
 
-#: Where the search for the vehicle's lag begins, s.
+#: Initial value of the search for the lag of the vehicle, s.
 GUESS = 0.2
 
 
@@ -42,18 +43,18 @@ class DelaySplit:
     Attributes
     ----------
     transport : DelayEstimate
-        From the command to the demand that the vehicle reports: its ``delay``, and a gain that is
-        1 if vehicle and ground station mean the same by a command.
+        From the command to the setpoint that the vehicle reports: its ``delay``, and a gain that is
+        1 if vehicle and ground station agree on the unit of a command.
     vehicle : DelayEstimate
-        From the demand to the climb: ``gain`` and ``time_constant``, and ``delay`` where there is
-        one; then the sum ``delay+time_constant`` is known best.
+        From the setpoint to the climb: ``gain`` and ``time_constant``, and ``delay`` where there is
+        one; then the sum ``delay+time_constant`` is the most accurate.
     """
 
     transport: DelayEstimate
     vehicle: DelayEstimate
 
     @property
-    def vehicle_lateness(self) -> float:
+    def vehicle_delay(self) -> float:
         """Delay and time constant of the vehicle together, s."""
         return self.vehicle.delay + self.vehicle.loop.parameters["time_constant"]
 
@@ -73,9 +74,9 @@ def split_delay(flights: Sequence[Telemetry]) -> DelaySplit:
     Raises
     ------
     NotIdentifiableError
-        If demand or climb do not answer what comes before them.
+        If the setpoint does not respond to the command, or the climb to the setpoint.
     """
-    # An open path: the controller is not in it, and a sample time says that commands are held.
+    # The controller is not part of this path; the sample time makes the commands held.
     link = ControlLoop(Integrator(), P(1.0), sample_time=_period(flights[0].command_time))
     transport = estimate_delay(
         [_followed(one) for one in flights], link, method="output_error", free=("delay", "gain")
@@ -85,7 +86,7 @@ def split_delay(flights: Sequence[Telemetry]) -> DelaySplit:
     free = ("delay", "gain", "time_constant")
     vehicle = estimate_delay(climbed, own, method="output_error", free=free)
     if vehicle.delay == 0.0:
-        # At its bound it is no number with an interval: a lag alone explains the answer.
+        # At its bound the delay has no interval, and a lag alone explains the response.
         vehicle = estimate_delay(
             climbed, own.replace(delay=0.0), method="output_error", free=free[1:]
         )
@@ -97,13 +98,13 @@ def _period(times: Array) -> float:
 
 
 def _followed(flight: Telemetry) -> Recording:
-    """Command, and the integral of the demand, whenever one of them may change."""
+    """Command and integral of the setpoint, at the times of commands and messages."""
     times = np.union1d(flight.command_time, flight.time[_kept(flight)])
     low = max(flight.command_time[0], flight.time[0])
     high = min(flight.command_time[-1], flight.time[-1])
     times = times[(times >= low) & (times <= high)]
-    # The demand holds from message to message: its integral is straight between them.
-    steps = np.diff(flight.time) * flight.demand[:-1]
+    # The setpoint holds from message to message, so its integral is linear in between.
+    steps = np.diff(flight.time) * flight.setpoint[:-1]
     integral = np.interp(times, flight.time, np.append(0.0, np.cumsum(steps)))
     rows = np.searchsorted(flight.command_time, times, side="right") - 1
     command = flight.command[rows]
@@ -111,15 +112,15 @@ def _followed(flight: Telemetry) -> Recording:
 
 
 def _climbed(flight: Telemetry) -> Recording:
-    """Demand and climb at every message at which the demand changes, and some between."""
+    """Setpoint and climb at the used messages."""
     rows = _kept(flight)
-    demand = flight.demand[rows]
-    return Recording(flight.time[rows], demand, flight.climb[rows], demand, source="vehicle")
+    setpoint = flight.setpoint[rows]
+    return Recording(flight.time[rows], setpoint, flight.climb[rows], setpoint, source="vehicle")
 
 
 def _kept(flight: Telemetry) -> NDArray[np.bool_]:
-    """Messages that bring a new demand, and of the others one every so often."""
-    changed = np.append(True, np.diff(flight.demand) != 0.0)
+    """The used messages: those with a new setpoint, and one every `SPARSE` seconds."""
+    changed = np.append(True, np.diff(flight.setpoint) != 0.0)
     slots = np.floor(flight.time / SPARSE)
     spaced = np.append(True, np.diff(slots) > 0.0)
     kept: NDArray[np.bool_] = changed | spaced

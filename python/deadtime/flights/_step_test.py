@@ -1,4 +1,4 @@
-"""Altitude steps on a vehicle in the air: one command a sample, every row saved as it comes."""
+"""Altitude steps with a vehicle in the air: one command and one saved row for each sample."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROW = (
     "height_m",
     "command_m_s",
     "climb_m_s",
-    "climb_demand_m_s",
+    "climb_setpoint_m_s",
     "vehicle_time_s",
     "sequence",
     "age_s",
@@ -34,23 +34,23 @@ ROW = (
     "battery_percent",
 )
 
-#: A stable loop never errs by more than the step it was given; beyond this much of it and of the
-#: room for disturbances, m, the error is growing.
-GROWTH, ROOM = 1.5, 0.1
+#: The error of a stable loop does not exceed the step: a flight ends where the error exceeds the
+#: step times this factor, plus this margin for disturbances, m.
+GROWTH, MARGIN = 1.5, 0.1
 
 
 @dataclass(frozen=True)
 class StepProgramme:
-    """References to hold one after the other.
+    """A sequence of heights, each held for a time.
 
     Attributes
     ----------
     heights : tuple of float
-        m.
+        The reference heights, m.
     holds : tuple of float
-        How long each is held, s.
+        Time for which each is held, s.
     sample_time : float
-        s.
+        Time between two commands, s.
 
     Examples
     --------
@@ -76,12 +76,12 @@ class StepProgramme:
 
     @property
     def duration(self) -> float:
-        """How long it takes, s."""
+        """Duration of the sequence, s."""
         return sum(self.holds)
 
     @property
     def samples(self) -> int:
-        """How many commands are given."""
+        """Number of commands."""
         return math.ceil(self.duration / self.sample_time - 1e-9)
 
     @property
@@ -90,7 +90,7 @@ class StepProgramme:
         return max((abs(b - a) for a, b in itertools.pairwise(self.heights)), default=0.0)
 
     def reference(self, time: float) -> float:
-        """The reference at a time since the beginning, m."""
+        """The reference at a time after the beginning, m."""
         until = 0.0
         for height, hold in zip(self.heights, self.holds, strict=True):
             until += hold
@@ -99,24 +99,24 @@ class StepProgramme:
         return self.heights[-1]
 
     def check(self, limits: Limits) -> None:
-        """Refuse what the limits would end.
+        """Refuse a sequence that would exceed the limits.
 
         Raises
         ------
         ValueError
-            If a height is outside, or so close to a limit that an overshoot of the whole step would
-            be; if a step alone is an error that ends a flight; or if a command would be too old
-            before the next.
+            If a height is outside the limits, or would be with an overshoot of a whole step; if
+            a step alone exceeds the largest error; or if a command would be too old before the
+            next one.
         """
-        if self.largest_step + ROOM > limits.max_error:
+        if self.largest_step + MARGIN > limits.max_error:
             raise ValueError(
-                f"a step of {self.largest_step:g} m is an error that ends a flight, at "
-                f"{limits.max_error:g} m: fly steps of {limits.max_error - ROOM:g} m or less"
+                f"a step of {self.largest_step:g} m exceeds the error that ends a flight, "
+                f"{limits.max_error:g} m: fly steps of {limits.max_error - MARGIN:g} m or less"
             )
         if self.sample_time >= limits.command_age:
             raise ValueError(
-                f"sample_time={self.sample_time:g} s is no less than the {limits.command_age:g} s "
-                "that a command is good for: command more often"
+                f"sample_time={self.sample_time:g} s is not below the {limits.command_age:g} s "
+                "for which a command is valid: use a shorter sample time"
             )
         for height in self.heights:
             for end in (height - self.largest_step, height + self.largest_step):
@@ -129,14 +129,14 @@ class StepProgramme:
 
 
 def check_gain(Kp: float, delay: float, gain: float) -> None:
-    """Refuse a gain that may be unstable, as far as is known before a flight.
+    """Refuse a gain that may be unstable with the assumed delay and gain of the vehicle.
 
     Parameters
     ----------
     Kp : float
         Proportional gain, 1/s.
     delay, gain : float
-        What delay (s) and gain of the vehicle are believed to be.
+        Assumed delay (s) and gain of the vehicle.
 
     Raises
     ------
@@ -146,8 +146,8 @@ def check_gain(Kp: float, delay: float, gain: float) -> None:
     most = largest_gain(delay, gain)
     if not 0.0 < positive("Kp", Kp) <= most:
         raise ValueError(
-            f"Kp = {Kp:g} is above {most:.3g}, half of what is stable with a delay of {delay:g} s "
-            f"and a gain of {gain:g}: fly a smaller gain"
+            f"Kp = {Kp:g} is above {most:.3g}, half of the stability limit with a delay of "
+            f"{delay:g} s and a gain of {gain:g}: fly a smaller gain"
         )
 
 
@@ -164,43 +164,46 @@ async def fly_steps(
     Parameters
     ----------
     vehicle : Vehicle
-        In the air.
+        A vehicle in the air.
     control : HeightControl
-        Makes the commands; its sample time is that of the programme.
+        Computes the commands; its sample time is that of the programme.
     programme : StepProgramme
-        The references.
+        The reference heights.
     limits : Limits
-        What ends the flight, the growth of the error included.
+        Limits of the flight; the error is limited further, to 1.5 times the step plus 0.1 m.
     journal : Journal
-        Takes a row of `ROW` for each sample.
+        Receives a row of `ROW` for each sample.
     begin : float, optional
         Time of the first sample, s of `deadtime.links.now`; now if not given.
 
     Raises
     ------
     FlightAbortedError
-        If a rule is broken; the vehicle hovers, and whoever holds it lands it.
+        If a limit is exceeded; the vehicle hovers, and the caller has to land it.
     LinkError
         If the link is lost.
     """
     begin = now() if begin is None else begin
     first = await vehicle.state()
     base = programme.heights[0]
-    way = abs(first.height - base)
-    if way + ROOM > limits.max_error:
+    distance = abs(first.height - base)
+    if distance + MARGIN > limits.max_error:
         raise FlightAbortedError(
-            f"the vehicle hovers at {first.height:.2f} m: the way to the first reference, "
-            f"{base:g} m, is an error that ends a flight, at {limits.max_error:g} m: begin closer"
+            f"the vehicle hovers at {first.height:.2f} m: the distance to the first "
+            f"reference, {base:g} m, exceeds the error that ends a flight, {limits.max_error:g} m: "
+            "begin closer to it"
         )
-    largest = max(programme.largest_step, way)
-    watch = Watch(replace(limits, max_error=min(limits.max_error, GROWTH * largest + ROOM)))
+    largest = max(programme.largest_step, distance)
+    watch = Watch(replace(limits, max_error=min(limits.max_error, GROWTH * largest + MARGIN)))
     sample = 0
     try:
         while sample < programme.samples:
             await asyncio.sleep(max(0.0, begin + sample * programme.sample_time - now()))
             state = await vehicle.state()
             if not state.flying:
-                raise FlightAbortedError("the vehicle no longer flies, without having been told so")
+                raise FlightAbortedError(
+                    "the vehicle no longer flies, although it was not told to land"
+                )
             time = now()
             reference = programme.reference(sample * programme.sample_time)
             watch.check(state, time, reference)
@@ -212,7 +215,7 @@ async def fly_steps(
                     state.height,
                     command,
                     state.climb,
-                    state.climb_demand,
+                    state.climb_setpoint,
                     state.vehicle_time,
                     state.sequence,
                     time - state.time,
@@ -221,12 +224,11 @@ async def fly_steps(
                     state.battery,
                 )
             )
-            # A sample that was missed is left out, not made up for: two commands at once would
-            # shorten the hold of the first.
+            # A missed sample is skipped: a late command would shorten the hold before the next.
             passed = math.floor((time - begin) / programme.sample_time + 1e-9)
             sample = max(sample, passed) + 1
     except BaseException:
-        with suppress(LinkError):  # what ended the flight is said, not that it cannot hover
+        with suppress(LinkError):  # report the reason of the end, not that the vehicle cannot hover
             vehicle.hover()
         raise
     vehicle.hover()

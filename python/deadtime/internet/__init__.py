@@ -1,4 +1,4 @@
-"""The integrator that is controlled over the Internet: run, replay, estimate."""
+"""An integrator controlled over the Internet: runs, estimates of the delay, replayed steps."""
 
 from deadtime.internet._loop import run_internet_loop
 from deadtime.internet._result import InternetLoop, InternetRun, Spread

@@ -1,4 +1,4 @@
-"""The paper's Internet loop from end to end: run it for several gains, estimate, compare."""
+"""`run_internet_loop`: run the paper's Internet loop for several gains and estimate its delay."""
 
 from __future__ import annotations
 
@@ -15,7 +15,14 @@ import numpy as np
 
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.validation import positive
-from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.estimation import (
+    DelayEstimate,
+    Method,
+    OutputError,
+    Overshoot,
+    Waveform,
+    estimate_delay,
+)
 from deadtime.internet._replay import age_error, answer_times, replayed_errors
 from deadtime.internet._result import METHODS, InternetLoop, InternetRun
 from deadtime.links import virtual_time
@@ -25,10 +32,10 @@ from deadtime.recordings import Recording, read_recording
 
 __all__ = ["GAINS", "run_internet_loop"]
 
-#: The gains of the paper's Table 1 with an overshoot.
+#: The gains of the paper's Table 1 whose step responses overshoot, 1/s.
 GAINS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0)
 
-#: Steps that are replayed for each gain.
+#: Replayed steps for each gain: more make the intervals more accurate and take longer.
 REPLAYS = 200
 
 Mode = Literal["virtual", "real", "processes"]
@@ -43,13 +50,13 @@ def run_internet_loop(
     methods: Sequence[str] = tuple(METHODS),
     progress: Callable[[str], None] = lambda stage: None,
 ) -> InternetLoop:
-    """Run the loop once for each gain, and estimate its delay from every run.
+    """Run the loop once for each gain, and estimate the delay from every run.
 
     Parameters
     ----------
     trial : Trial
-        The loop and its network; the gain is replaced. Each run has a seed of its own, counted
-        on from that of the trial.
+        The loop and its network; the gain is replaced. Each run has its own seed, counting
+        up from that of the trial.
     gains : sequence of float
         Gains of the controller, 1/s.
     mode : str
@@ -58,7 +65,7 @@ def run_internet_loop(
     folder : Path, optional
         Where both ends write what they record.
     methods : sequence of str
-        What the delay is estimated by: ``"dominant"`` (the paper's overshoot), ``"exact"``,
+        How the delay is estimated: ``"dominant"`` (the paper's overshoot), ``"exact"``,
         ``"waveform"``, ``"output_error"``.
     progress : callable, optional
         Called with the name of each stage as it begins.
@@ -89,8 +96,10 @@ def run_internet_loop(
         raise ValueError(f"methods {sorted(unknown)} are none of {', '.join(METHODS)}")
     stems = [f"{index + 1:02d}-gain-{one.gain:g}-" for index, one in enumerate(trials)]
     for file in [] if folder is None else [folder / f"{a}{b}.csv" for a in stems for b in ENDS]:
-        if file.exists():  # said before the first of them runs
-            raise FileExistsError(EEXIST, "there already; choose another folder", str(file))
+        if file.exists():  # refused before the first run
+            raise FileExistsError(
+                EEXIST, "the file exists already; choose another folder", str(file)
+            )
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     runs = []
@@ -116,7 +125,7 @@ def run_internet_loop(
 def _run(
     trial: Trial, mode: Mode, folder: Path | None, stem: str
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Recording]]:
-    """What happened at each end, and what it recorded."""
+    """The report of each end, and its recording."""
     if mode != "processes":
         start = virtual_time.run if mode == "virtual" else asyncio.run
         report = start(run_trial(trial, folder, stem=stem))
@@ -135,7 +144,7 @@ def _run(
 def _estimate(
     trial: Trial, recordings: Mapping[str, Recording], methods: Sequence[str]
 ) -> tuple[dict[str, DelayEstimate], dict[str, str]]:
-    """The delay by every method, and why some have no answer."""
+    """The delay by every method, and the reasons of those that refused."""
     known = ControlLoop(
         Integrator(gain=trial.plant_gain),
         P(Kp=trial.gain),
@@ -145,11 +154,11 @@ def _estimate(
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
     free = ("delay", "gain") if trial.lag == 0.0 else ("delay", "gain", "lag")
-    options: dict[str, dict[str, Any]] = {
-        "dominant": {"method": "overshoot", "map": "dominant"},
-        "exact": {"method": "overshoot", "map": "exact"},
-        "waveform": {"method": "waveform", "free": free},
-        "output_error": {"method": "output_error", "free": free},
+    by_name: dict[str, Method] = {
+        "dominant": Overshoot(map="dominant"),
+        "exact": Overshoot(map="exact"),
+        "waveform": Waveform(),
+        "output_error": OutputError(),
     }
     for name in methods:
         end = "controller" if name == "output_error" else "plant"
@@ -160,18 +169,18 @@ def _estimate(
         if end == "plant":
             data = _as_sampled(data, trial.sample_time)
         try:
-            estimates[name] = estimate_delay(data, known, **options[name])
+            estimates[name] = estimate_delay(data, known, method=by_name[name], free=free)
         except DeadtimeError as error:
             refusals[name] = str(error).rstrip(".")
     return estimates, refusals
 
 
 def _as_sampled(recording: Recording, sample_time: float) -> Recording:
-    """Reference and output of the plant on the grid of times at which it was to sample.
+    """Reference and output of the plant on the intended grid of sample times.
 
-    A process wakes up a little late, by less than a sample time; the simulated loop samples
-    on the grid, and would take a step of the reference just after a sample for one before the
-    next. The mean lateness, which all rows have, stays where it was.
+    A process wakes up late by less than a sample time, but the simulated loop samples on the grid:
+    a step of the reference just after a sample would be taken for one before the next sample. The
+    mean lateness is the same for all rows and is kept.
     """
     late = recording.time - sample_time * np.round(recording.time / sample_time)
     time = recording.time - late + float(np.mean(late))

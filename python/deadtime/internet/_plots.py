@@ -1,16 +1,15 @@
-"""The picture of an Internet loop: its steps, and its delay by every method beside the measured."""
+"""Plot of an Internet loop: its steps, and its delay by every method beside the measured one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from deadtime._base.drawing import COLOURS, REFERENCE, new_figure
+from deadtime._base.drawing import COLOURS, REFERENCE
 from deadtime.internet._result import InternetLoop
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 __all__ = ["plot_internet_loop"]
 
@@ -22,8 +21,10 @@ LABELS = {
 }
 
 
-def plot_internet_loop(found: InternetLoop, printed: Mapping[float, float]) -> Figure:
-    """Steps of all runs, and beside them their delays over the gain.
+def plot_internet_loop(
+    found: InternetLoop, printed: Mapping[float, float], axes: Sequence[Axes]
+) -> Sequence[Axes]:
+    """Draw the steps of all runs, and beside them the delays over the gain.
 
     Parameters
     ----------
@@ -31,11 +32,17 @@ def plot_internet_loop(found: InternetLoop, printed: Mapping[float, float]) -> F
         The runs.
     printed : mapping of float to float
         Delays of the paper's Table 1 by gain, s.
+    axes : sequence of two matplotlib.axes.Axes
+        For the steps, and for the delays.
+
+    Returns
+    -------
+    sequence of matplotlib.axes.Axes
     """
-    figure, (left, right) = new_figure(10.0, 4.2, columns=2)
+    left, right = axes
     _steps(left, found)
     _delays(right, found, printed)
-    return figure
+    return axes
 
 
 def _steps(ax: Axes, found: InternetLoop) -> None:

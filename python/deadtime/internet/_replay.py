@@ -1,11 +1,11 @@
-"""What a step would have shown at another moment of the same network.
+"""Bootstrap of step responses: the same network, with the step at other times.
 
-The ends know when the answer to every measurement came. With these times the loop is run again,
-exactly, for a step that comes at another moment of them; what a method reads from such steps,
-less the mean age of a command, is how far it misses. This has all of what makes it miss in it: the
-few delays that a step meets, the losses that come together, the error of the method itself. It is
-a bootstrap over the moment of the step, with the network as it was measured; that the measured
-mean is itself one of few bursts is added as a normal error (`age_error`).
+The plant knows when the answer to every measurement arrived. With these times the loop is simulated
+again, exactly, for a step at another time of the same recording. The delay that a method estimates
+from such a step, minus the mean age of a command, is its error. This error includes the few random
+delays within one step, bursts of losses, and the error of the method itself. The network is the
+measured one; the uncertainty of its mean, an average of few bursts, is added as a normal error
+(`age_error`).
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ __all__ = ["MAPS", "age_error", "answer_times", "interval_of_mean", "replayed_er
 
 Array = NDArray[np.float64]
 
-#: From overshoot to K·Td, by the names of the methods that are replayed.
+#: Functions from the overshoot to K·Td, by the names of the replayed methods.
 MAPS: dict[str, Callable[[float], float]] = {"dominant": dominant_x, "exact": exact_x}
 
-#: Stretches of the measured times whose means are taken as independent.
-STRETCHES = 20
+#: Segments of the measured times whose means are taken as independent.
+SEGMENTS = 20
 
-#: Means of the runs that are drawn for an interval.
+#: Bootstrap samples for an interval.
 DRAWS = 4000
 
 
 def answer_times(arrivals: Sequence[tuple[int, float]]) -> Array:
-    """How long each measurement's answer took, s, in the order of the measurements.
+    """Time from each measurement to its answer, s, in the order of the measurements.
 
-    Infinite where none came; from the first to the last that was answered.
+    From the first to the last answered measurement; infinite where no answer came.
     """
     if not arrivals:
         return np.empty(0)
@@ -49,7 +49,7 @@ def answer_times(arrivals: Sequence[tuple[int, float]]) -> Array:
 
 
 def age_error(times: Array, sample_time: float) -> float:
-    """Standard error of the mean age over these answers, s: by how much its stretches differ."""
+    """Standard error of the mean age over these answers, s, from its means over segments."""
     samples = np.arange(times.size)
     came = np.isfinite(times)
     arrived = samples[came] + np.ceil(times[came] / sample_time - 1e-9).astype(int)
@@ -58,36 +58,36 @@ def age_error(times: Array, sample_time: float) -> float:
     np.maximum.at(newest, arrived[inside], samples[came][inside])
     newest = np.maximum.accumulate(newest)
     ages = (samples - newest)[newest >= 0] * sample_time
-    if ages.size < 2 * STRETCHES:
+    if ages.size < 2 * SEGMENTS:
         return math.nan
-    means = [float(np.mean(part)) for part in np.array_split(ages, STRETCHES)]
-    return float(np.std(means, ddof=1)) / math.sqrt(STRETCHES)
+    means = [float(np.mean(part)) for part in np.array_split(ages, SEGMENTS)]
+    return float(np.std(means, ddof=1)) / math.sqrt(SEGMENTS)
 
 
 def replayed_errors(
     trial: Trial, times: Array, age: float, count: int, seed: int = 0
 ) -> dict[str, Array]:
-    """By how much the delays of `count` replayed steps miss the mean age, s.
+    """Errors of the delays from `count` replayed steps against the mean age, s.
 
     Parameters
     ----------
     trial : Trial
         The loop.
     times : ndarray
-        When each measurement was answered, as of `answer_times`.
+        Times from `answer_times`.
     age : float
         The mean age of the measurement behind the command in force, s.
     count : int
-        Steps to replay, at moments drawn by `seed`.
+        Steps to replay, at random times drawn with `seed`.
 
     Returns
     -------
     dict of str to ndarray
-        For each of `MAPS`; steps whose overshoot says nothing are left out.
+        For each of `MAPS`, without the steps whose overshoot determines no delay.
     """
     applied = np.array([_applied(trial, one) for one in times.tolist()])
-    moments = np.random.default_rng(seed).integers(times.size, size=count)
-    overshoots = [_overshoot(trial, np.roll(applied, -int(moment))) for moment in moments]
+    shifts = np.random.default_rng(seed).integers(times.size, size=count)
+    overshoots = [_overshoot(trial, np.roll(applied, -int(shift))) for shift in shifts]
     found = {}
     for name, mapped in MAPS.items():
         errors = []
@@ -103,10 +103,10 @@ def replayed_errors(
 def interval_of_mean(
     mean: float, errors: Sequence[Array], error: float, level: float = 0.95, seed: int = 0
 ) -> tuple[float, float]:
-    """Interval of the mean age from the mean of runs that miss like these errors, one array a run.
+    """Interval of the mean age from the mean of runs with these errors, one array a run.
 
-    `error` is that of the mean age the errors are counted from, s. NaN where the errors of a run
-    are too few to say.
+    `error` is the standard error of the mean age to which the errors refer, s. NaN where a run has
+    too few errors.
     """
     outside = 0.5 * (1.0 - level)
     if not errors or min(one.size for one in errors) < 2.0 / outside or math.isnan(error):
@@ -119,7 +119,7 @@ def interval_of_mean(
 
 
 def _applied(trial: Trial, age: float) -> float:
-    """When a command of this age is applied, counted from its measurement, s."""
+    """Time from a measurement until its command of this age is applied, s."""
     if not age <= trial.watchdog:
         return math.inf
     wait = trial.policy.wait(age)
@@ -136,28 +136,28 @@ def _overshoot(trial: Trial, times: Array) -> float:
         hold, then = holds * trial.sample_time, 0.0
     under_way: list[tuple[float, int, float]] = []
     command, newest, clock, peak = 0.0, -1, 0.0, 0.0
-    let_go = math.inf
-    trips = np.resize(times, samples).tolist()
+    released = math.inf
+    delays = np.resize(times, samples).tolist()
 
     def until(now: float) -> None:
-        nonlocal clock, command, let_go
-        if let_go < now:
-            plant.advance(let_go - clock, command)
-            clock, command, let_go = let_go, then, math.inf
+        nonlocal clock, command, released
+        if released < now:
+            plant.advance(released - clock, command)
+            clock, command, released = released, then, math.inf
         plant.advance(now - clock, command)
         clock = now
 
-    for number, trip in enumerate(trips):
+    for number, delay in enumerate(delays):
         now = number * trial.sample_time
         while under_way and under_way[0][0] <= now:
             arrival, answered, value = heapq.heappop(under_way)
             until(arrival)
             if answered > newest:
-                command, newest, let_go = value, answered, arrival + hold
+                command, newest, released = value, answered, arrival + hold
         until(now)
         peak = max(peak, plant.output)
-        if math.isfinite(trip):
-            wanted = trial.gain * (1.0 - plant.output)
-            value = max(-trial.limit, min(trial.limit, wanted))
-            heapq.heappush(under_way, (now + trip, number, value))
+        if math.isfinite(delay):
+            requested = trial.gain * (1.0 - plant.output)
+            value = max(-trial.limit, min(trial.limit, requested))
+            heapq.heappush(under_way, (now + delay, number, value))
     return peak - 1.0

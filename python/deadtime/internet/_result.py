@@ -1,18 +1,18 @@
-"""What runs of the Internet loop say of its delay: measured, estimated, and why they differ.
+"""Results of runs of the Internet loop: its delay, measured and estimated.
 
 With constant delays the loop is the sampled `ControlLoop` whose delay is the round trip: it samples
-every Ts, and a command holds until the next. What the loop is late by on average is then the age of
-the measurement behind the command in force,
+every Ts, and a command holds until the next. The mean delay of the loop is then the age of the
+measurement on which the command in force is based,
 
-    age = round trip + time an answer is held + Ts/2 + wait for what was lost or overtaken,
+    age = round trip + time an answer is held + Ts/2 + wait for lost or overtaken packets,
 
-and it is measured, packet by packet. Methods that know of the hold estimate the age less Ts/2;
-the overshoot read as that of a continuous loop has the hold in its delay, too.
+and it is measured, packet by packet. Methods that simulate the hold estimate the age minus Ts/2;
+the overshoot of a continuous loop includes the hold in its delay.
 
-A step sees few of the random delays, and what a fit takes for noise is not what makes it miss: its
-interval is for the delay that this one step met. How uncertain the mean delay of a network is shows
-in how much the runs differ, and better in what the steps would have shown at other moments of the
-network as it was measured (`_internet_replay`).
+A step contains few of the random delays, and they are not the noise of a fit: its interval is for
+the delays within this one step. The uncertainty of the mean delay shows in the differences between
+runs, and more accurately in steps that are replayed at other times of the measured network
+(`_replay`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from deadtime.estimation import DelayEstimate
 from deadtime.internet._replay import MAPS, interval_of_mean
@@ -33,7 +32,7 @@ from deadtime.recordings import Recording
 
 __all__ = ["METHODS", "InternetLoop", "InternetRun", "Spread"]
 
-#: The methods, and whether they have the hold in what they call the delay.
+#: The methods, and whether their delay includes the hold.
 METHODS = {
     "dominant": True,
     "exact": True,
@@ -41,28 +40,28 @@ METHODS = {
     "output_error": False,
 }
 
-#: What two of them are called at the beginning of a sentence.
-TOLD = {"dominant": "The paper's overshoot method", "waveform": "The fit of the waveform"}
+#: Names of two of them at the beginning of a sentence.
+IN_WORDS = {"dominant": "The paper's overshoot method", "waveform": "The fit of the waveform"}
 
-#: Part of the sample time by which ages differ where processes just wake up late.
+#: Largest spread of ages from processes that wake up late, as a share of the sample time.
 UNSTEADY = 0.3
 
 
 @dataclass(frozen=True)
 class Spread:
-    """What several runs say of one delay.
+    """Mean and interval of one delay over several runs.
 
     Attributes
     ----------
     count : int
-        Runs with an answer.
+        Runs with an estimate.
     mean : float
-        Their mean, s.
+        Mean of the estimates, s.
     low, high : float
-        Interval of 95 % for what was to be found, s: by replaying the steps (`replayed`), or by
-        how much the runs differ (Student's t); NaN where neither can be had.
+        95 % interval of the mean delay, s: from replayed steps (`replayed`), or from the
+        differences between runs (Student's t); NaN where neither exists.
     replayed : bool
-        Whether it is by replaying; it then has the error of the method in it.
+        Whether it is from replayed steps; it then includes the error of the method.
     """
 
     count: int
@@ -73,7 +72,9 @@ class Spread:
 
     @staticmethod
     def of(values: Sequence[float]) -> Spread:
-        """That of these delays."""
+        """The spread of these delays."""
+        from scipy import special
+
         count = len(values)
         if count == 0:
             return Spread(0, math.nan, math.nan, math.nan)
@@ -92,16 +93,16 @@ class InternetRun:
     Attributes
     ----------
     trial : Trial
-        What was run.
+        Description of the run.
     plant, controller : dict
-        What happened at each end, as of `PlantReport.to_dict` and `ControllerReport.to_dict`.
+        Report of each end, from `PlantReport.to_dict` and `ControllerReport.to_dict`.
     recordings : dict of str to Recording
-        Of the ``plant`` and the ``controller``, by the clock of each.
+        Recordings of the ``plant`` and the ``controller``, each by its own clock.
     estimates : dict of str to DelayEstimate
         By ``dominant`` (the paper's overshoot), ``exact``, ``waveform`` on the plant's recording,
         ``output_error`` on the controller's.
     refusals : dict of str to str
-        The methods that could not answer, and why.
+        The reasons of the methods that gave no estimate.
     """
 
     trial: Trial
@@ -119,7 +120,7 @@ class InternetRun:
 
     @property
     def age(self) -> float:
-        """Mean age of the measurement behind the command in force, as measured, s."""
+        """Measured mean age of the measurement on which the command in force is based, s."""
         return _number(self.plant["age"])
 
     @property
@@ -130,7 +131,7 @@ class InternetRun:
 
     @property
     def is_unsteady(self) -> bool:
-        """Whether the age of commands differs by more than waking up late explains."""
+        """Whether the age of commands varies more than by processes that wake up late."""
         ages = self.plant["age_when_applied"]
         lost = self.plant["link"]["lost"] + self.controller["link"]["lost"]
         spread = _number(ages["p95"]) - _number(ages["p50"])
@@ -142,10 +143,10 @@ class InternetRun:
         return math.nan if fit is None else fit.delay
 
     def budget(self) -> dict[str, float]:
-        """What the mean age is made of, s.
+        """The parts of the mean age, s.
 
         ``round trip``, ``held`` (by the controller), ``hold`` (half the sample time: a command
-        is in force until the next), and ``waiting`` for what was lost, overtaken or buffered.
+        is in force until the next), and ``waiting`` for lost, overtaken or buffered packets.
         """
         parts = {
             "round trip": _number(self.round_trip["mean"]),
@@ -166,7 +167,7 @@ class InternetLoop:
     Attributes
     ----------
     runs : tuple of InternetRun
-        One a gain.
+        One for each gain.
     """
 
     runs: tuple[InternetRun, ...]
@@ -174,7 +175,7 @@ class InternetLoop:
     _age_error: float = math.nan
 
     def spread(self, method: str) -> Spread:
-        """What the runs together say by a method; NaN where none answered."""
+        """Mean and interval of a method over all runs; NaN where all refused."""
         delays = [run.delay(method) for run in self.runs]
         answered = [index for index, delay in enumerate(delays) if math.isfinite(delay)]
         found = Spread.of([delays[index] for index in answered])
@@ -192,17 +193,17 @@ class InternetLoop:
         return float(np.mean([run.age for run in self.runs]))
 
     def expected(self, method: str) -> float:
-        """What a method has to find by the age as measured, s."""
+        """The delay that a method should find, from the measured age, s."""
         hold = 0.5 * self.runs[0].trial.sample_time
         return self.age - (0.0 if METHODS[method] else hold)
 
     def explanation(self) -> list[str]:
-        """The estimates against what was measured, a sentence or two each."""
+        """Comparison of the estimates with the measured delay, in sentences."""
         if not math.isfinite(self.age):
-            return ["No command came in time in a run, so that no delay was measured."]
+            return ["In a run no command arrived in time, so no delay was measured."]
         budgets = [run.budget() for run in self.runs]
         mean = {name: 1e3 * float(np.mean([one[name] for one in budgets])) for name in budgets[0]}
-        said = [
+        sentences = [
             f"Measured, the command in force is {1e3 * self.age:.1f} ms old on average: "
             f"{mean['round trip']:.1f} ms of round trip, {mean['held']:.1f} ms until the "
             f"controller answers, {mean['hold']:.1f} ms because a command holds for a sample time, "
@@ -211,33 +212,33 @@ class InternetLoop:
         ]
         unsteady = [run for run in self.runs if run.is_unsteady]
         if unsteady:
-            said.append(
-                "The delay is not constant: a step meets few of its values, and the interval of a "
-                "single fit is for those. For the mean delay go by the intervals of the replayed "
-                "steps, or make the delay constant with a jitter buffer."
+            sentences.append(
+                "The delay is not constant: a step contains few of its values, and the interval "
+                "of a single fit is for these. For the mean delay use the intervals of the "
+                "replayed steps, or make the delay constant with a jitter buffer."
             )
         lag = self.runs[0].trial.lag
         if lag > 0.0:
-            said.append(
-                f"The lag of the plant, {1e3 * lag:.1f} ms, is not in what was measured. The "
-                "overshoot methods take it for delay; replaying takes it out of their intervals."
+            sentences.append(
+                f"The lag of the plant, {1e3 * lag:.1f} ms, is not part of the measured age. The "
+                "overshoot methods count it as delay; replaying corrects their intervals for it."
             )
-        for method, label in TOLD.items():
+        for method, label in IN_WORDS.items():
             found = self.spread(method)
             if found.count == 0:
-                said.append(f"{label} has no answer in any run.")
+                sentences.append(f"{label} gives no estimate in any run.")
                 continue
-            wanted = self.expected(method)
-            knows = "which has the hold in it" if METHODS[method] else "the hold taken out"
+            expected = self.expected(method)
+            hold = "with the hold" if METHODS[method] else "without the hold"
             interval = ""
             if math.isfinite(found.low):
                 how = "corrected by replaying" if found.replayed else "by the spread of the runs"
                 interval = f" ({how} {1e3 * found.low:.1f} to {1e3 * found.high:.1f})"
-            said.append(
+            sentences.append(
                 f"{label} finds {1e3 * found.mean:.1f} ms{interval}, where "
-                f"{1e3 * wanted:.1f} ms was measured, {knows}."
+                f"{1e3 * expected:.1f} ms was measured, {hold}."
             )
-        return said
+        return sentences
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""

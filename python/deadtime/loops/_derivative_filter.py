@@ -16,7 +16,6 @@ from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete
 
 from deadtime._base.validation import positive
 
@@ -105,6 +104,8 @@ def discretised(
     F: Vector, G: Vector, C: Vector, sample_time: float, method: Discretisation
 ) -> SampledFilter:
     """Return the filter of a sample time in s by one of the methods."""
+    from scipy.signal import cont2discrete
+
     system = (F, G[:, None], C[None, :], np.zeros((1, 1)))
     found = cast(Any, cont2discrete)(system, sample_time, method=_SCIPY[method])
     return SampledFilter(found[0], found[1][:, 0], found[2][0], float(found[3][0, 0]))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from deadtime._base.validation import finite
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.systems import Response, SystemResponse
+from deadtime.systems import Response
 from deadtime.systems._realisation import Realisable
 from deadtime.systems._run import Given, respond
 
@@ -42,7 +42,7 @@ def simulate(
     initial_state: ArrayLike | None = ...,
     vectorized: bool = ...,
     max_step: float | None = ...,
-) -> SystemResponse: ...
+) -> Response: ...
 def simulate(
     system: ControlLoop | Realisable,
     time: ArrayLike,
@@ -58,7 +58,7 @@ def simulate(
     initial_state: ArrayLike | None = None,
     vectorized: bool = False,
     max_step: float | None = None,
-) -> SystemResponse | Response:
+) -> Response:
     """Response of a linear system with delays, exact to rounding.
 
     The run starts at ``time[0]``.
@@ -105,8 +105,7 @@ def simulate(
 
     Returns
     -------
-    SystemResponse
-        For a loop a `Response`.
+    Response
 
     Raises
     ------

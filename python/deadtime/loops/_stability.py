@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eig, matrix_balance
 
 from deadtime import _deadtime
 from deadtime._deadtime import sampled_abscissa_grid
@@ -91,6 +90,8 @@ def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> boo
 
 def _balanced(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix in units that make its norm small, each command in its own."""
+    from scipy.linalg import matrix_balance
+
     with np.errstate(invalid="ignore"):  # units beyond integers, read as places as well
         return np.asarray(matrix_balance(matrix, permute=False)[0], dtype=np.float64)
 
@@ -104,6 +105,8 @@ def _eigenvalues(
     matrix: NDArray[np.float64],
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
     """Eigenvalues and first-order bounds on their errors."""
+    from scipy.linalg import eig
+
     z, left, right = cast(Any, eig)(matrix, left=True, right=True)
     # |dz| <= ||error|| / |y* x|.
     overlap = np.abs(np.sum(left.conj() * right, axis=0))

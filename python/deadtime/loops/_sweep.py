@@ -7,7 +7,7 @@ handed to the native part in blocks, so that memory stays bounded.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.ranges import given_points, is_range
 from deadtime._base.validation import finite, increasing, positive, real_array, thread_number
 from deadtime._deadtime import sweep_metrics, sweep_responses
@@ -167,7 +168,7 @@ def sweep(
     settling: float = 0.02,
     rise: tuple[float, float] = (0.1, 0.9),
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Progress = False,
 ) -> Sweep:
     """Simulate the step response of a loop for many sets of its numbers.
 
@@ -199,8 +200,8 @@ def sweep(
         Parts of the step between which the rise time is measured.
     threads : int, optional
         Number of threads; by default ``DEADTIME_NUM_THREADS``, else all cores.
-    progress : callable, optional
-        Called now and then with the number of finished sets.
+    progress : bool or callable
+        True for a progress bar; or called now and then with the number of finished sets.
 
     Returns
     -------
@@ -258,12 +259,11 @@ def sweep(
     sampled = 1.0 if "sample_time" in values else common.sample_time
     refuse_discretised(common.controller, sampled, "a sweep")
     sets = _Sets(common, arrays, shape, height, band, parts, thread_number(threads))
-    if time is None and not responses:
-        return sets.until_settled(progress)
-    times = _times(time, responses)
-    if responses:
-        return sets.outputs(times, progress)
-    return sets.decided(times, progress)
+    times = None if time is None and not responses else _times(time, responses)
+    with reported(progress, math.prod(shape)) as report:
+        if times is None:
+            return sets.until_settled(report)
+        return sets.outputs(times, report) if responses else sets.decided(times, report)
 
 
 class LoopSets(NamedTuple):
@@ -297,7 +297,7 @@ class _Sets:
         return replace(self, arrays=arrays, shape=places.shape)
 
     def blocks(
-        self, progress: Callable[[int], object] | None
+        self, progress: Report | None
     ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any], LoopSets, Any]]:
         """Places, numbers, sets for the native part, and its progress, block by block."""
         flat = {name: np.broadcast_to(a, self.shape).ravel() for name, a in self.arrays.items()}
@@ -312,7 +312,7 @@ class _Sets:
             yield place, numbers, LoopSets(model.B.shape[-1], rows, self.amplitude, ahead), report
             done += len(place)
 
-    def outputs(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+    def outputs(self, times: Vector, progress: Report | None) -> Sweep:
         """Outputs at given times."""
         count = math.prod(self.shape)
         found, status = np.full((count, len(times)), np.nan), np.empty(count, dtype=np.uint8)
@@ -322,7 +322,7 @@ class _Sets:
         outputs = found.reshape(*self.shape, len(times))
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
-    def measured(self, times: Vector, progress: Callable[[int], object] | None = None) -> Sweep:
+    def measured(self, times: Vector, progress: Report | None = None) -> Sweep:
         """Metrics; the status tells of sets that are in the band, but may leave it later."""
         count, span = math.prod(self.shape), float(times[-1] - times[0])
         metrics = {name: np.full(count, np.nan) for name in _METRICS}
@@ -346,7 +346,7 @@ class _Sets:
         shaped = {name: values.reshape(self.shape) for name, values in metrics.items()}
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), shaped)
 
-    def decided(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+    def decided(self, times: Vector, progress: Report | None) -> Sweep:
         """Metrics; doubtful sets are decided by how long they have been in the band."""
         found = self.measured(times, progress)
         status, settled = found.status.flatten(), found.metrics["settling_time"].ravel()
@@ -357,7 +357,7 @@ class _Sets:
             status[doubtful[stays]] = SweepStatus.OK
         return self._told(found, times, found.metrics, status)
 
-    def until_settled(self, progress: Callable[[int], object] | None) -> Sweep:
+    def until_settled(self, progress: Report | None) -> Sweep:
         """Metrics of all sets, over a longer time where a set has not settled."""
         loop = self.loop
         numbers: dict[str, Any] = loop.parameters | dict(self.arrays)

@@ -1,19 +1,17 @@
-"""From the overshoot of a step to the delay, in the two ways that the paper compares.
+"""Delay from the overshoot of a step, in the two ways that the paper compares.
 
 By the dominant root: W0(-K Td)/Td (eq. 3) is to have the damping ratio (eq. 6) that a second-order
-system with this overshoot has (eq. 5). By simulation: the delay at which the simulated loop
-overshoots by so much, here with exact simulations, so that nothing is left of a solver's step.
+system with this overshoot has (eq. 5). By simulation: the delay at which the simulated loop has
+this overshoot, here with exact simulations, without the error of a solver.
 """
 
 from __future__ import annotations
-
-from scipy.optimize import brentq
 
 import deadtime as dtm
 
 __all__ = ["damping_of", "delay_by_dominant_root", "delay_by_simulation", "overshoot"]
 
-#: Longest delay that is looked for, in units of 1/(gain Kp): the limit of stability is pi/2.
+#: Longest delay of the search, in units of 1/(gain Kp): the limit of stability is pi/2.
 LONGEST = 1.55
 
 
@@ -40,7 +38,7 @@ def delay_by_dominant_root(gain: float, part: float) -> float:
     gain : float
         K = Kp of the unit integrator, 1/s.
     part : float
-        Overshoot as a part of the step.
+        Overshoot as a share of the step.
 
     Returns
     -------
@@ -53,6 +51,8 @@ def delay_by_dominant_root(gain: float, part: float) -> float:
     >>> round(delay_by_dominant_root(1.31, 0.0230), 4)
     0.3598
     """
+    from scipy.optimize import brentq
+
     wanted = dtm.damping_ratio(part)
 
     def excess(delay: float) -> float:
@@ -84,7 +84,7 @@ def delay_by_simulation(loop: dtm.ControlLoop, part: float) -> float:
     loop : ControlLoop
         An integrator under proportional control; its delay does not matter.
     part : float
-        Overshoot as a part of the step.
+        Overshoot as a share of the step.
 
     Returns
     -------
@@ -100,6 +100,8 @@ def delay_by_simulation(loop: dtm.ControlLoop, part: float) -> float:
     >>> round(delay_by_simulation(free, 0.0230), 5), round(delay_by_simulation(limited, 0.0230), 5)
     (0.35874, 0.36864)
     """
+    from scipy.optimize import brentq
+
     gain = loop.parameters["gain"] * loop.parameters["Kp"]
 
     def excess(delay: float) -> float:

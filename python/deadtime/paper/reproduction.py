@@ -1,4 +1,4 @@
-"""All tables and figures at once, with the verdicts counted."""
+"""`reproduce`: compute all tables and figures, and count the verdicts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PARTS", "TITLES", "Reproduction", "reproduce"]
 
-#: What is reproduced, in the order of the paper.
+#: The parts, in the order of the paper.
 PARTS: Mapping[str, Callable[[], Part]] = {
     "table1": table1,
     "figure2": figure2,
@@ -61,18 +61,18 @@ class Reproduction:
     Attributes
     ----------
     parts : mapping of str to object
-        What the functions of this namespace return, by their names.
+        Results of the functions of this room, by their names.
     """
 
     parts: Mapping[str, Part]
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
-        """Every printed number beside ours, in the order of the paper."""
+        """Every printed number beside the computed one, in the order of the paper."""
         return tuple(one for part in self.parts.values() for one in part.comparisons)
 
     def counts(self) -> dict[Verdict, int]:
-        """How often each verdict was given.
+        """Number of each verdict.
 
         Returns
         -------
@@ -97,7 +97,7 @@ class Reproduction:
             f"digits, {counts[Verdict.DIFFERENT]} not. "
             f"{sum(counts[one] for one in said)} statements: {counts[Verdict.CONFIRMED]} "
             f"confirmed, {counts[Verdict.CONTRADICTED]} not supported. "
-            f"{counts[Verdict.MEASURED]} measurements, which no model has to give."
+            f"{counts[Verdict.MEASURED]} measurements, which are not compared."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -125,7 +125,7 @@ class Reproduction:
         }
 
     def figures(self) -> dict[str, Figure]:
-        """Draw the figures of the parts that are there.
+        """Draw the figures of the computed parts.
 
         Returns
         -------
@@ -160,7 +160,7 @@ def reproduce(
     Raises
     ------
     ValueError
-        If there is no such part, or none is asked for.
+        If a part does not exist, or `only` is empty.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def reproduce(
     if unknown:
         raise ValueError(f"{', '.join(unknown)}: not one of {', '.join(PARTS)}")
     if not wanted:
-        raise ValueError(f"no part is asked for: give one or more of {', '.join(PARTS)}")
+        raise ValueError(f"only is empty: give one or more of {', '.join(PARTS)}")
     parts = {}
     for name in PARTS:
         if name in wanted:

@@ -1,4 +1,4 @@
-"""Recordings from CSV files."""
+"""Read recordings from CSV files."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ def read_recording(
     ----------
     path : path-like
         The file. Text, one line of column names, then one line a sample. Lines that begin with
-        ``#`` and empty lines are left out.
+        ``#`` and empty lines are skipped.
     time, reference, output : str
         Names of the columns that hold the time stamps (s), the reference and the measurement.
     command : str, optional
         Name of the column that holds the command sent to the plant.
-    window : (float or None, float or None), optional
-        Keep only the rows between these times, s.
+    window : (low, high), optional
+        Keep only the rows between these times, s; None leaves an end open.
     delimiter : str, optional
-        What separates the columns; told from the header line if not given.
+        Separator of the columns; found from the header line if not given.
 
     Returns
     -------
@@ -52,18 +52,18 @@ def read_recording(
     Raises
     ------
     RecordingError
-        When the file cannot be read, is not such a text, lacks a column, holds something that is
-        no finite number, a time that does not increase, a reference that never changes, or too
-        few samples. The message names the line.
+        When the file cannot be read, is not such a text, lacks a column, holds a value that is no
+        finite number, a time that does not increase, a constant reference, or too few samples.
+        The message names the line.
 
     Examples
     --------
     >>> import deadtime as dtm, pathlib, tempfile
-    >>> file = pathlib.Path(tempfile.mkdtemp()) / "flight.csv"
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "run.csv"
     >>> rows = [f"{k / 10},{int(k > 4)},{max(0, k - 6) / 10}" for k in range(20)]
     >>> _ = file.write_text("t_s,ref_m,height_m\n" + "\n".join(rows))
-    >>> flight = dtm.read_recording(file, time="t_s", reference="ref_m", output="height_m")
-    >>> len(flight), flight.steps()[0].time
+    >>> recording = dtm.read_recording(file, time="t_s", reference="ref_m", output="height_m")
+    >>> len(recording), recording.steps()[0].time
     (20, 0.5)
     """
     path = Path(path)
@@ -71,13 +71,13 @@ def read_recording(
     if command is not None:
         names["command"] = command
     header, lines = _table(path, delimiter)
-    places = {signal: _place(path, header, signal, name) for signal, name in names.items()}
+    columns_of = {signal: _column_of(path, header, signal, name) for signal, name in names.items()}
     low, high = _ends(window)
     columns: dict[str, list[float]] = {signal: [] for signal in names}
     last = None
     for number, cells in lines:
         _check_width(path, number, cells, len(header))
-        now = _value(path, number, cells, places["time"], time)
+        now = _value(path, number, cells, columns_of["time"], time)
         if last is not None and now <= last:
             what = "repeats" if now == last else "goes back"
             raise RecordingError(
@@ -86,11 +86,11 @@ def read_recording(
             )
         last = now
         if not low <= now <= high:
-            continue  # what lies outside the window need not be valid: setpoints are often NaN
+            continue  # rows outside the window need not be valid: setpoints are often NaN there
         columns["time"].append(now)
-        for signal, place in places.items():
+        for signal, column in columns_of.items():
             if signal != "time":
-                columns[signal].append(_value(path, number, cells, place, names[signal]))
+                columns[signal].append(_value(path, number, cells, column, names[signal]))
     try:
         recording = Recording(
             columns["time"],
@@ -104,14 +104,14 @@ def read_recording(
         raise RecordingError(f"{path}{where}: {error}") from None
     if not recording.steps():
         raise RecordingError(
-            f"{path}: the reference {reference!r} is {recording.reference[0]:g} throughout: there "
-            "is no step to see a delay by; choose another column or window"
+            f"{path}: the reference {reference!r} is {recording.reference[0]:g} throughout, "
+            "so there is no step; choose another column or window"
         )
     return recording
 
 
 def _ends(window: OpenRange | None) -> tuple[float, float]:
-    """Ends of the window, open where None, with room for a last printed digit."""
+    """Ends of the window, open where None, widened by rounding of the last printed digit."""
     low, high = open_interval("window", window)
     start = low if math.isinf(low) else low - 1e-9 * max(1.0, abs(low))
     stop = high if math.isinf(high) else high + 1e-9 * max(1.0, abs(high))
@@ -125,13 +125,13 @@ def _table(path: Path, delimiter: str | None) -> tuple[list[str], Iterator[tuple
     except FileNotFoundError:
         raise RecordingError(f"there is no file {path}") from None
     except IsADirectoryError:
-        raise RecordingError(f"{path} is a folder, a CSV file is needed") from None
+        raise RecordingError(f"{path} is a folder: give a CSV file") from None
     except UnicodeDecodeError:
-        raise RecordingError(f"{path} is not a text file: a CSV file is needed") from None
+        raise RecordingError(f"{path} is not a text file: give a CSV file") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror}") from None
     if "\0" in text:
-        raise RecordingError(f"{path} is not a text file: a CSV file is needed")
+        raise RecordingError(f"{path} is not a text file: give a CSV file")
     numbered = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -159,15 +159,15 @@ def _delimiter(header: str) -> str:
         return ","
 
 
-def _place(path: Path, header: list[str], signal: str, name: str) -> int:
-    """The position of a column, by its name."""
+def _column_of(path: Path, header: list[str], signal: str, name: str) -> int:
+    """Index of a column, by its name."""
     count = header.count(name)
     if count == 1:
         return header.index(name)
     if count > 1:
         raise RecordingError(f"{path} has {count} columns named {name!r}: rename all but one")
-    near = difflib.get_close_matches(name, header, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    similar = difflib.get_close_matches(name, header, n=1)
+    hint = f"; did you mean {similar[0]!r}?" if similar else ""
     shown = ", ".join(repr(cell) for cell in header[:12]) + (", …" if len(header) > 12 else "")
     raise RecordingError(f"{path} has no column {name!r} for the {signal}: it has {shown}{hint}")
 
@@ -180,14 +180,14 @@ def _check_width(path: Path, number: int, cells: list[str], width: int) -> None:
         )
 
 
-def _value(path: Path, number: int, cells: list[str], place: int, name: str) -> float:
-    if place >= len(cells):
+def _value(path: Path, number: int, cells: list[str], column: int, name: str) -> float:
+    if column >= len(cells):
         raise RecordingError(
-            f"{path}, line {number}: {len(cells)} cells, so none for the column {name!r}"
+            f"{path}, line {number}: {len(cells)} cells, so the column {name!r} has none"
         )
-    cell = cells[place]
+    cell = cells[column]
     try:
-        if "_" in cell:  # Python would read 1_000 as a thousand
+        if "_" in cell:  # float() would read 1_000 as 1000
             raise ValueError
         value = float(cell)
     except ValueError:

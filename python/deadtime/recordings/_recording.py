@@ -1,4 +1,4 @@
-"""The recording of a flight: what was asked of the loop and what it did."""
+"""Recordings of a control loop: reference, output and command over time."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from deadtime._base.validation import unmasked
 
 __all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
 
-#: Larger values are of no physical quantity in any sensible unit, and their squares overflow.
+#: Largest absolute value. The squares of larger ones may overflow, and no physical quantity has
+#: them.
 LARGEST = 1e100
 
-#: Fewer samples than this determine no delay: two parameters, a start, and something left over
-#: to judge the fit by.
+#: Fewest samples of a recording: enough for two parameters, an initial output, and a test of the
+#: residuals.
 MINIMUM_SAMPLES = 8
 
 
@@ -29,7 +30,7 @@ class Step:
     Attributes
     ----------
     index : int
-        Row at which the reference has its new value.
+        First row with the new reference.
     time : float
         Time of that row, s.
     before, after : float
@@ -43,7 +44,7 @@ class Step:
 
     @property
     def amplitude(self) -> float:
-        """Size of the step, with its sign."""
+        """Reference after the step minus that before."""
         return self.after - self.before
 
 
@@ -56,15 +57,15 @@ class Recording(ReadOnlyArrays):
     time : array_like, shape (n,)
         Time stamps in seconds, strictly increasing.
     reference : array_like, shape (n,)
-        What the loop was asked to do.
+        The reference of the loop.
     output : array_like, shape (n,)
-        What was measured, in the unit of the reference.
+        The measured output, in the unit of the reference.
     command : array_like, shape (n,), optional
         The command sent to the plant, after any limit.
     units : dict of str to str, optional
         Unit of each signal, for labels.
     source : str, optional
-        Where the recording comes from, for messages and labels.
+        Origin of the recording, for messages and labels.
 
     Raises
     ------
@@ -75,15 +76,15 @@ class Recording(ReadOnlyArrays):
 
     Notes
     -----
-    A row in which one of the columns is masked (`numpy.ma`) is missing and left out.
+    A row in which one of the columns is masked (`numpy.ma`) is left out.
 
     Examples
     --------
     >>> import numpy as np
     >>> import deadtime as dtm
     >>> t = np.arange(20) * 0.1
-    >>> flight = dtm.Recording(t, np.where(t < 0.5, 0.0, 1.0), np.zeros(20))
-    >>> flight.steps()
+    >>> recording = dtm.Recording(t, np.where(t < 0.5, 0.0, 1.0), np.zeros(20))
+    >>> recording.steps()
     [Step(index=5, time=0.5, before=0.0, after=1.0)]
     """
 
@@ -106,7 +107,7 @@ class Recording(ReadOnlyArrays):
         columns = {"time": time, "reference": reference, "output": output}
         if command is not None:
             columns["command"] = command
-        arrays = {name: _column(name, values) for name, values in _present(columns).items()}
+        arrays = {name: _column(name, values) for name, values in _unmasked_rows(columns).items()}
         lengths = {name: array.size for name, array in arrays.items()}
         if len(set(lengths.values())) > 1:
             raise RecordingError(f"the columns of a recording differ in length: {lengths}")
@@ -131,7 +132,7 @@ class Recording(ReadOnlyArrays):
 
     @property
     def sample_time(self) -> float:
-        """Median distance of the time stamps, s."""
+        """Median time between samples, s."""
         return float(np.median(np.diff(self.time)))
 
     def window(self, start: float | None = None, stop: float | None = None) -> Recording:
@@ -157,9 +158,9 @@ class Recording(ReadOnlyArrays):
         high = np.inf if stop is None else float(stop)
         if not low < high:
             raise RecordingError(
-                f"the window ({start}, {stop}) s is empty: give the earlier time first"
+                f"the window ({start}, {stop}) s is empty: give (low, high) with low below high"
             )
-        # A time stamp printed with few digits still belongs to the window it was meant for.
+        # Time stamps printed with few digits may miss the ends by rounding.
         slack = 1e-6 * self.sample_time
         first = int(np.searchsorted(self.time, low - slack, side="left"))
         last = int(np.searchsorted(self.time, high + slack, side="right"))
@@ -185,11 +186,11 @@ class Recording(ReadOnlyArrays):
         ]
 
 
-def _present(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
-    """Leave out the rows in which a column is masked: they are missing.
+def _unmasked_rows(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
+    """Leave out the rows in which a column is masked.
 
-    Reference and command hold until they change, so a missing row takes nothing away where
-    neither changes there. Where one does, or may, nobody knows when.
+    Reference and command hold until they change, so a missing row loses no information where
+    neither changes. Where one changes, or may change, the time of the change is unknown: refused.
     """
     masks = {
         name: np.ma.getmaskarray(values)
@@ -202,7 +203,7 @@ def _present(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
     if missing.ndim != 1 or not missing.any():
         return columns
     kept = np.flatnonzero(~missing)
-    # Each missing row with those that are kept before and after it.
+    # Each missing row, and the kept rows before and after it.
     rows = np.flatnonzero(missing)
     place = np.searchsorted(kept, rows)
     rows, place = rows[(place > 0) & (place < kept.size)], place[(place > 0) & (place < kept.size)]
@@ -216,8 +217,8 @@ def _present(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
         moved = np.where(unknown, data[after] != data[before], data[rows] != data[before])
         if moved.any():
             raise RecordingError(
-                f"row {rows[moved][0]} is masked, and the {name} changes there: when it did would "
-                "be lost with the row; fill in what is masked, or choose a window without it"
+                f"row {rows[moved][0]} is masked, and the {name} changes there, at an unknown "
+                "time; fill in the masked values, or choose a window without them"
             )
     return {name: np.ma.getdata(values)[kept] for name, values in columns.items()}
 
@@ -231,7 +232,7 @@ def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     except (TypeError, ValueError) as error:
         raise RecordingError(f"the {name} is not an array of numbers: {error}") from None
     if array.ndim != 1:
-        raise RecordingError(f"the {name} has shape {array.shape}, a column (n,) is needed")
+        raise RecordingError(f"the {name} has shape {array.shape}: give a column (n,)")
     if array.size < MINIMUM_SAMPLES:
         raise RecordingError(
             f"the {name} has {array.size} samples, at least {MINIMUM_SAMPLES} are needed"
@@ -239,13 +240,13 @@ def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise RecordingError(
-            f"the {name} is {array[bad[0]]} at row {bad[0]} ({bad.size} such values): leave such "
-            "rows out or choose a window without them"
+            f"the {name} is {array[bad[0]]} at row {bad[0]} ({bad.size} such values): leave these "
+            "rows out, or choose a window without them"
         )
     if np.max(np.abs(array)) > LARGEST:
         raise RecordingError(
             f"the {name} reaches {array[np.argmax(np.abs(array))]:g}: values beyond {LARGEST:g} "
-            "cannot be worked with, choose another unit"
+            "may overflow; use another unit"
         )
     array.flags.writeable = False
     return array

@@ -1,4 +1,4 @@
-"""One self-contained page about one recording: what it says, and what to do."""
+"""`write_report`: a self-contained HTML page about one recording and the gains for it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def render(study: Study) -> str:
             _fits(study),
             "<h2>Which gains are stable</h2>",
             _map(study),
-            "<h2>With the delay known, and without</h2>",
+            "<h2>Designed with the delay, and without</h2>",
             _responses(study),
         ],
     )
@@ -69,14 +69,14 @@ def _estimates(study: Study) -> str:
     return (
         f"{table(COLUMNS, body)}"
         "<p>In brackets: taken as given, not fitted. Sum: delay and lag, which one step determines "
-        "better than either. “As flown”: with the hold and the limit.</p>"
+        "better than either. “Overshoot with limit”: with the hold too.</p>"
     )
 
 
 def _fits(study: Study) -> str:
     figure, axes = new_figure(7.5, 3.8)
     plot_fits(axes, study.fit.recording, study.comparison.pictured())
-    return picture("fits", figure, "The recorded step and the loops that the methods make of it.")
+    return picture("fits", figure, "The recorded step, and the fitted loops of the methods.")
 
 
 def _map(study: Study) -> str:
@@ -90,7 +90,7 @@ def _map(study: Study) -> str:
         f"design, which is stable for every delay tried from {min(design.delays):.3f} to "
         f"{max(design.delays):.3f} s. Proportional control alone is stable up to Kp = "
         f"{study.held_limit:.3f} with the hold"
-        f" ({study.continuous_limit:.3f} if one forgets the hold)."
+        f" ({study.continuous_limit:.3f} without the hold in the model)."
     )
     return picture("map", figure, caption)
 
@@ -98,14 +98,14 @@ def _map(study: Study) -> str:
 def _responses(study: Study) -> str:
     figure, axes = new_figure(7.5, 3.8)
     labelled = {}
-    for (name, response), made in zip(
+    for (name, response), designed in zip(
         study.responses.items(), (study.designed, study.naive), strict=True
     ):
-        gains = ", ".join(f"{key} {value:.3g}" for key, value in made.gains.items())
+        gains = ", ".join(f"{key} {value:.3g}" for key, value in designed.gains.items())
         labelled[f"{name} ({gains})"] = response
     plot_responses(axes, labelled)
     caption = (
-        f"A step of 1 m on {study.flown_on}, limit included: gains made for the delay beside "
-        "gains made in the same way as if there were none."
+        f"A step of 1 m on {study.simulated_loop}, with its limit: gains designed for the delay, "
+        "and gains designed in the same way without it."
     )
     return picture("responses", figure, caption)

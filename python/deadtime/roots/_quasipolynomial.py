@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import cmath
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeAlias, TypeVar, cast, overload
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Final,
+    Literal,
+    Protocol,
+    SupportsFloat,
+    TypeAlias,
+    TypeVar,
+    cast,
+    overload,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
+from deadtime._base.ranges import Range
 from deadtime._base.validation import unmasked
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
 
 if TYPE_CHECKING:
-    from deadtime.systems import TransferFunction
+    from deadtime.systems import Margins, TransferFunction
 
 __all__ = ["QuasiPolynomial", "delay", "s"]
 
@@ -274,6 +286,71 @@ class QuasiPolynomial(Characteristic):
         points = _places(s)
         values = self._native.logarithmic_derivatives(points)
         return values.reshape(points.shape) if points.ndim else complex(values[0])
+
+    # As the characteristic function of a loop
+
+    def _loop_gain(self) -> TransferFunction:
+        """Give the part with delays over the part without, the smallest delay factored out."""
+        delays = self._delays - self._delays[0]
+        rows = self._coefficients
+        late = QuasiPolynomial(rows[1:], delays[1:]) if len(rows) > 1 else 0.0
+        return late / QuasiPolynomial(rows[:1], delays[:1])
+
+    def margin(self) -> Margins:
+        """Gain, phase and delay margin of the loop whose characteristic function this is.
+
+        The loop gain is the part with delays over the part without: ``h = d + n`` with the delay
+        in n is that of ``feedback(n / d)``.
+
+        Returns
+        -------
+        Margins
+            As of `TransferFunction.margin`.
+
+        Raises
+        ------
+        ValueError
+            As in `TransferFunction.margin`.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> (s + 2.0 * delay(0.36)).margin()
+        <Margins: gain 2.182 at 4.363 rad/s, phase 48.75° at 2 rad/s, delay 0.4254 s at 2 rad/s>
+        """
+        return self._loop_gain().margin()
+
+    def crossings(
+        self, ranges: Mapping[str, Range], *, at: Mapping[str, SupportsFloat] | None = None
+    ) -> Any:  # Crossings, which itself is made of quasi-polynomials
+        """Every crossing of the imaginary axis as the part with delays changes.
+
+        Parameters
+        ----------
+        ranges : mapping of str to (low, high)
+            ``gain``, a factor on the part with delays, or ``delay``, a further delay of it in s.
+        at : mapping of str to float, optional
+            The value of the other one.
+
+        Returns
+        -------
+        Crossings
+
+        Raises
+        ------
+        ValueError, TypeError
+            As in `deadtime.crossings`.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> (s + 2.0 * delay(0.36)).crossings({"delay": (0.0, 1.0)}).values.round(4)
+        array([0.4254])
+        """
+        return self._loop_gain().crossings(ranges, at=at)
+
+    def _delay_margin(self) -> float:
+        return self.margin()._delay_margin()
 
     def expansion(self, s: complex, order: int = 1) -> Expansion:
         r"""Taylor coefficients at a place, with bounds on their errors.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import SupportsFloat, TypeAlias
 
 import numpy as np
@@ -16,7 +16,6 @@ __all__ = [
     "MOST_MOVING",
     "Floats",
     "Given",
-    "Progress",
     "Range",
     "System",
     "Values",
@@ -25,7 +24,6 @@ __all__ = [
 ]
 
 Floats: TypeAlias = NDArray[np.float64]
-Progress: TypeAlias = Callable[[int], object]
 System: TypeAlias = ParametricQuasiPolynomial | ControlLoop
 Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
 Values: TypeAlias = Mapping[str, SupportsFloat]

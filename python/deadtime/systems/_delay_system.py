@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -27,10 +28,11 @@ from deadtime.roots._crossings import margin_of_family
 from deadtime.roots._determinant import NotExpandedError, expanded
 from deadtime.roots._family import family_of
 from deadtime.roots._matrix_roots import MatrixDeterminant
-from deadtime.systems._realisation import Realisation, of_matrices
-from deadtime.systems._run import respond, step_response
+from deadtime.systems._margins import Margins
+from deadtime.systems._poles import HasPoles
+from deadtime.systems._realisation import Realisable, Realisation, of_matrices
+from deadtime.systems._responses import HasResponses
 from deadtime.systems._scaled_delays import scaled_family, smallest_delay
-from deadtime.systems._system_response import SystemResponse
 from deadtime.systems._transfer import TransferFunction
 
 __all__ = ["DelaySystem"]
@@ -40,7 +42,7 @@ Matrix = NDArray[np.float64]
 Matrices: TypeAlias = ArrayLike | Mapping[float, ArrayLike]
 
 
-class DelaySystem:
+class DelaySystem(HasPoles, HasResponses):
     """A linear system with delays: any order, any number of inputs and outputs. Immutable.
 
     Every matrix is given as an array, which acts without delay, or as a dict of arrays by their
@@ -395,73 +397,27 @@ class DelaySystem:
         ]
         return TransferFunction(expanded(bordered, bordered=True), self.characteristic())
 
-    # Poles, however many states there are
-
-    def count(self, re: OpenRange | None = None, im: OpenRange | None = None) -> int:
-        """Count the poles in a region, with multiplicity, and prove the number.
+    def margin(self, output: int = 0, input: int = 0) -> Margins:  # noqa: A002
+        """Gain, phase and delay margin of the loop closed from one output to one input.
 
         Parameters
         ----------
-        re, im : tuple of (float or None, float or None), optional
-            As in `QuasiPolynomial.count`.
+        output, input : int, default 0
+            Which ones, from zero.
 
         Returns
         -------
-        int
+        Margins
+            As of `TransferFunction.margin`.
 
         Raises
         ------
-        ContourError
-            If a pole lies on the edge, or closer to it than double precision can tell.
         ValueError
-            If the region holds infinitely many poles, if a side is open and E cannot be inverted,
-            or if the determinant is zero for every s.
-
-        Notes
-        -----
-        While `characteristic` is safe, roots are counted in it. Otherwise the matrix is factorised
-        at points along the contour, so close to one another that bounds on its change and on all
-        rounding prove how far the argument of the determinant turns between them.
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> import numpy as np
-        >>> dtm.DelaySystem({1.0: -np.eye(12)}).count(re=(-3, 1), im=(0, 20))
-        36
+            As in `characteristic` and in `TransferFunction.margin`.
+        IndexError
+            If there is no such input or output.
         """
-        return self._determinant().count(re, im)
-
-    def poles(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
-        """Locate every pole in a region, each in a disc proved to hold it.
-
-        Parameters
-        ----------
-        re, im : tuple of (float or None, float or None), optional
-            As in `QuasiPolynomial.roots`.
-
-        Returns
-        -------
-        RootSet
-            Roots of det M; of `characteristic` while that is safe.
-
-        Raises
-        ------
-        ValueError, ContourError
-            As in `count`.
-        CountMismatchError
-            If double precision does not suffice to locate what was counted.
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> import numpy as np
-        >>> chain = np.diag(np.ones(11), 1) - np.eye(12)
-        >>> chain[11, 0] = 0.5
-        >>> dtm.DelaySystem(chain).poles(re=(-0.1, 1)).roots.round(4).tolist()
-        [(-0.0561+0j)]
-        """
-        return self._determinant().roots(re, im)
+        return self.transfer_function(output, input).margin()
 
     def zeros(
         self,
@@ -525,40 +481,6 @@ class DelaySystem:
         late = {tau: bordered(matrix, none, tau) for tau, matrix in self._N.items()}
         return MatrixDeterminant(bordered(self._E, none, 0.0), late, state).roots(re, im)
 
-    def rightmost(self, n: int = 1) -> RootSet:
-        """Locate the rightmost poles, as `QuasiPolynomial.rightmost` does.
-
-        Parameters
-        ----------
-        n : int, default 1
-            How many, not counting mirror images in the real axis, which are listed as well.
-
-        Returns
-        -------
-        RootSet
-            Those right of the chains of a neutral system.
-
-        Raises
-        ------
-        ValueError
-            As in `count`, and if the system is advanced.
-        """
-        return self._leading().rightmost(n)
-
-    def spectral_abscissa(self) -> float:
-        """Give the largest real part of a pole in 1/s, or `chain_abscissa` if that is larger.
-
-        Returns
-        -------
-        float
-
-        Raises
-        ------
-        ValueError
-            As in `rightmost`.
-        """
-        return self._leading().spectral_abscissa()
-
     def chain_enclosure(self) -> tuple[float, float]:
         r"""Enclose the real part that the chains of a neutral system can come to.
 
@@ -592,109 +514,34 @@ class DelaySystem:
         """
         return self._matrix().chain_enclosure()
 
-    def chain_abscissa(self) -> float:
-        """Give the upper end of `chain_enclosure`; of `characteristic`, where E is singular.
-
-        Returns
-        -------
-        float
-            In 1/s; -inf for a system without delayed derivatives.
-
-        Raises
-        ------
-        ValueError
-            If E cannot be inverted and the determinant not be expanded.
-        """
-        matrix = self._matrix()
-        if matrix.is_invertible:
-            return matrix.chain_enclosure()[1]
-        return self.characteristic().chain_abscissa()
-
-    def is_stable(self, strong: bool = True) -> bool:
-        """Tell whether every pole is proved to lie left of the imaginary axis.
-
-        Parameters
-        ----------
-        strong : bool, default True
-            As in `QuasiPolynomial.is_stable`.
-
-        Returns
-        -------
-        bool
-
-        Raises
-        ------
-        ValueError
-            As in `rightmost`; for `strong=False` also where only the expanded determinant could
-            tell, and there is none.
-        """
-        if not strong and self._determinant().is_stable(strong=False):
-            return True
-        return self._leading().is_stable()
-
     # Responses
-
-    def simulate(self, time: ArrayLike, inputs: Any = 1.0, **arguments: Any) -> SystemResponse:
-        """Response to inputs of any kind, from any history: `deadtime.simulate` of this system.
-
-        Parameters
-        ----------
-        time : array_like, shape (n,)
-            Output times in s, increasing.
-        inputs : float, array_like or callable
-            As in `deadtime.simulate`.
-        **arguments
-            As in `deadtime.simulate`.
-
-        Returns
-        -------
-        SystemResponse
-        """
-        return respond(self, time, inputs, **arguments)
-
-    def step_response(
-        self,
-        time: ArrayLike | None = None,
-        amplitude: float = 1.0,
-        *,
-        input: int = 0,  # noqa: A002
-    ) -> SystemResponse:
-        """Response to a step of one input from rest at zero.
-
-        Parameters
-        ----------
-        time : array_like, optional
-            Output times in s; by default 501 from the step until the response has settled, or
-            has visibly failed to.
-        amplitude : float
-            Height of the step.
-        input : int, default 0
-            Which input, from zero; the others stay zero.
-
-        Returns
-        -------
-        SystemResponse
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> system = dtm.DelaySystem(A={0.36: -2.0}, B={0.36: 2.0})
-        >>> round(system.step_response().info()["overshoot"], 3)
-        22.475
-        """
-        return step_response(self, time, amplitude, input)
 
     def _realised(self) -> Realisation:
         if self._realisation is None:
-            object.__setattr__(
-                self,
-                "_realisation",
-                of_matrices(
-                    self.E, self.A, self.N, self.B, self.C, self.D, self.n_inputs, self.n_outputs
-                ),
-            )
+            object.__setattr__(self, "_realisation", self._realise())
         assert self._realisation is not None
         return self._realisation
+
+    def _realise(self, differentiated: bool = False) -> Realisation:
+        return of_matrices(
+            self._E,
+            self._A,
+            self._N,
+            self._B,
+            self._C,
+            self._D,
+            self.n_inputs,
+            self.n_outputs,
+            differentiated=differentiated,
+        )
+
+    def _differentiated(self) -> Realisable:
+        if any(matrix.any() for matrix in self._D.values()):
+            raise ValueError(
+                "D is not zero: the response to an impulse holds an impulse itself; leave D out "
+                "and add its part"
+            )
+        return _Differentiated(self)
 
     def _gains_at_rest(self) -> Matrix | None:
         try:
@@ -709,7 +556,7 @@ class DelaySystem:
         except NotExpandedError:
             return self._matrix()
 
-    def _leading(self) -> QuasiPolynomial | MatrixDeterminant:
+    def _robust_determinant(self) -> QuasiPolynomial | MatrixDeterminant:
         """Give det M in the form that knows better where the chains of a neutral system end.
 
         The coefficients of an expansion do not tell that tau_1 + tau_2 is no delay of its own.
@@ -741,6 +588,24 @@ class DelaySystem:
         entry |= {(1, tau): float(matrix[i, j]) for tau, matrix in self._N.items()}
         entry[1, 0.0] = float(self._E[i, j])
         return {key: value for key, value in entry.items() if value != 0.0}
+
+
+@dataclass(frozen=True, eq=False)
+class _Differentiated:
+    """A system with the derivatives of its outputs in their place."""
+
+    system: DelaySystem
+
+    def _realised(self) -> Realisation:
+        return self.system._realise(differentiated=True)
+
+    def _differentiated(self) -> Realisable:
+        raise NotImplementedError
+
+    def _gains_at_rest(self) -> Matrix | None:
+        """Zero where the system comes to rest."""
+        gains = self.system._gains_at_rest()
+        return None if gains is None else 0.0 * gains
 
 
 def _restored(*parts: Any) -> DelaySystem:

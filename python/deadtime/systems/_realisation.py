@@ -53,6 +53,9 @@ class Realisable(Protocol):
 
     def _realised(self) -> Realisation: ...
 
+    def _differentiated(self) -> Realisable:
+        """Give the system whose outputs are the derivatives of those of this one."""
+
     def _gains_at_rest(self) -> NDArray[np.float64] | None:
         """Outputs at rest per input, shape (n_outputs, n_inputs); None where there are none."""
 
@@ -112,8 +115,13 @@ def of_matrices(
     d: Group,
     inputs: int,
     outputs: int,
+    *,
+    differentiated: bool = False,
 ) -> Realisation:
-    """Solve for the derivative, which takes an E that can be inverted."""
+    """Solve for the derivative, which takes an E that can be inverted.
+
+    Where the outputs are to be `differentiated`, their matrices stand before x' instead of x.
+    """
     size = len(E)
     if not np.array_equal(E, np.eye(size)):
         rank = int(np.linalg.matrix_rank(E))
@@ -123,7 +131,8 @@ def of_matrices(
             {tau: np.asarray(np.linalg.solve(E, m), np.float64) for tau, m in group.items()}
             for group in (a, n, b)
         )
-    return _realised(size, inputs, outputs, has_states=True, A=a, N=n, B=b, C=c, D=d)
+    C, F = ({}, c) if differentiated else (c, {})
+    return _realised(size, inputs, outputs, has_states=True, A=a, N=n, B=b, C=C, F=F, D=d)
 
 
 def _singular(rank: int, size: int, is_late: bool) -> str:

@@ -1,7 +1,8 @@
-"""The response of a loop in time, and its figures of merit."""
+"""The response of a loop or a system in time."""
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import finite, positive, real_array
 from deadtime._deadtime import LoopResponse
+from deadtime.systems._step_metrics import OneSignal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,39 +22,36 @@ __all__ = ["Response"]
 
 Vector = NDArray[np.float64]
 
-# Points in one magnification around an extremum or a crossing, and how often to magnify: the
-# place is then known to 1e-8 of the output step, the height of a peak to rounding.
-_POINTS = 101
-_MAGNIFICATIONS = 4
-
-
 #: Sensitivities that nobody asked for.
 NONE = FrozenDict()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Response(ReadOnlyArrays):
-    """Output and command of a loop over time.
+    """Outputs and inputs of a loop or a system over time.
 
-    Unpacks into ``time, outputs``.
+    Unpacks into ``time, outputs``. A signal of one component has the shape (n,), as in
+    python-control; where it jumps, its value is that after the jump.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
         s.
-    outputs : ndarray, shape (n,)
-        The output y.
-    inputs : ndarray, shape (n,)
-        The command u after the limit. Where it jumps, the value after the jump.
+    outputs : ndarray, shape (n,) or (n_outputs, n)
+        The outputs y; of shape (n,) for a loop and for a system with one input and one output.
+    inputs : ndarray, shape (n,) or (n_inputs, n)
+        The inputs u, of shape (n,) where the outputs are; for a loop the command after the limit.
     breaks : ndarray, shape (m,)
-        Times in s between the first and the last of `time` at which output or command, or one
-        of their first ten derivatives, jumps: jumps of the reference, switching times of the
-        limit, samples, and all of these again each time they have gone round the loop.
-    reference : ndarray, shape (n,)
-        The reference r.
-    steady_state : float or None
-        The output at which the loop rests under the last reference, None where there is no such
-        rest within the limit.
+        Times in s between the first and the last of `time` at which output, input or state, or
+        one of their first ten derivatives, jumps by more than rounding: jumps of what is put in,
+        switching times of a limit, samples, and all of these again after each delay.
+    reference : ndarray, shape (n,), or None
+        The reference r of a loop.
+    states : ndarray, shape (n_states, n), or None
+        The states x of a system.
+    steady_state : float, ndarray of shape (n_outputs,), or None
+        The outputs at rest under the last inputs or the last reference, if those stay constant;
+        None where there is no such rest.
     sensitivities : dict of str to ndarray, shape (n,)
         Derivatives of `outputs`, at fixed times, with respect to the numbers of the loop that
         `ControlLoop.simulate` was asked for, by name.
@@ -72,16 +71,19 @@ class Response(ReadOnlyArrays):
     outputs: Vector
     inputs: Vector
     breaks: Vector
-    reference: Vector
-    steady_state: float | None = None
+    reference: Vector | None = None
+    states: Vector | None = None
+    steady_state: float | Vector | None = None
     sensitivities: dict[str, Vector] = field(default_factory=dict)
     input_sensitivities: dict[str, Vector] = field(default_factory=dict)
+    #: Outputs at other times of the same run.
     _dense: Callable[[Vector], Vector] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("time", "outputs", "inputs", "breaks", "reference"):
-            array = np.array(real_array(name, getattr(self, name)))
-            object.__setattr__(self, name, array)
+        for name in ("time", "outputs", "inputs", "breaks", "reference", "states"):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, np.array(real_array(name, given)))
         self._freeze()
 
     @classmethod
@@ -103,16 +105,18 @@ class Response(ReadOnlyArrays):
         for array in list(fields.values()):
             # Read-only, in a fifth of the time that `flags` takes.
             array.setflags(False)
-        fields["steady_state"] = steady_state
+        fields["states"], fields["steady_state"] = None, steady_state
         fields["sensitivities"] = fields["input_sensitivities"] = NONE
         fields["_dense"] = dense
         return response
 
     def __repr__(self) -> str:
-        rests = "" if self.steady_state is None else f", steady state {self.steady_state:g}"
+        outputs = "1 output" if self.outputs.ndim == 1 else f"{len(self.outputs)} outputs"
+        rest = self.steady_state
+        rests = f", steady state {rest:g}" if isinstance(rest, float) else ""
         return (
-            f"<Response: {len(self.time)} output times, {self.time[0]:g} to {self.time[-1]:g} s"
-            f"{rests}>"
+            f"<Response: {outputs} at {len(self.time)} times, {self.time[0]:g} to "
+            f"{self.time[-1]:g} s{rests}>"
         )
 
     def __iter__(self) -> Iterator[Vector]:
@@ -121,6 +125,7 @@ class Response(ReadOnlyArrays):
 
     def info(
         self,
+        output: int = 0,
         *,
         settling: float = 0.02,
         rise: tuple[float, float] = (0.1, 0.9),
@@ -134,6 +139,8 @@ class Response(ReadOnlyArrays):
 
         Parameters
         ----------
+        output : int, default 0
+            Which output, from zero.
         settling : float
             Half width of the settling band as a part of the step.
         rise : (float, float)
@@ -153,6 +160,8 @@ class Response(ReadOnlyArrays):
 
         Raises
         ------
+        IndexError
+            If there is no such output.
         ValueError
             If `settling` is not above zero, `rise` is no increasing pair, or a number is not
             finite.
@@ -170,58 +179,31 @@ class Response(ReadOnlyArrays):
             raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
         if steady_state is not None:
             steady_state = finite("steady_state", steady_state)
-        start, first = float(self.time[0]), float(self.outputs[0])
-        if steady_state is None:
-            known = self.steady_state
-            steady_state = float(self.outputs[-1]) if known is None else known
-        span = steady_state - first
-        nan = float("nan")
-        peak_time, peak = self._greatest(np.abs)
-        found = dict.fromkeys(
-            ("rise_time", "settling_time", "settling_min", "settling_max"), nan
-        ) | {
-            "overshoot": nan,
-            "undershoot": nan,
-            "peak": peak,
-            "peak_time": peak_time - start,
-            "steady_state": steady_state,
-        }
-        if span == 0.0:
-            return found
+        signals = np.atleast_2d(self.outputs)
+        index = operator.index(output)
+        if not 0 <= index < len(signals):
+            raise IndexError(f"output={output}: there are {len(signals)} of them, from 0")
+        if steady_state is None and self.steady_state is not None:
+            steady_state = float(np.ravel(self.steady_state)[index])
+        dense = self._dense
+        one = OneSignal(
+            self.time,
+            signals[index],
+            None if dense is None else lambda times: np.atleast_2d(dense(times))[index],
+        )
+        return one.step_metrics(settling, rise, steady_state)
 
-        def progress(outputs: Vector) -> Vector:
-            return (outputs - first) / span
-
-        found["overshoot"] = 100.0 * max(0.0, self._greatest(progress)[1] - 1.0)
-        found["undershoot"] = 100.0 * max(0.0, self._greatest(lambda y: -progress(y))[1])
-        low, high = (self._crossing(progress(self.outputs) >= part) for part in rise)
-        if low is not None and high is not None:
-            left = self._refined(low, lambda y: progress(y) >= rise[0])
-            risen = self._refined(high, lambda y: progress(y) >= rise[1])
-            found["rise_time"] = risen - left
-            found["settling_min"] = -self._greatest(lambda y: -y, first=high)[1]
-            found["settling_max"] = self._greatest(lambda y: y, first=high)[1]
-        outside = np.abs(progress(self.outputs) - 1.0) > settling
-        if not outside[-1]:
-            last = self._crossing(~np.logical_or.accumulate(outside[::-1])[::-1])
-            found["settling_time"] = (
-                0.0
-                if last is None or last == 0
-                else self._refined(last, lambda y: np.abs(progress(y) - 1.0) <= settling) - start
-            )
-        return found
-
-    def plot(self, ax: Axes | None = None, *, command: bool = False, **style: Any) -> Axes:
-        """Draw the output, with the reference as a thin line.
+    def plot(self, ax: Axes | None = None, *, inputs: bool = False, **style: Any) -> Axes:
+        """Draw the outputs, with the reference of a loop as a thin line.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
             Where to draw; new axes by default.
-        command : bool
-            Draw the command as well.
+        inputs : bool
+            Draw the inputs as well.
         **style
-            Passed to `matplotlib.axes.Axes.plot` for the output.
+            Passed to `matplotlib.axes.Axes.plot` for the outputs.
 
         Returns
         -------
@@ -235,50 +217,16 @@ class Response(ReadOnlyArrays):
         from deadtime._base.drawing import shown_axes
 
         ax = shown_axes(ax)
-        ax.plot(self.time, self.outputs, **({"label": "output"} | style))
-        ax.step(self.time, self.reference, "k", where="post", linewidth=0.8, label="reference")
-        if command:
-            ax.plot(self.time, self.inputs, linewidth=0.8, label="command")
+        shown = [("output", self.outputs, style)]
+        if inputs:
+            shown.append(("input", self.inputs, {"linewidth": 0.8}))
+        for name, signals, looks in shown:
+            rows = np.atleast_2d(signals)
+            for i, values in enumerate(rows):
+                label = name if len(rows) == 1 else f"{name} {i}"
+                ax.plot(self.time, values, **({"label": label} | looks))
+        if self.reference is not None:
+            ax.step(self.time, self.reference, "k", where="post", linewidth=0.8, label="reference")
         ax.set_xlabel("time in s")
         ax.legend()
         return ax
-
-    def _greatest(self, measure: Callable[[Vector], Vector], first: int = 0) -> tuple[float, float]:
-        """Time and value of the greatest `measure` of the output, from index `first` on."""
-        values = measure(self.outputs[first:])
-        best = int(np.argmax(values)) + first
-        time, value = float(self.time[best]), float(values[best - first])
-        if self._dense is None:
-            return time, value
-        left = float(self.time[max(best - 1, first)])
-        right = float(self.time[min(best + 1, len(self.time) - 1)])
-        for _ in range(_MAGNIFICATIONS):
-            times = np.linspace(left, right, _POINTS)
-            values = measure(self._dense(times))
-            best = int(np.argmax(values))
-            if values[best] > value:
-                time, value = float(times[best]), float(values[best])
-            left, right = times[max(best - 1, 0)], times[min(best + 1, _POINTS - 1)]
-        return time, value
-
-    @staticmethod
-    def _crossing(reached: NDArray[np.bool_]) -> int | None:
-        """Index of the first output for which `reached` holds."""
-        return int(np.argmax(reached)) if reached.any() else None
-
-    def _refined(self, index: int, reached: Callable[[Vector], NDArray[np.bool_]]) -> float:
-        """Return the time between outputs `index` - 1 and `index` from which `reached` holds."""
-        right = float(self.time[index])
-        if index == 0 or self._dense is None:
-            return right
-        left = float(self.time[index - 1])
-        for _ in range(_MAGNIFICATIONS):
-            times = np.linspace(left, right, _POINTS)
-            holds = reached(self._dense(times))
-            holds[-1] = True
-            # The last stretch that holds to the end: a settling band may be left and entered
-            # between two outputs.
-            held = int(np.argmin(holds[::-1])) if not holds.all() else _POINTS
-            right = float(times[_POINTS - held])
-            left = float(times[max(_POINTS - held - 1, 0)])
-        return right

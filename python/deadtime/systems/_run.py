@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -17,9 +17,9 @@ import deadtime.systems._signals as signals
 from deadtime._base.validation import finite, increasing, positive, real_array
 from deadtime._deadtime import Signal
 from deadtime.systems._realisation import Realisable, Realisation
-from deadtime.systems._system_response import SystemResponse
+from deadtime.systems._response import Response
 
-__all__ = ["Given", "respond", "step_response"]
+__all__ = ["Given", "impulse_response", "respond", "step_response"]
 
 Vector = NDArray[np.float64]
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
@@ -50,19 +50,13 @@ class _Run:
         return outputs if len(inner) < len(times) else outputs[:, 1:]
 
 
-@dataclass(frozen=True, eq=False)
-class _Rest:
-    """Outputs at rest under constant inputs."""
-
-    system: Realisable
-    inputs: Vector
-
-    def __call__(self) -> Vector | None:
-        gains = self.system._gains_at_rest()
-        if gains is None:
-            return None
-        rest: Vector = gains @ self.inputs
-        return rest if np.isfinite(rest).all() else None
+def _rest(system: Realisable, inputs: Vector | None) -> Vector | None:
+    """Outputs at rest under inputs that stay constant."""
+    gains = None if inputs is None else system._gains_at_rest()
+    if gains is None or inputs is None or not np.isfinite(gains).all():
+        return None
+    rest: Vector = gains @ inputs
+    return rest
 
 
 def respond(
@@ -80,8 +74,8 @@ def respond(
     initial_state: ArrayLike | None = None,
     vectorized: bool = False,
     max_step: float | None = None,
-) -> SystemResponse:
-    """Check the arguments of `deadtime.simulate` and run the system."""
+) -> Response:
+    """Check the arguments of `simulate` and run the system."""
     input_breaks, history_breaks = tuple(input_breaks), tuple(history_breaks)
     model = _realisation(system)
     if not model.has_states and (callable(history) or np.any(history) or initial_state is not None):
@@ -129,14 +123,15 @@ def respond(
         "vectorized": vectorized,
         "max_step": max_step,
     }
-    return SystemResponse(
-        time=np.array(times),
+    rest = _rest(system, last)
+    return Response(
+        time=times,
         outputs=outputs,
         inputs=shown,
         states=found.states.reshape(count, model.states).T,
         breaks=found.breaks + start,
+        steady_state=float(rest[0]) if rest is not None and outputs.ndim == 1 else rest,
         _dense=_Run(system, start, arguments) if len(times) > 1 else None,
-        _rest=None if last is None else _Rest(system, last),
     )
 
 
@@ -145,7 +140,7 @@ def step_response(
     time: ArrayLike | None,
     amplitude: float,
     input: int,  # noqa: A002
-) -> SystemResponse:
+) -> Response:
     """Response to a step of one input from rest at zero; up to where it has settled by default."""
     model = _realisation(system)
     index = operator.index(input)
@@ -159,15 +154,21 @@ def step_response(
     span = _SHORTEST * max([model.longest, *slowest, _LEAST])
     for _ in range(_DOUBLINGS):
         response = respond(system, np.linspace(0.0, span, _POINTS), height)
-        rest = response._rest() if response._rest else None
-        outputs = np.atleast_2d(response.outputs)
-        goal = outputs[:, -1] if rest is None else rest
+        rest, outputs = response.steady_state, np.atleast_2d(response.outputs)
+        goal = outputs[:, -1] if rest is None else np.atleast_1d(rest)
         away = np.abs(outputs - goal[:, None]).max(axis=0)
-        size = float(np.abs(goal).max())
+        # A response that comes back to zero is measured by its peak.
+        size = float(np.abs(goal).max()) or float(away.max())
         if away[-_POINTS // 4 :].max() <= _SETTLED * size or away.max() > _LOST * size:
             break
         span *= 2.0
     return response
+
+
+def impulse_response(system: Realisable, time: ArrayLike | None, input: int) -> Response:  # noqa: A002
+    """Response to an impulse: the derivative of the response to a step."""
+    found = step_response(system._differentiated(), time, 1.0, input)
+    return replace(found, inputs=np.zeros_like(found.inputs), states=None)
 
 
 def _realisation(system: object) -> Realisation:
@@ -175,7 +176,7 @@ def _realisation(system: object) -> Realisation:
     if realised is not None:
         model: Realisation = realised()
         return model
-    raise TypeError(f"system={system!r}: give a DelaySystem, a TransferFunction or a ControlLoop")
+    raise TypeError(f"system={system!r}: give a DelaySystem or a TransferFunction")
 
 
 def _is_sampled(inputs: Given, model: Realisation) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 
 import numpy as np
@@ -15,7 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.ranges import OpenRange
 from deadtime._base.validation import non_negative, real_array, unmasked
-from deadtime.roots import QuasiPolynomial, RootSet, delay
+from deadtime.roots import (
+    Parameter,
+    ParametricQuasiPolynomial,
+    QuasiPolynomial,
+    RootSet,
+    delay,
+    s,
+)
 from deadtime.roots._frequency import powers_of_s, without_powers
 from deadtime.roots._quasipolynomial import is_number
 from deadtime.systems._interchange import (
@@ -26,10 +33,10 @@ from deadtime.systems._interchange import (
 )
 from deadtime.systems._margins import Margins, margins
 from deadtime.systems._phase import argument
+from deadtime.systems._poles import HasPoles
 from deadtime.systems._ratio import first_term, ratio
-from deadtime.systems._realisation import Realisation, of_ratio
-from deadtime.systems._run import respond, step_response
-from deadtime.systems._system_response import SystemResponse
+from deadtime.systems._realisation import Realisable, Realisation, of_ratio
+from deadtime.systems._responses import HasResponses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +46,7 @@ __all__ = ["TransferFunction", "feedback"]
 Polynomial: TypeAlias = QuasiPolynomial | float | Sequence[float] | NDArray[Any]
 
 
-class TransferFunction:
+class TransferFunction(HasPoles, HasResponses):
     """A transfer function num(s)/den(s) of two quasi-polynomials.
 
     Usually made by dividing: ``2.0 / s * delay(0.36)``. Immutable. A delay common to numerator
@@ -51,13 +58,15 @@ class TransferFunction:
     ----------
     num, den : QuasiPolynomial, float or sequence of float
         A sequence holds the coefficients of a polynomial in descending powers of s.
+    delay : float, default 0
+        A delay in series, in s, zero or more.
 
     Raises
     ------
     ZeroDivisionError
         If `den` is zero.
     ValueError
-        If a coefficient is not finite, or a sequence is empty.
+        If a coefficient is not finite, a sequence is empty, or the delay is negative.
     TypeError
         If the coefficients are not real numbers.
 
@@ -72,7 +81,7 @@ class TransferFunction:
     >>> G = 2.0 / s * delay(0.36)
     >>> G
     2 exp(-0.36 s) / s
-    >>> G == dtm.TransferFunction([2.0], [1.0, 0.0]) * delay(0.36)
+    >>> G == dtm.TransferFunction([2.0], [1.0, 0.0], delay=0.36)
     True
     >>> dtm.feedback(G)
     2 exp(-0.36 s) / (s + 2 exp(-0.36 s))
@@ -88,10 +97,13 @@ class TransferFunction:
     _num: QuasiPolynomial
     _den: QuasiPolynomial
 
-    def __init__(self, num: Polynomial, den: Polynomial = 1.0) -> None:
+    def __init__(self, num: Polynomial, den: Polynomial = 1.0, *, delay: float = 0.0) -> None:
         n, d = _quasi_polynomial("num", num), _quasi_polynomial("den", den)
         if not d.coefficients.any():
             raise ZeroDivisionError("den is zero: a transfer function needs one that is not")
+        dead = non_negative("delay", delay)
+        if dead:
+            n = n * QuasiPolynomial([[1.0]], [dead])
         n, d = _without_common_delay(n, d)
         object.__setattr__(self, "_num", n)
         object.__setattr__(self, "_den", d)
@@ -301,34 +313,6 @@ class TransferFunction:
 
     # Poles and zeros
 
-    def poles(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
-        """Locate every root of the denominator in a region, each with a disc proved to hold it.
-
-        Poles that zeros cancel are among them: see `hidden_modes`.
-
-        Parameters
-        ----------
-        re, im : tuple of (float or None, float or None), optional
-            Ranges of the real part (1/s) and of the imaginary part (rad/s); None is an open end.
-
-        Returns
-        -------
-        RootSet
-
-        Raises
-        ------
-        ContourError, CountMismatchError, ValueError
-            As in `QuasiPolynomial.roots`; ValueError where the region holds infinitely many.
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> T = dtm.feedback(2.0 / dtm.s * dtm.delay(0.36))
-        >>> [complex(round(p.real, 4), round(p.imag, 4)) for p in T.poles(re=(-5, 0), im=(0, 10))]
-        [(-1.5154+3.1005j)]
-        """
-        return self._den.roots(re, im)
-
     def zeros(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
         """Locate every root of the numerator in a region, as `poles` does for the denominator.
 
@@ -405,101 +389,23 @@ class TransferFunction:
         k = min(powers_of_s(self._num), powers_of_s(self._den))
         return TransferFunction(without_powers(self._num, k), without_powers(self._den, k))
 
-    def rightmost(self, n: int = 1) -> RootSet:
-        """Locate the rightmost poles, as `QuasiPolynomial.rightmost` does for the denominator.
+    def _determinant(self) -> QuasiPolynomial:
+        return self._den
 
-        Parameters
-        ----------
-        n : int, default 1
-            How many, not counting mirror images in the real axis, which are listed as well.
-
-        Returns
-        -------
-        RootSet
-        """
-        return self._den.rightmost(n)
-
-    def spectral_abscissa(self) -> float:
-        """Give the largest real part of a pole in 1/s, hidden ones and chains of poles included.
-
-        Returns
-        -------
-        float
-        """
-        return self._den.spectral_abscissa()
-
-    def is_stable(self, strong: bool = True) -> bool:
-        """Tell whether every pole, hidden ones included, is proved to lie left of the axis.
-
-        Parameters
-        ----------
-        strong : bool, default True
-            As in `QuasiPolynomial.is_stable`.
-
-        Returns
-        -------
-        bool
-        """
-        return self._den.is_stable(strong)
+    def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
+        """Characteristic function of the loop closed around this one."""
+        unknown = [name for name in names if name not in ("gain", "delay")]
+        if unknown:
+            raise ValueError(
+                f"{unknown[0]}: a loop gain has the numbers 'gain', a factor on it, and 'delay', a "
+                "further delay"
+            )
+        gain: Any = Parameter("gain") if "gain" in names else 1.0
+        late: Any = delay(Parameter("delay")) if "delay" in names else 1.0
+        found: ParametricQuasiPolynomial = self._den + gain * self._num * late
+        return found
 
     # In time
-
-    def step_response(
-        self, time: ArrayLike | None = None, amplitude: float = 1.0
-    ) -> SystemResponse:
-        """Response to a step from rest.
-
-        Parameters
-        ----------
-        time : array_like, optional
-            Output times in s; by default 501 from the step until the response has settled, or
-            has visibly failed to.
-        amplitude : float
-            Height of the step.
-
-        Returns
-        -------
-        SystemResponse
-
-        Raises
-        ------
-        ValueError
-            As in `deadtime.simulate`.
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> time, outputs = dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)).step_response([0.0, 1.0])
-        >>> print(outputs)
-        [0.     1.1232]
-        """
-        return step_response(self, time, amplitude, 0)
-
-    def forced_response(self, time: ArrayLike, inputs: Any, **arguments: Any) -> SystemResponse:
-        """Response to an input of any kind from rest: `deadtime.simulate` of this system.
-
-        Parameters
-        ----------
-        time : array_like, shape (n,)
-            Output times in s, increasing.
-        inputs : float, array_like or callable
-            As in `deadtime.simulate`.
-        **arguments
-            As in `deadtime.simulate`.
-
-        Returns
-        -------
-        SystemResponse
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from deadtime import delay, s
-        >>> G = delay(0.5) / (s + 1)
-        >>> print(G.forced_response([0.0, 1.0, 2.0], np.sin).outputs.round(6))
-        [0.       0.104187 0.574944]
-        """
-        return respond(self, time, inputs, **arguments)
 
     def _realised(self) -> Realisation:
         num, den = self.num, self.den
@@ -514,6 +420,14 @@ class TransferFunction:
                 "is advanced)"
             )
         return of_ratio(num, den)
+
+    def _differentiated(self) -> Realisable:
+        if self._num.degree >= self._den.degree and self._num.coefficients.any():
+            raise ValueError(
+                f"the numerator has degree {self._num.degree}, the denominator "
+                f"{self._den.degree}: the response to an impulse holds an impulse itself"
+            )
+        return self * s
 
     def _gains_at_rest(self) -> NDArray[np.float64]:
         return np.array([[self.dcgain()]])
@@ -554,12 +468,33 @@ class TransferFunction:
         """
         return margins(self._num, self._den)
 
+    def sensitivity(self) -> TransferFunction:
+        """Sensitivity S = 1/(1 + G) of the loop closed around this one.
+
+        Returns
+        -------
+        TransferFunction
+            From a disturbance of the output to the output; 1 - S is ``feedback(G)``.
+
+        Raises
+        ------
+        ValueError
+            If G is -1 everywhere.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> (2.0 / s * delay(0.36)).sensitivity()
+        s / (s + 2 exp(-0.36 s))
+        """
+        return feedback(1.0, self)
+
     def bode(
         self,
         omega: ArrayLike | None = None,
         *,
         margins: bool = False,
-        axes: Sequence[Axes] | None = None,
+        ax: Sequence[Axes] | None = None,
     ) -> Sequence[Axes]:
         """Draw gain and phase over frequency.
 
@@ -570,7 +505,7 @@ class TransferFunction:
             lowest corner to a decade above the highest.
         margins : bool, default False
             Take this as a loop gain and mark its margins.
-        axes : sequence of two matplotlib.axes.Axes, optional
+        ax : sequence of two matplotlib.axes.Axes, optional
             Where to draw gain and phase; a new figure by default.
 
         Returns
@@ -587,7 +522,7 @@ class TransferFunction:
 
         places = self._plotted(omega, 0.1, 10.0)
         found = self.margin() if margins else None
-        drawn = shown_rows(axes, 2)
+        drawn = shown_rows(ax, 2)
         plot_bode(drawn, self, places, found)
         return drawn
 
@@ -672,7 +607,7 @@ class TransferFunction:
         TypeError
             If it is no such system.
         """
-        return _delayed(polynomials_of_control(system), delay)
+        return cls(*polynomials_of_control(system), delay=delay)
 
     def to_control(self, pade: int | None = None) -> Any:
         """Write as a transfer function of python-control, which knows no delays.
@@ -725,7 +660,7 @@ class TransferFunction:
         >>> dtm.TransferFunction.from_scipy(([2.0], [1.0, 0.0]), delay=0.36)
         2 exp(-0.36 s) / s
         """
-        return _delayed(polynomials_of_scipy(system), delay)
+        return cls(*polynomials_of_scipy(system), delay=delay)
 
     def to_scipy(self, pade: int | None = None) -> Any:
         """Write as a transfer function of scipy.signal, which knows no delays.
@@ -849,12 +784,6 @@ def _without_common_delay(
         for h in (n, d)
     )
     return n, d
-
-
-def _delayed(
-    polynomials: tuple[NDArray[np.float64], NDArray[np.float64]], dead: float
-) -> TransferFunction:
-    return TransferFunction(*polynomials) * delay(non_negative("delay", dead))
 
 
 def _frequencies(omega: ArrayLike) -> NDArray[np.float64]:

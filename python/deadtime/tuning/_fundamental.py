@@ -16,7 +16,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from deadtime.loops._model import LoopModel, LoopRun
 
@@ -37,6 +36,8 @@ class Fundamental:
     """The unit responses of one loop, simulated as far as they are asked for."""
 
     def __init__(self, model: LoopModel, delay: float) -> None:
+        from scipy.linalg import expm
+
         self.model, self.delay = model, delay
         n = len(model.B)
         undelayed = model.A + np.outer(model.B, model.K)

@@ -1,9 +1,9 @@
 //! Time-delay systems: Lambert W, quasi-polynomials and their roots, stability maps, delay
 //! differential equations.
 //!
-//! Everything numerical of the `deadtime` Python package is here, and nothing of Python.
-//! Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots ←
-//! stability; quasipoly ← dde.
+//! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
+//! Python. Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots
+//! ← stability; quasipoly ← dde.
 
 pub mod dde;
 pub mod elementary;

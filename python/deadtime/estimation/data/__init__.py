@@ -1,1 +1,1 @@
-"""What estimators read from a recording, and what they refuse."""
+"""What the methods read from a recording, and the checks that refuse unusable ones."""

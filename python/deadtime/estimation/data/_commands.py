@@ -1,4 +1,4 @@
-"""The command of every row of a recording: logged, or as the controller makes it."""
+"""The command of every row of a recording: as logged, or computed from the controller."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from deadtime.recordings import Recording
 
 __all__ = ["commands_over_samples", "known_commands", "moves_between_rows"]
 
-#: A logged command is the controller's own where it differs from that by so little of its size:
-#: noise that is in the log alone parts them.
+#: A logged command is taken to be the P controller's where the two differ by less than this share
+#: of the command's standard deviation. Larger values accept more noise in the log, and more foreign
+#: commands.
 ALIKE = 0.2
 
 
 def known_commands(recording: Recording, loop: ControlLoop) -> tuple[NDArray[np.float64], str]:
-    """Commands within the limit, and where they come from.
+    """Commands within the limit, and their source in words.
 
-    What a P controller commands at a sample depends on that sample alone, so it can be computed
-    from the log; other controllers remember what came before the log.
+    The command of a P controller depends on its sample alone, so it can be computed from the log;
+    the command of other controllers depends on samples before the log.
     """
     limit = math.inf if loop.limit is None else loop.limit
     if recording.command is not None:
@@ -38,24 +39,25 @@ def known_commands(recording: Recording, loop: ControlLoop) -> tuple[NDArray[np.
 
 
 def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
-    """Whether a logged command is that of a continuous P controller, and so is held nowhere.
+    """Whether a logged command is that of a continuous P controller, which is not held.
 
-    Anything else that was logged as a command, such as a setpoint, is taken as held.
+    Any other logged command, such as a setpoint, is taken as held between rows.
     """
     if loop.is_sampled or recording.command is None or not isinstance(loop.controller, P):
         return False
-    made, _ = known_commands(replace(recording, command=None), loop)
+    computed, _ = known_commands(replace(recording, command=None), loop)
     logged, _ = known_commands(recording, loop)
-    return float(np.std(made - logged)) < ALIKE * float(np.std(logged))
+    return float(np.std(computed - logged)) < ALIKE * float(np.std(logged))
 
 
 def commands_over_samples(
     recording: Recording, loop: ControlLoop
 ) -> tuple[NDArray[np.float64], str]:
-    """Mean command from each sample to the next, and where the commands come from.
+    """Mean command from each sample to the next, and the source of the commands in words.
 
-    A sampled loop holds its command. That of a continuous one moves from sample to sample, on a
-    line to second order; where the reference jumps at a sample, up to just before the jump.
+    A sampled loop holds its command. In a continuous loop the mean is that of a straight line
+    between the samples (second order); where the reference steps at a sample, the line ends just
+    before the step.
     """
     command, source = known_commands(recording, loop)
     if loop.is_sampled:

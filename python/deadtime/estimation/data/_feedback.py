@@ -1,14 +1,14 @@
 """Whether the command of a recording follows the output.
 
-In a loop the sensor noise is in the output and, through the controller, in the command: methods
-that take the one for the cause of the other then find relations that go the other way round.
+In a closed loop the sensor noise is in the output and, through the controller, in the command.
+Methods that assume that the command causes the output then also find the effect of the output on
+the command.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from deadtime.recordings import Recording
 
@@ -16,21 +16,23 @@ __all__ = ["FEEDBACK", "feedback_p_value"]
 
 Array = NDArray[np.float64]
 
-#: Below this p-value the command follows the output.
+#: The command is taken to follow the output below this p-value.
 FEEDBACK = 1e-3
 
-#: Samples of the past that the test looks at.
+#: Past samples in the test.
 PAST = 2
 
 
 def feedback_p_value(recording: Recording) -> float:
-    """How often a command that is not made from the output would look so much as if it were.
+    """P-value of the test that the command does not depend on the output.
 
-    An F test of Granger's (1969) kind: does the output, to `PAST` samples back, help to predict the
-    command beyond what reference and past commands do?
+    A Granger (1969) F test: whether the output, up to `PAST` samples back, improves the prediction
+    of the command by the reference and past commands.
     """
+    from scipy import special
+
     command = recording.command
-    if command is None:  # computed from the output, then
+    if command is None:  # it is then computed from the output
         return 0.0
     rows = np.arange(PAST, command.size)
 

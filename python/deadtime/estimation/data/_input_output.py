@@ -1,10 +1,11 @@
-"""What went into the vehicle and what came out, sample by sample, freed of what is known of it.
+"""Command and response of a vehicle, sample by sample, with its known dynamics inverted.
 
 With u_k the command held over each sample time h, or its mean over it, an integrator moves by
 (y_{k+1} - y_k)/h per second and a first-order plant with time constant c leaves
-(y_{k+1} - p y_k)/(1 - p), p = e^(-h/c), behind: in both cases the gain times what arrived between
-the two samples, for the integrator the command (1-f) u_{k-d} + f u_{k-d-1} at a delay of (d + f) h.
-No half sample of the hold is left over then; where the plant is not undone it is, and is taken off.
+(y_{k+1} - p y_k)/(1 - p), p = e^(-h/c), behind: in both cases the gain times the mean input between
+the two samples, which for the integrator is the command (1-f) u_{k-d} + f u_{k-d-1} at a delay of
+(d + f) h. This includes the half sample of the hold; where the plant cannot be inverted, the half
+sample is subtracted from the delay.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ __all__ = ["InputOutput", "read_input_output"]
 
 Array = NDArray[np.float64]
 
-#: Fewest samples that tell a delay by correlation or regression.
+#: Fewest samples for a delay by correlation or regression.
 FEWEST = 16
 
-#: Samples are even where their distances differ by less than this share.
+#: Largest relative deviation of the time between samples from its median.
 EVEN = 0.01
 
-#: Longest delay that is sought, as a share of the record.
+#: Longest delay of the search, as a share of the record.
 LONGEST = 0.6
 
 
@@ -43,21 +44,21 @@ class InputOutput:
     Attributes
     ----------
     command : ndarray, shape (n,)
-        Command of each sample, less the one that would have kept the vehicle where it was.
-    answer : ndarray, shape (n,)
-        What the vehicle was driven by over each sample time, times the gain.
+        Command of each sample, less the one that keeps the vehicle at its initial output.
+    response : ndarray, shape (n,)
+        Gain times the mean input of the vehicle over each sample time.
     sample_time : float
         s.
     late : float
-        How much later than by the delay the answer comes, s: what was not undone of plant and hold.
+        Delay of the response besides the delay itself, s: what was not inverted of plant and hold.
     source : str
-        Where the commands come from.
+        Source of the commands.
     remark : str
-        What the delay holds besides itself, in words; empty if nothing.
+        What else is part of the delay, in words; empty if nothing.
     """
 
     command: Array
-    answer: Array
+    response: Array
     sample_time: float
     late: float
     source: str
@@ -65,14 +66,14 @@ class InputOutput:
 
     @property
     def longest(self) -> int:
-        """Longest delay that is sought, in samples."""
+        """Longest delay of the search, in samples."""
         return int(LONGEST * self.command.size)
 
 
 def read_input_output(
     recording: Recording, loop: ControlLoop, simulated: SimulatedRecording, method: str
 ) -> InputOutput:
-    """Input and output over the window of `simulated`, refused where there is nothing in them."""
+    """Input and output over the window of `simulated`; refuses constant ones."""
     data = simulated.recording
     steps = np.diff(data.time)
     h = data.sample_time
@@ -88,20 +89,22 @@ def read_input_output(
             "the window"
         )
     check_moves(data.output, command)
-    return _undone(command, data.output, loop, h, source)
+    return _inverted(command, data.output, loop, h, source)
 
 
-def _undone(command: Array, output: Array, loop: ControlLoop, h: float, source: str) -> InputOutput:
-    """Command and answer without the plant, as far as it can be undone."""
+def _inverted(
+    command: Array, output: Array, loop: ControlLoop, h: float, source: str
+) -> InputOutput:
+    """Command and response without the plant, as far as it can be inverted."""
     plant = loop.plant
     moved = output - float(output[0])
     if isinstance(plant, Integrator):
         return InputOutput(command[:-1], np.diff(moved) / h, h, plant.lag, source, "")
     if isinstance(plant, FirstOrder):
         kept = math.exp(-h / plant.time_constant)
-        answer = (moved[1:] - kept * moved[:-1]) / (1.0 - kept)
+        response = (moved[1:] - kept * moved[:-1]) / (1.0 - kept)
         resting = float(output[0]) / plant.gain
-        return InputOutput(command[:-1] - resting, answer, h, 0.0, source, "")
-    remark = "; the plant was not undone, so its own lag is part of the delay"
+        return InputOutput(command[:-1] - resting, response, h, 0.0, source, "")
+    remark = "; the plant was not inverted, so its lag is part of the delay"
     centred = output - float(output.mean())
     return InputOutput(command - float(command.mean()), centred, h, 0.5 * h, source, remark)

@@ -1,9 +1,9 @@
-"""Spectra of a periodic experiment: means over the periods, and how periods differ.
+"""Spectra of a periodic experiment: means over the periods, and their covariances.
 
 The DFT of period m at the lines that the reference excites is U_m, Y_m; noise differs from period
-to period, the answer to the reference does not. Means over M periods have 1/M of the covariances
-between the periods (Pintelon & Schoukens 2012, section 10.2). Noise has a smooth spectrum, so
-covariances are averaged over neighbouring lines too, which makes few periods enough.
+to period, the response to the reference does not. Means over M periods have 1/M of the covariances
+between the periods (Pintelon & Schoukens 2012, section 10.2). The spectrum of the noise is smooth,
+so covariances are also averaged over neighbouring lines, and few periods are enough.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ __all__ = ["PeriodicSpectra", "periodic_spectra"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: A line of the reference above this share of its largest is excited.
+#: A line of the reference counts as excited above this share of the largest line.
 EXCITED = 1e-3
 
-#: Lines to either side over which covariances are averaged. Noise that goes round the loop has no
-#: flat spectrum: with three, standard errors came out a tenth too small.
+#: Lines to either side over which covariances are averaged. The spectrum of noise in a loop is not
+#: flat: with three lines, standard errors were 10 % too small.
 NEIGHBOURS = 1
 
-#: A period is a whole number of samples to this share of one.
+#: Largest deviation of a period from a whole number of samples, in samples.
 WHOLE = 1e-3
 
 
@@ -46,7 +46,7 @@ class PeriodicSpectra:
     input, output : ndarray of complex
         Mean DFT of command and output.
     input_variance, output_variance, covariance : ndarray
-        Of these means; ``covariance`` is E[n_y n_u*].
+        Variances and covariance of these means; ``covariance`` is E[n_y n_u*].
     freedom : float
         Complex degrees of freedom of each.
     """
@@ -70,17 +70,17 @@ def periodic_spectra(
     samples = round(period / h)
     if abs(period / h - samples) > WHOLE or samples < 4:
         raise ValueError(
-            f"period={period:g} s is {period / h:.4g} samples of {h:g} s: it has to be a whole "
-            "number, four at least"
+            f"period={period:g} s is {period / h:.4g} samples of {h:g} s: give a whole "
+            "number of samples, at least four"
         )
     begin = whole_number("left_out", left_out, least=0) * samples
     periods = (len(data) - begin) // samples
     if periods < 2:
         raise NotIdentifiableError(
-            f"{max(0, periods)} periods of {period:g} s after {left_out} left out: two at least "
-            "are needed to see how they differ; record longer"
+            f"{max(0, periods)} periods of {period:g} s after {left_out} left out: at least "
+            "two are needed for their covariance; record longer"
         )
-    begin = len(data) - periods * samples  # the latest ones, farthest from the transient
+    begin = len(data) - periods * samples  # the last ones, in which the transient has decayed most
 
     def spectra(values: Array) -> Complex:
         parts = values[begin:].reshape(periods, samples)
@@ -90,11 +90,11 @@ def periodic_spectra(
     spread = float(np.max(np.ptp(reference, axis=0)))
     if spread > 1e-6 * float(np.ptp(reference)) or float(np.ptp(reference)) == 0.0:
         raise NotIdentifiableError(
-            f"the reference does not repeat itself every {period:g} s (it differs by {spread:.3g} "
-            "between periods, or does not move): give the period of Experiment.multisine"
+            f"the reference does not repeat every {period:g} s (periods differ by {spread:.3g}, "
+            "or the reference is constant): give the period of Experiment.multisine"
         )
     power = np.abs(np.fft.rfft(reference[0]))
-    power[0] = 0.0  # the mean of an integrator's output tells nothing
+    power[0] = 0.0  # the mean of an integrator's output holds no information
     excited = (power > EXCITED * power.max()) & (np.arange(power.size) / period <= highest)
     lines = np.flatnonzero(excited)
     lines = lines[2 * lines < samples]
@@ -111,7 +111,7 @@ def periodic_spectra(
             return np.full(lines.size, summed.mean())
         return np.asarray(np.convolve(summed, width, "same") / count)
 
-    together = min(lines.size, NEIGHBOURS + 1)  # what there is at the ends
+    together = min(lines.size, NEIGHBOURS + 1)  # lines that are averaged at the ends
     return PeriodicSpectra(
         lines=lines,
         samples=samples,

@@ -1,8 +1,9 @@
-"""A recording beside the simulation of the loop that made it.
+"""Simulations of the recorded loop over a window of the recording.
 
-The one place that knows how a window of a recording becomes initial conditions: the loop starts
-at rest at the output it has there, samples at the time stamps of the recording, and a sampled
-loop still has the commands of its last delay on the way, which the rows before the window tell.
+This file alone turns a window of a recording into initial conditions: the loop starts at rest at
+its output at the beginning of the window, the simulation is evaluated at the time stamps of the
+recording, and in a sampled loop the commands of the last delay before the window, which its rows
+hold, are still to arrive.
 """
 
 from __future__ import annotations
@@ -23,14 +24,16 @@ __all__ = ["SimulatedRecording"]
 
 Array = NDArray[np.float64]
 
-#: Longest window, in samples of the recording and in samples of the loop.
+#: Longest window, in samples of the recording and of the loop (bounds the time of a fit).
 MOST_SAMPLES = 50_000
 
-#: Difference quotients: part of a number, of the time between two samples, or of the step.
+#: Relative step of difference quotients: of the parameter, the time between two samples, or the
+#: excitation.
 STEP = 1e-5
 
-#: In place of none, where none cannot be differentiated at: part of the time between two samples.
-SHORT = 0.25
+#: Step of the difference quotient by a delay or lag of zero in a continuous loop, as a share of the
+#: time between two samples. A shorter one makes the loop stiff.
+STEP_FROM_ZERO = 0.25
 
 IN_S = frozenset({"delay", "lag", "start"})
 NOT_NEGATIVE = frozenset({"delay", "lag"})
@@ -44,26 +47,26 @@ class SimulatedRecording:
     recording : Recording
         The whole recording.
     loop : ControlLoop
-        What is known of the loop; its delay may be None.
-    window : (float or None, float or None) or None
-        The part to be simulated, s.
+        The known part of the loop; its delay may be None.
+    window : (float or None, float or None)
+        The part that is simulated, s.
     """
 
     def __init__(
         self,
         recording: Recording,
         loop: ControlLoop,
-        window: tuple[float | None, float | None] | None,
+        window: tuple[float | None, float | None] = (None, None),
     ) -> None:
-        rows = recording.rows(*(window or (None, None)))
-        # The recorded output is what came back to the controller, wherever the delay is.
+        rows = recording.rows(*window)
+        # The recorded output is the one that the controller received, wherever the delay is.
         self.loop = loop.replace(delay_path="command")
-        self.recording = recording.window(*(window or (None, None)))
+        self.recording = recording.window(*window)
         _check_work(self.recording, loop)
         self._past = _past_commands(recording, loop, rows.start)
 
     def output(self, values: Mapping[str, float], start: float) -> Array:
-        """Output of the loop with these numbers, from rest at the output `start`."""
+        """Output of the loop with these parameters, from rest at the output `start`."""
         return self._run(values, start).outputs
 
     def slopes(self, values: Mapping[str, float], start: float) -> dict[str, Array]:
@@ -74,7 +77,7 @@ class SimulatedRecording:
         """
         exact = [name for name in values if name in self._differentiable]
         loop = self.loop.replace(**_of_the_loop(values))
-        # Next to none, a lag delays like a delay, to first order exactly so.
+        # At zero the derivative by a lag equals that by a delay.
         no_lag = loop.parameters.get("lag") == 0.0
         if no_lag and "lag" in exact:
             exact = [*(name for name in exact if name not in ("lag", "delay")), "delay"]
@@ -92,12 +95,11 @@ class SimulatedRecording:
         return found
 
     def _quotient(self, values: Mapping[str, float], start: float, name: str) -> Array:
-        """Difference quotient by one number, one-sided where the number cannot be less."""
+        """Difference quotient by one parameter, one-sided where it is at its lower bound."""
         value = values[name]
         change = STEP * max(abs(value), self.recording.sample_time if name in IN_S else 0.0)
         if value == 0.0 and name in NOT_NEGATIVE and not self.loop.is_sampled:
-            # A shorter one makes the loop stiff; at their bound these have no error bars anyway.
-            change = SHORT * self.recording.sample_time
+            change = STEP_FROM_ZERO * self.recording.sample_time
         low = max(0.0, value - change) if name in NOT_NEGATIVE else value - change
         higher = self.output({**values, name: value + change}, start)
         return (higher - self.output({**values, name: low}, start)) / (value + change - low)
@@ -114,7 +116,7 @@ class SimulatedRecording:
         self, values: Mapping[str, float], start: float, sensitivities: Sequence[str] = ()
     ) -> Response:
         window = self.recording
-        # A clock of the output that runs late: what it calls t was at t - late.
+        # The clock of the output is late: its time stamp t was at t - late.
         late = values.get("start", 0.0)
         loop = self.loop.replace(**_of_the_loop(values))
         phase = 0.0
@@ -141,11 +143,11 @@ def _of_the_loop(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _check_work(window: Recording, loop: ControlLoop) -> None:
-    """Refuse what would take minutes: a fit simulates the window some hundred times."""
+    """Refuse windows whose fit, some hundred simulations, would take minutes."""
     advice = "use a window around one step"
     if len(window) > MOST_SAMPLES:
         raise RecordingError(
-            f"{len(window)} samples are more than the {MOST_SAMPLES} that a fit can simulate in "
+            f"{len(window)} samples exceed the {MOST_SAMPLES} that a fit can simulate in "
             f"reasonable time: {advice}, or keep every tenth sample"
         )
     held = 0.0
@@ -160,7 +162,7 @@ def _check_work(window: Recording, loop: ControlLoop) -> None:
 
 
 def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array:
-    """Commands issued before row `start`, where the loop is sampled and the rows tell them."""
+    """Commands before row `start`, where the loop is sampled and the rows determine them."""
     if loop.sample_time is None or start == 0:
         return np.empty(0)
     if recording.command is not None:

@@ -1,4 +1,4 @@
-"""One step of the reference in a recording, and the answer to it as a share of the step."""
+"""One step of the reference in a recording, and the step response as a share of the step."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.loops import ControlLoop, Integrator, P
 from deadtime.recordings import Recording, Step
 
-__all__ = ["CLEARANCE", "StepReading", "read_step", "scatter_of_bends", "stiffness_of"]
+__all__ = ["CLEARANCE", "StepReading", "noise_of_second_differences", "read_step", "stiffness_of"]
 
-#: What is read has to stand out of the noise by this many standard deviations.
+#: Smallest size of what is read from the response, in standard deviations of the noise.
 CLEARANCE = 3.0
 
-#: How much longer than the step's own reading of noise the start is averaged, s.
+#: Longest time before the step over which the initial output is averaged, s.
 BEFORE_STEP = 2.0
 
-#: So many samples at rest tell the noise by themselves.
+#: Fewest samples at rest whose standard deviation alone gives the noise.
 ENOUGH = 20
 
-#: An output that ends short of this share of the step does not follow the reference.
+#: Least share of the step at the end; below it the output does not follow the reference.
 FOLLOWS = 0.5
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class StepReading:
-    """The answer to one step.
+    """The response to one step.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class StepReading:
     start : float
         Mean output before the step.
     start_samples : int
-        How many samples that mean is of.
+        Number of samples in that mean.
     size : float
         From `start` to the new reference.
     noise : float
@@ -48,7 +48,7 @@ class StepReading:
     since : ndarray, shape (n,)
         Time since the step, s.
     travelled : ndarray, shape (n,)
-        Share of the step made good by then: 0 at the start, 1 at the new reference.
+        Output as a share of the step: 0 at the start, 1 at the new reference.
     """
 
     step: Step
@@ -61,7 +61,7 @@ class StepReading:
 
     @property
     def tail(self) -> Array:
-        """The last quarter of what was travelled."""
+        """The last quarter of `travelled`."""
         return self.travelled[-max(4, self.travelled.size // 4) :]
 
 
@@ -82,18 +82,18 @@ def stiffness_of(loop: ControlLoop, method: str) -> float:
 
 
 def read_step(recording: Recording) -> StepReading:
-    """The answer to the one step in a recording, refused where there is none."""
+    """The response to the one step in a recording; refuses windows with none or several."""
     steps = recording.steps()
     if not steps:
         raise NotIdentifiableError(
-            "the reference does not move in the window: there is no step to answer; begin the "
-            "window some samples before it"
+            "the reference is constant in the window, so there is no step; begin the window some "
+            "samples before a step"
         )
     if len(steps) > 1:
         times = ", ".join(f"{step.time:g}" for step in steps[:6])
         raise NotIdentifiableError(
             f"{len(steps)} steps of the reference in the window (at {times} s): choose a window "
-            "with one"
+            "with one of them"
         )
     step = steps[0]
     after = recording.output[step.index :]
@@ -124,14 +124,14 @@ def read_step(recording: Recording) -> StepReading:
 
 
 def _noise(before: Array, tail: Array) -> float:
-    """Standard deviation of the sensor noise, from where the loop rests."""
+    """Standard deviation of the sensor noise, from the samples at rest."""
     resting = float(np.std(before, ddof=1)) if before.size >= 5 else 0.0
     if before.size >= ENOUGH:
         return resting
-    # Few samples often show too little.
-    return max(resting, scatter_of_bends(tail))
+    # Few samples often give too small a value.
+    return max(resting, noise_of_second_differences(tail))
 
 
-def scatter_of_bends(values: Array) -> float:
-    """Standard deviation of the noise on three values or more of something that moves smoothly."""
+def noise_of_second_differences(values: Array) -> float:
+    """Standard deviation of the noise on a smooth signal of at least three values."""
     return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / math.sqrt(6.0)

@@ -1,1 +1,1 @@
-"""Least squares, profiles of a parameter, and residuals."""
+"""Least squares, profile likelihood, and tests of residuals."""

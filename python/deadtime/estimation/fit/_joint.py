@@ -1,10 +1,9 @@
-"""Several recordings of the same vehicle, fitted by one set of numbers.
+"""Several recordings of the same vehicle, fitted by one set of parameters.
 
-Numbers of the vehicle are common, the output at the start is each recording's own. Recordings
-differ in how well the model explains them. Where the misfit is white, it is noise, and each counts
-by the inverse of its variance, which maximum likelihood estimates along (iterated until it
-rests). Where it is not, it is what the model lacks, which grows with the motion: then each
-counts by the inverse of how far it was moved.
+The parameters of the vehicle are common; each recording has its own initial output. The recordings
+are weighted. Where residuals are white, they are noise, and the weight is the inverse of their
+standard deviation, which is estimated too (iterated to convergence). Where they are not, the model
+is incomplete and its error grows with the motion: the weight is then the inverse of the excitation.
 """
 
 from __future__ import annotations
@@ -23,10 +22,11 @@ __all__ = ["JointModel", "solve_jointly"]
 
 Array = NDArray[np.float64]
 
-#: Rounds of weighing recordings by their misfit, at most, and the change at which they rest.
-ROUNDS, AT_REST = 20, 1e-6
+#: Most iterations of the weights, and the change at which they have converged.
+ITERATIONS, CONVERGED = 20, 1e-6
 
-#: A misfit below this share of the largest one is rounding: it must not outweigh the others.
+#: Smallest residuals of a recording, as a share of the largest of any recording: below it is
+#: rounding, which must not outweigh the other recordings.
 LEAST_SHARE = 1e-6
 
 
@@ -37,9 +37,9 @@ class JointModel:
     Attributes
     ----------
     parts : tuple of Model
-        One a recording; the same names are asked of each.
+        One for each recording; all have the same names.
     weights : tuple of float
-        Factor on the misfit of each.
+        Factor on the residuals of each.
     """
 
     parts: tuple[Model, ...]
@@ -47,7 +47,7 @@ class JointModel:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of what is asked for."""
+        """Names of the common parameters."""
         return self.parts[0].names
 
     @cached_property
@@ -63,7 +63,7 @@ class JointModel:
 
     @property
     def size(self) -> float:
-        """How far the recordings were moved at most."""
+        """Largest excitation of the recordings."""
         return max(part.size for part in self.parts)
 
     @property
@@ -73,7 +73,7 @@ class JointModel:
 
     @cached_property
     def _places(self) -> list[Array]:
-        """Where the parameters of each recording stand among all."""
+        """Indices of the parameters of each recording among all parameters."""
         count, after, places = len(self.names), len(self.names), []
         for part in self.parts:
             own = len(part.labels) - count
@@ -87,24 +87,24 @@ class JointModel:
 
     @cached_property
     def low(self) -> Array:
-        """Lower bounds: the highest of the recordings' own."""
+        """Lower bounds: the largest over the recordings."""
         ends = [part.low for part in self.parts]
         return self._joined(ends, np.max([end[: len(self.names)] for end in ends], axis=0))
 
     @cached_property
     def high(self) -> Array:
-        """Upper bounds: the lowest of the recordings' own."""
+        """Upper bounds: the smallest over the recordings."""
         ends = [part.high for part in self.parts]
         return self._joined(ends, np.min([end[: len(self.names)] for end in ends], axis=0))
 
     @cached_property
     def scale(self) -> Array:
-        """Sizes of the parameters."""
+        """Scales of the parameters."""
         ends = [part.scale for part in self.parts]
         return self._joined(ends, ends[0][: len(self.names)])
 
     def misfit(self, point: Array) -> Array:
-        """Weighted misfits, one recording after the other."""
+        """Weighted residuals, one recording after the other."""
         return np.concatenate(
             [
                 weight * part.misfit(point[place])
@@ -113,7 +113,7 @@ class JointModel:
         )
 
     def jacobian(self, point: Array) -> Array:
-        """Derivatives of the weighted misfits."""
+        """Derivatives of the weighted residuals."""
         rows = []
         for part, weight, place in zip(self.parts, self.weights, self._places, strict=True):
             block = np.zeros((sum(part.sizes), point.size))
@@ -122,7 +122,7 @@ class JointModel:
         return np.concatenate(rows)
 
     def starts(self) -> list[Array]:
-        """Starts of every recording, the others' own parameters at their best first ones."""
+        """Starting points of every recording, completed by the best ones of the others."""
         starts = [part.starts() for part in self.parts]
         own = [points[0] for points in starts]
         count = len(self.names)
@@ -134,7 +134,7 @@ class JointModel:
         return sorted(candidates, key=lambda point: float(np.sum(self.misfit(point) ** 2)))
 
     def scatter(self, minimum: Minimum) -> Array:
-        """Root mean square of the misfit of each recording, unweighted."""
+        """Root mean square of the unweighted residuals of each recording."""
         ends = np.cumsum(self.sizes)[:-1]
         pieces = np.split(minimum.misfit, ends)
         return np.array(
@@ -159,16 +159,16 @@ def solve_jointly(parts: Sequence[Model]) -> tuple[Model, Minimum]:
 
 
 def _by_scatter(model: JointModel, found: Minimum) -> tuple[JointModel, Minimum]:
-    """Weigh recordings by their misfit until that rests."""
-    for _ in range(ROUNDS):
+    """Iterate weights and fit until the weights converge."""
+    for _ in range(ITERATIONS):
         scatter = model.scatter(found)
         scatter = np.maximum(scatter, LEAST_SHARE * scatter.max())
         if not scatter.max() > 0.0:
             break
         weights = scatter.min() / scatter
-        resting = np.max(np.abs(weights - model.weights)) <= AT_REST
+        converged = np.max(np.abs(weights - model.weights)) <= CONVERGED
         model = replace(model, weights=tuple(weights.tolist()))
         found = minimise(model, found.point)
-        if resting:
+        if converged:
             break
     return model, found

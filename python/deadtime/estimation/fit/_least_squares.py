@@ -1,9 +1,9 @@
 """Least squares over named parameters: a minimum, and the minimum with one quantity held.
 
-A model gives the misfit (simulated minus recorded output) of its recordings and the derivatives
-of it. The search is scipy's trust-region method from a few starts, because a delay's cost has
-several valleys. With a quantity held, the other parameters move on: delay + lag is held by moving
-the delay against the lag.
+A model gives the misfit (simulated minus recorded output) of its recordings and its derivatives.
+The search is SciPy's trust-region method from a few starting points, because the cost has several
+local minima over the delay. With a quantity held, the other parameters are minimised over; delay +
+lag is held by changing the delay opposite to the lag.
 """
 
 from __future__ import annotations
@@ -16,20 +16,19 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 __all__ = ["Ends", "Minimum", "Model", "ModelOfOne", "ProfileCost", "minimise", "solve"]
 
 Array = NDArray[np.float64]
 
-#: Starts that are refined; the best of them wins.
+#: Starting points that are refined; the best minimum is taken.
 REFINED = 3
 
-#: Evaluations of one search, at most.
+#: Most evaluations of one search.
 EVALUATIONS = 200
 
-#: Where a search ends, as a change of cost or parameters: at rounding for the answer; earlier where
-#: minima are compared, or only the cost is wanted, which is flat there.
+#: Relative change of cost or parameters at which a search ends: at rounding for a result; earlier
+#: where minima are compared or only the cost is needed, which is flat there.
 TO_ROUNDING, TO_COMPARE = 1e-14, 1e-6
 
 
@@ -39,15 +38,15 @@ class Model(Protocol):
     Attributes
     ----------
     labels : tuple of str
-        Names of the parameters: those that are asked for first, then those fitted along.
+        Names of all parameters: `names` first, then the further fitted ones.
     names : tuple of str
-        Those that are asked for.
+        Names of the parameters to be estimated.
     low, high, scale : ndarray, shape (p,)
-        Bounds, and sizes that matter.
+        Bounds and scales.
     size : float
-        How far the recording was moved.
+        Size of the excitation.
     sizes : tuple of int
-        Samples of each recording, in the order in which they stand in the misfit.
+        Samples of each recording, in the order of the misfit.
     """
 
     @property
@@ -71,11 +70,11 @@ class Model(Protocol):
         """Derivatives of the misfit, shape (n, p)."""
 
     def starts(self) -> list[Array]:
-        """Points to search from, the most promising first."""
+        """Starting points, the best first."""
 
 
 class Ends(NamedTuple):
-    """Between which values a parameter is sought, and the size that matters."""
+    """Bounds and scale of a parameter."""
 
     low: float
     high: float
@@ -83,7 +82,7 @@ class Ends(NamedTuple):
 
 
 class ModelOfOne(ABC):
-    """What the models of one recording share: bounds and sizes by the names of parameters."""
+    """Base of models of one recording: bounds and scales by the names of parameters."""
 
     @property
     @abstractmethod
@@ -92,7 +91,7 @@ class ModelOfOne(ABC):
 
     @abstractmethod
     def ends(self, label: str) -> Ends:
-        """Bounds and size of one of them."""
+        """Bounds and scale of one of them."""
 
     @cached_property
     def low(self) -> Array:
@@ -106,13 +105,13 @@ class ModelOfOne(ABC):
 
     @cached_property
     def scale(self) -> Array:
-        """Sizes that matter."""
+        """Scales."""
         return np.array([self.ends(label).scale for label in self.labels])
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where a search ended: the parameters, the misfit there, its derivatives."""
+    """Result of a search: the parameters, the misfit and its derivatives."""
 
     point: Array
     misfit: Array
@@ -125,7 +124,7 @@ class Minimum:
 
 
 def solve(model: Model) -> Minimum:
-    """Return the best minimum reached from the best starts."""
+    """Return the lowest minimum from the best starting points."""
     found = [minimise(model, start, tolerance=TO_COMPARE) for start in model.starts()[:REFINED]]
     best = min(found, key=lambda minimum: minimum.cost)
     return minimise(model, best.point)
@@ -147,17 +146,19 @@ def minimise(
     base : ndarray, shape (p,), optional
         Point through which the parameters move; the origin if not given.
     free : ndarray, shape (p, k), optional
-        Directions in which they move, each with one entry of 1 where no other has one; all of
-        them if not given.
+        Directions in which they move, each with an entry of 1 where the others have 0; all
+        directions if not given.
     tolerance : float
         Relative change of cost and parameters at which the search ends.
     """
+    from scipy.optimize import least_squares
+
     base = np.zeros(start.size) if base is None else base
     free = np.eye(start.size) if free is None else free
     moving = np.argmax(free > 0.0, axis=0)
     low, high = model.low[moving].copy(), model.high[moving].copy()
     for row in np.flatnonzero(np.any(free < 0.0, axis=1)):
-        # base - q is not to leave the bounds of its own.
+        # base - q has to stay within its own bounds.
         column = int(np.argmin(free[row]))
         high[column] = min(high[column], base[row] - model.low[row])
     if not free.shape[1]:
@@ -191,8 +192,8 @@ def minimise(
 class ProfileCost:
     """Least cost with one quantity held, the others free.
 
-    Searched from where the linearised model has it. `known` holds the numbers that were not
-    fitted, which may be part of a sum.
+    The search starts from the minimum of the linearised model. `known` holds the parameters that
+    were not fitted, which may be part of a sum.
     """
 
     model: Model
@@ -203,7 +204,7 @@ class ProfileCost:
         """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
         base, free = self._held(name.split("+"), value)
         least = minimise(self.model, self._linear(base, free), base, free, TO_COMPARE).cost
-        # What the best fit has none of is none here too, unless more of it is better.
+        # A parameter that is zero in the best fit is tried at zero here too.
         for place in np.flatnonzero(self.best.point < self.model.low):
             column = np.flatnonzero(free[place] == 1.0)
             if column.size:
@@ -215,7 +216,7 @@ class ProfileCost:
         return least
 
     def _linear(self, base: Array, free: Array) -> Array:
-        """Where the others move to when one is held, by the derivatives at the best point."""
+        """Minimum of the linearised model with one quantity held."""
         jacobian = self.best.jacobian
         away = jacobian @ (self.best.point - base)
         moved, *_ = np.linalg.lstsq(jacobian @ free, away, rcond=None)
@@ -228,7 +229,7 @@ class ProfileCost:
         places = [labels.index(name) for name in names if name in labels]
         fixed = places[0]
         if len(places) == 1 and value != self.best.point[fixed]:
-            # Between none and the shortest that is sought there is nothing.
+            # Values between zero and the lower bound of the search are not simulated.
             value = max(value, float(self.model.low[fixed]))
         base = np.zeros(len(labels))
         base[fixed] = value

@@ -1,8 +1,8 @@
 """Least squares over delay, gain and lag on the misfit at lines of a spectrum, and its profile.
 
-The misfit has several valleys over the delay, so a grid over the delay comes first. A lag may lie
-at zero, its bound: to first order it is a delay there, so a lag that improves the cost by nothing
-is none.
+The cost has several local minima over the delay, so a grid over the delay comes first. A lag may be
+at zero, its bound, where it acts like a delay to first order: a lag that does not reduce the cost
+is set to zero.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from deadtime._base.errors import NotIdentifiableError
 
@@ -22,15 +21,15 @@ __all__ = ["LineProfile", "Lines", "fit_lines"]
 Array = NDArray[np.float64]
 Values: TypeAlias = dict[str, float]
 
-#: How many delays to a sample are tried first, and the most of them.
-EACH, MOST_POINTS = 1, 400
+#: Points of the initial grid over the delay for each sample, and most points.
+POINTS_PER_SAMPLE, MOST_POINTS = 1, 400
 
-#: A lag that changes the cost by less than this share is none.
+#: A lag is set to zero where this raises the cost by less than this share.
 VANISHING = 1e-6
 
 
 class Lines(NamedTuple):
-    """What is fitted: misfit at the lines, over their standard deviation where that is known."""
+    """The fitted lines: their misfit, over its standard deviation where that is known."""
 
     misfit: Callable[[Values], Array]
     known_noise: bool
@@ -46,9 +45,9 @@ class Lines(NamedTuple):
 
 
 def fit_lines(lines: Lines, names: tuple[str, ...], known: Values) -> tuple[Values, Array]:
-    """The numbers of least cost, and the derivatives of the misfit by `names` there.
+    """The parameters of least cost, and the derivatives of the misfit by `names` there.
 
-    Those by a lag at its bound mean nothing.
+    The derivative by a lag at its bound is zero.
     """
     start = dict(known)
     if "lag" in names:
@@ -72,7 +71,8 @@ def fit_lines(lines: Lines, names: tuple[str, ...], known: Values) -> tuple[Valu
 
 
 def _descend(lines: Lines, names: tuple[str, ...], start: Values) -> tuple[Values, Array]:
-    """Least squares over `names` from a start."""
+    """Least squares over `names` from a starting point."""
+    from scipy.optimize import least_squares
 
     def misfit(point: Array) -> Array:
         return lines.misfit(start | dict(zip(names, (float(x) for x in point), strict=True)))
@@ -93,21 +93,21 @@ def _descend(lines: Lines, names: tuple[str, ...], start: Values) -> tuple[Value
 
 
 def _best_delay(lines: Lines, names: tuple[str, ...], start: Values) -> float:
-    """The best delay of a grid, the gain at its best for each."""
-    count = int(min(MOST_POINTS, max(2.0, EACH * lines.longest / lines.sample_time)))
+    """The best delay of a grid, with the best gain for each."""
+    count = int(min(MOST_POINTS, max(2.0, POINTS_PER_SAMPLE * lines.longest / lines.sample_time)))
     grid = np.linspace(0.0, lines.longest, count + 1)
     costs = [_at_best_gain(lines, start | {"delay": float(delay)}, names) for delay in grid]
     place = int(np.argmin(costs))
     if place == count:
         raise NotIdentifiableError(
-            f"the fit runs away to a delay of {grid[-1]:.3g} s, the longest that is tried: the "
-            "output is no answer to this command; check columns and units"
+            f"the fit ends at a delay of {grid[-1]:.3g} s, the longest of the search: the output "
+            "is no response to this command; check columns and units"
         )
     return float(grid[place])
 
 
 def _at_best_gain(lines: Lines, values: Values, names: tuple[str, ...]) -> float:
-    """Cost at some values, the misfit taken as linear in the gain where that is free."""
+    """Least cost over the gain where it is free; the misfit is linear in the gain."""
     now = lines.misfit(values)
     if "gain" in names:
         slope = now - lines.misfit(values | {"gain": 0.9 * values["gain"]})
@@ -118,7 +118,7 @@ def _at_best_gain(lines: Lines, values: Values, names: tuple[str, ...]) -> float
 
 @dataclass(frozen=True)
 class LineProfile:
-    """Least cost with one quantity held, the others free, from the best values on."""
+    """Least cost with one quantity held, searched from the best values."""
 
     lines: Lines
     names: tuple[str, ...]
@@ -130,7 +130,7 @@ class LineProfile:
         if "lag" not in self.names:
             return self._least(self.lines, "delay", max(0.0, value - self.best["lag"]))
 
-        # The sum held: the delay is what the lag leaves of it, and the misfit goes on past none.
+        # With the sum held, the delay is the sum less the lag, and no less than zero.
         def misfit(values: Values) -> Array:
             return self.lines.misfit(values | {"delay": max(0.0, value - values["lag"])})
 
@@ -140,6 +140,6 @@ class LineProfile:
         others = tuple(other for other in self.names if other != name)
         held = self.best | {name: value}
         if name == "delay" and "lag" in others:
-            # What the delay gives up the lag takes over, to first order.
+            # To first order the lag replaces the change of the delay.
             held["lag"] = max(0.0, self.best["delay"] + self.best["lag"] - value)
         return lines.cost(_descend(lines, others, held)[0] if others else held)

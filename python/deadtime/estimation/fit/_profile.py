@@ -1,4 +1,4 @@
-"""Profile likelihood: how much worse the best fit gets when one number is held.
+"""Profile likelihood: the increase of the cost when one parameter is held.
 
 For white Gaussian noise of unknown size, (cost(value) - best)/(best/freedom) is distributed as
 the square of Student's t where the model is nearly linear, and the interval holds all values for
@@ -13,25 +13,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
-from scipy.optimize import brentq
 
 __all__ = ["Profile", "floor_of"]
 
 Array = NDArray[np.float64]
 
-#: An end of an interval is sought no farther than this many times its Gaussian distance.
+#: Farthest end of an interval, in multiples of the Gaussian one.
 FARTHEST = 64.0
 
-#: Ends are found to this part of a standard error.
-END = 1e-3
+#: Accuracy of the ends, in standard errors.
+TOLERANCE = 1e-3
 
-#: They are sought a little farther out than a Gaussian interval ends.
-BEYOND = 1.05
+#: The search starts at this multiple of the Gaussian interval, so that most ends are bracketed at
+#: once.
+FIRST_STEP = 1.05
 
 
 def floor_of(name: str) -> float:
-    """Below what a quantity cannot be: times cannot be negative, gains and clocks can."""
+    """Lower bound of a quantity: zero for times, none for gains and clock offsets."""
     return -np.inf if name in ("gain", "start") else 0.0
 
 
@@ -46,11 +45,11 @@ class Profile:
     best : float
         The least sum of squares.
     freedom : int
-        Samples less fitted numbers.
+        Samples less fitted parameters.
     widening : dict of str to float
-        Robust over plain standard error of each quantity.
+        Ratio of robust to plain standard error of each quantity.
     preferred : str
-        Why the Gaussian interval is not to be used; empty where it is.
+        Why the profile interval is preferred to the Gaussian one; empty where it is not.
     """
 
     cost: Callable[[str, float], float]
@@ -60,14 +59,16 @@ class Profile:
     preferred: str = ""
 
     def statistic(self, name: str, value: float) -> float:
-        """The square of t at which `value` is the end of an interval."""
-        worse = max(0.0, self.cost(name, value) - self.best)
+        """The squared t for which `value` is the end of an interval."""
+        increase = max(0.0, self.cost(name, value) - self.best)
         scale = self.best / self.freedom
         widening = self.widening.get(name, 1.0)
-        return worse / (scale * widening**2) if scale > 0.0 else float(np.inf) * (worse > 0.0)
+        return increase / (scale * widening**2) if scale > 0.0 else float(np.inf) * (increase > 0.0)
 
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
-        """Ends of the interval around the fitted `value`, no lower than it can be."""
+        """Ends of the interval around the fitted `value`, no lower than `floor_of` allows."""
+        from scipy import special
+
         quantile = float(special.stdtrit(self.freedom, 0.5 + level / 2))
         floor = floor_of(name)
         reach = max(stderr, 1e-9 * abs(value), 1e-12)
@@ -76,12 +77,14 @@ class Profile:
         )
 
     def _end(self, name: str, value: float, reach: float, quantile: float, floor: float) -> float:
-        # In t itself, which is nearly a line, so that secants find the end.
+        # In t itself, which is nearly linear, so that the root search converges quickly.
+        from scipy.optimize import brentq
+
         def excess(offset: float) -> float:
             return float(np.sqrt(self.statistic(name, value + offset)) - quantile)
 
-        inner, factor = 0.0, BEYOND * quantile
-        if excess(inner) > 0.0:  # the best fit is exact to rounding, which is all that is left
+        inner, factor = 0.0, FIRST_STEP * quantile
+        if excess(inner) > 0.0:  # the best fit is exact to rounding
             return value
         while factor <= FARTHEST:
             outer = reach * factor
@@ -90,6 +93,6 @@ class Profile:
                     return floor
                 outer = floor - value
             if excess(outer) > 0.0:
-                return value + float(brentq(excess, inner, outer, xtol=END * abs(reach)))
+                return value + float(brentq(excess, inner, outer, xtol=TOLERANCE * abs(reach)))
             inner, factor = outer, 2.0 * factor
         return value + inner

@@ -1,8 +1,8 @@
-"""What the residuals of a fit say: whether they are white, and how uncertain the fit is if not.
+"""Test of residuals for whiteness, and the covariance of a fit for white and coloured ones.
 
 Least squares gives the covariance ``σ² (JᵀJ)⁻¹`` only for residuals that are white. Coloured
-ones (a model that is not quite the vehicle, sensor noise that circulates in the loop) carry
-less information than their number suggests; the sandwich ``(JᵀJ)⁻¹ S (JᵀJ)⁻¹`` with Newey and
+ones (an incomplete model, sensor noise that the controller acts on) carry less information than
+their number suggests; the sandwich ``(JᵀJ)⁻¹ S (JᵀJ)⁻¹`` with Newey and
 West's (1987) long-run covariance S of the scores ``J_t e_t`` stays valid for them. Its
 bandwidth is Andrews' (1991, eq. 6.2 and 6.4) plug-in for the Bartlett kernel.
 """
@@ -14,11 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 __all__ = ["Whiteness", "pieces_of", "robust_covariance", "white_covariance", "whiteness_of"]
 
-#: Residuals are called coloured when white ones would look so only this seldom.
+#: Significance level of the whiteness test: this share of white residuals is called coloured.
 SIGNIFICANCE = 0.01
 
 Array = NDArray[np.float64]
@@ -31,10 +30,10 @@ class Whiteness:
     Attributes
     ----------
     statistic : float
-        Q, chi-squared with `lags` degrees of freedom (less the fitted numbers, summed over
+        Q, chi-squared with `lags` degrees of freedom (less the fitted parameters, summed over
         recordings) for white residuals.
     p_value : float
-        How often white residuals come out at least as coloured.
+        Probability that white residuals have a statistic at least as large.
     lags : int
         Number of autocorrelations in Q, of one recording.
     autocorrelation : float
@@ -55,11 +54,13 @@ class Whiteness:
 def whiteness_of(
     residuals: Array, parameters: int = 0, sizes: Sequence[int] | None = None
 ) -> Whiteness:
-    """Test residuals of a fit with so many `parameters` for whiteness.
+    """Test the residuals of a fit with this number of `parameters` for whiteness.
 
     Residuals of several recordings, of these `sizes`, are tested one recording at a time, and
-    their statistics added. Residuals that vanish to rounding pass: there is nothing left in them.
+    the statistics are added. Residuals of zero pass.
     """
+    from scipy import special
+
     statistic, freedom, first, weight = 0.0, -parameters, 0.0, 0.0
     longest = 1
     for piece in pieces_of(residuals, sizes):
@@ -92,7 +93,7 @@ def white_covariance(jacobian: Array, residuals: Array) -> Array:
 def robust_covariance(
     jacobian: Array, residuals: Array, sizes: Sequence[int] | None = None
 ) -> Array:
-    """Covariance of the parameters that holds for autocorrelated residuals too.
+    """Covariance of the parameters that is also valid for autocorrelated residuals.
 
     Recordings, of these `sizes`, are independent of each other.
     """

@@ -1,101 +1,128 @@
 """Chebyshev spectral continuous-time approximation (Torkamani & Butcher 2013).
 
-The output over the last delay, y(t + θ) for -Td <= θ <= 0, is taken for the polynomial through its
-values Y_0 … Y_N at the Chebyshev points θ_j = Td/2 (cos(jπ/N) - 1). All but the first are moved by
-the differentiation matrix, Y_j' = 2/Td (D Y)_j (Trefethen 2000, chapter 6), the first by the loop,
+The output over the last delay, y(t + θ) for -Td <= θ <= 0, is approximated by the polynomial
+through its values Y_0 … Y_N at the Chebyshev points θ_j = Td/2 (cos(jπ/N) - 1). All but the first
+follow from the differentiation matrix, Y_j' = 2/Td (D Y)_j (Trefethen 2000, chapter 6), the first
+by the loop,
     Y_0' = v,   lag v' + v = K (r - Y_N)
 (v itself the right side without a lag), so the delay equation becomes N + 1 ordinary ones, whose
 step response is a sum of exponentials; the reference is a sum of steps. Delay, gain, lag and the
 output at the start follow by least squares on the recording.
 
-The polynomial cannot have the corners that a step leaves, so the delay comes out biased: at
-K Td = 0.47 and 1.08 by -1.2 and -4.4 % for N = 2, by -0.06 and -0.4 % for N = 3 and by less than
-1e-6 for N = 6. It is for continuous loops without limit, and the same as fitting the waveform.
+The polynomial cannot follow the corners that a step leaves, so the delay is biased: at K Td = 0.47
+and 1.08 by -1.2 and -4.4 % for N = 2, by -0.06 and -0.4 % for N = 3 and by less than 1e-6 for N =
+6. The method is for continuous loops without a limit; it is otherwise the waveform fit.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._evidence import check_distinguishable, checked_names, standard_errors
 from deadtime.estimation.data._excitation import check_excitation, check_gain, start_and_span
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import stiffness_of
 from deadtime.estimation.fit._residuals import robust_covariance
+from deadtime.estimation.methods._method import Method, check_initial_output
 from deadtime.estimation.methods._read_off import read_off_estimate
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = ["chebyshev_differentiation", "estimate_by_cta"]
+__all__ = ["CTA", "chebyshev_differentiation"]
 
 Array = NDArray[np.float64]
 
-#: Points of the grid over the delay, and its ends as shares of the window.
+#: Points of the initial grid over the delay, and its ends as shares of the window.
 POINTS, SHORTEST, LONGEST = 20, 0.005, 0.6
 
-#: More nodes than this gain nothing: the corners are what is left.
+#: Most intervals: with more, the corners dominate the error.
 MOST_NODES = 24
 
-#: Exponents are kept below this: such a loop explains nothing.
+#: Bound of the exponents, so that unstable loops do not overflow.
 LARGEST_EXPONENT = 50.0
 
 
-def estimate_by_cta(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str],
-    intervals: int = 8,
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Least squares on the loop with its delay line in so many Chebyshev intervals."""
-    names = checked_names(free, loop)
-    if "delay" not in names:
-        raise ValueError("the cta method is there for the delay: leave it among `free`")
-    stiffness_of(loop, "cta")
-    order = whole_number("intervals", intervals, limit=MOST_NODES + 1)
-    if loop.is_sampled or loop.limit is not None:
-        what = "a hold" if loop.is_sampled else "a limit"
-        raise ValueError(
-            f"the cta method is for continuous loops without a limit, this one has {what}: use "
-            "method='waveform' or 'grid', or loop.continuous() to leave a hold out on purpose"
+@dataclass(frozen=True)
+class CTA(Method):
+    """The waveform, with Chebyshev's approximation in the place of the delay.
+
+    Parameters
+    ----------
+    intervals : int
+        Degree of the polynomial that stands for the output over one delay, from 1 to 24.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        When the number of intervals is out of its range.
+    """
+
+    intervals: int = 8
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "cta"
+
+    def __post_init__(self) -> None:
+        whole_number("intervals", self.intervals, limit=MOST_NODES + 1)
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        names = checked_names(free, loop)
+        if "delay" not in names:
+            raise ValueError("the cta method estimates the delay: keep it among `free`")
+        stiffness_of(loop, "cta")
+        if loop.is_sampled or loop.limit is not None:
+            what = "a hold" if loop.is_sampled else "a limit"
+            raise ValueError(
+                f"the cta method is for continuous loops without a limit, this one has {what}: use "
+                "method='waveform' or 'grid', or loop.continuous() to leave a hold out on purpose"
+            )
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        check_excitation(data, len(names))
+        fit = _Fit(data, loop, names, self.intervals, self.initial_output)
+        point, jacobian = fit.solve()
+        misfit = fit.misfit(point)
+        check_distinguishable(jacobian, fit.labels)
+        cov = robust_covariance(jacobian, -misfit)[: len(names), : len(names)]
+        values = dict(zip(names, (float(value) for value in point), strict=False))
+        check_gain(values, standard_errors(names, cov))
+        return read_off_estimate(
+            "cta",
+            simulated,
+            values,
+            cov,
+            fit.start_of(point),
+            message=(
+                f"least squares over {', '.join(names)}, the delay line in {self.intervals} "
+                "intervals"
+            ),
+            uncalibrated=(
+                "the cta method approximates the delay by a polynomial of degree "
+                f"{self.intervals}, which biases it; noise alone makes the delay uncertain by "
+                f"{math.sqrt(cov[0, 0]):.2g} s where the controller does not act on it; use "
+                "method='waveform' for an interval"
+            ),
+            details={
+                "intervals": self.intervals,
+                "rms_of_approximation": float(np.sqrt(np.mean(misfit**2))),
+                "initial_output": fit.start_of(point),
+            },
         )
-    simulated = SimulatedRecording(recording, loop, window)
-    data = simulated.recording
-    check_excitation(data, len(names))
-    fit = _Fit(data, loop, names, order, initial_output)
-    point, jacobian = fit.solve()
-    misfit = fit.misfit(point)
-    check_distinguishable(jacobian, fit.labels)
-    cov = robust_covariance(jacobian, -misfit)[: len(names), : len(names)]
-    values = dict(zip(names, (float(value) for value in point), strict=False))
-    check_gain(values, standard_errors(names, cov))
-    return read_off_estimate(
-        "cta",
-        simulated,
-        values,
-        cov,
-        fit.start_of(point),
-        message=f"least squares over {', '.join(names)}, the delay line in {order} intervals",
-        uncalibrated=(
-            f"the cta method puts a polynomial of degree {order} in the place of the delay, which "
-            f"biases it; noise alone makes the delay uncertain by {math.sqrt(cov[0, 0]):.2g} s "
-            "where it does not circulate in the loop; use method='waveform' for an interval"
-        ),
-        details={
-            "intervals": order,
-            "rms_of_approximation": float(np.sqrt(np.mean(misfit**2))),
-            "initial_output": fit.start_of(point),
-        },
-    )
 
 
 def chebyshev_differentiation(order: int) -> Array:
@@ -105,7 +132,7 @@ def chebyshev_differentiation(order: int) -> Array:
     c = np.where((index == 0) | (index == order), 2.0, 1.0) * (-1.0) ** index
     away = x[:, None] - x[None, :] + np.eye(order + 1)
     matrix = np.outer(c, 1.0 / c) / away
-    # The diagonal makes constants vanish to rounding, which its formula does not.
+    # With this diagonal the derivative of a constant is zero to rounding.
     return np.asarray(matrix - np.diag(matrix.sum(axis=1)))
 
 
@@ -162,7 +189,7 @@ class _Fit:
         else:
             a[0, nodes - 1] = -stiffness
         rates, modes = np.linalg.eig(a)
-        # The deviation from the new reference begins at -1 all along the delay, at no speed.
+        # The deviation from the new reference is -1 over the whole delay at first, at rest.
         begin = np.where(np.arange(size) < nodes, -1.0, 0.0)
         weights = modes[0] * np.linalg.solve(modes, begin)
         # One of each conjugate pair stands for both.
@@ -171,7 +198,9 @@ class _Fit:
         return rates[upper].astype(np.complex128), weights[upper].astype(np.complex128)
 
     def solve(self) -> tuple[Array, Array]:
-        """The best numbers and the derivatives of the misfit there."""
+        """The parameters of least cost, and the derivatives of the misfit there."""
+        from scipy.optimize import least_squares
+
         parameters = self.loop.parameters
         shortest = 1e-4 * self.span
         starts = {"gain": parameters["gain"], "lag": 0.02 * self.span, "initial output": self.start}
@@ -200,7 +229,7 @@ class _Fit:
         delay = float(solution.x[0])
         if not 1.01 * shortest < delay < 0.99 * self.span:
             raise NotIdentifiableError(
-                f"the fit runs away to a delay of {delay:.3g} s, the end of its search: the output "
-                "is no answer of such a loop to this reference; check columns, signs and gains"
+                f"the fit ends at a delay of {delay:.3g} s, a bound of its search: the output is "
+                "no response of such a loop to this reference; check columns, signs and gains"
             )
         return solution.x, np.asarray(solution.jac)

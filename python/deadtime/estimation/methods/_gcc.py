@@ -1,6 +1,6 @@
-"""Generalised cross-correlation of the command and the vehicle's answer to it.
+"""Generalised cross-correlation of the command and the response of the vehicle.
 
-The answer r is the command u, delayed, plus noise, so their correlation over the shift,
+The response r is the command u, delayed, plus noise, so their correlation over the shift,
 R(m) = sum_k u_k r_{k+m}, peaks at the delay. Knapp & Carter (1976) filter both first: their cross
 spectrum is weighted by 1 ("none"), 1/sqrt(S_uu S_rr) ("scot"), 1/abs(S_ur) ("phat"), or both
 signals pass the filter that whitens u ("prewhitened": Box & Jenkins 1970, section 11.1.2; its order
@@ -8,104 +8,124 @@ by Akaike's criterion). The peak is found between samples: for a broad one by a 
 whitened ones by the share of the two largest values, which a delay of (d + f) samples under a hold
 leaves at 1 - f and f.
 
-In a loop the command is made from the output, noise and all, and is correlated with it at negative
-shifts too: the peak is then biased, the more so the weaker the excitation. Whether the command
-follows the output is tested (does the output's past help to predict the command?) and said. A step
-holds few frequencies: weightings that treat all alike then amplify noise.
+In a closed loop the command depends on the output and its noise, and is correlated with it at
+negative shifts too: the peak is biased, more so with weaker excitation. Whether the command follows
+the output is tested and reported. A step excites few frequencies: weightings that treat all alike
+then amplify noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, special
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_dies_out, read_ringing
+from deadtime.estimation.data._extremes import check_decays, read_ringing
 from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
 from deadtime.estimation.data._input_output import InputOutput, read_input_output
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.methods._method import Method, check_choice
 from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 
-__all__ = ["Weighting", "estimate_by_gcc"]
+__all__ = ["GCC", "Weighting"]
 
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
 Array = NDArray[np.float64]
 
-#: A peak of the correlation that uncorrelated signals reach by chance this often at one shift, and
-#: at the best of a hundred in one case of a hundred, is no answer to the command.
-CHANCE = 1e-4
+#: Significance level of the correlation at one shift. Uncorrelated signals exceed it at the best of
+#: a hundred shifts in one of a hundred recordings.
+LEVEL = 1e-4
 
-#: Spectra for "scot" are averaged over this share of all frequencies.
+#: Width of the average of spectra for "scot", as a share of all frequencies: a wider one has less
+#: noise and less resolution.
 SMOOTHED = 0.05
 
 #: Longest whitening filter, in samples.
 LONGEST_FILTER = 12
 
 
-def estimate_by_gcc(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),
-    weighting: Weighting = "none",
-) -> DelayEstimate:
-    """Delay at the peak of the cross-correlation of command and answer."""
-    check_delay_alone("gcc", free)
-    if weighting not in get_args(Weighting):
-        raise ValueError(f"weighting={weighting!r} is not one of {', '.join(get_args(Weighting))}")
-    simulated = SimulatedRecording(recording, loop, window)
-    data = simulated.recording
-    read = read_input_output(recording, loop, simulated, "gcc")
-    if int(np.count_nonzero(np.diff(read.command))) < 2:
-        raise NotIdentifiableError(
-            "the command changes once in the window, as one at its limit throughout does: its "
-            "correlation has no peak; use a smaller step, or method='output_error'"
+@dataclass(frozen=True)
+class GCC(Method):
+    """Delay at the peak of the generalised cross-correlation of command and response.
+
+    Parameters
+    ----------
+    weighting : {"none", "scot", "phat", "prewhitened"}
+        Weighting of the cross spectrum.
+
+    Raises
+    ------
+    ValueError
+        For another weighting.
+    """
+
+    weighting: Weighting = "none"
+
+    name: ClassVar[str] = "gcc"
+
+    def __post_init__(self) -> None:
+        check_choice("weighting", self.weighting, get_args(Weighting))
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("gcc", free)
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        read = read_input_output(recording, loop, simulated, "gcc")
+        if int(np.count_nonzero(np.diff(read.command))) < 2:
+            raise NotIdentifiableError(
+                "the command changes at most once in the window, as when it is at its limit: its "
+                "correlation has no peak; use a smaller step, or method='output_error'"
+            )
+        p_value = feedback_p_value(data)
+        feedback = p_value < FEEDBACK
+        if feedback:
+            check_decays(read_ringing(data), "gcc")
+        # Feedback within the same sample makes a peak at shift zero.
+        least = 1 if feedback else 0
+        gain = float(loop.parameters.get("gain", 1.0))
+        shifts, correlation = correlogram(
+            read.command, np.sign(gain) * read.response, self.weighting
         )
-    p_value = feedback_p_value(data)
-    feedback = p_value < FEEDBACK
-    if feedback:
-        check_dies_out(read_ringing(data), "gcc")
-    # Noise that comes back within the same sample makes a peak at no shift.
-    least = 1 if feedback else 0
-    gain = float(loop.parameters.get("gain", 1.0))
-    shifts, correlation = correlogram(read.command, np.sign(gain) * read.answer, weighting)
-    near = (shifts >= least - 1) & (shifts <= read.longest + 1)
-    shifts, correlation = shifts[near], correlation[near]
-    place = int(np.argmax(correlation[1:-1])) + 1
-    share = _explained(read, int(shifts[place]))
-    peak = float(shifts[place]) + _between(correlation, place, weighting)
-    delay = max(0.0, peak * read.sample_time - read.late)
-    return read_off_estimate(
-        "gcc",
-        simulated,
-        {"delay": delay},
-        None,
-        float(data.output[0]),
-        message=_message(weighting, share, feedback, read),
-        uncalibrated=(
-            "the gcc method reads the peak of a correlation: the error formulas for it hold for "
-            "stationary noise in open loop only"
-            + (", and here the command is made from the output" if feedback else "")
-            + "; use method='output_error' for an interval"
-        ),
-        details={
-            "weighting": weighting,
-            "correlation": share,
-            "feedback": feedback,
-            "feedback_p_value": p_value,
-        },
-    )
+        near = (shifts >= least - 1) & (shifts <= read.longest + 1)
+        shifts, correlation = shifts[near], correlation[near]
+        place = int(np.argmax(correlation[1:-1])) + 1
+        share = _explained(read, int(shifts[place]))
+        peak = float(shifts[place]) + _between(correlation, place, self.weighting)
+        delay = max(0.0, peak * read.sample_time - read.late)
+        return read_off_estimate(
+            "gcc",
+            simulated,
+            {"delay": delay},
+            None,
+            float(data.output[0]),
+            message=_message(self.weighting, share, feedback, read),
+            uncalibrated=(
+                "the gcc method reads the peak of a correlation: the error formulas for it hold "
+                "for stationary noise in open loop only"
+                + (", and here the command depends on the output" if feedback else "")
+                + "; use method='output_error' for an interval"
+            ),
+            details={
+                "weighting": self.weighting,
+                "correlation": share,
+                "feedback": feedback,
+                "feedback_p_value": p_value,
+            },
+        )
 
 
 def correlogram(u: Array, r: Array, weighting: Weighting) -> tuple[Array, Array]:
     """Shifts in samples and the generalised cross-correlation of u and r at them."""
+    from scipy import signal
+
     if weighting == "prewhitened":
         whitener = _whitener(u)
         u, r = np.convolve(u, whitener)[: u.size], np.convolve(r, whitener)[: r.size]
@@ -114,7 +134,7 @@ def correlogram(u: Array, r: Array, weighting: Weighting) -> tuple[Array, Array]
             np.asarray(signal.correlation_lags(r.size, u.size), dtype=np.float64),
             np.asarray(signal.correlate(r, u)),
         )
-    length = 2 * u.size  # room for every shift without wrapping
+    length = 2 * u.size  # long enough that no shift wraps around
     spectrum_u, spectrum_r = np.fft.rfft(u, length), np.fft.rfft(r, length)
     cross = spectrum_r * np.conj(spectrum_u)
     if weighting == "phat":
@@ -130,7 +150,7 @@ def correlogram(u: Array, r: Array, weighting: Weighting) -> tuple[Array, Array]
 
 
 def _whitener(u: Array) -> Array:
-    """The filter 1 - a_1 q - a_2 q² … that leaves least of u, its order by Akaike's criterion."""
+    """The whitening filter 1 - a_1 q - a_2 q² … of u, its order by Akaike's criterion."""
     most = min(LONGEST_FILTER, u.size // 8)
     target = u[most:]
     past = np.stack([u[most - lag : u.size - lag] for lag in range(1, most + 1)], axis=1)
@@ -145,7 +165,7 @@ def _whitener(u: Array) -> Array:
 
 
 def _between(correlation: Array, place: int, weighting: Weighting) -> float:
-    """Where the peak is, from the largest value on, in samples."""
+    """Position of the peak relative to the largest value, in samples."""
     before, top, after = (float(value) for value in correlation[place - 1 : place + 2])
     if weighting in ("none", "scot"):
         bend = before - 2.0 * top + after
@@ -155,36 +175,37 @@ def _between(correlation: Array, place: int, weighting: Weighting) -> float:
 
 
 def _explained(read: InputOutput, shift: int) -> float:
-    """Correlation coefficient of answer and shifted command; refused if chance explains it."""
+    """Correlation coefficient of response and shifted command; refuses insignificant ones."""
+    from scipy import signal, special
+
     late = max(0, shift)
     size = read.command.size
-    u, r = read.command[: size - late], read.answer[late:]
+    u, r = read.command[: size - late], read.response[late:]
     coefficient = float(u @ r) / float(np.linalg.norm(u) * np.linalg.norm(r) or 1.0)
-    # Were u and what it leaves of r unrelated, its variance would be sum_m rho_u(m) rho_e(m)/n
-    # (Bartlett 1935).
+    # For independent signals its variance is sum_m rho_u(m) rho_e(m)/n (Bartlett 1935).
     left = r - u * float(u @ r) / float(u @ u or 1.0)
     rho = [np.asarray(signal.correlate(x, x))[u.size - 1 :] for x in (u, left)]
     rho_u, rho_e = (x / x[0] if x[0] > 0.0 else x for x in rho)
     taper = 1.0 - np.arange(u.size) / u.size
     spread = 1.0 + 2.0 * float(np.sum((taper * rho_u * rho_e)[1 : u.size // 4]))
-    needed = -float(special.ndtri(CHANCE)) * np.sqrt(max(spread, 0.25) / u.size)
+    needed = -float(special.ndtri(LEVEL)) * np.sqrt(max(spread, 0.25) / u.size)
     if abs(coefficient) < needed:
         raise NotIdentifiableError(
-            f"command and answer are correlated by {abs(coefficient):.2g} at best, and unrelated "
-            f"signals come to {needed:.2g}: the output is no answer to this command, or the noise "
-            "drowns it; check columns and units, or excite more"
+            f"command and response are correlated by {abs(coefficient):.2g} at best, unrelated "
+            f"signals by up to {needed:.2g}: the output is no response to this command, or the "
+            "noise hides it; check columns and units, or excite more"
         )
     return abs(coefficient)
 
 
 def _message(weighting: Weighting, share: float, feedback: bool, read: InputOutput) -> str:
     text = (
-        f"peak of the cross-correlation (weighting {weighting!r}), command and answer correlated "
+        f"peak of the cross-correlation (weighting {weighting!r}), command and response correlated "
         f"by {share:.2f}"
     )
     if feedback:
         text += (
-            "; the command is made from the output, so noise is on both and biases the peak: an "
-            "initial value rather than an answer"
+            "; the command depends on the output, so noise is on both and biases the peak: use it "
+            "as an initial value only"
         )
     return text + read.remark

@@ -1,13 +1,14 @@
-"""Cost of the simulated loop over a range of delays (Leva's way), its minimum refined.
+"""Cost of the simulated loop over a grid of delays (Leva), its minimum refined.
 
 For each delay of a grid the loop is simulated with its hold and its limit, everything else that is
-free (gain, lag, output at the start) at its best for that delay, and the sum of squared misfits
-kept: a curve that shows every valley, which a search that descends into one does not. From the
-lowest point least squares over all free numbers gives the minimum and the curvature there, and
-with it the standard error, robust where the residuals are coloured.
+free (gain, lag, initial output) at its best for that delay, and the sum of squared residuals is
+kept: the curve shows every local minimum, where a search finds one. From the lowest points, least
+squares over all free parameters gives the minimum and the curvature there, and from it the standard
+error, robust where the residuals are coloured.
 
-The model runs on the reference, so sensor noise that goes round the loop through the controller is
-not explained by it: the curvature then promises too much, without the residuals always showing it.
+The input of the model is the reference, so it does not explain sensor noise that the controller
+acts on: the standard error from the curvature is then too small, which the residuals do not always
+show.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
@@ -35,107 +36,131 @@ from deadtime.estimation.data._excitation import (
     check_gain,
     start_and_span,
 )
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
-from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
+from deadtime.estimation.methods._method import Method, check_initial_output
 
-__all__ = ["estimate_by_grid"]
+__all__ = ["Grid"]
 
 Array = NDArray[np.float64]
 
-#: Points of the grid, and between which shares of the window they lie besides none.
+#: Points of the grid besides zero, and its ends as shares of the window.
 POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
 
-#: Delays and lags of a continuous loop below this share of the window, or of the time between two
-#: samples, take long to simulate and cannot be told from none.
+#: Shortest delay and lag of a continuous loop, as a share of the window and of the time between two
+#: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
 SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
-#: Valleys of the curve that are refined; the deepest wins.
+#: Local minima of the curve that are refined; the lowest is taken.
 REFINED = 3
 
-#: A lag is none where none raises the cost by no more than this share: next to zero it delays
-#: like a delay, and the two cannot be told apart.
+#: A lag is set to zero where this raises the cost by no more than this share: next to zero it acts
+#: like a delay, and the two cannot be distinguished.
 VANISHING = 1e-6
 
-#: A misfit for simulations that leave all bounds, in units of the output's range.
-HOPELESS = 1e3
+#: Bound of the misfit of simulations that diverge, in units of the output's range.
+LARGEST_MISFIT = 1e3
 
-#: Quantile of the normal distribution for 95 % between two sides.
+#: Two-sided 95 % quantile of the normal distribution.
 TWO_SIDED_95 = 1.96
 
 
-def estimate_by_grid(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str],
-    delays: ArrayLike | None = None,
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Lowest point of the cost over `delays`, refined over all of `free`."""
-    names = checked_names(free, loop)
-    if "delay" not in names:
-        raise ValueError("the grid method goes over the delay: leave it among `free`")
-    simulated = SimulatedRecording(recording, loop, window)
-    data = simulated.recording
-    check_excitation(data, len(names))
-    problem = _Problem(simulated, names, initial_output)
-    grid = problem.grid() if delays is None else _checked(delays)
-    costs, points = problem.over(grid)
-    point = problem.refined(costs, points)
-    problem.check_ends(point)
+@dataclass(frozen=True)
+class Grid(Method):
+    """Cost of the simulated loop over a grid of delays, its lowest point refined.
 
-    misfit, jacobian = problem.misfit(point), problem.jacobian(point)
-    residuals = -misfit
-    held = [
-        i for i, name in enumerate(problem.labels) if name == "lag" and problem.at_least(point, i)
-    ]
-    loose = [i for i in range(len(problem.labels)) if i not in held]
-    check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
-    whiteness = whiteness_of(residuals, len(names))
-    exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
-    adequate = whiteness.white or exact
-    size, count = len(problem.labels), len(names)
-    white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
-    spread = white
-    if not adequate:
-        spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
-    errors = standard_errors(names, spread)
-    check_gain(problem.values(point), errors)
-    noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
-    low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
-    return DelayEstimate(
-        method="grid",
-        loop=loop.replace(**problem.values(point)),
-        free=names,
-        stderr=errors,
-        cov=spread[:count, :count],
-        crb=CramerRaoBound(tuple(problem.labels), noise, standard_errors(names, white)),
-        recording=data,
-        residuals=residuals,
-        whiteness=whiteness,
-        adequate=adequate,
-        message=_message(names, grid, adequate),
-        uncalibrated=(
-            "the grid method fits the answer to the reference, and noise that goes round the loop "
-            "is no part of that: the curvature of the cost gives "
-            f"{max(0.0, point[0] + low):.4g} to {point[0] + high:.4g} s (95 %), which holds the "
-            "delay that often only where noise does not circulate; use method='output_error' or "
-            "'waveform' for an interval"
-        ),
-        details={
-            "delays": grid.tolist(),
-            "costs": costs.tolist(),
-            "valleys": [float(grid[i]) for i in _valleys(costs)],
-            "curvature_interval_95": [max(0.0, float(point[0] + low)), float(point[0] + high)],
-            "initial_output": problem.start_of(point),
-        },
-    )
+    Parameters
+    ----------
+    delays : array_like, shape (n,), optional
+        Delays to try in s, increasing, three at least, none below zero. By default 25 from zero
+        to 60 % of the window.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        When the delays are fewer than three, do not increase, or are negative.
+    """
+
+    delays: ArrayLike | None = None
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "grid"
+
+    def __post_init__(self) -> None:
+        if self.delays is not None:
+            object.__setattr__(self, "delays", tuple(_checked(self.delays).tolist()))
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        names = checked_names(free, loop)
+        if "delay" not in names:
+            raise ValueError("the grid method searches the delay: keep it among `free`")
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        check_excitation(data, len(names))
+        problem = _Problem(simulated, names, self.initial_output)
+        grid = problem.grid() if self.delays is None else np.array(self.delays)
+        costs, points = problem.over(grid)
+        point = problem.refined(costs, points)
+        problem.check_ends(point)
+
+        misfit, jacobian = problem.misfit(point), problem.jacobian(point)
+        residuals = -misfit
+        held = [
+            i
+            for i, name in enumerate(problem.labels)
+            if name == "lag" and problem.at_least(point, i)
+        ]
+        loose = [i for i in range(len(problem.labels)) if i not in held]
+        check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
+        whiteness = whiteness_of(residuals, len(names))
+        exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
+        adequate = whiteness.white or exact
+        size, count = len(problem.labels), len(names)
+        white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
+        spread = white
+        if not adequate:
+            spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
+        errors = standard_errors(names, spread)
+        check_gain(problem.values(point), errors)
+        noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
+        low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
+        return DelayEstimate(
+            method="grid",
+            loop=loop.replace(**problem.values(point)),
+            free=names,
+            stderr=errors,
+            cov=spread[:count, :count],
+            crb=CramerRaoBound(tuple(problem.labels), noise, standard_errors(names, white)),
+            recording=data,
+            residuals=residuals,
+            whiteness=whiteness,
+            adequate=adequate,
+            message=_message(names, grid, adequate),
+            uncalibrated=(
+                "the grid method fits the response to the reference, without the noise that the "
+                "controller acts on: the curvature of the cost gives "
+                f"{max(0.0, point[0] + low):.4g} to {point[0] + high:.4g} s (95 %), which has "
+                "this coverage only where the controller does not act on the noise; use "
+                "method='output_error' or 'waveform' for an interval"
+            ),
+            details={
+                "delays": grid.tolist(),
+                "costs": costs.tolist(),
+                "local_minima": [float(grid[i]) for i in _local_minima(costs)],
+                "curvature_interval_95": [max(0.0, float(point[0] + low)), float(point[0] + high)],
+                "initial_output": problem.start_of(point),
+            },
+        )
 
 
 def _checked(delays: ArrayLike) -> Array:
-    """The delays of the caller, as a grid that a minimum can lie within."""
+    """The given delays, checked: a minimum has to lie between two of them."""
     grid = increasing("delays", delays)
     if grid.size < 3 or grid[0] < 0.0:
         raise ValueError(
@@ -145,15 +170,15 @@ def _checked(delays: ArrayLike) -> Array:
     return grid
 
 
-def _valleys(costs: Array) -> list[int]:
-    """Rows of the grid that are lower than both neighbours."""
+def _local_minima(costs: Array) -> list[int]:
+    """Rows of the grid with a lower cost than both neighbours."""
     middle = costs[1:-1]
     return [int(i) + 1 for i in np.flatnonzero((middle < costs[:-2]) & (middle <= costs[2:]))]
 
 
 @dataclass(eq=False)
 class _Problem:
-    """The misfit as a function of `labels`: the delay, what else is free, the output at first."""
+    """The misfit as a function of `labels`: the free parameters, then the initial output."""
 
     simulated: SimulatedRecording
     names: tuple[str, ...]
@@ -178,13 +203,13 @@ class _Problem:
 
     @property
     def shortest(self) -> float:
-        """Shortest delay and lag: in continuous loops shorter ones take long to simulate."""
+        """Shortest delay and lag of the search."""
         if self.simulated.loop.is_sampled:
             return 0.0
         return min(self.span * SHORTEST_OF_WINDOW, self.sample * SHORTEST_OF_SAMPLE)
 
     def grid(self) -> Array:
-        """Delays from the shortest to most of the window, closer where they are short."""
+        """Delays from the shortest on, spaced geometrically."""
         points = np.geomspace(SHORTEST, LONGEST, POINTS) * self.span
         return np.concatenate([[self.shortest], points[points > self.shortest]])
 
@@ -195,11 +220,11 @@ class _Problem:
         return float(point[-1]) if self.initial_output is None else self.initial_output
 
     def misfit(self, point: Array) -> Array:
-        """Simulated minus recorded output, bounded where the loop with these numbers is not."""
-        most = HOPELESS * self.range
+        """Simulated minus recorded output, bounded where the simulation diverges."""
+        most = LARGEST_MISFIT * self.range
         try:
             output = self.simulated.output(self.values(point), self.start_of(point))
-        except ValueError:  # the response with these numbers grows without bound
+        except ValueError:  # the response diverges
             return np.full(len(self.simulated.recording), most)
         return np.clip(output - self.simulated.recording.output, -most, most)
 
@@ -208,7 +233,7 @@ class _Problem:
         return float(misfit @ misfit)
 
     def jacobian(self, point: Array, first: int = 0) -> Array:
-        """Derivatives by the numbers from the `first` on; one-sided at an end."""
+        """Derivatives by the parameters from the `first` on; one-sided at a bound."""
         columns = []
         for place in range(first, point.size):
             step = 1e-5 * self.scale[place]
@@ -220,23 +245,23 @@ class _Problem:
         return np.stack(columns, axis=1)
 
     def over(self, grid: Array) -> tuple[Array, Array]:
-        """Least cost at each delay, and the numbers there."""
+        """Least cost at each delay, and the parameters there."""
         costs, points = np.empty(grid.size), np.empty((grid.size, self.guess.size))
         point = self.guess
         for row, delay in enumerate(grid):
             starts = [np.concatenate([[delay], start[1:]]) for start in (self.guess, point)]
-            point = self._nearer(min(starts, key=self.cost))
+            point = self._improved(min(starts, key=self.cost))
             costs[row], points[row] = self.cost(point), point
         if int(np.argmin(costs)) == grid.size - 1:
             raise NotIdentifiableError(
-                f"the cost falls up to a delay of {grid[-1]:g} s, the longest that is tried: the "
-                "output is no answer of such a loop to this reference; check columns, signs, "
+                f"the cost falls up to a delay of {grid[-1]:g} s, the longest of the grid: the "
+                "output is no response of such a loop to this reference; check columns, signs, "
                 "units and gains, or give other `delays`"
             )
         return costs, points
 
-    def _nearer(self, point: Array) -> Array:
-        """A Gauss-Newton step in all but the delay, where it helps."""
+    def _improved(self, point: Array) -> Array:
+        """A Gauss-Newton step in all parameters but the delay, if it reduces the cost."""
         if point.size == 1:
             return point
         jacobian = self.jacobian(point, first=1)
@@ -246,26 +271,28 @@ class _Problem:
         return min((point, moved), key=self.cost)
 
     def refined(self, costs: Array, points: Array) -> Array:
-        """The deepest of the deepest valleys, all numbers at their best."""
-        valleys = sorted({int(np.argmin(costs)), *_valleys(costs)}, key=lambda row: costs[row])
-        found = [self._descended(points[row]) for row in valleys[:REFINED]]
+        """The lowest of the refined local minima."""
+        minima = sorted({int(np.argmin(costs)), *_local_minima(costs)}, key=lambda row: costs[row])
+        found = [self._minimised(points[row]) for row in minima[:REFINED]]
         return self._without_lag(min(found, key=self.cost))
 
     def _without_lag(self, point: Array) -> Array:
-        """The shortest lag, the delay taking it over, where that fits as well."""
+        """The point with the shortest lag and a longer delay, where that fits as well."""
         if "lag" not in self.labels:
             return point
         delay, lag = self.labels.index("delay"), self.labels.index("lag")
         without = point.copy()
         without[delay] += point[lag] - self.low[lag]
         without[lag] = self.low[lag]
-        without = self._descended(without, held=lag)
+        without = self._minimised(without, held=lag)
         rounding = len(self.simulated.recording) * (ROUNDING * self.range) ** 2
         as_well = self.cost(without) <= self.cost(point) * (1.0 + VANISHING) + rounding
         return without if as_well else point
 
-    def _descended(self, point: Array, held: int | None = None) -> Array:
-        """Least squares over all numbers, or all but one, from a point."""
+    def _minimised(self, point: Array, held: int | None = None) -> Array:
+        """Least squares over all parameters, or all but one, from a point."""
+        from scipy.optimize import least_squares
+
         loose = [place for place in range(point.size) if place != held]
 
         def at(moved: Array) -> Array:
@@ -293,18 +320,18 @@ class _Problem:
         return at(np.asarray(found.x))
 
     def at_least(self, point: Array, place: int) -> bool:
-        """Whether a delay or lag came out at the shortest there is."""
+        """Whether a delay or lag is at the lower bound of the search."""
         return bool(point[place] <= self.low[place] * (1.0 + 1e-6) + 1e-9)
 
     def check_ends(self, point: Array) -> None:
-        """Refuse what ran to an end of its search; a delay or lag of zero is an answer."""
+        """Refuse a parameter at a bound of its search; a delay or lag of zero is a valid result."""
         for label, value, low, high in zip(self.labels, point, self.low, self.high, strict=True):
             ends = (high,) if label in ("delay", "lag") else (low, high)
             for end in ends:
                 if math.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
                     raise NotIdentifiableError(
-                        f"the fit runs away to a {label} of {end:g}, the end of its search: the "
-                        "output is no answer of such a loop to this reference; check columns, "
+                        f"the fit ends at a {label} of {end:g}, a bound of its search: the "
+                        "output is no response of such a loop to this reference; check columns, "
                         "signs, units and gains, and choose a window around one step"
                     )
 
@@ -313,10 +340,10 @@ def _message(names: tuple[str, ...], grid: Array, adequate: bool) -> str:
     others = [name for name in names if name != "delay"]
     text = f"least cost over {grid.size} delays from {grid[0]:.3g} to {grid[-1]:.3g} s"
     if others:
-        text += f", {' and '.join(others)} at their best for each"
+        text += f", {' and '.join(others)} at their best values for each"
     if not adequate:
         text += (
-            "; the residuals are not white, so the loop is only an equivalent of the vehicle and "
+            "; the residuals are not white, so the loop only approximates the vehicle and "
             "the standard errors are robust ones"
         )
     return text

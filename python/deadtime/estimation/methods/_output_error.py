@@ -1,12 +1,12 @@
-"""Output error with the command as logged: the response of the vehicle alone, not of the loop.
+"""Output error: least squares on the response of the vehicle alone to the logged command.
 
     y(t_i) = b + a F(t_i - Td; lag) + noise,
 
 F the exact response of 1/(s (lag s + 1)), or of another plant, to the command as it was held
-(`plant_path`), a the gain, b the output at the start. The command being known, noise that
-circulates in the loop and a limit are no matter, and least squares is maximum likelihood for
-white noise: the standard error is the Cramér-Rao bound. For a given delay and lag the best a and b
-are linear least squares (variable projection, Golub & Pereyra 1973); the cost has several valleys
+(`plant_path`), a the gain, b the output at the start. Because the command is known, a limit and
+noise that the controller acts on have no effect, and least squares is maximum likelihood for white
+noise: the standard error is the Cramér-Rao bound. For a given delay and lag the best a and b are
+linear least squares (variable projection, Golub & Pereyra 1973). The cost has several local minima
 over the delay, so a grid over delay and lag comes first.
 """
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,82 +29,90 @@ from deadtime.estimation.data._commands import (
 )
 from deadtime.estimation.data._evidence import checked_names, excited
 from deadtime.estimation.data._excitation import check_moves
-from deadtime.estimation.data._several import Flights, Window, each_flight
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.fit._joint import solve_jointly
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
-from deadtime.estimation.methods._conclusion import Fitted, concluded, without_vanishing
+from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.methods._method import Method, check_initial_output
 from deadtime.estimation.models._plant_path import Path, path_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_output_error", "estimate_from_commands"]
+__all__ = ["OutputError", "estimate_from_commands"]
 
 Array = NDArray[np.float64]
 
-#: Longest delay that is sought, as a part of the window.
+#: Longest delay of the search, as a share of the window.
 LONGEST = 0.6
 
-#: Points of the grid over the delay, at most; fewer where a sample has four, or one where a lag
-#: is searched, too, whose responses have no corners.
+#: Most points of the grid over the delay. It has four points a sample, or one where a lag is fitted
+#: too, whose response is smooth.
 MOST_POINTS = 600
 
-#: Lags of the grid, in samples, and factors on a time constant.
+#: Lags of the grid, in samples, and factors of that over a time constant.
 LAGS = (0.0, 2.0, 8.0)
 FACTORS = (0.3, 1.0, 3.0)
 
-#: Values that one block of the grid holds, so that long recordings need no memory for all of it.
+#: Values in one block of the grid: bounds the memory for long recordings.
 BLOCK = 200_000
 
-#: The command counts as computed only where rows are the controller's samples, to this part.
+#: Largest relative difference between the time of a row and the sample time at which a command can
+#: be computed from the rows.
 ON_SAMPLES = 1e-3
 
 
-def estimate_by_output_error(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Fit `free` to the response of the plant to the logged command."""
-    return estimate_from_commands("output_error", recording, loop, window, free, initial_output)
+@dataclass(frozen=True)
+class OutputError(Method):
+    """Least squares on the response of the vehicle to the command as it was logged.
+
+    Parameters
+    ----------
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+    """
+
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "output_error"
+    joint: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the response of the plant to the logged commands."""
+        return estimate_from_commands(self.name, runs, free, self.initial_output)
 
 
 def estimate_from_commands(
     method: str,
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
+    runs: Sequence[Run],
     free: Sequence[str],
     initial_output: float | None = None,
     computed: bool = False,
 ) -> DelayEstimate:
-    """Fit to the response to the command: as logged, or `computed` as the controller makes it."""
-    flights = each_flight(recording, loop, window)
-    names = checked_names(free, flights[0].loop)
-    models = [
-        _model(flight.recording, flight.loop, flight.window, names, initial_output, computed)
-        for flight in flights
-    ]
+    """Fit the response to the command: logged, or `computed` from the recorded output."""
+    names = checked_names(free, runs[0].loop)
+    models = [_model(run, names, initial_output, computed) for run in runs]
     model, found = solve_jointly(models)
     found = without_vanishing(model, found)
     longest = min(LONGEST * one.span for one in models)
     delay = dict(zip(names, found.point.tolist(), strict=False)).get("delay", 0.0)
     if delay >= longest * (1.0 - 1e-3):
-        _runs_away(longest)
+        _refuse_longest(longest)
     sources = {one.source for one in models}
-    done = f"least squares over {', '.join(names)} on the response to the command"
+    message = f"least squares over {', '.join(names)} on the response to the command"
     if computed:
-        done += " as the controller made it of the recorded output, whose noise goes through it"
+        message += " computed from the recorded output, on whose noise the controller acts"
     elif sources != {"logged"}:
-        done += ", which was not logged but computed from reference and output"
+        message += ", which was not logged but computed from reference and output"
     start = found.point[len(names) :] if initial_output is None else [initial_output]
     return concluded(
         method,
         model,
         found,
-        [Fitted(one.recording, flight.loop) for one, flight in zip(models, flights, strict=True)],
-        message=done,
+        [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)],
+        message=message,
         details={
             "initial_output": float(start[0]),
             "command": " or ".join(sorted(sources)),
@@ -114,7 +123,7 @@ def estimate_from_commands(
 
 @dataclass(frozen=True, eq=False)
 class _Model(ModelOfOne):
-    """Misfit of one recording; parameters are `names`, then the output at the start if free."""
+    """Residuals of one recording; parameters are `names`, then the initial output if fitted."""
 
     recording: Recording
     path: Path
@@ -173,22 +182,22 @@ class _Model(ModelOfOne):
         return np.stack([columns[label] for label in self.labels], axis=1)
 
     def starts(self) -> list[Array]:
-        """The best points of a grid over delay and lag, gain and offset at their best."""
+        """The best points of a grid over delay and lag, with the best gain and offset at each."""
         found = []
-        for slow in self._slow_grid():
-            values = {**self.known, **slow}
-            delays = self._delays(4 if not slow else 1)
+        for lags in self._lag_grid():
+            values = {**self.known, **lags}
+            delays = self._delays(4 if not lags else 1)
             costs, gains, offsets = self._projected(delays, values)
-            inner = np.r_[np.inf, costs, np.inf]
-            valleys = np.flatnonzero((costs <= inner[:-2]) & (costs <= inner[2:]))
-            for place in valleys[np.argsort(costs[valleys])][:2]:
+            padded = np.r_[np.inf, costs, np.inf]
+            minima = np.flatnonzero((costs <= padded[:-2]) & (costs <= padded[2:]))
+            for place in minima[np.argsort(costs[minima])][:2]:
                 values |= {"delay": float(delays[place]), "gain": float(gains[place])}
                 point = [values[name] for name in self.names]
                 tail = [float(offsets[place])] if self.offset is None else []
                 found.append((float(costs[place]), np.array([*point, *tail])))
         return [point for _, point in sorted(found, key=lambda pair: pair[0])]
 
-    def _slow_grid(self) -> list[dict[str, float]]:
+    def _lag_grid(self) -> list[dict[str, float]]:
         if "lag" in self.names:
             return [{"lag": lag * self._sample} for lag in LAGS]
         if "time_constant" in self.names:
@@ -197,7 +206,7 @@ class _Model(ModelOfOne):
         return [{}]
 
     def _delays(self, each: int) -> Array:
-        """The grid over the delay, so many points a sample, or the delay if it is known."""
+        """The grid over the delay with `each` points a sample, or the known delay."""
         if "delay" not in self.names:
             return np.array([self.known["delay"]])
         longest = LONGEST * self.span
@@ -205,7 +214,7 @@ class _Model(ModelOfOne):
         return np.linspace(0.0, longest, points + 1)
 
     def _projected(self, delays: Array, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
-        """Cost at each delay with the best gain and offset, and these."""
+        """Least cost at each delay, with the best gain and offset there."""
         rows = max(1, BLOCK // len(self.recording))
         blocks = [
             self._projected_block(delays[first : first + rows], values)
@@ -221,40 +230,35 @@ class _Model(ModelOfOne):
         target = self.recording.output - (self.offset or 0.0)
         centres = path.mean(axis=1) if self.offset is None else np.zeros(delays.size)
         level = float(target.mean()) if self.offset is None else 0.0
-        moved, wanted = path - centres[:, None], target - level
+        moved, target = path - centres[:, None], target - level
         power = np.einsum("ij,ij->i", moved, moved)
         if "gain" in self.names:
-            gains = np.divide(moved @ wanted, power, out=np.zeros(delays.size), where=power > 0.0)
+            gains = np.divide(moved @ target, power, out=np.zeros(delays.size), where=power > 0.0)
         else:
             gains = np.full(delays.size, values["gain"])
-        left = wanted - gains[:, None] * moved
+        left = target - gains[:, None] * moved
         return np.einsum("ij,ij->i", left, left), gains, level - gains * centres
 
 
-def _runs_away(longest: float) -> None:
+def _refuse_longest(longest: float) -> None:
     raise NotIdentifiableError(
-        f"the fit runs away to a delay of {longest:g} s, {LONGEST:g} of the window: the output is "
-        "no answer to this command; check columns and units, or choose a longer window"
+        f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is no "
+        "response to this command; check columns and units, or choose a longer window"
     )
 
 
 def _model(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    names: tuple[str, ...],
-    initial_output: float | None,
-    computed: bool,
+    run: Run, names: tuple[str, ...], initial_output: float | None, computed: bool
 ) -> _Model:
-    """Commands up to the end of the window, from before its start where the rows tell them."""
-    ends = window or (None, None)
-    rows = recording.rows(*ends)
-    data = recording.window(*ends)
+    """Commands up to the end of the window, including those before its start where known."""
+    recording, loop, window = run
+    rows = recording.rows(*window)
+    data = recording.window(*window)
     command, source = _commands(recording, loop, computed)
     command = command[: rows.stop]
     if len(data) < 2 * (len(names) + 2):
         raise NotIdentifiableError(
-            f"{len(data)} samples are too few for {len(names)} numbers and an initial output: "
+            f"{len(data)} samples are too few for {len(names)} parameters and an initial output: "
             "widen the window"
         )
     check_moves(data.output, command)
@@ -269,7 +273,7 @@ def _model(
 
 
 def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[Array, str]:
-    """The command of every row: logged, or as the controller makes it of reference and output."""
+    """The command of every row: logged, or computed from reference and output."""
     if recording.command is not None and not computed:
         if moves_between_rows(recording, loop):
             return commands_over_samples(recording, loop)
@@ -284,7 +288,7 @@ def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[
     if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
         raise NotIdentifiableError(
             f"rows are {between:g} s apart and the controller samples every {loop.sample_time:g} "
-            "s: its command cannot be computed from rows it did not see; log the command, or use "
+            "s: its command cannot be computed from rows that are not its samples; log it, or use "
             "method='waveform'"
         )
     return found

@@ -1,19 +1,21 @@
-"""From the overshoot of a step to the delay of an integrator under proportional control.
+"""Delay of an integrator under proportional control from the overshoot of a step.
 
 The loop is ``z'(t) = K (r − z)(t − Td)`` with ``K = gain·Kp``; everything depends on
 ``x = K·Td`` alone. Three maps from the overshoot Mo to x:
 
 * ``dominant``: Armah & Yi's. Mo gives a damping ratio ζ as in a second-order system (their
   eq. 5), and the rightmost root ``s = W₀(−K Td)/Td`` (eq. 3) has ``ζ = |Re s|/|s|`` (eq. 6). The
-  step response is taken for that of one pair of roots, which makes the delay 0 to 4 % too long.
+  step response is approximated by that of one pair of roots, which makes the delay 0 to 4 % too
+  long.
 * ``exact``: the step response itself. With θ = t/Td the error ``e = 1 − z`` is the delayed
   exponential ``e(θ) = Σ_j (−x)^j (θ − j + 1)^j / j!`` over ``j ≤ θ + 1`` (method of steps); z
   peaks one delay after the first zero of e.
-* ``saturated``: the loop as it flew, with its hold and its limit, simulated at the time stamps
-  of the recording; no closed form.
+* ``saturated``: the loop with its hold and its limit, simulated at the time stamps of the
+recording;
+  no closed form.
 
-No map knows of a gain that is not what it was taken for, of a lag, or that the largest of many
-noisy samples is larger than the peak.
+All maps assume the given gain and no lag, and none corrects for the largest of many noisy samples
+being larger than the peak.
 """
 
 from __future__ import annotations
@@ -21,21 +23,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
-from scipy.optimize import brentq
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_dies_out, read_extremes
+from deadtime.estimation.data._extremes import check_decays, read_extremes
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
+from deadtime.estimation.methods._method import Method, check_choice
 from deadtime.estimation.methods._read_off import read_off_estimate
-from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording, Step
+from deadtime.recordings import Step
 
-__all__ = ["OvershootMap", "damping_ratio", "estimate_by_overshoot"]
+__all__ = ["Overshoot", "OvershootMap", "damping_ratio"]
 
 OvershootMap = Literal["dominant", "exact", "saturated"]
 
@@ -44,21 +46,21 @@ SMALLEST_X = math.exp(-1.0)
 
 
 @dataclass(frozen=True)
-class Overshoot:
-    """The overshoot of one step of a recording, as read.
+class OvershootReading:
+    """The overshoot of one step of a recording.
 
     Attributes
     ----------
     value : float
         Peak beyond the reference over the size of the step; 0.3 is 30 %.
     noise : float
-        Standard deviation of `value` that the sensor noise explains.
+        Standard deviation of `value` by the sensor noise.
     start : float
         Output before the step.
     step : Step
         The step.
     peak_time : float
-        When the peak was reached, s.
+        Time of the peak, s.
     """
 
     value: float
@@ -115,6 +117,8 @@ def dominant_x(overshoot: float) -> float:
 
 def exact_overshoot(x: float) -> float:
     """Overshoot of the exact step response for ``x = K·Td``; 0 where there is none."""
+    from scipy.optimize import brentq
+
     if x >= 1.0:
         return x - 0.5
     if x <= SMALLEST_X:
@@ -130,12 +134,14 @@ def exact_overshoot(x: float) -> float:
 
 def exact_x(overshoot: float) -> float:
     """Inverse of `exact_overshoot`, which increases with x."""
+    from scipy.optimize import brentq
+
     if overshoot >= 0.5:
         return overshoot + 0.5
-    low = 0.375  # overshoots by less than 1e-7, the least that can be told from rounding here
+    low = 0.375  # the overshoot is below 1e-7, close to rounding
     if overshoot <= exact_overshoot(low):
         raise NotIdentifiableError(
-            f"an overshoot of {100 * overshoot:.3g} % is too small to be read: K·Td is at its "
+            f"an overshoot of {100 * overshoot:.3g} % is too small: K·Td is at its "
             f"limit 1/e = {SMALLEST_X:.4f}; use the waveform method"
         )
     return float(brentq(lambda x: exact_overshoot(x) - overshoot, low, 1.0, xtol=1e-15))
@@ -152,79 +158,98 @@ def _error(theta: float, x: float) -> float:
     return math.fsum(terms)
 
 
-def estimate_by_overshoot(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),  # the delay is what this method fits, whatever is asked for
-    map: OvershootMap = "dominant",  # noqa: A002
-) -> DelayEstimate:
-    """Delay from the overshoot of the one step in the window."""
-    if map not in get_args(OvershootMap):
-        raise ValueError(f"map={map!r} is not one of {', '.join(get_args(OvershootMap))}")
-    stiffness = stiffness_of(loop, "overshoot")
-    simulated = SimulatedRecording(recording, loop, window)
-    answer = read_step(simulated.recording)
-    if map != "saturated":  # which knows of the limit
-        check_dies_out(read_extremes(answer), "overshoot")
-    read = read_overshoot(answer)
+@dataclass(frozen=True)
+class Overshoot(Method):
+    """Delay from the overshoot of one step, as Armah & Yi read it.
 
-    def delay_of(value: float) -> float:
-        if map == "dominant":
-            return dominant_x(value) / stiffness
-        if map == "exact":
-            return exact_x(value) / stiffness
-        return _saturated_delay(value, read, simulated, exact_x(value) / stiffness)
+    Parameters
+    ----------
+    map : {"dominant", "exact", "saturated"}
+        From the overshoot to the delay: by the rightmost pair of roots alone (the paper's), by
+        the exact step response, or by simulating the loop with its hold and limit.
 
-    delay = delay_of(read.value)
-    # A difference quotient over the noise itself: the map is smooth and the noise small.
-    change = max(read.noise, 1e-6)
-    slope = abs(delay_of(read.value + change) - delay) / change if read.value + change < 1 else 0.0
-    stderr = slope * read.noise
-    details = {"map": map, "overshoot": read.value, "overshoot_noise": read.noise}
-    if 0.0 < read.value < 1.0:
-        details["damping_ratio"] = damping_ratio(read.value)
-    return read_off_estimate(
-        "overshoot",
-        simulated,
-        {"delay": delay},
-        np.array([[stderr**2]]),
-        read.start,
-        message=(
-            f"{100 * read.value:.2f} % overshoot, map {map!r}: takes the gain to be "
-            f"{loop.parameters['gain']:g} and the vehicle to have no lag"
-        ),
-        uncalibrated=(
-            "the overshoot method reads one peak: noise alone makes the delay uncertain by "
-            f"{stderr:.2g} s, but the largest of noisy samples is biased upwards and a wrong gain, "
-            "a lag or the hold shift it further; use method='waveform' for an interval"
-        ),
-        details=details,
-    )
+    Raises
+    ------
+    ValueError
+        For another map.
+    """
+
+    map: OvershootMap = "dominant"
+
+    name: ClassVar[str] = "overshoot"
+
+    def __post_init__(self) -> None:
+        check_choice("map", self.map, get_args(OvershootMap))
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        stiffness = stiffness_of(loop, "overshoot")
+        simulated = SimulatedRecording(recording, loop, window)
+        reading = read_step(simulated.recording)
+        if self.map != "saturated":  # which simulates the limit
+            check_decays(read_extremes(reading), "overshoot")
+        read = read_overshoot(reading)
+
+        def delay_of(value: float) -> float:
+            if self.map == "dominant":
+                return dominant_x(value) / stiffness
+            if self.map == "exact":
+                return exact_x(value) / stiffness
+            return _saturated_delay(value, read, simulated, exact_x(value) / stiffness)
+
+        delay = delay_of(read.value)
+        # A difference quotient with the noise as its step: the map is smooth and the noise small.
+        change = max(read.noise, 1e-6)
+        slope = (
+            abs(delay_of(read.value + change) - delay) / change if read.value + change < 1 else 0.0
+        )
+        stderr = slope * read.noise
+        details = {"map": self.map, "overshoot": read.value, "overshoot_noise": read.noise}
+        if 0.0 < read.value < 1.0:
+            details["damping_ratio"] = damping_ratio(read.value)
+        return read_off_estimate(
+            "overshoot",
+            simulated,
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            read.start,
+            message=(
+                f"{100 * read.value:.2f} % overshoot, map {self.map!r}: assumes a gain of "
+                f"{loop.parameters['gain']:g} and no lag"
+            ),
+            uncalibrated=(
+                "the overshoot method reads one peak: noise alone makes the delay uncertain by "
+                f"{stderr:.2g} s, but the largest of noisy samples is biased upwards and a wrong "
+                "gain, a lag or the hold shift it further; use method='waveform' for an interval"
+            ),
+            details=details,
+        )
 
 
-def read_overshoot(answer: StepReading) -> Overshoot:
-    """The overshoot of the answer to a step, refused where there is none."""
-    row = int(np.argmax(answer.travelled))
-    value = float(answer.travelled[row]) - 1.0
-    settled = max(0.0, float(np.mean(answer.tail)) - 1.0)
-    if value - settled <= max(CLEARANCE * answer.noise, 1e-9):
+def read_overshoot(reading: StepReading) -> OvershootReading:
+    """The overshoot of a step response; refuses one without overshoot."""
+    row = int(np.argmax(reading.travelled))
+    value = float(reading.travelled[row]) - 1.0
+    settled = max(0.0, float(np.mean(reading.tail)) - 1.0)
+    if value - settled <= max(CLEARANCE * reading.noise, 1e-9):
         beyond = max(0.0, value - settled)
         raise NotIdentifiableError(
             f"no overshoot: the output exceeds its final value by {100 * beyond:.2g} % of the "
-            f"step, noise alone gives {100 * CLEARANCE * answer.noise:.2g} %. Kp·Td is below or "
-            "near 1/e, where the overshoot says nothing of the delay: raise Kp, or use "
+            f"step, noise alone gives {100 * CLEARANCE * reading.noise:.2g} %. Kp·Td is below or "
+            "near 1/e, where the overshoot does not determine the delay: raise Kp, or use "
             "method='waveform'"
         )
-    deviation = answer.noise * math.sqrt(1.0 + 1.0 / answer.start_samples)
-    peak_time = answer.step.time + float(answer.since[row])
-    return Overshoot(value, deviation, answer.start, answer.step, peak_time)
+    deviation = reading.noise * math.sqrt(1.0 + 1.0 / reading.start_samples)
+    peak_time = reading.step.time + float(reading.since[row])
+    return OvershootReading(value, deviation, reading.start, reading.step, peak_time)
 
 
 def _saturated_delay(
-    overshoot: float, read: Overshoot, simulated: SimulatedRecording, start: float
+    overshoot: float, read: OvershootReading, simulated: SimulatedRecording, start: float
 ) -> float:
     """Delay at which the simulated loop overshoots by this much at the recorded times."""
+    from scipy.optimize import brentq
 
     def excess(delay: float) -> float:
         output = simulated.output({"delay": delay}, read.start)

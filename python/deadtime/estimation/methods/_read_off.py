@@ -1,7 +1,7 @@
-"""A delay that was read off a recording, made into a result.
+"""Results of methods that read the delay from a few features of the response.
 
-Such methods look at a few features of the response, not at all of it. How well the loop with the
-numbers they found explains the recording is told by the same residuals as for every other method.
+The residuals of the loop with the estimated parameters are computed as for every other method, so
+they show how well it explains the whole recording.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["check_delay_alone", "estimate_with_residuals", "read_off_estimate"]
 
 
 def check_delay_alone(method: str, free: Sequence[str]) -> None:
-    """Refuse to fit anything without the delay; what else is asked for is taken as given."""
+    """Refuse `free` without the delay; its other names are taken as given."""
     if "delay" not in free:
         raise ValueError(
             f"the {method} method determines the delay alone, and free={tuple(free)!r} does not "
@@ -44,16 +44,16 @@ def read_off_estimate(
     uncalibrated: str,
     details: Mapping[str, Any],
 ) -> DelayEstimate:
-    """The result for these `values`, its loop at rest at `start` at first.
+    """The result for these `values`, with the loop at rest at the output `start`.
 
-    Without a covariance the standard errors are NaN: the method has none.
+    Without a covariance the standard errors are NaN.
     """
     try:
         residuals = simulated.residuals(values, start)
     except ValueError as error:
         found = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
         raise NotIdentifiableError(
-            f"the {method} method reads {found}, and a loop with that does not do what was "
+            f"the {method} method reads {found}, and a loop with these values cannot have been "
             f"recorded ({error}): check gains, signs and units"
         ) from None
     return estimate_with_residuals(

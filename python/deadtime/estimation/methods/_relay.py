@@ -1,14 +1,14 @@
 """Delay from the limit cycle of an integrator under relay feedback (Åström & Hägglund 1984).
 
-The output climbs with slope a until a delay after the command has switched, then falls with the
-same slope: from its crossing c of the reference to the next, c', it takes 2 (s + Td - c), s being
-when the command switched. Each half cycle so gives Td = (c + c')/2 - s, a quarter of the period
-where the relay switches at the crossing. A sampled one waits for the next sample; where noise
-makes it switch to and fro, s is the time of one switch with the same effect. Crossings are those of
-lines through the samples on the slope; the peak is a (s + Td - c).
+The output climbs with slope a until one delay after the command has switched, then falls with the
+same slope: from one crossing c of the reference to the next, c', it takes 2 (s + Td - c), where s
+is the time of the switch. Each half cycle gives Td = (c + c')/2 - s, a quarter of the period where
+the relay switches at the crossing. A sampled relay switches at the next sample; where noise makes
+it switch several times, s is the time of one switch with the same effect. Crossings are those of
+lines fitted to the samples on the slope; the peak is a (s + Td - c).
 
-A known lag is taken off (exactly where the relay switches at the crossing, within a millisecond or
-two where samples are as long as the lag), an unknown one counts as delay: almost all of it where it
+A known lag is subtracted (exactly where the relay switches at the crossing, within a millisecond or
+two where samples are as long as the lag). An unknown lag counts as delay: almost all of it where it
 is shorter than a quarter of the period. Half cycles are averaged in pairs, in which an offset or a
 drift cancels to first order; the standard error is that of the mean of these cycles.
 """
@@ -19,111 +19,132 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._step_reading import scatter_of_bends
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._step_reading import noise_of_second_differences
+from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._read_off import check_delay_alone, estimate_with_residuals
 from deadtime.estimation.models._held_response import HeldResponse
-from deadtime.loops import ControlLoop, Integrator
+from deadtime.loops import Integrator
 from deadtime.recordings import Recording
 
-__all__ = ["estimate_by_relay"]
+__all__ = ["Relay"]
 
 Array = NDArray[np.float64]
 
 #: Crossings at the beginning that are left out: from rest, where noise alone switches the relay,
-#: the cycle has yet to come about.
+#: the limit cycle is not yet reached.
 LEFT_OUT = 2
 
-#: Fewest half cycles after that: a scatter takes two pairs.
+#: Fewest half cycles after these: a standard error takes two pairs.
 FEWEST = 4
 
-#: Part of the way from a crossing to the peaks around it that is straight, with a lag too.
+#: Share of the path from a crossing to its peaks that is taken as straight, also with a lag.
 STRAIGHT = 0.6
 
-#: A crossing is one when the output has gone so many standard deviations of the noise beyond it.
+#: Distance from the reference that counts as a crossing, in standard deviations of the noise.
 CLEARANCE = 4.0
 
-#: Half cycles whose length differs by more, and peaks that shrink by more, are no limit cycle.
+#: Largest relative standard deviation of the half cycles, and smallest ratio of the last peak to
+#: the first, of a limit cycle.
 UNEVEN, SHRINKING = 0.25, 0.7
 
-#: A relay's command is at one of its two values in at least this share of the samples.
+#: Least share of the samples in which the command of a relay is at one of its two values.
 AT_VALUES = 0.9
 
 
-def estimate_by_relay(
-    recording: Recording,
-    loop: ControlLoop,
-    window: tuple[float | None, float | None] | None,
-    free: Sequence[str] = ("delay",),
-    amplitude: float | None = None,
-) -> DelayEstimate:
-    """Delay from the period of a limit cycle; `amplitude` of the relay if it was not logged."""
-    check_delay_alone("relay", free)
-    plant = loop.plant
-    if not isinstance(plant, Integrator):
-        raise ValueError(
-            f"the relay method is for an Integrator, the loop has a {type(plant).__name__}: use "
-            "method='waveform'"
+@dataclass(frozen=True)
+class Relay(Method):
+    """Delay from the period of a limit cycle under relay feedback.
+
+    Parameters
+    ----------
+    amplitude : float, optional
+        Amplitude of the relay, where the command was not logged; only the residuals need it.
+
+    Raises
+    ------
+    ValueError
+        When the amplitude is not above zero.
+    """
+
+    amplitude: float | None = None
+
+    name: ClassVar[str] = "relay"
+
+    def __post_init__(self) -> None:
+        if self.amplitude is not None:
+            positive("amplitude", self.amplitude)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("relay", free)
+        plant = loop.plant
+        if not isinstance(plant, Integrator):
+            raise ValueError(
+                f"the relay method is for an Integrator, the loop has a {type(plant).__name__}: "
+                "use method='waveform'"
+            )
+        data = recording.window(*window)
+        signs, height = _relay(data, self.amplitude)
+        error = data.output - data.reference
+        crossings = _crossings(data.time, error)[LEFT_OUT:]
+        _check_cycle(crossings, error, data.time)
+        switches = _switches(data.time, signs, crossings, loop.is_sampled)
+        half = float(np.mean(np.diff(crossings)))
+        readings = 0.5 * (crossings[1:] + crossings[:-1]) - switches
+        cycles = _paired(readings)
+        late = _delay_by_lag(plant.lag, half)
+        delay = float(cycles.mean()) - late
+        stderr = _error_of_mean(cycles)
+        if delay <= 0.0:
+            raise NotIdentifiableError(
+                f"a quarter of the period, {0.5 * half:.3g} s, is explained by lag and hold: the "
+                f"lag is shorter than the given {plant.lag:g} s, or there is no delay"
+            )
+        path = _Path(data, switches, signs, delay, plant.lag)
+        first, last = data.time[path.rows[[0, -1]]]
+        slope = abs(plant.gain) * height if height is not None else path.slope
+        waits = float(np.mean(switches - crossings[:-1]))
+        peaks = _peaks(data.time, error, crossings)
+        return estimate_with_residuals(
+            "relay",
+            loop,
+            data.window(float(first), float(last)),
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            path.residuals(slope),
+            message=(
+                f"{cycles.size} cycles of {2.0 * half:.4g} s; "
+                + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
+                + (f"a lag of {plant.lag:g} s subtracted" if plant.lag else "a lag counts as delay")
+            ),
+            uncalibrated=(
+                f"the relay method gives the scatter of {cycles.size} cycles, {stderr:.2g} s for "
+                "their mean, but not what a lag or a drift adds to each of them; use "
+                "method='output_error' for an interval"
+            ),
+            details={
+                "period": 2.0 * half,
+                "cycles": int(cycles.size),
+                "wait_of_hold": waits,
+                "amplitude": float(peaks.mean()),
+                "amplitude_expected": slope * (delay + waits),
+                "slope": path.slope,
+            },
         )
-    data = recording.window(*(window or (None, None)))
-    signs, height = _relay(data, amplitude)
-    error = data.output - data.reference
-    crossings = _crossings(data.time, error)[LEFT_OUT:]
-    _check_cycle(crossings, error, data.time)
-    switches = _switches(data.time, signs, crossings, loop.is_sampled)
-    half = float(np.mean(np.diff(crossings)))
-    reads = 0.5 * (crossings[1:] + crossings[:-1]) - switches
-    cycles = _paired(reads)
-    late = _late_by_lag(plant.lag, half)
-    delay = float(cycles.mean()) - late
-    stderr = _error_of_mean(cycles)
-    if delay <= 0.0:
-        raise NotIdentifiableError(
-            f"a quarter of the period, {0.5 * half:.3g} s, is all lag and hold: the lag of "
-            f"{plant.lag:g} s is shorter than it is taken to be, or there is no delay"
-        )
-    path = _Path(data, switches, signs, delay, plant.lag)
-    first, last = data.time[path.rows[[0, -1]]]
-    slope = abs(plant.gain) * height if height is not None else path.slope
-    waits = float(np.mean(switches - crossings[:-1]))
-    peaks = _peaks(data.time, error, crossings)
-    return estimate_with_residuals(
-        "relay",
-        loop,
-        data.window(float(first), float(last)),
-        {"delay": delay},
-        np.array([[stderr**2]]),
-        path.residuals(slope),
-        message=(
-            f"{cycles.size} cycles of {2.0 * half:.4g} s; "
-            + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
-            + (f"a lag of {plant.lag:g} s taken off" if plant.lag else "a lag counts as delay")
-        ),
-        uncalibrated=(
-            f"the relay method gives the scatter of {cycles.size} cycles, {stderr:.2g} s for their "
-            "mean, but not what a lag or a drift adds to each of them; use method='output_error' "
-            "for an interval"
-        ),
-        details={
-            "period": 2.0 * half,
-            "cycles": int(cycles.size),
-            "wait_of_hold": waits,
-            "amplitude": float(peaks.mean()),
-            "amplitude_expected": slope * (delay + waits),
-            "slope": path.slope,
-        },
-    )
 
 
 def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | None]:
-    """Sign of the command of every sample, and its size where it is known."""
+    """Sign of the command at every sample, and its amplitude where it is known."""
     error = data.reference - data.output
     if data.command is None:
         size = None if amplitude is None else positive("amplitude", amplitude)
@@ -133,15 +154,15 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
     if size == 0.0 or float(np.mean(at)) < AT_VALUES:
         raise NotIdentifiableError(
             f"the command is at ±{size:.3g} in {100 * float(np.mean(at)):.0f} % of the samples "
-            "only: no relay made it; use method='output_error', or fly Experiment.relay"
+            "only, so it is not that of a relay; use method='output_error', or run Experiment.relay"
         )
     return np.where(data.command >= 0.0, 1.0, -1.0), size
 
 
 def _crossings(time: Array, error: Array) -> Array:
     """Times at which the output crosses the reference, between samples."""
-    # Second differences of a path of straight lines are noise, except at the corners.
-    beyond = max(CLEARANCE * scatter_of_bends(error), 1e-9 * float(np.ptp(error)))
+    # Second differences of straight lines are noise, except at the corners.
+    beyond = max(CLEARANCE * noise_of_second_differences(error), 1e-9 * float(np.ptp(error)))
     rough, side, last = [], 0.0, 0
     for row, value in enumerate(error):
         if abs(value) <= beyond:
@@ -159,7 +180,7 @@ def _crossings(time: Array, error: Array) -> Array:
 
 
 def _on_a_line(time: Array, error: Array, place: float, reach: float) -> float:
-    """Where a line through the samples near a crossing is zero."""
+    """Zero of a line fitted to the samples near a crossing."""
     near = np.abs(time - place) <= reach
     if int(near.sum()) < 3:
         return place
@@ -169,7 +190,7 @@ def _on_a_line(time: Array, error: Array, place: float, reach: float) -> float:
 
 
 def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
-    """Refuse what is no steady oscillation around the reference."""
+    """Refuse what is no sustained oscillation around the reference."""
     if float(np.ptp(error)) == 0.0:
         raise NotIdentifiableError("the output does not move: there is no limit cycle")
     if crossings.size < FEWEST + 1:
@@ -181,13 +202,13 @@ def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
     if float(np.std(halves)) > UNEVEN * float(np.mean(halves)):
         raise NotIdentifiableError(
             f"the output crosses the reference every {float(halves.min()):.3g} to "
-            f"{float(halves.max()):.3g} s: that is noise or a reference that moves, no limit cycle"
+            f"{float(halves.max()):.3g} s: that is noise or a changing reference, no limit cycle"
         )
     peaks = _peaks(time, error, crossings)
     if peaks[-1] < SHRINKING * peaks[0]:
         raise NotIdentifiableError(
-            f"the oscillation dies out, from {peaks[0]:.3g} to {peaks[-1]:.3g}: no relay keeps it "
-            "up; use method='decrement' or 'waveform'"
+            f"the oscillation decays from {peaks[0]:.3g} to {peaks[-1]:.3g}, so no relay sustains "
+            "it; use method='decrement' or 'waveform'"
         )
 
 
@@ -200,7 +221,7 @@ def _peaks(time: Array, error: Array, crossings: Array) -> Array:
 
 
 def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Array:
-    """When the command switched at each crossing but the last; at once without samples."""
+    """Time of the switch at each crossing but the last; the crossing itself without samples."""
     if not sampled:
         return crossings[:-1]
     rows = np.flatnonzero(np.diff(signs)) + 1
@@ -212,23 +233,23 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
         if own.size % 2 == 0:
             raise NotIdentifiableError(
                 f"the command switches {own.size} times around the crossing at "
-                f"{crossings[place]:.3g} s: the noise drowns the limit cycle, or this command did "
-                "not make it; use a larger relay"
+                f"{crossings[place]:.3g} s: the noise hides the limit cycle, or another "
+                "command caused it; use a larger relay"
             )
         found.append(float(np.sum(own[::2]) - np.sum(own[1::2])))
     return np.array(found)
 
 
-def _paired(reads: Array) -> Array:
-    """Means of one half cycle and the next, whole pairs only."""
-    even = reads[reads.size % 2 :]
+def _paired(readings: Array) -> Array:
+    """Means of pairs of successive half cycles."""
+    even = readings[readings.size % 2 :]
     return np.asarray(even.reshape(-1, 2).mean(axis=1))
 
 
 def _error_of_mean(cycles: Array) -> float:
     """Standard error of the mean of cycles that share a crossing with their neighbours.
 
-    Without a hold the errors of the crossings between them cancel, all but the first and the last.
+    Without a hold the errors of all crossings but the first and the last cancel.
     """
     off = cycles - cycles.mean()
     count = cycles.size
@@ -237,13 +258,15 @@ def _error_of_mean(cycles: Array) -> float:
     return math.sqrt(max(power + 2.0 * neighbours, power / count) / count)
 
 
-def _late_by_lag(lag: float, half: float) -> float:
-    """How much longer a lag makes the quarter of a period, given half a period.
+def _delay_by_lag(lag: float, half: float) -> float:
+    """Increase of a quarter of the period by a lag, for half a period of `half`.
 
     From the arrival of one switch to that of the next the speed goes from -v to v as
-    1 - (1 + v) e^(-t/lag), v = tanh(half/2 lag), and the output from -p to p; it is zero later than
-    in the middle by the time that is returned.
+    1 - (1 + v) e^(-t/lag), v = tanh(half/2 lag), and the output from -p to p. The zero of the
+    output is later than the middle by the returned time.
     """
+    from scipy.optimize import brentq
+
     if lag == 0.0:
         return 0.0
     v = math.tanh(0.5 * half / lag)
@@ -257,7 +280,7 @@ def _late_by_lag(lag: float, half: float) -> float:
 
 @dataclass(frozen=True)
 class _Path:
-    """The output that the switches make, from the second of them on."""
+    """The output caused by the switches, from the second of them on."""
 
     data: Recording
     switches: Array
@@ -285,10 +308,10 @@ class _Path:
 
     @property
     def slope(self) -> float:
-        """Slope of the output that fits best."""
+        """Slope of the best fit."""
         return abs(self.fitted()[1])
 
     def residuals(self, slope: float) -> Array:
-        """Recorded output less the path of this slope."""
+        """Recorded output minus the path of this slope."""
         path, found, output = self.fitted()
         return np.asarray(output - math.copysign(slope, found) * path)

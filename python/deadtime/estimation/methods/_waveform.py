@@ -1,17 +1,17 @@
 """Least squares of the simulated loop on the whole recording.
 
 The output of the loop, simulated with its hold and its limit at the recording's time stamps, is
-fitted to the recorded one; the output at the start of the window is fitted along, because one
-noisy sample is a poor initial condition. The cost has several valleys over the delay (a whole
-period of the loop's oscillation too much fits almost as well), so a grid over delay and gain comes
-first and the best few points of it are refined, by the loop's exact sensitivities.
+fitted to the recorded one. The output at the start of the window is fitted too, because one noisy
+sample is a poor initial condition. The cost has several local minima over the delay (a delay that
+is longer by a period of the oscillation fits almost as well), so a grid over delay and gain comes
+first and its best points are refined, with the exact sensitivities of the loop.
 
-The residuals are white only if the model is the vehicle and the noise enters at the measurement
-but does not circulate through the controller. Where it does (`noise="loop"`), the controller of the
-model reads the recorded output in place of the simulated one: what is left over are the
-innovations, and they are white. Both are predictions with as many numbers, so the one that leaves
-less over is the likelier. What a controller read at its samples is what is in the rows, so the
-innovations are taken unless the other is likelier by far (`noise="auto"`).
+The residuals are white only if the model is complete and the noise is added to the recording alone.
+Where the controller acts on the noise (`noise="loop"`), the controller of the model reads the
+recorded output instead of the simulated one: the residuals are then the innovations, and they are
+white. Both models have the same number of parameters, so the one with the smaller residuals is
+likelier. The rows of a sampled controller hold what it read, so the innovations are taken unless
+the other model is likelier by far (`noise="auto"`).
 """
 
 from __future__ import annotations
@@ -21,132 +21,139 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import OF_THE_LOOP, OF_THE_VEHICLE, checked_names, excited
+from deadtime.estimation.data._evidence import (
+    LOOP_PARAMETERS,
+    VEHICLE_PARAMETERS,
+    checked_names,
+    excited,
+)
 from deadtime.estimation.data._excitation import check_excitation, start_and_span
-from deadtime.estimation.data._several import Flights, FlownOnce, Window, each_flight
+from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.fit._joint import solve_jointly
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
-from deadtime.estimation.methods._conclusion import Fitted, concluded, without_vanishing
+from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.methods._method import Method, check_choice, check_initial_output
 from deadtime.estimation.methods._output_error import estimate_from_commands
-from deadtime.loops import ControlLoop
 
-__all__ = ["Noise", "estimate_by_waveform"]
+__all__ = ["NoisePath", "Waveform"]
 
 Array = NDArray[np.float64]
 
 #: Where sensor noise goes: into the recording alone, or through the controller as well.
-Noise = Literal["auto", "recording", "loop"]
+NoisePath = Literal["auto", "recording", "loop"]
 
-#: Points of the first grid over the delay, and factors of the first grid over the gain.
+#: Points of the initial grid over the delay, and factors of that over the gain: more points find a
+#: narrow minimum more often and take proportionally longer.
 DELAY_POINTS = 24
 GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
 
-#: Delays and lags of a continuous loop below this share of the window, or of the time between two
-#: samples, take long to simulate and cannot be told from none: they are taken for it.
+#: Shortest delay and lag of a continuous loop, as a share of the window and of the time between two
+#: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
 SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
-#: A lag of a sampled loop below this share of the time between two samples would overflow.
+#: Shortest lag of a sampled loop, as a share of the time between two samples; shorter ones
+#: overflow.
 LEAST_LAG = 1e-6
 
-#: A residual for simulations that leave all bounds, in units of the step.
-HOPELESS = 1e3
+#: Bound of the residuals of simulations that diverge, in units of the excitation.
+LARGEST_MISFIT = 1e3
 
-#: A misfit below this part of the excitation is rounding.
+#: Residuals below this share of the excitation count as rounding.
 ROUNDING = 1e-9
 
-#: Noise is taken to be in the recording alone where that is likelier by this log likelihood, a
-#: factor of 20.
-LIKELIER = 3.0
+#: Noise is taken to be in the recording alone where its log likelihood is larger by this (a factor
+#: of 20). Larger values prefer the innovations more often.
+LIKELIHOOD_RATIO = 3.0
 
 
-def estimate_by_waveform(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    noise: Noise = "auto",
-    initial_output: float | None = None,
-) -> DelayEstimate:
-    """Fit `free` of the loop to the window of the recording."""
-    if noise not in get_args(Noise):
-        raise ValueError(f"noise={noise!r} is not one of {', '.join(map(repr, get_args(Noise)))}")
-    if noise == "loop":
-        return _by_innovations(recording, loop, window, free, initial_output)
-    simulated = _by_simulation(recording, loop, window, free, initial_output)
-    if noise == "recording" or not set(free) <= set(OF_THE_VEHICLE):
-        return simulated
-    try:
-        innovations = _by_innovations(recording, loop, window, free, initial_output)
-    except NotIdentifiableError:  # the command cannot be computed, or says less than the loop
-        return simulated
-    likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
-    return simulated if likelier > LIKELIER else innovations
+@dataclass(frozen=True)
+class Waveform(Method):
+    """Least squares on the simulated response of the whole loop.
+
+    Parameters
+    ----------
+    noise : {"auto", "recording", "loop"}
+        Where the sensor noise goes: ``"recording"`` where it is in the recording alone, ``"loop"``
+        where the controller acted on it too. ``"auto"`` takes ``"loop"`` for rows that are the
+        samples of a P controller, unless ``"recording"`` is likelier by a factor of 20.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        For another `noise`.
+    """
+
+    noise: NoisePath = "auto"
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "waveform"
+    joint: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_choice("noise", self.noise, get_args(NoisePath))
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the windows of the runs."""
+        if self.noise == "loop":
+            return self._by_innovations(runs, free)
+        simulated = self._by_simulation(runs, free)
+        if self.noise == "recording" or not set(free) <= set(VEHICLE_PARAMETERS):
+            return simulated
+        try:
+            innovations = self._by_innovations(runs, free)
+        except NotIdentifiableError:  # the command cannot be computed, or does not determine `free`
+            return simulated
+        likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
+        return simulated if likelier > LIKELIHOOD_RATIO else innovations
+
+    def _by_innovations(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        return estimate_from_commands(self.name, runs, free, self.initial_output, computed=True)
+
+    def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        names = checked_names(free, runs[0].loop, LOOP_PARAMETERS)
+        models = [_model(run, names, self.initial_output) for run in runs]
+        model, found = solve_jointly(models)
+        found = without_vanishing(model, found)
+        _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
+        return concluded(
+            self.name,
+            model,
+            found,
+            [Run(one.simulated.recording, run.loop) for one, run in zip(models, runs, strict=True)],
+            message=f"least squares over {', '.join(names)} on the response of the loop",
+            details={
+                "initial_output": float([*found.point, self.initial_output][len(names)]),
+                "noise": "recording",
+            },
+        )
 
 
 def _unlikelihood(fit: DelayEstimate) -> float:
-    """Minus log likelihood of Gaussian noise of unknown size in each recording, but for a constant.
+    """Negative log likelihood, but for a constant, of Gaussian noise of unknown size.
 
-    Below rounding there is nothing to choose by.
+    Residuals are taken as no smaller than rounding.
     """
     total = 0.0
-    for one in fit.flights:
+    for one in fit.runs:
         scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))
         total += one.residuals.size * math.log(scatter)
     return total
 
 
-def _by_innovations(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    initial_output: float | None,
-) -> DelayEstimate:
-    return estimate_from_commands(
-        "waveform", recording, loop, window, free, initial_output, computed=True
-    )
-
-
-def _by_simulation(
-    recording: Flights,
-    loop: ControlLoop | Sequence[ControlLoop],
-    window: Window,
-    free: Sequence[str],
-    initial_output: float | None,
-) -> DelayEstimate:
-    flights = each_flight(recording, loop, window)
-    names = checked_names(free, flights[0].loop, OF_THE_LOOP)
-    models = [_model(flight, names, initial_output) for flight in flights]
-    model, found = solve_jointly(models)
-    found = without_vanishing(model, found)
-    _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
-    return concluded(
-        "waveform",
-        model,
-        found,
-        [
-            Fitted(one.simulated.recording, flight.loop)
-            for one, flight in zip(models, flights, strict=True)
-        ],
-        message=f"least squares over {', '.join(names)} on the response of the loop",
-        details={
-            "initial_output": float([*found.point, initial_output][len(names)]),
-            "noise": "recording",
-        },
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class _Model(ModelOfOne):
-    """Misfit of one recording; parameters are `names`, then the output at the start if free."""
+    """Residuals of one recording; parameters are `names`, then the initial output if fitted."""
 
     simulated: SimulatedRecording
     names: tuple[str, ...]
@@ -197,7 +204,7 @@ class _Model(ModelOfOne):
 
     def misfit(self, point: Array) -> Array:
         """Simulated minus recorded output; bounded where the loop with these numbers is not."""
-        bound = HOPELESS * self.size
+        bound = LARGEST_MISFIT * self.size
         recorded = self.simulated.recording.output
         try:
             output = self.simulated.output(*self._values(point))
@@ -206,13 +213,15 @@ class _Model(ModelOfOne):
         return np.clip(output - recorded, -bound, bound)
 
     def jacobian(self, point: Array) -> Array:
-        """Derivatives of the misfit; none where it is at its bound."""
+        """Derivatives of the misfit; zero where it is at its bound."""
         try:
             slopes = self.simulated.slopes(*self._values(point))
         except ValueError:
             return np.zeros((sum(self.sizes), point.size))
         columns = np.stack([slopes[label] for label in self.labels], axis=1)
-        bounded = np.abs(slopes["output"] - self.simulated.recording.output) < HOPELESS * self.size
+        bounded = (
+            np.abs(slopes["output"] - self.simulated.recording.output) < LARGEST_MISFIT * self.size
+        )
         return np.where(bounded[:, None], columns, 0.0)
 
     def starts(self) -> list[Array]:
@@ -234,21 +243,21 @@ class _Model(ModelOfOne):
         return [grids[name] if name in grids else np.array([known[name]]) for name in self.names]
 
 
-def _model(flight: FlownOnce, names: tuple[str, ...], offset: float | None = None) -> _Model:
-    simulated = SimulatedRecording(flight.recording, flight.loop, flight.window)
-    in_flight = simulated.recording.time[0] > flight.recording.time[0]
-    check_excitation(simulated.recording, len(names), in_flight=in_flight)
+def _model(run: Run, names: tuple[str, ...], offset: float | None = None) -> _Model:
+    simulated = SimulatedRecording(*run)
+    in_motion = simulated.recording.time[0] > run.recording.time[0]
+    check_excitation(simulated.recording, len(names), in_motion=in_motion)
     return _Model(simulated, names, offset)
 
 
 def _check_ends(values: Mapping[str, float], low: Array, high: Array) -> None:
-    """Refuse a fit that ran to an end of its search; a delay or lag of zero is an answer."""
+    """Refuse a fit at a bound of its search; a delay or lag of zero is a valid result."""
     for (name, value), least, most in zip(values.items(), low, high, strict=False):
         for end in (least, most):
             inner = name in ("delay", "lag") and end == least
             if not inner and abs(value - end) <= 1e-3 * abs(end):
                 raise NotIdentifiableError(
-                    f"the fit runs away to a {name} of {end:g}, the end of its search: the output "
-                    "is no answer of such a loop to this reference; check columns, signs, units "
+                    f"the fit ends at a {name} of {end:g}, a bound of its search: the output is "
+                    "no response of such a loop to this reference; check columns, signs, units "
                     "and gains, and choose a window around one step"
                 )

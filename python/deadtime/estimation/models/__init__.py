@@ -1,1 +1,1 @@
-"""Models that predict an output from recorded commands."""
+"""Models of the output of a vehicle under recorded commands."""

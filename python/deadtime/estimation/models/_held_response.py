@@ -1,4 +1,4 @@
-"""Response of an integrator with a lag to a held command, at any time, with its derivatives.
+"""Response of an integrator with lag to held commands, at any time, with its derivatives.
 
 A command u_k that holds from t_k to t_{k+1} goes into gain/(s (lag s + 1)). For a gain of one,
 
@@ -15,13 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 __all__ = ["HeldResponse", "Response"]
 
 Array = NDArray[np.float64]
 
-#: Commands are evenly apart where their distances differ by rounding of the time only.
+#: Largest relative range of the time between commands that counts as rounding of even times.
 EVEN = 1e-11
 
 
@@ -39,7 +38,7 @@ class HeldResponse:
     Parameters
     ----------
     time : ndarray, shape (n,)
-        From when each command holds, s, increasing; the last one holds for ever.
+        Time from which each command holds, s, increasing; the last one holds for ever.
     command : ndarray, shape (n,)
         The commands.
     """
@@ -49,7 +48,7 @@ class HeldResponse:
         self._steps = np.diff(time)
         self._kept: tuple[float, Array, Array] | None = None
         self._is_even = bool(np.ptp(self._steps) <= EVEN * self._steps.mean())
-        # A lag of less has died away before it matters, and would overflow below.
+        # Shorter lags have no effect and would overflow below.
         self._shortest = 1e-7 * float(self._steps.min(initial=np.inf))
         self._integral = np.concatenate([[0.0], np.cumsum(command[:-1] * self._steps)])
 
@@ -72,7 +71,7 @@ class HeldResponse:
         return Response(integral - lag * v, v, -v - lag * p)
 
     def _velocities(self, lag: float) -> tuple[Array, Array]:
-        """V and dv/dlag when each command begins; those of the last lag are kept."""
+        """The velocity v and dv/dlag at the start of each command; kept for the last lag."""
         if self._kept is None or self._kept[0] != lag:
             decays, rates = np.exp(-self._steps / lag), self._steps / lag**2
             recursion = _even if self._is_even else _uneven
@@ -81,7 +80,9 @@ class HeldResponse:
 
 
 def _even(command: Array, decays: Array, rates: Array) -> tuple[Array, Array]:
-    """The recursion of v and dv/dlag where commands are evenly apart: two filters."""
+    """The recursion of v and dv/dlag for evenly spaced commands, as two filters."""
+    from scipy.signal import lfilter
+
     d = float(decays[0])
     v = lfilter([0.0, 1.0 - d], [1.0, -d], command)
     p = lfilter([0.0, d * float(rates[0])], [1.0, -d], v - command)

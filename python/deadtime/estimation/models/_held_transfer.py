@@ -1,6 +1,6 @@
 """Transfer function from held commands to samples of an integrator with lag and delay.
 
-The plant gain/(s (lag s + 1)) answers a unit step after t by S(t) = t - lag (1 - e^(-t/lag)). A
+The unit step response of the plant gain/(s (lag s + 1)) is S(t) = t - lag (1 - e^(-t/lag)). A
 command held for one sample time h is a step up and a step down, so with a delay of (d + f) h,
 0 <= f < 1, g = 1 - f and q = 1/z (modified z-transform, Jury 1964),
 

@@ -1,8 +1,8 @@
-"""The way of a plant's output under a command as it was held, and its derivatives.
+"""Output of a plant under held commands, for a gain of one and no delay, with its derivatives.
 
 A path is F(t; lag or time constant) for a gain of one and no delay. An integrator has a closed
-form (`held_response`); any other plant runs through the stepper, its derivatives are central
-difference quotients, good to about 1e-9 of the path.
+form (`held_response`); any other plant is simulated, and its derivatives are central difference
+quotients with an error of about 1e-9 of the path.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ __all__ = ["Path", "PathSlopes", "path_of"]
 
 Array = NDArray[np.float64]
 
-#: Difference quotients: part of a number, or of the time between two commands.
+#: Relative step of difference quotients: of a parameter, or of the time between two commands.
 STEP = 1e-5
 
 
 class PathSlopes(NamedTuple):
-    """dF/dt, and dF by each number of the plant."""
+    """dF/dt, and the derivatives of F by the parameters of the plant."""
 
     rate: Array
     by: dict[str, Array]
@@ -36,7 +36,7 @@ class Path(Protocol):
     """Output of a plant of unit gain under one record of commands."""
 
     def value(self, times: Array, values: Mapping[str, float]) -> Array:
-        """F at `times`, of any shape, for the plant's numbers."""
+        """F at `times`, of any shape, for these parameters of the plant."""
 
     def slopes(self, times: Array, values: Mapping[str, float], names: Sequence[str]) -> PathSlopes:
         """Derivatives of F at `times`, by those of `names` that the plant has."""

@@ -1,6 +1,6 @@
-"""Many flights of one experiment, an estimate from each: what a method makes of the noise.
+"""Monte Carlo simulation of an experiment: many noisy runs, and an estimate from each.
 
-Each flight has a seed of its own, so results do not depend on how flights are shared out.
+Each run has a seed of its own, so results do not depend on how runs are divided among processes.
 """
 
 from __future__ import annotations
@@ -10,55 +10,55 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from inspect import signature
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.processes import Progress, shared_out
+from deadtime._base.processes import shared_out
+from deadtime._base.progress import Progress
 from deadtime._base.validation import whole_number
-from deadtime.estimation._estimate import METHODS, estimate_delay
+from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.methods._method import Method
 from deadtime.experiments import Experiment
-from deadtime.loops import ControlLoop, Integrator
+from deadtime.loops import ControlLoop
 
-__all__ = ["SLOW", "MonteCarlo", "Plan", "flown_many_times"]
+__all__ = ["SLOW", "MonteCarlo", "Plan", "run_many_times"]
 
 Array = NDArray[np.float64]
 
-#: Numbers that act like a delay.
+#: Parameters whose effect is similar to that of a delay.
 SLOW = ("lag", "time_constant")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MonteCarlo(ReadOnlyArrays):
-    """What a method found in many flights of one experiment.
+    """Errors of a method over many simulated runs of one experiment.
 
     Attributes
     ----------
     method : str
         Name of the method.
     runs : int
-        Number of flights.
+        Number of runs.
     truth : dict of str to float
         The true value of each quantity.
     estimates : dict of str to ndarray, shape (m,)
-        The estimates from the flights that were not refused, in the order of their seeds.
+        The estimates from the runs that were not refused, in the order of their seeds.
     rmse, bias : dict of str to float
         Root mean square and mean of the error of each quantity.
     mean_bound : dict of str to float
-        Mean over the flights of the Cramér-Rao bounds that were reported with the estimates;
+        Mean over the runs of the Cramér-Rao bounds that were reported with the estimates;
         empty where the method reports none.
     level : float
         Level of the intervals.
     coverage : dict of str to float
         Share of the intervals that held the truth; empty where the method gives none.
     failures : dict of str to int
-        How many flights were refused, by reason; numbers in reasons are left out.
+        How many runs were refused, by reason; numbers in reasons are left out.
     """
 
     method: str
@@ -76,7 +76,7 @@ class MonteCarlo(ReadOnlyArrays):
         """The figures as a few lines of text."""
         refused = sum(self.failures.values())
         lines = [
-            f"{self.method}: {self.runs} flights, {refused} refused",
+            f"{self.method}: {self.runs} runs, {refused} refused",
             f"  {'':<12}{'rmse':>11}{'bias':>11}{'mean bound':>12}{'coverage':>10}",
         ]
         for name in self.rmse:
@@ -90,12 +90,12 @@ class MonteCarlo(ReadOnlyArrays):
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} {error:.3g}" for name, error in self.rmse.items())
-        return f"<MonteCarlo of {self.method}: {self.runs} flights, rmse {errors}>"
+        return f"<MonteCarlo of {self.method}: {self.runs} runs, rmse {errors}>"
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is flown, and how each flight is estimated from."""
+    """What is simulated, and how each run is estimated from."""
 
     loop: ControlLoop
     experiment: Experiment
@@ -103,14 +103,13 @@ class Plan:
     free: tuple[str, ...]
     initial_output: float | None
     known: ControlLoop
-    method: str
-    options: Mapping[str, Any]
-    circulates: bool
+    method: Method
+    noise_in_loop: bool
     level: float
 
 
 class _Outcome(NamedTuple):
-    """One flight: estimates, bounds and whether intervals held the truth, or why it was refused."""
+    """Result of one run: estimates, bounds, whether intervals held the truth; or the refusal."""
 
     values: dict[str, float]
     bounds: dict[str, float]
@@ -118,33 +117,30 @@ class _Outcome(NamedTuple):
     refusal: str = ""
 
 
-def flown_many_times(
+def run_many_times(
     plan: Plan,
     runs: int,
     seed: int,
     processes: int | None,
     progress: Progress,
 ) -> MonteCarlo:
-    """Fly and estimate `runs` times and sum up."""
+    """Simulate and estimate `runs` times, and collect the statistics."""
     count = whole_number("runs", runs)
     if not 0.0 < plan.level < 1.0:
         raise ValueError(f"level={plan.level!r} is not between 0 and 1: 0.95 is usual")
-    outcomes = shared_out(partial(_flown, plan, seed), count, processes, progress)
+    outcomes = shared_out(partial(_outcomes, plan, seed), count, processes, progress)
     return _summed_up(plan, outcomes)
 
 
-def _flown(plan: Plan, seed: int, flights: range) -> list[_Outcome]:
+def _outcomes(plan: Plan, seed: int, runs: range) -> list[_Outcome]:
     # The children of one seed, as its `spawn` makes them.
-    return [_outcome(plan, np.random.SeedSequence(seed, spawn_key=(i,))) for i in flights]
+    return [_outcome(plan, np.random.SeedSequence(seed, spawn_key=(i,))) for i in runs]
 
 
 def _outcome(plan: Plan, seed: np.random.SeedSequence) -> _Outcome:
-    flight = plan.experiment.fly(plan.loop, plan.noise, seed, plan.circulates)
-    options = dict(plan.options)
-    if plan.initial_output is not None and _takes_the_start(plan):
-        options.setdefault("initial_output", plan.initial_output)
+    recording = plan.experiment.run(plan.loop, plan.noise, seed, plan.noise_in_loop)
     try:
-        fit = estimate_delay(flight, plan.known, method=plan.method, free=plan.free, **options)
+        fit = estimate_delay(recording, plan.known, method=plan.method, free=plan.free)
         truth = _with_sum(plan.loop.parameters)
         fitted = _with_sum(fit.loop.parameters)
         values = {name: fitted[name] for name in fit.stderr}
@@ -160,8 +156,10 @@ def _outcome(plan: Plan, seed: np.random.SeedSequence) -> _Outcome:
 def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
     """Whether the interval holds the truth.
 
-    One value of the profile tells: its ends, which need some ten of them each, are not sought.
+    One value of the profile decides it; the ends of the interval would take about ten each.
     """
+    from scipy import special
+
     profile = fit._profile
     if profile is not None and profile.preferred:
         quantile = float(special.stdtrit(profile.freedom, 0.5 + level / 2.0)) ** 2
@@ -170,48 +168,43 @@ def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
     return low <= truth <= high
 
 
-def _takes_the_start(plan: Plan) -> bool:
-    """Whether the method can be told the output at the start."""
-    method = plan.method
-    if method == "auto" and plan.loop.is_sampled and isinstance(plan.loop.plant, Integrator):
-        method = "output_error"
-    return method in METHODS and "initial_output" in signature(METHODS[method]).parameters
-
-
 def _with_sum(values: Mapping[str, float]) -> dict[str, float]:
-    """The numbers of a loop, and the sum of its delay and what delays beside it."""
+    """The parameters of a loop, and the sum of its delay and its lag or time constant."""
     sums = {f"delay+{name}": values["delay"] + values[name] for name in SLOW if name in values}
     return dict(values) | {"delay+lag": values["delay"]} | sums
 
 
 def _summed_up(plan: Plan, outcomes: list[_Outcome]) -> MonteCarlo:
-    told = [outcome for outcome in outcomes if not outcome.refusal]
+    answered = [outcome for outcome in outcomes if not outcome.refusal]
     reasons = Counter(_without_numbers(outcome.refusal) for outcome in outcomes if outcome.refusal)
-    if not told:
+    if not answered:
         raise NotIdentifiableError(
-            f"all {len(outcomes)} flights were refused, most of them because "
+            f"all {len(outcomes)} runs were refused, most of them because "
             f"{reasons.most_common(1)[0][0]}"
         )
     everything = _with_sum(plan.loop.parameters)
-    truth = {name: everything[name] for name in told[0].values}
-    estimates = {name: np.array([one.values[name] for one in told]) for name in truth}
+    truth = {name: everything[name] for name in answered[0].values}
+    estimates = {name: np.array([one.values[name] for one in answered]) for name in truth}
     errors = {name: estimates[name] - truth[name] for name in truth}
     return MonteCarlo(
-        method=plan.method,
+        method=plan.method.name,
         runs=len(outcomes),
         truth=truth,
         estimates=estimates,
         rmse={name: float(np.sqrt(np.mean(error**2))) for name, error in errors.items()},
         bias={name: float(np.mean(error)) for name, error in errors.items()},
         mean_bound={
-            name: float(np.mean([one.bounds[name] for one in told])) for name in told[0].bounds
+            name: float(np.mean([one.bounds[name] for one in answered]))
+            for name in answered[0].bounds
         },
         level=plan.level,
-        coverage={name: float(np.mean([one.held[name] for one in told])) for name in told[0].held},
+        coverage={
+            name: float(np.mean([one.held[name] for one in answered])) for name in answered[0].held
+        },
         failures=dict(reasons.most_common()),
     )
 
 
 def _without_numbers(reason: str) -> str:
-    """Reasons that differ in their numbers only are one."""
+    """The reason with its numbers left out, so that equal reasons are counted together."""
     return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", reason)

@@ -1,17 +1,17 @@
-"""The Cramér-Rao bound of a flight that has not been flown.
+"""The Cramér-Rao bound of a planned experiment.
 
 For output y_i = f(t_i; p) + white noise of standard deviation sigma, no unbiased estimator of p
 has a smaller covariance than sigma^2 (J^T J)^-1, J = df/dp. Two bounds, for two kinds of log:
 
-* command logged: f is the answer of the plant to that command, which is known, whatever noise went
-  round the loop to make it. With P its transfer function, w the command and T the delay,
+* command logged: f is the response of the plant to that command, which is known, with the noise
+  that the controller acted on. With P its transfer function, w the command and T the delay,
   df/dT = -s P e^(-sT) w, df/dlag = -s/(lag s + 1) P e^(-sT) w, df/dgain = f/gain: plants with
   delay themselves, simulated exactly.
-* reference only: f is the output of the whole loop, and noise does not circulate; J is the
-  sensitivity of its simulation.
+* reference only: f is the output of the whole loop, whose controller does not act on the noise; J
+  is the sensitivity of its simulation.
 
-The path is the one without noise. Noise that circulates moves the command too, which informs; the
-information of the first kind is then the mean of J^T J over flights.
+Both are taken along the run without noise. Noise that the controller acts on moves the command too,
+which adds information; the information of the first kind is then the mean of J^T J over runs.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._evidence import check_distinguishable, standard_errors
 from deadtime.experiments import Experiment
-from deadtime.loops import ControlLoop, simulate
+from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 from deadtime.roots import delay, s
 from deadtime.systems import TransferFunction
@@ -35,17 +35,17 @@ __all__ = ["PlannedBound", "bound_of", "from_the_command", "from_the_reference"]
 
 Array = NDArray[np.float64]
 
-#: Where a delay is a whole number of samples, slopes are those towards a longer one: so much, as
-#: a share of a sample, is on the safe side of rounding.
+#: Where a delay is a whole number of samples, the derivative is one-sided, towards a longer delay:
+#: the delay is increased by this share of a sample, which is more than rounding.
 LONGER = 1e-9
 
-#: The initial output is moved by this share of the noise to see what it does.
+#: Change of the initial output, as a share of the noise, in the difference quotient by it.
 START_CHANGE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedBound(CramerRaoBound):
-    """The bound of an experiment, with what it comes from.
+    """The Cramér-Rao bound of an experiment, with its covariance and sensitivities.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class PlannedBound(CramerRaoBound):
         Returns
         -------
         float
-            Near -1 or 1 the experiment does not part them.
+            Near -1 or 1 the experiment hardly tells them apart.
 
         Raises
         ------
@@ -90,55 +90,55 @@ class PlannedBound(CramerRaoBound):
 
 
 def bound_of(
-    flights: Sequence[dict[str, Array]], names: tuple[str, ...], noise: float
+    runs: Sequence[dict[str, Array]], names: tuple[str, ...], noise: float
 ) -> PlannedBound:
-    """The bound from the mean information of flights; slopes of the first are kept."""
-    labels = tuple(flights[0])
-    jacobian = np.concatenate([np.stack(list(flight.values()), axis=1) for flight in flights])
+    """The bound from the mean information of runs; the sensitivities of the first are kept."""
+    labels = tuple(runs[0])
+    jacobian = np.concatenate([np.stack(list(run.values()), axis=1) for run in runs])
     check_distinguishable(jacobian, list(labels))
     scale = np.linalg.norm(jacobian, axis=0)
     # P P^T is the inverse of J^T J for the pseudoinverse P of J.
     inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
-    cov = noise**2 * len(flights) * inverse @ inverse.T
-    return PlannedBound(labels, noise, standard_errors(names, cov), cov, flights[0])
+    cov = noise**2 * len(runs) * inverse @ inverse.T
+    return PlannedBound(labels, noise, standard_errors(names, cov), cov, runs[0])
 
 
 def from_the_command(
-    loop: ControlLoop, flight: Recording, names: Sequence[str], offset: bool
+    loop: ControlLoop, recording: Recording, names: Sequence[str], offset: bool
 ) -> dict[str, Array]:
-    """Slopes of the plant's answer to the command of a flight, held from sample to sample."""
+    """Sensitivities of the plant's response to the recorded command, held between samples."""
     num, den = loop.plant.polynomials()
     if len(num) == len(den):
         raise NotIdentifiableError(
             f"{loop.plant!r} passes its command straight to its output, which jumps with it: there "
-            "is no slope by the delay; give the plant a lag"
+            "is no derivative by the delay; give the plant a lag"
         )
-    values, command, time = loop.parameters, flight.command, flight.time
+    values, command, time = loop.parameters, recording.command, recording.time
     assert command is not None
-    late = delay(values["delay"] + LONGER * flight.sample_time)
+    late = delay(values["delay"] + LONGER * recording.sample_time)
     plant = TransferFunction(num, den)
 
-    def answer(system: TransferFunction) -> Array:
-        return np.asarray(simulate(system * late, time, command, input_time=time).outputs)
+    def response(system: TransferFunction) -> Array:
+        return np.asarray((system * late).simulate(time, command, input_time=time).outputs)
 
     slopes: dict[str, Array] = {}
     for name in names:
         if name == "delay":
-            slopes[name] = -answer(plant * s)
+            slopes[name] = -response(plant * s)
         elif name == "gain":
-            slopes[name] = answer(plant) / values["gain"]
+            slopes[name] = response(plant) / values["gain"]
         else:  # a lag or time constant
-            slopes[name] = -answer(plant * s / (values[name] * s + 1.0))
+            slopes[name] = -response(plant * s / (values[name] * s + 1.0))
     if offset:
-        slopes["initial output"] = np.ones(len(flight))
+        slopes["initial output"] = np.ones(len(recording))
     return slopes
 
 
 def from_the_reference(
     loop: ControlLoop, experiment: Experiment, names: Sequence[str], offset: bool, noise: float
 ) -> dict[str, Array]:
-    """Slopes of the output of the whole loop."""
-    time, reference = experiment.time, experiment.flown_reference()
+    """Sensitivities of the output of the whole loop."""
+    time, reference = experiment.time, experiment.reference_in_run()
     response = loop.simulate(time, reference, reference_time=time, sensitivities=tuple(names))
     slopes = {name: response.sensitivities[name] for name in names}
     if offset:

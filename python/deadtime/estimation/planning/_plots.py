@@ -1,16 +1,18 @@
-"""Drawing of planned experiments; matplotlib is imported when something is drawn."""
+"""Plots of planned experiments. Matplotlib is imported when something is drawn."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from deadtime._base.drawing import COLOURS, REFERENCE, empty_figure
+from deadtime._base.drawing import COLOURS, REFERENCE, bare_axes
+from deadtime.estimation._plots import shown_figure
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from deadtime.estimation.planning._identifiability import Identifiability
     from deadtime.estimation.planning._planned_bound import PlannedBound
@@ -21,42 +23,46 @@ __all__ = ["plot_identifiability"]
 TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
 
 
-def plot_identifiability(plan: Identifiability) -> Figure:
-    """The expected flight over its sensitivities, and delay against lag where both are free."""
+def plot_identifiability(plan: Identifiability, axes: Sequence[Axes] | None = None) -> list[Axes]:
+    """The expected recording, its sensitivities; delay against lag where both are free."""
     both = plan.correlation is not None
-    figure = empty_figure(10.0 if both else 7.0, 5.0)
-    layout: Any = (
-        [["flight", "ellipse"], ["slopes", "ellipse"]] if both else [["flight"], ["slopes"]]
-    )
-    axes = figure.subplot_mosaic(layout, width_ratios=[3.0, 2.0] if both else [1.0])
-    for one in axes.values():
-        one.spines[["top", "right"]].set_visible(False)
-        one.grid(alpha=0.25)
-    axes["slopes"].sharex(axes["flight"])
-    _draw_flight(axes["flight"], plan)
-    _draw_slopes(axes["slopes"], plan)
+    axes = _new_axes(both) if axes is None else list(axes)
+    if len(axes) != 2 + both:
+        raise ValueError(f"ax holds {len(axes)} axes: give {2 + both}")
+    for one in axes:
+        bare_axes(one)
+    _draw_recording(axes[0], plan)
+    _draw_slopes(axes[1], plan)
     if both:
-        _draw_ellipse(axes["ellipse"], plan)
-    return figure
+        _draw_ellipse(axes[2], plan)
+    return axes
 
 
-def _draw_flight(ax: Axes, plan: Identifiability) -> None:
-    flight = plan.flight
-    assert flight.command is not None
-    ax.step(flight.time, flight.reference, where="post", label="reference", **REFERENCE)
-    ax.plot(flight.time, flight.output, color="0.15", lw=1.4, label="output")
+def _new_axes(both: bool) -> list[Axes]:
+    figure = shown_figure(10.0 if both else 7.0, 5.0)
+    grid = figure.add_gridspec(2, 1 + both, width_ratios=[3.0, 2.0][: 1 + both])
+    upper = figure.add_subplot(grid[0, 0])
+    axes = [upper, figure.add_subplot(grid[1, 0], sharex=upper)]
+    return [*axes, figure.add_subplot(grid[:, 1])] if both else axes
+
+
+def _draw_recording(ax: Axes, plan: Identifiability) -> None:
+    recording = plan.recording
+    assert recording.command is not None
+    ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
+    ax.plot(recording.time, recording.output, color="0.15", lw=1.4, label="output")
     held: Literal["post", "mid"] = "post" if plan.loop.is_sampled else "mid"
-    ax.step(flight.time, flight.command, where=held, color="0.6", lw=0.8, label="command")
+    ax.step(recording.time, recording.command, where=held, color="0.6", lw=0.8, label="command")
     _legend_above(ax, f"{plan.experiment.name}, noise {plan.noise:g}:")
     ax.tick_params(labelbottom=False)
 
 
 def _draw_slopes(ax: Axes, plan: Identifiability) -> None:
-    """What an error as large as the bound does to the output: alike means hard to part."""
+    """Effect of an error as large as the bound; similar curves are hard to tell apart."""
     bound = plan.bound
     for name, colour in zip(plan.free, COLOURS, strict=False):
         moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise
-        ax.plot(plan.flight.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
+        ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
     ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the noise")
     _legend_above(ax, "for one standard error of")
 
@@ -78,7 +84,7 @@ def _with_error(bound: PlannedBound, name: str) -> str:
 
 
 def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
-    """Where 95 % of the estimates of an efficient method lie; zero is an end for both."""
+    """Region of 95 % of the estimates of an efficient method; neither can be below zero."""
     slow = next(name for name in plan.free if name not in ("delay", "gain"))
     centre = np.array([plan.loop.parameters["delay"], plan.loop.parameters[slow]])
     angle = np.linspace(0.0, 2.0 * np.pi, 361)

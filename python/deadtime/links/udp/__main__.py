@@ -1,8 +1,8 @@
 """``python -m deadtime.links.udp controller|relay|plant``: each part as a process of its own.
 
-Each says where it listens in one line of JSON when it is ready, and what happened in another when
-it ends: after its time, by Ctrl-C or SIGTERM, or with whoever started it. Nothing but the base of
-the package is needed, so that either end can run on a small computer.
+Each prints its address as a line of JSON when it is ready, and its report as another one when it
+ends: after its time, by Ctrl-C or SIGTERM, or with its parent process. No extras are needed, so
+that either end can run on a small computer.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 
 from deadtime._base.errors import DeadtimeError
 from deadtime.links.addresses import Address
-from deadtime.links.lifeline import input_ends
+from deadtime.links.parent_watch import parent_ended
 from deadtime.links.udp.controller import Controller, ControllerOptions
 from deadtime.links.udp.described import (
     DELAYS,
@@ -42,20 +42,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one part of the loop; the exit code is 0 on success only."""
     given = _parser().parse_args(arguments)
     try:
-        asyncio.run(_until_told(given.run(given), given.until_input_ends))
+        asyncio.run(_until_stopped(given.run(given), given.until_input_ends))
     except (DeadtimeError, OSError, ValueError) as error:
         print(f"deadtime.links.udp: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
     return 0
 
 
-async def _until_told(work: Coroutine[Any, Any, None], until_input_ends: bool) -> None:
-    """Run, and end in an orderly way when told to."""
+async def _until_stopped(work: Coroutine[Any, Any, None], until_input_ends: bool) -> None:
+    """Run, and end in an orderly way on a signal or at the end of standard input."""
     task = asyncio.ensure_future(work)
     loop = asyncio.get_running_loop()
     if until_input_ends:
-        lifeline = asyncio.ensure_future(input_ends().wait())
-        lifeline.add_done_callback(lambda _: task.cancel())
+        parent_watch = asyncio.ensure_future(parent_ended().wait())
+        parent_watch.add_done_callback(lambda _: task.cancel())
     for number in (signal.SIGINT, signal.SIGTERM):
         with suppress(NotImplementedError, RuntimeError):  # Windows has no such handlers
             loop.add_signal_handler(number, task.cancel)
@@ -92,7 +92,7 @@ async def _run_controller(given: argparse.Namespace) -> None:
 
 
 async def _run_relay(given: argparse.Namespace) -> None:
-    words = {name: getattr(given, name) for name in WAYS}
+    words = {name: getattr(given, name) for name in PATHS}
     both = network_of(
         given.delays,
         given.delay,
@@ -109,7 +109,7 @@ async def _run_relay(given: argparse.Namespace) -> None:
         try:
             await asyncio.sleep(given.duration)
         finally:
-            paths = {name: getattr(relay, name) for name in WAYS}
+            paths = {name: getattr(relay, name) for name in PATHS}
             counts = {name: path.counts() for name, path in paths.items()}
             _say(report={**counts, "overflowed": relay.overflowed})
 
@@ -140,8 +140,8 @@ async def _run_plant(given: argparse.Namespace) -> None:
             _say(report=plant.report().to_dict())
 
 
-#: From the plant to the controller, and back.
-WAYS = ("there", "back")
+#: From the plant to the controller, and from the controller to the plant.
+PATHS = ("forward_path", "return_path")
 
 LOOPBACK = ("127.0.0.1", 0)
 
@@ -156,7 +156,7 @@ def _address(text: str) -> Address:
 def _time(text: str) -> float:
     time = float(text)
     if not time > 0.0:
-        raise argparse.ArgumentTypeError(f"{text} s is no time to run for: give more than zero")
+        raise argparse.ArgumentTypeError(f"{text} s: give a time above zero")
     return time
 
 
@@ -173,7 +173,7 @@ def _parser() -> argparse.ArgumentParser:
         "--every", action="store_true", help="answer every measurement, for a jitter buffer"
     )
 
-    relay = parts.add_parser("relay", help="stands for the network between")
+    relay = parts.add_parser("relay", help="emulates the network between them")
     relay.set_defaults(run=_run_relay)
     relay.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
     relay.add_argument("--to", type=_address, required=True, help="the controller")
@@ -184,13 +184,15 @@ def _parser() -> argparse.ArgumentParser:
     relay.add_argument("--burst", type=float, default=1.0, help="mean length of a burst of losses")
     relay.add_argument("--duplication", type=float, default=0.0, help="part that comes twice")
     relay.add_argument("--ordered", action="store_true", help="no packet overtakes another")
-    for way, which in zip(WAYS, ("to the controller", "to the plant"), strict=True):
+    for path, which in zip(PATHS, ("to the controller", "to the plant"), strict=True):
         relay.add_argument(
-            f"--{way}", metavar="JSON", help=f"the network {which}, in place of the options above"
+            f"--{path.replace('_', '-')}",
+            metavar="JSON",
+            help=f"the network {which}, in place of the options above",
         )
     relay.add_argument("--seed", type=int, default=0, help="of delays and losses")
 
-    plant = parts.add_parser("plant", help="an integrator that samples and obeys")
+    plant = parts.add_parser("plant", help="an integrator with sampled output")
     plant.set_defaults(run=_run_plant)
     plant.add_argument(
         "--controller", type=_address, required=True, help="the controller, or a relay"
@@ -211,7 +213,7 @@ def _parser() -> argparse.ArgumentParser:
         part.add_argument(
             "--until-input-ends",
             action="store_true",
-            help="end when standard input does, as whoever started this does",
+            help="end at the end of standard input, that is with the parent process",
         )
     for part in (controller, plant):
         part.add_argument("--limit", type=float, default=20.0, help="largest size of the command")
@@ -223,8 +225,8 @@ def _parser() -> argparse.ArgumentParser:
             type=int,
             nargs=2,
             metavar=("IN", "OUT"),
-            help="speak in bare doubles as Simulink does, so many in a datagram from the other end "
-            "and to it",
+            help="use plain doubles as Simulink does: their number in a datagram from and to the "
+            "other end",
         )
     return parser
 

@@ -1,15 +1,15 @@
-//! When a run is given up, and when two of its times are one.
+//! Limits of a run: divergence, and the least difference of two times.
 
 use super::scalar::Scalar;
 use crate::Error;
 
-/// Largest magnitude of a state before a run is given up as diverging.
+/// Magnitude of a state above which a run counts as diverging.
 pub(crate) const DIVERGED: f64 = 1e150;
 
-/// What memory is asked for.
+/// What memory is requested for, in errors.
 pub(crate) const RESPONSE: &str = "the response";
 
-/// The error of a response that has grown out of bounds.
+/// Return an error if a state or the command exceeds [`DIVERGED`].
 pub(crate) fn check_growth<S: Scalar>(x: &[S], u: S, t: S) -> Result<(), Error> {
     let sound = |v: &S| v.value().abs() <= DIVERGED;
     if x.iter().all(sound) && sound(&u) {
@@ -22,7 +22,7 @@ pub(crate) fn check_growth<S: Scalar>(x: &[S], u: S, t: S) -> Result<(), Error> 
     }
 }
 
-/// Two times closer than this are one: rounding of sums of delays and samples.
+/// Two times closer than this are equal: rounding errors of sums of delays and samples.
 pub(crate) fn slack<S: Scalar>(t: S, delay: S) -> f64 {
     16.0 * f64::EPSILON * (t.value().abs() + delay.value())
 }

@@ -1,8 +1,9 @@
 //! Exponential, sine and cosine, logarithm and angle with proved error bounds.
 //!
-//! Proofs by winding numbers lean on these functions, so what they lose is derived, not trusted.
-//! Each file carries its derivation. u = 2⁻⁵³ is half an ulp of 1; every sum and product of the
-//! derivations is one IEEE operation, rounded to nearest, relative error at most u.
+//! Proofs by winding numbers depend on the errors of these functions, which are therefore derived.
+//! Each file contains its derivation; "loses" states a rounding error there. u = 2⁻⁵³ is half an
+//! ulp of 1; every sum and product of the derivations is one IEEE operation, rounded to nearest,
+//! relative error at most u.
 //!
 //! | function | bound |
 //! |---|---|
@@ -13,7 +14,7 @@
 //! | [`precise::exp`], [`precise::sin_cos`] of a [`DoubleDouble`] | 8 u² |
 //!
 //! No library function and no fused operation is used: the bits are the same on every machine.
-//! `simd` has the same bits of several elements at once.
+//! `simd` computes several elements at once with the same bits.
 
 mod angle;
 mod circular;

@@ -55,7 +55,7 @@ fn errors_stay_within_the_proved_bounds() {
         count += 1;
     }
     assert!(count > 1400, "{count} rows");
-    // A bound far from what is reached would be a slip in its derivation.
+    // A bound far above the errors found would indicate a mistake in its derivation.
     assert!(worst.iter().all(|share| *share > 0.2), "{worst:?}");
 }
 
@@ -94,7 +94,7 @@ proptest! {
 
     #[test]
     fn both_reductions_agree_where_they_meet(y in 1_048_000.0..1_049_000.0f64) {
-        // The double angle is reduced the other way.
+        // The double angle is reduced in another way.
         let (s, c) = sin_cos(y);
         let (far_s, far_c) = sin_cos(y * 2.0);
         prop_assert!((far_s - 2.0 * s * c).abs() <= 8.0 * U);
@@ -120,7 +120,7 @@ proptest! {
 }
 
 #[test]
-fn two_words_stay_within_the_proved_bounds() {
+fn double_doubles_stay_within_the_proved_bounds() {
     let bound = 8.0 * U * U;
     let mut worst = 0.0f64;
     let mut count = 0;
@@ -147,10 +147,10 @@ fn two_words_stay_within_the_proved_bounds() {
 
 proptest! {
     #[test]
-    fn two_word_arguments_obey_the_addition_theorems(
+    fn double_double_arguments_obey_the_addition_theorems(
         x in -300.0f64..300.0, y in -1e6f64..1e6, small in -1.0f64..1.0,
     ) {
-        // e^(x + t) = e^x e^t, the small part being the second word of the sum.
+        // e^(x + t) = e^x e^t, where the small part is the low word of the sum.
         let tiny = small * 1e-17 * x.abs().max(1e-3);
         let both = DoubleDouble::difference(x, -tiny);
         let product = precise::exp(x.into()) * precise::exp(tiny.into());
@@ -164,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn arithmetic_of_two_words_stays_within_its_bounds(
+    fn double_double_arithmetic_stays_within_its_bounds(
         a in -1e3f64..1e3, b in -1e3f64..1e3, c in 1e-3f64..1e3,
     ) {
         // (a + b)² c = a² c + 2 a b c + b² c: every operation has its part.

@@ -1,7 +1,7 @@
-//! Which way an element goes, so that its neighbours in a vector can be those that go the same.
+//! Elements sorted by the branch of code that they need.
 //!
-//! A vector takes every way that one of its lanes asks for. Sorting a block by the way saves
-//! that; no bit of a result depends on it.
+//! A vector executes every branch that one of its lanes needs. Sorting a block by branch avoids
+//! this; no bit of a result depends on it.
 
 use num_complex::Complex64;
 
@@ -9,12 +9,13 @@ use super::branch_point::INVERSE_E;
 use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS};
 use super::kernel::{SERIES_ANSWERS, SMALL};
 
-/// One element in so many is looked at before a block is sorted.
+/// One element in this many is examined before a block is sorted.
 const SAMPLED: usize = 8;
-/// Bits of a count among four in one word.
+/// Bits of one count; four counts share one word.
 const FIELD: u32 = 16;
 
-/// 0: no step follows; 1: rational starting value; 2: by the logarithm; 3: by two steps of it.
+/// 0: no step follows; 1: rational starting value; 2: starting value from the logarithm; 3: from
+/// two steps on it.
 #[inline(always)]
 fn route(z: Complex64, k: i64) -> u8 {
     let (along, across, shifted) = (z.re.abs(), z.im.abs(), (z.re + INVERSE_E).abs());
@@ -32,7 +33,7 @@ fn route(z: Complex64, k: i64) -> u8 {
     if direct { 0 } else { stepped }
 }
 
-/// The order in which the elements of a block are taken.
+/// The order in which the elements of a block are processed.
 pub(super) struct Order<const W: usize> {
     routes: [u8; W],
     indices: [u16; W],
@@ -46,10 +47,11 @@ impl<const W: usize> Order<W> {
         }
     }
 
-    /// Sort a block by routes. False if most elements go the same way: there is no order then.
+    /// Sort a block by branch. Returns false if most elements need the same branch; there is no
+    /// order then.
     pub(super) fn sort(&mut self, z: &[Complex64], k: &[i64]) -> bool {
         let length = z.len().min(k.len()).min(W);
-        // A look at some of them: a few strays are cheaper taken along than sorted out.
+        // Examine some of them: a few elements of another branch cost less than sorting.
         let mut seen = [0; 4];
         for (z, k) in z.iter().zip(k).step_by(SAMPLED) {
             if let Some(count) = seen.get_mut(usize::from(route(*z, *k))) {
@@ -68,7 +70,7 @@ impl<const W: usize> Order<W> {
         for way in routes {
             counts += 1 << (u32::from(*way) * FIELD);
         }
-        // Where each route begins: the sum of the counts before it.
+        // Start of each branch: the sum of the counts before it.
         let mut next = (counts << FIELD) + (counts << (2 * FIELD)) + (counts << (3 * FIELD));
         for (i, way) in (0..).zip(routes) {
             let shift = u32::from(*way) * FIELD;
@@ -81,7 +83,7 @@ impl<const W: usize> Order<W> {
         true
     }
 
-    /// The element taken as number `i`.
+    /// Index of the element processed as number `i`.
     #[inline]
     pub(super) fn index(&self, i: usize) -> Option<usize> {
         self.indices.get(i).map(|&index| usize::from(index))

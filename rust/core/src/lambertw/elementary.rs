@@ -1,10 +1,10 @@
-//! Exponential, sine and cosine to 2^-61, as sums of two words; rough logarithms.
+//! Exponential, sine and cosine to 2^-61 as double-doubles; logarithms of low accuracy.
 //!
-//! Reduction by multiples of ln 2 and pi/2 in pieces short enough that each product is exact
-//! (Cody & Waite 1980), then the Taylor series: its first terms in two words, the tail, at most
-//! 2^-10 of the sum, in one. What is lost is the rounding of that tail.
-//! Valid for |a| < 5000 (exponential) and |b| < 2^23 (sine and cosine). Errors are meant beside 1:
-//! a sine next to a multiple of pi (other than 0) is good to 2^-61, not to 2^-61 of itself.
+//! Reduction by multiples of ln 2 and pi/2 in pieces short enough that each product is exact (Cody
+//! & Waite 1980), then the Taylor series: its first terms in double-double arithmetic, the tail, at
+//! most 2^-10 of the sum, in double precision. The error is the rounding error of that tail. Valid
+//! for |a| < 5000 (exponential) and |b| < 2^23 (sine and cosine). Errors are absolute: a sine next
+//! to a multiple of pi (other than 0) has the error 2^-61, not the relative error 2^-61.
 
 use crate::simd::{Complex, Real, Simd};
 
@@ -84,8 +84,8 @@ fn polynomial<S: Simd, const PAIRS: usize>(
 pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (DoubleDouble<S>, Real<S>) {
     let n = (a * LOG2_E).nearest();
     let [first, second] = LN_2;
-    // The first difference is exact. If the second piece is the larger one, both are so small
-    // that the rounding of this sum is out of sight.
+    // The first difference is exact. If the second piece is the larger one, both are so small that
+    // the rounding error of this sum is negligible.
     let piece = product(n, n.constant(second));
     let near = ordered_sum(n.negated_mul_add(first, a), -piece.hi);
     let r = DoubleDouble::new(near.hi, (near.lo - piece.lo) + low);
@@ -99,27 +99,28 @@ pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (DoubleDouble<S>, Real<S
     let fifth = fourth * r.hi * polynomial(&EXP_TAIL, r.hi);
     let tail = fourth.mul_add(TWENTY_FOURTH.0, fifth);
 
-    // 1 + (r + (r^2/2 + r^3/6)); the rest comes last to the second words, being the largest there.
+    // 1 + (r + (r^2/2 + r^3/6)); the rest, which is the largest there, is added last to the low
+    // words.
     let curved = ordered_sum(square.hi * 0.5, third.hi);
     let change = ordered_sum(r.hi, curved.hi);
     let whole = ordered_sum(change.hi.constant(1.0), change.hi);
     let low = square.lo.mul_add(0.5, curved.lo + third_low) + (change.lo + r.lo) + whole.lo;
-    // r^4/24 was taken from the first word alone; the second moves it by r^3/6 of itself.
+    // r^4/24 was computed from the high word alone; the low word changes it by r^3/6 times itself.
     let low = r.lo.mul_add(third.hi, low);
     (ordered_sum(whole.hi, tail + low), n)
 }
 
-/// Cosine and sine of an angle less whole quarter turns.
+/// Cosine and sine of an angle reduced by whole quarter turns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reduced<S: Simd> {
     pub(super) cosine: DoubleDouble<S>,
     pub(super) sine: DoubleDouble<S>,
-    /// The quarter turns taken off, modulo 4: -2 or 2, -1, 0 or 1.
+    /// The quarter turns removed, modulo 4: -2 or 2, -1, 0 or 1.
     pub(super) quarters: Real<S>,
 }
 
-/// Cosine and sine of `b + low` less quarter turns, so that what is left is at most pi/4; `low` is
-/// at most an ulp of `b`.
+/// Cosine and sine of `b + low` reduced by quarter turns to at most pi/4; `low` is at most an ulp
+/// of `b`.
 #[inline(always)]
 pub(super) fn cos_sin<S: Simd>(b: Real<S>, low: Real<S>) -> Reduced<S> {
     let n = (b * TWO_OVER_PI).nearest();
@@ -204,7 +205,7 @@ mod tests {
         lanes[0]
     }
 
-    /// What is left of a two-word sum that ought to be 1.
+    /// The difference between a double-double that should be 1 and 1.
     fn beside_one(value: DoubleDouble<Scalar128b>) -> f64 {
         ((first(value.hi) - 1.0) + first(value.lo)).abs()
     }

@@ -1,13 +1,13 @@
 //! The Lambert W function: all solutions of w e^w = z, and the delay system behind it.
 //!
-//! Branch k is fixed by w + log w = log z + 2 pi i k with principal logarithms. Every finite z
-//! and every integer k is served with a fixed amount of work: a starting value good to a few
-//! 1e-4 and one step of fourth order whose residual is formed in two words. The error |w - W|/|W| stays
-//! near that of a correctly rounded result (0.5 ulp in each component), also next to -1/e.
-//! Signed zeros count as in C99: Im z = +0 is the upper side of the cut, -0 the lower, so that
-//! W_k(conj z) = conj W_-k(z) without exception, and a real answer has an imaginary part of zero
-//! with the sign of its limit. Bits do not depend on machine, threads or position.
-//! Not guaranteed: the relative accuracy of a component much smaller than the other.
+//! Branch k is fixed by w + log w = log z + 2 pi i k with principal logarithms. Every finite z and
+//! every integer k needs the same fixed amount of work: a starting value with an error of a few
+//! 1e-4 and one step of fourth order whose residual is formed in double-double arithmetic. The
+//! error |w - W|/|W| stays near that of a correctly rounded result (0.5 ulp in each component),
+//! also next to -1/e. Signed zeros count as in C99: Im z = +0 is the upper side of the cut, -0 the
+//! lower, so that W_k(conj z) = conj W_-k(z) without exception, and a real answer has an imaginary
+//! part of zero with the sign of its limit. Bits do not depend on machine, threads or position. Not
+//! guaranteed: the relative accuracy of a component much smaller than the other.
 //!
 //! # Edge cases
 //!

@@ -1,20 +1,20 @@
 //! Sums, products and derivatives of quasi-polynomials.
 //!
-//! Everything is exact but for the rounding of coefficients and of the sums of delays that a
-//! product forms. Such sums depend on the order of their summands by an ulp or two, so a product
-//! takes delays that agree to 4 ulp for the same one; where one factor has no delays, nothing is
-//! rounded and nothing merged.
+//! Everything is exact except for the rounding of coefficients and of the sums of delays in a
+//! product. Such sums depend on the order of their summands by an ulp or two, so that a product
+//! merges delays that agree to 4 ulp. Where one factor has no delays, no delay is rounded or
+//! merged.
 
 use super::quasi_polynomial::QuasiPolynomial;
 use crate::Error;
 
-/// A product with more coefficients than this is a slip of the pen.
+/// Upper limit on the coefficients of a product (bounds memory and time).
 const MAX_COEFFICIENTS: usize = 1_000_000;
 
-/// A derivative of higher order, of anything but a polynomial, is a slip of the pen as well.
+/// Upper limit on the order of a derivative of anything other than a polynomial (bounds the time).
 const MAX_ORDER: u32 = 10_000;
 
-/// Delays of a product closer than this (relative) are the same sum in another order.
+/// Relative difference of delays of a product below which they are merged.
 const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
 
 fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -25,6 +25,20 @@ fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
         }
     }
     product
+}
+
+/// Sort rows by their delays, and give delays that agree to 4 ulp the same value: they are one sum
+/// in different orders.
+pub(crate) fn equate_close_delays(rows: &mut [(Vec<f64>, f64)]) {
+    rows.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut last = f64::NEG_INFINITY;
+    for (_, delay) in rows {
+        if *delay - last <= SAME_DELAY * *delay {
+            *delay = last;
+        } else {
+            last = *delay;
+        }
+    }
 }
 
 impl QuasiPolynomial {
@@ -126,15 +140,7 @@ impl QuasiPolynomial {
         }
         let rounded = |h: &Self| h.delays.iter().any(|delay| *delay > 0.0);
         if rounded(self) && rounded(other) {
-            rows.sort_by(|a, b| a.1.total_cmp(&b.1));
-            let mut last = f64::NEG_INFINITY;
-            for (_, delay) in &mut rows {
-                if *delay - last <= SAME_DELAY * *delay {
-                    *delay = last;
-                } else {
-                    last = *delay;
-                }
-            }
+            equate_close_delays(&mut rows);
         }
         Self::from_rows(rows)
     }
@@ -157,7 +163,8 @@ impl QuasiPolynomial {
     /// The `order`-th derivative by s: row p becomes p′ − τp, `order` times.
     ///
     /// # Errors
-    /// [`Error::Argument`] when a coefficient overflows, [`Error::TooMuch`] for an absurd order.
+    /// [`Error::Argument`] when a coefficient overflows, [`Error::TooMuch`] for an order above the
+    /// limit.
     pub fn derivative(&self, order: u32) -> Result<Self, Error> {
         let mut rows = self.rows();
         for taken in 0..order {

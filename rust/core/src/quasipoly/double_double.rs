@@ -1,13 +1,16 @@
-//! g(s) = h(s) e^(s τ_c) and its slope in two words, for places where double precision drowns.
+//! g(s) = h(s) e^(s τ_c) and its slope in double-double arithmetic, for points where rounding
+//! errors of double precision exceed the value.
 //!
-//! The terms are those of `probe`. With u = 2⁻⁵³ a two-word complex product loses 7 √2 + 3.1 < 13.1 u²
-//! of its size, a sum 3.1 u²: Horner's rule for degree n 17 n u² P_j, its derivative 34 n u² P_j′. The
-//! difference d of two delays is exact in two words; d x and d y lose 2 u² each, which changes the
-//! exponential by less than 3 u² |d| (|x| + |y|). e^(−x d) loses 8 u², sine and cosine together 12 u²,
-//! their products with it 7 u², the product with p_j 13.1 u², the factor d and the difference in g′ 23.2 u²,
-//! the sum of m terms 3.1 (m − 1) u². Hence
+//! The terms are those of `probe`. With u = 2⁻⁵³ a complex product has the relative error 7 √2 +
+//! 3.1 < 13.1 u², a sum 3.1 u²: Horner's rule for degree n 17 n u² P_j, its derivative 34 n u²
+//! P_j′. The difference d of two delays is exact; d x and d y have errors of 2 u² each, which
+//! changes the exponential by less than 3 u² |d| (|x| + |y|). The errors are 8 u² of e^(−x d), 12
+//! u² of sine and cosine together, 7 u² of their products with it, 13.1 u² of the product with p_j,
+//! 23.2 u² of the factor d and the difference in g′, and 3.1 (m − 1) u² of the sum of m terms.
+//! Hence
 //!     |error of g| ≤ u² Σ (17n + 4m + 64 + 3|d| (|x| + |y|)) P_j(|s|) e^(−x d_j),
-//! with 34n and P_j′ + |d| P_j for g′, and u |g| for rounding the result to doubles. Underflow: as there.
+//! with 34n and P_j′ + |d| P_j for g′, and u |g| for rounding the result to doubles. Underflow is
+//! covered as in `probe`.
 
 use num_complex::Complex64;
 
@@ -16,19 +19,20 @@ use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::DoubleDouble;
 use crate::elementary::precise::{self, LARGEST_EXPONENT};
 
-/// u², enlarged by what the bounds themselves lose in being computed.
+/// u², enlarged by the rounding errors of computing the bounds.
 pub(super) const ROUNDING: f64 = 1.02 * 0.25 * f64::EPSILON * f64::EPSILON;
 
-/// Rounding a two-word number to a double, likewise.
+/// Relative error of rounding a double-double to a double, enlarged in the same way.
 pub(super) const LAST_ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
-/// No phase is wrong by more than a half turn: 2.5 of the exponential, in units of u².
+/// Largest relative error of an exponential, in units of u²: its phase is wrong by at most half a
+/// turn.
 const OPPOSITE: f64 = 10.0 / (f64::EPSILON * f64::EPSILON);
 
-/// e^−600 is below this, and then taken for zero.
+/// Larger than e^−600, which counts as zero.
 const VANISHING: f64 = 1e-260;
 
-/// A complex number whose parts have two words.
+/// A complex number whose parts are double-doubles.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Complex {
     re: DoubleDouble,
@@ -74,7 +78,7 @@ impl Complex {
 /// e^(−s d).
 pub(super) struct Turn {
     pub(super) factor: Complex,
-    /// Its modulus, or more: what errors relative to it are multiplied by.
+    /// Its modulus, or a larger number: the factor of relative errors.
     pub(super) weight: f64,
 }
 
@@ -89,7 +93,7 @@ pub(super) fn turn(gap: DoubleDouble, s: Complex64) -> Turn {
     }
     let exponent = gap * -s.re;
     if exponent.high < -LARGEST_EXPONENT {
-        // Lost whole, not by u² of it.
+        // The factor is lost completely, with an error of its own size.
         return Turn {
             factor: Complex::default(),
             weight: VANISHING / ROUNDING,
@@ -106,7 +110,7 @@ pub(super) fn turn(gap: DoubleDouble, s: Complex64) -> Turn {
     }
 }
 
-/// e^(−s (`delay` − `own`)), to double precision whatever the size of the exponent.
+/// e^(−s (`delay` − `own`)) to double precision for any size of the exponent.
 pub(crate) fn relative_turn(delay: f64, own: f64, s: Complex64) -> Complex64 {
     turn(DoubleDouble::difference(delay, own), s)
         .factor
@@ -115,8 +119,8 @@ pub(crate) fn relative_turn(delay: f64, own: f64, s: Complex64) -> Complex64 {
 
 /// The jet of h e^(s τ_c) at `s`, τ_c being the delay of term `reference`.
 ///
-/// Its error bounds are about 2⁻⁵² times those of a jet in doubles, beside the rounding of the
-/// result. NaN where an exponential or a product leaves the range of double precision.
+/// Its error bounds are about 2⁻⁵² times those of a jet in double precision, plus the rounding of
+/// the result. NaN where an exponential or a product leaves the range of double precision.
 pub(super) fn jet(h: &QuasiPolynomial, reference: usize, s: Complex64) -> Jet {
     let own = h.delays().get(reference).copied().unwrap_or(0.0);
     let place = Complex::from(s);

@@ -2,15 +2,15 @@
 
 use num_complex::Complex64;
 
-/// 2⁻¹⁰¹⁰: u times this is still far above what an underflow loses.
+/// 2⁻¹⁰¹⁰: u times this is far above the errors of an underflow.
 pub(super) const TINY: f64 = f64::MIN_POSITIVE * 4096.0;
 
-/// Above all that underflow can do to a sum of terms.
+/// Larger than every effect of underflow on a sum of terms.
 pub(super) const FLOOR: f64 = 1e-290;
 
-/// |s| within 4u, wherever it is a normal number: two squares and their sum lose 2 u, of which the
-/// root, correctly rounded, keeps half. Where squares leave the range, of the quotient by the larger
-/// part.
+/// |s| within 4u where it is a normal number: two squares and their sum have the relative error 2
+/// u, of which the correctly rounded root keeps half. Where the squares leave the range, the
+/// quotient by the larger part is used.
 pub(crate) fn modulus(s: Complex64) -> f64 {
     let square = s.norm_sqr();
     if square > 1e-280 && square < 1e300 {
@@ -37,6 +37,6 @@ pub struct Jet {
     pub value_error: f64,
     /// Bound on the error of `slope`.
     pub slope_error: f64,
-    /// Index of the largest term, where it exceeds the reference term fourfold.
+    /// Index of the largest term, if it exceeds the reference term fourfold.
     pub overtaken_by: Option<usize>,
 }

@@ -2,9 +2,9 @@
 //!
 //! They are the characteristic functions of linear systems with delays. The delays are sorted and
 //! distinct, no row p_j is zero, none has trailing zeros: checked once, in
-//! [`QuasiPolynomial::new`]. Values are computed as g(s) = h(s) e^(s τ_c) with the delay τ_c of
-//! the term that dominates at s, so that no exponential overflows, and come with a bound on their
-//! rounding error, derived in `probe` down to the elementary functions.
+//! [`QuasiPolynomial::new`]. Values are computed as g(s) = h(s) e^(s τ_c) with the delay τ_c of the
+//! term that dominates at s, so that no exponential overflows, and have a bound on their rounding
+//! error, derived in `probe` down to the elementary functions.
 
 mod algebra;
 mod double_double;
@@ -17,6 +17,7 @@ mod probe;
 mod quasi_polynomial;
 mod value;
 
+pub(crate) use algebra::equate_close_delays;
 pub(crate) use double_double::relative_turn;
 pub use expansion::Expansion;
 pub(crate) use expansion::{expansion, remainder};

@@ -1,9 +1,10 @@
-//! Values at points so large that powers of s overflow, or cancel an exponential that does.
+//! Values at points where powers of s overflow, or are cancelled by an exponential that underflows.
 //!
 //! With s = 2ᵉ m, |m| near 1, a row is p(s) = 2^(en) q(m), the coefficients of q being those of p
-//! times 2^(−e(n−k)): what underflows there does not count. The terms are added up relative to the
-//! largest one, by their logarithms en log 2 + log |q| − x τ and their directions. The logarithm
-//! of a large value has large absolute error: its size is known to some 1e-13 only.
+//! times 2^(−e(n−k)): numbers that underflow there are negligible. The terms are added relative to
+//! the largest one, by their logarithms en log 2 + log |q| − x τ and their directions. The
+//! logarithm of a large value has a large absolute error, so that the relative error of the value
+//! is about 1e-13.
 
 use num_complex::Complex64;
 
@@ -43,7 +44,7 @@ pub(super) fn value(h: &QuasiPolynomial, s: Complex64) -> Complex64 {
         .iter()
         .map(|(log, direction)| direction * libm::exp(log - largest))
         .sum();
-    // In two halves, as the sum may be small where its largest term overflows.
+    // In two factors, because the sum may be small where its largest term overflows.
     let half = libm::exp(0.5 * largest);
     let grow = |part: f64| {
         if part == 0.0 {

@@ -1,4 +1,4 @@
-//! The object itself, checked once.
+//! The type of quasi-polynomials, checked at construction.
 
 use crate::Error;
 
@@ -60,7 +60,7 @@ impl QuasiPolynomial {
         for (row, delay) in rows {
             match merged.last_mut() {
                 Some((sum, known)) if *known == delay => accumulate(sum, &row),
-                // Adding 0.0 makes a negative zero a positive one.
+                // Adding 0.0 turns a negative zero into a positive one.
                 _ => merged.push((row, delay + 0.0)),
             }
         }

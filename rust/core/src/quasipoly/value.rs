@@ -11,10 +11,10 @@ use crate::elementary::{exp, sin_cos};
 use crate::memory::filled;
 use crate::{Error, Task};
 
-/// Points that one thread takes at a time.
+/// Points in one task of a thread.
 const CHUNK: usize = 1024;
 
-/// A value less than this many times its error bound is computed anew.
+/// A value less than this many times its error bound is computed again in double-double arithmetic.
 const DROWNED: f64 = 1e6;
 
 /// A value of h without its largest exponential: h(s) = `value` · e^(−s `delay`).
@@ -75,7 +75,7 @@ impl QuasiPolynomial {
     }
 
     /// h′(s)/h(s), the exponential of the dominating term cancelled: g′/g − τ. Where double
-    /// precision does not tell h from zero it is computed in two words.
+    /// precision does not separate h from zero, it is computed in double-double arithmetic.
     ///
     /// ```
     /// # use deadtime::quasipoly::QuasiPolynomial;

@@ -4,16 +4,16 @@ use num_complex::Complex64;
 
 use crate::quasipoly::{QuasiPolynomial, modulus};
 
-/// Relative radius of a disc whose roots are one point to twelve digits.
+/// Relative radius below which the roots of a disc count as one point: they agree to twelve digits.
 pub(super) const RESOLVED: f64 = 1e-12;
 
 /// A disc in which the number of roots is proved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Disc {
     pub(super) center: Complex64,
-    /// All `multiplicity` roots are within this of the centre.
+    /// All `multiplicity` roots are within this distance of the centre.
     pub(super) radius: f64,
-    /// And no other root is within this.
+    /// No other root is within this distance.
     pub(super) isolation: f64,
     pub(super) multiplicity: u32,
 }
@@ -24,12 +24,12 @@ impl Disc {
         self.center.im.abs() <= self.radius
     }
 
-    /// Roots in the disc and its mirror image.
+    /// Number of roots in the disc and its mirror image.
     pub(super) fn weight(&self) -> u64 {
         u64::from(self.multiplicity) * if self.is_on_axis() { 1 } else { 2 }
     }
 
-    /// A disc about 0 shrinks to it where all its roots are exactly there.
+    /// Shrink a disc about 0 to the point 0 if all its roots are exactly there.
     pub(super) fn at_zero_if_exact(self, h: &QuasiPolynomial) -> Self {
         let about_zero = modulus(self.center) <= self.radius;
         if about_zero && h.order_at_zero(self.multiplicity) == self.multiplicity {

@@ -1,4 +1,4 @@
-//! Roots of a region, with their evidence.
+//! Roots of a region with their discs and multiplicities.
 
 use num_complex::Complex64;
 
@@ -16,8 +16,8 @@ pub struct RootSet {
     pub multiplicities: Vec<u32>,
     /// Radii of the discs, 1/s.
     pub radii: Vec<f64>,
-    /// Is the disc one point to working precision? `false` for a multiple root or cluster whose disc
-    /// is wider than 1e-12 of its distance from 0.
+    /// Is the disc one point to working precision? `false` for a multiple root or cluster whose
+    /// disc is wider than 1e-12 of its distance from 0.
     pub resolved: Vec<bool>,
     /// Number of roots in `region`, with multiplicity, by the argument principle; equal to the
     /// sum of the multiplicities.
@@ -47,7 +47,7 @@ impl RootSet {
         }
     }
 
-    /// The roots that are `kept`, by their index, as those of `region`.
+    /// The roots, selected by their index with `kept`, as those of `region`.
     pub(super) fn part(&self, region: Region, kept: impl Fn(usize) -> bool) -> Self {
         fn chosen<T: Copy>(list: &[T], kept: impl Fn(usize) -> bool) -> Vec<T> {
             let numbered = list.iter().enumerate();

@@ -1,4 +1,4 @@
-//! Signs and exponents: what has to be done on the bits of a double.
+//! Operations on the bits of a double: signs and exponents.
 
 use pulp::{Simd, cast};
 
@@ -95,7 +95,7 @@ impl<S: Simd> Real<S> {
     /// `2^self` for a whole number from -1022 to 1023.
     #[inline(always)]
     pub(crate) fn power_of_two(self) -> Self {
-        // The exponent, biased, comes to the last bits of the upper half; that half is shifted.
+        // The biased exponent is moved to the last bits of the upper half, which is then shifted.
         let [a, b] = self.mul_add(HALF, WHOLE + 1023.0 * HALF).bits();
         let simd = self.simd;
         let places = simd.splat_u32s(20);

@@ -1,7 +1,7 @@
-//! Arrays through a kernel in lanes: a block of elements as columns of doubles.
+//! Kernels applied to arrays: a block of elements as columns of doubles.
 //!
-//! A block is padded to whole vectors with a harmless element, so that an array's end takes the
-//! same path as its middle.
+//! A block is padded to whole vectors with a harmless element, so that the end of an array is
+//! processed like its middle.
 
 use pulp::WithSimd;
 
@@ -54,7 +54,7 @@ where
     }
 }
 
-/// Fill `values` for the first `length` elements and those that complete their last vector.
+/// Fill `values` for the first `length` elements and for those that complete their last vector.
 pub(crate) fn sweep<K, const IN: usize, const OUT: usize, const W: usize>(
     kernel: &K,
     arguments: &Columns<IN, W>,

@@ -1,4 +1,4 @@
-//! Complex numbers in lanes. Moduli are supposed to have squares within range.
+//! Complex numbers in lanes. The squares of their moduli must be in range.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -131,7 +131,7 @@ impl<S: Simd> Neg for Complex<S> {
 }
 
 impl<S: Simd> Mask<S> {
-    /// Lane by lane: `yes` where true, `no` elsewhere.
+    /// In each lane `yes` where the mask is true, `no` elsewhere.
     #[inline(always)]
     pub(crate) fn choose(self, yes: Complex<S>, no: Complex<S>) -> Complex<S> {
         Complex::new(self.select(yes.re, no.re), self.select(yes.im, no.im))

@@ -1,12 +1,20 @@
-//! Which instruction set runs: the widest the machine has, unless the environment asks for less.
+//! Choice of the instruction set: the widest one of the machine, unless an environment variable
+//! limits it.
 
 use std::sync::LazyLock;
 
 use pulp::{Arch, Scalar128b, Simd, WithSimd};
 
-/// Environment variable that keeps wider instructions out: `avx512`, `avx2`, `neon` or `plain`.
-/// Results do not depend on it; what it serves is comparison.
+/// Environment variable that limits the instruction set: `avx512`, `avx2`, `neon` or `plain`.
+/// Results do not depend on it; it is used for comparisons.
 const VARIABLE: &str = "DEADTIME_INSTRUCTIONS";
+
+static CHOSEN: LazyLock<Instructions> = LazyLock::new(|| {
+    let wanted = std::env::var(VARIABLE).unwrap_or_default();
+    let available = Instructions::available();
+    let named = available.iter().find(|set| set.name() == wanted);
+    *named.or(available.first()).unwrap_or(&Instructions::Plain)
+});
 
 /// Instruction sets the kernels are compiled for.
 #[derive(Debug, Clone, Copy)]
@@ -21,15 +29,8 @@ pub(crate) enum Instructions {
     Plain,
 }
 
-static CHOSEN: LazyLock<Instructions> = LazyLock::new(|| {
-    let wanted = std::env::var(VARIABLE).unwrap_or_default();
-    let available = Instructions::available();
-    let named = available.iter().find(|set| set.name() == wanted);
-    *named.or(available.first()).unwrap_or(&Instructions::Plain)
-});
-
 impl Instructions {
-    /// What this machine can run, the widest first.
+    /// The instruction sets of this machine, the widest first.
     pub(crate) fn available() -> Vec<Self> {
         let mut sets = Vec::new();
         match Arch::new() {
@@ -48,7 +49,7 @@ impl Instructions {
         sets
     }
 
-    /// What kernels run on.
+    /// The instruction set on which kernels run.
     pub(crate) fn chosen() -> Self {
         *CHOSEN
     }

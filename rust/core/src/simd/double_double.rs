@@ -1,10 +1,10 @@
-//! Sums of two words: a value as `hi + lo`, with `lo` at most a few ulps of `hi`.
+//! Double-double arithmetic in lanes: a value as `hi + lo`, with `lo` at most a few ulps of `hi`.
 //!
 //! Sums and products of doubles leave an error that is itself a double (Møller 1965, Knuth 1969,
-//! Dekker 1971); a fused multiply-add gives that of a product at once. Second words are summed as
-//! they come and brought below half an ulp of the first only by [`DoubleDouble::normalised`]: the
-//! relative error of an operation is a few 2^-104 then, and some 2^-100 in a short chain.
-//! Provided nothing underflows and nothing overflows.
+//! Dekker 1971); a fused multiply-add gives the error of a product directly. Low words are summed
+//! without normalisation and brought below half an ulp of the high word only by
+//! [`DoubleDouble::normalised`]: the relative error of an operation is a few 2^-104 then, and some
+//! 2^-100 in a short chain. This holds if nothing underflows or overflows.
 
 use pulp::Simd;
 
@@ -17,7 +17,7 @@ pub(crate) struct DoubleDouble<S: Simd> {
     pub(crate) lo: Real<S>,
 }
 
-/// A constant in two words.
+/// A constant as a double-double.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Constant(pub(crate) f64, pub(crate) f64);
 
@@ -59,7 +59,7 @@ impl<S: Simd> DoubleDouble<S> {
         Self { hi, lo }
     }
 
-    /// One word as two.
+    /// A double as a double-double.
     #[inline(always)]
     pub(crate) fn from_word(hi: Real<S>) -> Self {
         Self::new(hi, hi.constant(0.0))
@@ -70,7 +70,7 @@ impl<S: Simd> DoubleDouble<S> {
         Self::new(-self.hi, -self.lo)
     }
 
-    /// The same value with a second word of at most half an ulp of the first.
+    /// The same value with a low word of at most half an ulp of the high word.
     #[inline(always)]
     pub(crate) fn normalised(self) -> Self {
         ordered_sum(self.hi, self.lo)
@@ -114,7 +114,7 @@ impl<S: Simd> DoubleDouble<S> {
         Self::new(self.hi * power, self.lo * power)
     }
 
-    /// The value in one word.
+    /// The value rounded to a double.
     #[inline(always)]
     pub(crate) fn rounded(self) -> Real<S> {
         self.hi + self.lo

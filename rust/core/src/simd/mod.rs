@@ -1,11 +1,11 @@
-//! Several doubles side by side, one element of an array in each lane.
+//! SIMD arithmetic: several doubles at a time, one element of an array in each lane.
 //!
-//! Kernels are written once, over [`Real`] and [`Complex`], and compiled for every instruction
-//! set that pulp knows (AVX2, AVX-512, NEON, and plain arithmetic elsewhere); which one runs is
-//! decided on the machine. Only operations that IEEE 754 rounds correctly are offered, the fused
-//! multiply-add among them, and none crosses lanes. So an element's bits depend neither on the
-//! instruction set nor on its neighbours, provided a kernel blends lanes and never lets
-//! [`Mask::any`] decide more than whether work may be left out.
+//! Kernels are written once, over [`Real`] and [`Complex`], and compiled for every instruction set
+//! that pulp knows (AVX2, AVX-512, NEON, and plain arithmetic elsewhere); which one runs is decided
+//! on the machine. Only operations that IEEE 754 rounds correctly are offered, the fused
+//! multiply-add among them, and none crosses lanes. The bits of an element therefore depend neither
+//! on the instruction set nor on its neighbours, provided that a kernel blends lanes and uses
+//! [`Mask::any`] only to skip work.
 
 mod bits;
 mod columns;

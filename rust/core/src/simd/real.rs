@@ -8,7 +8,7 @@ use pulp::bytemuck::{cast_slice, cast_slice_mut};
 /// One double in each lane of two vectors.
 ///
 /// A kernel is one long chain of dependent operations; while one vector waits for a result, the
-/// other can go on.
+/// other one proceeds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Real<S: Simd> {
     pub(super) simd: S,
@@ -45,7 +45,7 @@ impl<S: Simd> Real<S> {
         cast_slice(&self.lanes)
     }
 
-    /// The same, to be written.
+    /// The same for writing.
     #[inline(always)]
     pub(crate) fn numbers_mut(&mut self) -> &mut [f64] {
         cast_slice_mut(&mut self.lanes)
@@ -144,7 +144,7 @@ impl<S: Simd> Real<S> {
     }
 }
 
-/// What stands beside a [`Real`] in an operation: another one, or a number for every lane.
+/// The second operand of an operation with a [`Real`]: another one, or one number for every lane.
 pub(crate) trait Operand<S: Simd>: Copy {
     fn spread(self, like: Real<S>) -> Real<S>;
 }
@@ -223,7 +223,7 @@ impl<S: Simd> Mask<S> {
         Self { simd, lanes }
     }
 
-    /// Lane by lane: `yes` where true, `no` elsewhere.
+    /// In each lane `yes` where the mask is true, `no` elsewhere.
     #[inline(always)]
     pub(crate) fn select(self, yes: impl Operand<S>, no: Real<S>) -> Real<S> {
         let yes = yes.spread(no);
@@ -238,10 +238,10 @@ impl<S: Simd> Mask<S> {
         let [a, b] = self.lanes;
         let either = self.simd.or_m64s(a, b);
         if const { size_of::<S::m64s>() < size_of::<f64>() } {
-            // A bit for each lane, in one small register.
+            // One bit for each lane, in one small register.
             return self.simd.first_true_m64s(either) != S::F64_LANES;
         }
-        // Folding words into one compiles to a single test; searching them does not.
+        // Combining words into one compiles to a single test; searching them does not.
         let (yes, no) = (self.simd.splat_u64s(1), self.simd.splat_u64s(0));
         let marks = [self.simd.select_u64s(either, yes, no)];
         let words: &[u64] = cast_slice(&marks);

@@ -2,21 +2,18 @@
 //!
 //! A family is a sum of terms c · Π p_i^e_i · s^k · e^(−s τ(p)) with whole e_i and k and delays
 //! τ(p) = τ_0 + Σ σ_i p_i affine in the parameters p. It is what sums, differences and products of
-//! gains, s and e^(−s T) lead to. [`Family::at`] puts numbers in. Its coefficients and delays
-//! carry the rounding of that evaluation and no more; delays that agree to 4 ulp are the same
-//! sum in another order and are merged, as in products of quasi-polynomials, and a delay that is
-//! negative by no more than rounding is zero.
+//! gains, s and e^(−s T) lead to. [`Family::at`] puts numbers in. The coefficients and delays of a
+//! member have only the rounding errors of that evaluation. Delays that agree to 4 ulp are the same
+//! sum in another order and are merged, as in products of quasi-polynomials; a delay that is
+//! negative only by rounding errors is zero.
 
 use crate::Error;
-use crate::quasipoly::QuasiPolynomial;
+use crate::quasipoly::{QuasiPolynomial, equate_close_delays};
 
-/// Delays closer than this (relative) are the same.
-const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
-
-/// A power of s or of a parameter beyond this is a slip of the pen.
+/// Upper limit on a power of s or of a parameter. A larger one is most likely a typing error.
 const MAX_POWER: u32 = 1000;
 
-/// More terms than this are a slip of the pen, too.
+/// Upper limit on the number of terms (bounds memory and time).
 const MAX_TERMS: usize = 100_000;
 
 /// constant + Σ `slopes`[i] · p_i.
@@ -45,7 +42,7 @@ impl Affine {
 /// One summand of a family.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// The number in front.
+    /// The numerical factor.
     pub coefficient: f64,
     /// The power of each parameter.
     pub exponents: Vec<u32>,
@@ -83,12 +80,12 @@ pub struct Family {
 }
 
 impl Family {
-    /// Check the terms and gather them by delay.
+    /// Check the terms and group them by delay.
     ///
     /// # Errors
-    /// [`Error::Argument`] where a name occurs twice, a term has not one exponent and one slope a
-    /// parameter, a number is not finite, or a power is absurdly large; [`Error::TooMuch`] for
-    /// absurdly many terms.
+    /// [`Error::Argument`] where a name occurs twice, a term does not have one exponent and one
+    /// slope for each parameter, a number is not finite, or a power is above its limit;
+    /// [`Error::TooMuch`] for too many terms.
     pub fn new(names: Vec<String>, terms: Vec<Term>) -> Result<Self, Error> {
         if let Some(name) = repeated(&names) {
             return Err(Error::argument(format!(
@@ -127,7 +124,7 @@ impl Family {
         if term.exponents.len() != count || term.delay.slopes.len() != count {
             return Err(Error::argument(format!(
                 "a term has {} exponents and {} slopes of its delay for {count} parameters: give \
-                 one of each a parameter",
+                 one of each for every parameter",
                 term.exponents.len(),
                 term.delay.slopes.len()
             )));
@@ -143,7 +140,7 @@ impl Family {
         let highest = term.exponents.iter().fold(term.power, |a, b| a.max(*b));
         if highest > MAX_POWER {
             return Err(Error::argument(format!(
-                "a power of {highest}: powers up to {MAX_POWER} are taken"
+                "a power of {highest}: give powers up to {MAX_POWER}"
             )));
         }
         Ok(())
@@ -183,20 +180,13 @@ impl Family {
         if rows.is_empty() {
             return Ok(QuasiPolynomial::zero());
         }
-        rows.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let mut last = f64::NEG_INFINITY;
-        for (_, delay) in &mut rows {
-            if *delay - last <= SAME_DELAY * *delay {
-                *delay = last;
-            } else {
-                last = *delay;
-            }
-        }
+        equate_close_delays(&mut rows);
         let (coefficients, delays) = rows.into_iter().unzip();
         QuasiPolynomial::new(coefficients, delays)
     }
 
-    /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine in it.
+    /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine
+    /// in it.
     pub fn split(&self, parameter: usize) -> Option<(Self, Self)> {
         let exponent = |term: &Term| term.exponents.get(parameter).copied().unwrap_or(0);
         let part = |wanted: u32| {
@@ -223,7 +213,7 @@ impl Family {
         part(0).zip(part(1))
     }
 
-    /// The highest power of s, whatever the parameters are.
+    /// The highest power of s for any parameters.
     pub(super) fn degree(&self) -> u32 {
         let terms = self.terms.iter().flatten();
         terms.fold(0, |highest, term| highest.max(term.power))
@@ -258,7 +248,7 @@ impl Family {
     fn check_values(&self, values: &[f64]) -> Result<(), Error> {
         if values.len() != self.names.len() {
             return Err(Error::argument(format!(
-                "{} values for {} parameters ({}): give one value a parameter",
+                "{} values for {} parameters ({}): give one value for each parameter",
                 values.len(),
                 self.names.len(),
                 self.names.join(", ")
@@ -316,7 +306,7 @@ fn repeated(names: &[String]) -> Option<&String> {
 fn value_of(term: &Term, values: &[f64]) -> f64 {
     let mut product = term.coefficient;
     for (value, exponent) in values.iter().zip(&term.exponents) {
-        // Repeated products, not powi: its bits differ from machine to machine.
+        // Repeated products instead of powi, whose bits differ between machines.
         for _ in 0..*exponent {
             product *= value;
         }

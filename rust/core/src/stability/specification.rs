@@ -1,10 +1,10 @@
-//! What is demanded of the roots: decay, and damping of those that decay slowly.
+//! The specification for the roots: decay, and damping of those that decay slowly.
 //!
-//! A root s offends if Re s > −σ, or, with a damping ratio ζ₀ and a horizon d, if Re s > −d and its own
-//! damping ratio −Re s/|s| is below ζ₀. Without the horizon nothing would do: the chains of a retarded equation
-//! run off along Re s ≈ −log|s|/τ, so that their damping ratios come down to 0. The edge of the offending region is,
-//! in the upper half plane, the line Re s = −σ up to the ray of ζ₀, this ray, and the line Re s = −d from there on;
-//! its lower half mirrors it.
+//! A root s violates it if Re s > −σ, or, with a damping ratio ζ₀ and a horizon d, if Re s > −d and
+//! its own damping ratio −Re s/|s| is below ζ₀. Without the horizon no equation could meet it: the
+//! chains of a retarded equation follow Re s ≈ −log|s|/τ, so that their damping ratios tend to 0.
+//! The edge of the excluded region is, in the upper half plane, the line Re s = −σ up to the ray of
+//! ζ₀, this ray, and the line Re s = −d from there on; its lower half mirrors it.
 
 use num_complex::Complex64;
 
@@ -20,12 +20,12 @@ pub struct Damping {
     pub horizon: f64,
 }
 
-/// What is demanded of every root.
+/// What every root has to satisfy.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Specification {
-    /// σ: real parts below −σ, 1/s.
+    /// σ: all real parts must be below −σ, 1/s.
     pub decay: f64,
-    /// And damping, if asked for.
+    /// The damping, if required.
     pub damping: Option<Damping>,
 }
 
@@ -33,14 +33,14 @@ pub struct Specification {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
     pub(super) from: Complex64,
-    /// Unit vector; upwards, since Im s grows all along the edge.
+    /// Unit vector, pointing upwards: Im s grows along the edge.
     pub(super) along: Complex64,
-    /// Infinite for the last one.
+    /// Infinite for the last piece.
     pub(super) length: f64,
 }
 
 impl Piece {
-    /// The t up to which |s| is at most `radius`, or a little more: |s| grows along the edge.
+    /// The t up to which |s| is at most `radius`, or slightly more: |s| grows along the edge.
     pub(super) fn within(&self, radius: f64) -> f64 {
         let lean = self.from.re * self.along.re + self.from.im * self.along.im;
         let (start, end) = (self.from.norm(), radius * (1.0 + 1e-9));
@@ -51,7 +51,7 @@ impl Piece {
 }
 
 impl Specification {
-    /// Re s < `line` alone.
+    /// The specification Re s < `line` alone.
     pub(super) fn left_of(line: f64) -> Self {
         Self {
             decay: -line,
@@ -86,7 +86,7 @@ impl Specification {
         Ok(())
     }
 
-    /// Left of this line nothing offends, 1/s.
+    /// No root left of this line violates the specification, 1/s.
     pub(super) fn leftmost(&self) -> f64 {
         -self.damping.map_or(self.decay, |damping| damping.horizon)
     }
@@ -118,8 +118,9 @@ impl Specification {
         }
     }
 
-    /// Offending roots among those right of [`leftmost`](Self::leftmost); `None` where a disc meets the edge.
-    pub(super) fn offending(&self, set: &RootSet) -> Option<u64> {
+    /// Number of violating roots among those right of [`leftmost`](Self::leftmost); `None` where a
+    /// disc meets the edge.
+    pub(super) fn violating(&self, set: &RootSet) -> Option<u64> {
         let mut total = 0;
         for ((root, radius), multiplicity) in
             set.roots.iter().zip(&set.radii).zip(&set.multiplicities)

@@ -353,7 +353,7 @@ proptest! {
             sum += value;
             size += value.norm() * (1.0 + delay * s.norm());
         }
-        // Each side rounds a handful of times.
+        // Each side has a few rounding errors.
         prop_assert!((h.value(s) - sum).norm() <= 1e-13 * size);
     }
 
@@ -368,7 +368,7 @@ proptest! {
         let h = velocity().at(&[kp, kv]).unwrap();
         prop_assert_eq!(chart.unstable[0] as u64, count_right_of(&h, 0.0, &task).unwrap());
         prop_assert_eq!(chart.abscissa[0], spectral_abscissa(&h, true, &task).unwrap());
-        // Both proved, hence never at odds.
+        // Both are proved, so that they never contradict each other.
         prop_assert_eq!(chart.unstable[0] > 0, chart.abscissa[0] > 0.0);
     }
 }
@@ -420,7 +420,7 @@ fn boundaries_are_closed_forms_in_order() {
     assert_eq!(curve.len(), others.len());
     for (vertex, kv) in curve.iter().zip(&others) {
         let omega = (-kv).acos() / 0.36;
-        // A crossing is known to some rounding errors of the bounds of F, not of F itself.
+        // A crossing is known to a few rounding errors of the bounds of F, not of F itself.
         assert!((vertex.omega - omega).abs() < 1e-10);
         assert!((vertex.gain - omega * (0.36 * omega).sin()).abs() < 1e-9);
         assert_eq!(vertex.jump, 2);
@@ -429,8 +429,9 @@ fn boundaries_are_closed_forms_in_order() {
 
 #[test]
 fn a_curve_that_turns_back_is_one() {
-    // The pendulum s² − 1 + (Kp + Kd s) e^(−0.3 s): Kp = (1 + w²) cos 0.3w, Kd = (w + 1/w) sin 0.3w, which grows up to
-    // 6.2 at w = 6.8 and comes back to 0, so that most rows meet the curve twice.
+    // The pendulum s² − 1 + (Kp + Kd s) e^(−0.3 s): Kp = (1 + w²) cos 0.3w, Kd = (w + 1/w) sin
+    // 0.3w, which grows up to 6.2 at w = 6.8 and returns to 0, so that most rows meet the curve
+    // twice.
     let none = [0.0, 0.0];
     let terms = vec![
         term(1.0, &[0, 0], 2, 0.0, &none),
@@ -444,7 +445,7 @@ fn a_curve_that_turns_back_is_one() {
         [(0, &first[..]), (1, &second[..])].map(|(parameter, points)| Axis { parameter, points });
     let found = boundaries(&family, &none, axes, Specification::default(), &Task::new());
     let found = found.unwrap().unwrap();
-    // The real root crosses the other way where the pair comes down to it, at Kd = 0.3.
+    // The real root crosses in the opposite direction where the pair reaches it, at Kd = 0.3.
     assert_eq!((found.along, found.curves.len()), (0, 3));
     let curves = &found.curves;
     let (real, pairs): (Vec<_>, Vec<_>) = curves.iter().partition(|curve| curve[0].omega == 0.0);
@@ -460,7 +461,7 @@ fn a_curve_that_turns_back_is_one() {
         assert!((gain - (1.0 + omega * omega) * cosine).abs() < 1e-9);
         assert!((second[*row] - (omega + 1.0 / omega) * sine).abs() < 1e-9);
     }
-    // Once through all frequencies, rows and directions turning in one place.
+    // All frequencies once, with rows and directions turning at one point.
     let up = curve[0].omega < curve[1].omega;
     assert!(
         curve

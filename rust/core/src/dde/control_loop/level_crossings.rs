@@ -1,9 +1,9 @@
-//! Where a polynomial on [0, 1] crosses a level.
+//! Crossings of a level by a polynomial on [0, 1].
 
 use super::series::{DEGREE, Series};
 use crate::dde::scalar::Scalar;
 
-/// Narrowest interval that is still halved.
+/// Width below which an interval is not halved any more.
 const NARROWEST: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// The value of `u` at σ.
@@ -45,7 +45,8 @@ pub(crate) fn crossings<S: Scalar>(u: &Series<S>, level: f64, zeros: &mut Vec<f6
         }
         match stack.pop() {
             Some(next) => {
-                // A zero exactly on the seam is an end of both halves and a change in neither.
+                // A zero exactly on the common end of two halves is an end of both and a sign
+                // change in neither.
                 if next.b[0] == 0.0 {
                     zeros.push(next.low);
                 }

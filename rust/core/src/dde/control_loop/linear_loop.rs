@@ -3,13 +3,13 @@
 //!   x′ = A x + B w + E r,   u = K x + L w + M r,   y = C x + D w,   w(t) = sat(u(t − Td)).
 //!
 //! x holds the states of plant and controller, u is the command, w the command that reaches the
-//! plant, r the reference, y the output. L = 0 is the retarded loop; L ≠ 0 (an ideal derivative
-//! of y, or direct feedthrough) the neutral one, whose jumps travel on for ever. With a sample
-//! time Ts the command is u_k = sat(K x(t_k) + L w(t_k−) + M r(t_k)) and w = u_k on
-//! [t_k + Td, t_{k+1} + Td); controller states see the reference held in the same way.
-//! An ideal derivative of r is zero but for an impulse at each jump of r, which arrives at the
-//! plant like the rest of the command and, where L ≠ 0, comes back with weight L.
-//! Time counts from the start of the run; every signal is scalar, x has any length.
+//! plant, r the reference, y the output. L = 0 is the retarded loop; L ≠ 0 (an ideal derivative of
+//! y, or direct feedthrough) the neutral one, whose jumps do not become smoother. With a sample
+//! time Ts the command is u_k = sat(K x(t_k) + L w(t_k−) + M r(t_k)) and w = u_k on [t_k + Td,
+//! t_{k+1} + Td); controller states see the reference held in the same way. An ideal derivative of
+//! r is zero except for an impulse at each jump of r, which arrives at the plant like the rest of
+//! the command and, where L ≠ 0, returns with weight L. Time counts from the start of the run;
+//! every signal is scalar, x has any length.
 
 use super::reference::finite;
 use crate::Error;
@@ -35,7 +35,7 @@ pub struct Equations<S = f64> {
     /// Feedthrough D.
     pub d: S,
     /// Weight of the impulse in u per unit jump of the reference: the gain of an ideal derivative
-    /// of r. A limited or sampled command does not see it.
+    /// of r. A limited or sampled command has none.
     pub impulse: S,
 }
 
@@ -56,10 +56,10 @@ impl<S: Scalar> Equations<S> {
     }
 }
 
-/// What a sample does to the states, once the command is computed: x becomes J x + G w + H r.
+/// Change of the states at a sample, after the command is computed: x becomes J x + G w + H r.
 ///
-/// The states of a controller that runs in samples, such as a discretised filter, move so and
-/// hold in between; the rows of J of all other states are those of the identity.
+/// The states of a controller that runs in samples, such as a discretised filter, change in this
+/// way and are constant in between; the rows of J of all other states are those of the identity.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Update {
     /// J, n × n.
@@ -80,7 +80,7 @@ pub struct LinearLoop<S = f64> {
     update: Option<Update>,
 }
 
-/// State of affairs when a run begins, at time 0.
+/// Initial values of a run, at time 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Start<S = f64> {
     /// x(0), n.
@@ -95,7 +95,7 @@ pub struct Start<S = f64> {
 }
 
 impl<S: Scalar> LinearLoop<S> {
-    /// Check and keep.
+    /// Check the arguments.
     pub fn new(
         equations: Equations<S>,
         delay: S,
@@ -156,7 +156,7 @@ impl<S: Scalar> LinearLoop<S> {
         })
     }
 
-    /// The same loop with states that move at samples.
+    /// The same loop with states that change at samples.
     pub fn with_update(mut self, update: Update) -> Result<Self, Error> {
         let n = self.equations.states();
         let lengths = (
@@ -172,7 +172,7 @@ impl<S: Scalar> LinearLoop<S> {
         }
         if self.sample_time.is_none() {
             return Err(Error::argument(
-                "states that move at samples need a sample_time",
+                "states that change at samples need a sample_time",
             ));
         }
         finite("the update of a sample", &update.states)?;
@@ -182,7 +182,7 @@ impl<S: Scalar> LinearLoop<S> {
         Ok(self)
     }
 
-    /// What a sample does to the states; nothing where there is none.
+    /// The change of the states at a sample; none where there is none.
     pub fn update(&self) -> Option<&Update> {
         self.update.as_ref()
     }

@@ -1,9 +1,20 @@
 //! Metrics of a step response, and the record of a response from which they follow.
 
+/// Width of the quiet band as a share of the settling band: what remains of the band after three
+/// time constants.
+const QUIET_SHARE: f64 = 0.05;
+
+/// The output must have been in the quiet band for this share of the time between entering the
+/// settling band and the quiet band (a slow oscillation that passes through both stays a tenth),
+/// and for at least this many delays.
+const QUIET_FOR: f64 = 0.2;
+
+const QUIET_WAITS: f64 = 3.0;
+
 /// Metrics of a step response, measured between its first output and its steady state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Metrics {
-    /// Time from the lower to the upper part of the step, s; NaN where it does not get there.
+    /// Time from the lower to the upper level of the rise, s; NaN where a level is not reached.
     pub rise_time: f64,
     /// Time from the start after which the output stays in the band, s; NaN where it does not.
     pub settling_time: f64,
@@ -19,12 +30,12 @@ pub struct Metrics {
     pub settling_max: f64,
     /// The output farthest from zero, its modulus.
     pub peak: f64,
-    /// The output that counts as that after a long time.
+    /// The value that the output tends to.
     pub steady_state: f64,
 }
 
 impl Metrics {
-    /// Where nothing is known.
+    /// All metrics unknown.
     pub const UNKNOWN: Self = Self {
         rise_time: f64::NAN,
         settling_time: f64::NAN,
@@ -54,37 +65,28 @@ impl Metrics {
     }
 }
 
-/// What is left of the band after three time constants: an output that keeps to so narrow a band
-/// has died down.
-const QUIET_SHARE: f64 = 0.05;
-
-/// An output has been in the narrow band for this part of the time it took to get there from the
-/// other; a slow oscillation that passes through both lasts a tenth. And for so many delays.
-const QUIET_FOR: f64 = 0.2;
-const QUIET_WAITS: f64 = 3.0;
-
-/// What counts as risen and as settled.
+/// Definitions of rise and settling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criteria {
-    /// Parts of the step between which the rise time is measured.
+    /// Shares of the step between which the rise time is measured.
     pub rise: (f64, f64),
-    /// Half width of the settling band as a part of the step.
+    /// Half width of the settling band as a share of the step.
     pub settling: f64,
 }
 
-/// The levels that a response from `first` to `steady` is measured against. Outputs are compared
-/// after a change of sign where the step goes down, so that every step goes up.
+/// The levels with which a response from `first` to `steady` is compared. Outputs change sign where
+/// the step goes down, so that every step goes up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Levels {
     pub(crate) first: f64,
     pub(crate) steady: f64,
     /// 1 or −1: the direction of the step.
     pub(crate) sign: f64,
-    /// Where the rise begins and ends, with the sign.
+    /// Levels where the rise begins and ends, multiplied by the sign.
     pub(crate) rise: (f64, f64),
     /// Half width of the band.
     pub(crate) band: f64,
-    /// Half width of the band of what has died down.
+    /// Half width of the quiet band.
     pub(crate) quiet_band: f64,
 }
 
@@ -104,26 +106,26 @@ impl Levels {
     }
 }
 
-/// What a response did, from which its metrics follow. Times count from its start.
+/// Record of a response from which its metrics follow. Times count from its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Record {
     /// Greatest output and its time.
     pub(crate) top: (f64, f64),
     /// Least output and its time.
     pub(crate) bottom: (f64, f64),
-    /// When the rise began and ended; NaN where it did not.
+    /// Times at which the rise began and ended; NaN where it did not.
     pub(crate) risen: (f64, f64),
     /// Least and greatest output from the end of the rise on.
     pub(crate) after: (f64, f64),
-    /// Since when the output is in the band; NaN where it is outside at the end.
+    /// Time since which the output is in the band; NaN where it is outside at the end.
     pub(crate) inside_since: f64,
-    /// Until when the output has left the narrow band now and then.
+    /// Last time at which the output was outside the quiet band.
     pub(crate) unsettled_until: f64,
 }
 
 impl Record {
     /// Does the response itself show at `end` that it stays in the band? `wait` is the time after
-    /// which the loop answers to itself.
+    /// which the loop reacts to its own output.
     pub(crate) fn stays_settled(&self, end: f64, wait: f64) -> bool {
         let quiet = end - self.unsettled_until;
         quiet >= QUIET_FOR * (self.unsettled_until - self.inside_since)

@@ -16,7 +16,7 @@ impl Reference {
     pub fn new(before: f64, times: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         if times.len() != values.len() {
             return Err(Error::argument(format!(
-                "{} reference values for {} reference times: give one value a time",
+                "{} reference values for {} reference times: give one value for each time",
                 values.len(),
                 times.len()
             )));
@@ -30,7 +30,7 @@ impl Reference {
                 pair[1], pair[0]
             )));
         }
-        // Only true jumps are kept: each one ends an element of time.
+        // Only true jumps are kept, because each one ends an element of time.
         let mut last = before;
         let (times, values) = times
             .into_iter()
@@ -57,7 +57,7 @@ impl Reference {
         }
     }
 
-    /// A reader that walks forward in time.
+    /// A reader for times that do not decrease.
     pub(crate) fn cursor(&self) -> Cursor<'_> {
         Cursor {
             reference: self,
@@ -76,7 +76,8 @@ pub(crate) struct Cursor<'a> {
 }
 
 impl Cursor<'_> {
-    /// Move to time `t` (a jump closer than `slack` after it counts as reached); the value there.
+    /// Advance to time `t`, where a jump up to `slack` later counts as reached. Returns the value
+    /// there.
     pub(crate) fn advance(&mut self, t: f64, slack: f64) -> f64 {
         while let (Some(&time), Some(&value)) = (
             self.reference.times.get(self.next),
@@ -91,7 +92,7 @@ impl Cursor<'_> {
         self.value
     }
 
-    /// The value at the time reached, `before` until the first move.
+    /// The value at the time reached; `before` until the first call of `advance`.
     pub(crate) fn value(&self) -> f64 {
         self.value
     }

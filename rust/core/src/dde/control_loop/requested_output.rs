@@ -1,4 +1,4 @@
-//! What a run is to deliver: outputs and inputs at given times, breaking points, measurements.
+//! The requested output of a run: outputs and inputs at given times, breaking points, metrics.
 
 use super::series::Series;
 use super::step_metrics::StepMetrics;
@@ -7,7 +7,7 @@ use crate::dde::limits::RESPONSE;
 use crate::dde::scalar::Scalar;
 use crate::memory::{push, reserved};
 
-/// What a run returns.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trajectory<S = f64> {
     /// y at the output times.
@@ -20,20 +20,20 @@ pub struct Trajectory<S = f64> {
     pub input_breaks: Vec<f64>,
 }
 
-/// Output and input times of a run, and how many of each are served.
+/// Output and input times of a run, and the values so far.
 #[derive(Debug)]
 pub(crate) struct RequestedOutput<'a, S = f64> {
     output_times: &'a [f64],
     input_times: &'a [f64],
-    /// Speed at which the output times move.
+    /// Derivative of the output times with respect to the parameter.
     ahead: S,
     pub(crate) trajectory: Trajectory<S>,
-    /// Who measures the output on its way, if anyone does.
+    /// Measures the output during the run, if metrics are requested.
     metrics: Option<&'a mut StepMetrics>,
 }
 
 impl<'a, S: Scalar> RequestedOutput<'a, S> {
-    /// Times to be served; the output times move with the slope of `ahead`.
+    /// The times at which values are requested; the output times have the slope of `ahead`.
     pub(crate) fn new(
         output_times: &'a [f64],
         input_times: &'a [f64],
@@ -52,13 +52,13 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         })
     }
 
-    /// Have the output measured as well, at least up to the last of the times.
+    /// Measure the output as well, at least up to the last of the times.
     pub(crate) fn measured_by(mut self, metrics: &'a mut StepMetrics) -> Self {
         self.metrics = Some(metrics);
         self
     }
 
-    /// Does anyone measure the output?
+    /// Is the output measured?
     pub(crate) fn is_measured(&self) -> bool {
         self.metrics.is_some()
     }
@@ -75,13 +75,13 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         [self.output_times, self.input_times]
     }
 
-    /// The last time asked for, 0 if none is.
+    /// The last requested time, 0 if there is none.
     pub(crate) fn last(&self) -> f64 {
         let last = |times: &[f64]| times.last().copied().unwrap_or(0.0);
         last(self.output_times).max(last(self.input_times))
     }
 
-    /// Serve the output times before `end`.
+    /// Store the outputs at all times before `end`.
     pub(crate) fn outputs_before(&mut self, end: f64, mut value: impl FnMut(S) -> S) {
         while let Some(&t) = self.output_times.get(self.trajectory.outputs.len()) {
             if t >= end {
@@ -91,7 +91,7 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         }
     }
 
-    /// Serve the input times before `end`.
+    /// Store the inputs at all times before `end`.
     pub(crate) fn inputs_before(&mut self, end: f64, mut value: impl FnMut(S) -> S) {
         while let Some(&t) = self.input_times.get(self.trajectory.inputs.len()) {
             if t >= end {
@@ -101,7 +101,7 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         }
     }
 
-    /// Note a break of y at `t` unless it lies after the last output time.
+    /// Store a break of y at `t` unless it lies after the last output time.
     pub(crate) fn output_break(&mut self, t: S) -> Result<(), Error> {
         let t = t.value();
         if self.output_times.last().is_some_and(|&last| t <= last) {
@@ -110,7 +110,7 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         Ok(())
     }
 
-    /// Note a break of the command at `t` unless it lies after the last input time.
+    /// Store a break of the command at `t` unless it lies after the last input time.
     pub(crate) fn input_break(&mut self, t: S) -> Result<(), Error> {
         let t = t.value();
         if self.input_times.last().is_some_and(|&last| t <= last) {
@@ -119,7 +119,7 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         Ok(())
     }
 
-    /// Is every time served?
+    /// Are all values stored?
     pub(crate) fn is_done(&self) -> bool {
         self.trajectory.outputs.len() == self.output_times.len()
             && self.trajectory.inputs.len() == self.input_times.len()

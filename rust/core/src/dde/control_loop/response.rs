@@ -1,8 +1,9 @@
-//! A loop's response in the caller's own clock: what `simulate` gives, as it is handed out.
+//! The response of a loop in the caller's clock.
 //!
-//! The run starts at the first of the times. Times and jumps of the reference that miss a sample
-//! only by the rounding of that clock are moved onto it; breaking points of output and command
-//! become one list, those within rounding of one another one point.
+//! The run starts at the first of the times. Times and jumps of the reference that differ from a
+//! sample only by rounding errors of that clock are moved onto the sample. Breaking points of
+//! output and command are merged into one list, in which points that differ only by rounding errors
+//! are one.
 
 use crate::memory::{append, collected, copied};
 use crate::{Error, Task};
@@ -11,13 +12,13 @@ use super::linear_loop::{LinearLoop, Start};
 use super::reference::Reference;
 use crate::dde::limits::RESPONSE;
 
-/// Roundings of a time of the clock, in units of the last place.
+/// Rounding error of a time of the clock, relative to the time.
 const CLOCK: f64 = 4.0 * f64::EPSILON;
 
-/// Breaking points closer than this part of their time are one.
+/// Breaking points closer than this share of their time are merged.
 const ONE_BREAK: f64 = 64.0 * f64::EPSILON;
 
-/// What is asked for, in the caller's clock.
+/// A request, in the caller's clock.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
     /// Output times, increasing; the first is the start of the run.
@@ -32,7 +33,7 @@ pub struct Request<'a> {
     pub reference: &'a [f64],
 }
 
-/// The response at the times asked for.
+/// The response at the requested times.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Response {
     /// y.
@@ -108,8 +109,8 @@ impl LinearLoop {
     }
 }
 
-/// `since` the start of a run at `start` in its clock, on a sample (every so many seconds, from
-/// the phase on) that it misses by rounding only.
+/// `since` the start of a run at `start` of the clock, moved onto a sample if it differs from it
+/// only by rounding errors. `sample` holds the sample time and the time of the first sample.
 pub fn on_sample(since: f64, start: f64, sample: Option<(f64, f64)>) -> f64 {
     let Some((sample_time, phase)) = sample else {
         return since;

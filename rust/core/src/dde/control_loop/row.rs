@@ -1,11 +1,11 @@
-//! A loop as one row of numbers: the form in which many loops, or a loop with its slopes, arrive.
+//! A loop as one row of numbers: the form of many loops, or of a loop with its slopes, in arrays.
 
 use crate::Error;
 
 use super::linear_loop::{Equations, LinearLoop};
 use crate::dde::scalar::Scalar;
 
-/// Numbers in the row of a loop with `n` states.
+/// Length of the row of a loop with `n` states.
 pub(crate) const fn width(n: usize) -> usize {
     n * n + 4 * n + 7
 }
@@ -30,7 +30,7 @@ pub(crate) struct Row<'a, S = f64> {
 }
 
 impl<'a, S: Scalar> Row<'a, S> {
-    /// Of a loop with `n` states.
+    /// The row of a loop with `n` states.
     pub(crate) fn new(n: usize, row: &'a [S]) -> Result<Self, Error> {
         let (states, numbers) = row.split_at(row.len().saturating_sub(7));
         match (states.len() == n * n + 4 * n, numbers) {
@@ -60,12 +60,12 @@ impl<'a, S: Scalar> Row<'a, S> {
         }
     }
 
-    /// Is there a hold?
+    /// Is the loop sampled?
     pub(crate) fn is_sampled(&self) -> bool {
         self.sample_time.value() != 0.0
     }
 
-    /// The loop, checked.
+    /// The loop, after a check.
     pub(crate) fn checked(&self) -> Result<LinearLoop<S>, Error> {
         let equations = Equations {
             a: self.a.to_vec(),

@@ -1,4 +1,4 @@
-//! Derivatives of a response with respect to numbers of the loop: the engines run in [`Dual`]s.
+//! Derivatives of a response with respect to numbers of the loop: the simulation runs in [`Dual`]s.
 
 use crate::{Error, Task};
 
@@ -31,7 +31,7 @@ pub struct Sloped<'a> {
 
 /// Slopes of the outputs and of the inputs at fixed times, parameter by parameter.
 ///
-/// At a time at which the response jumps, they are those of what follows.
+/// At a jump of the response they are the derivatives after the jump.
 pub fn sensitivities(
     of: &Sloped<'_>,
     command_history: &[f64],

@@ -2,16 +2,22 @@
 
 use crate::dde::scalar::Scalar;
 
-/// A last coefficient below this part of the largest one is below rounding, with the remainder
-/// of the series behind it.
+/// A last coefficient below this share of the largest one is smaller than rounding errors, and so
+/// is the remainder of the series.
 pub(crate) const NEGLIGIBLE: f64 = 1e-17;
 
-/// Degree of the polynomials. With the elements as long as [`NEGLIGIBLE`] allows, about 1.9 over
-/// the fastest rate of the loop, 24 terms cost least per unit of time.
+/// Degree of the polynomials. With elements as long as [`NEGLIGIBLE`] allows, about 1.9 over the
+/// fastest rate of the loop, 24 terms cost least for each unit of time.
 pub(crate) const DEGREE: usize = 24;
 
-/// Σ c_j σ^j, c_j at `offset` + `stride` j of `terms`: even and odd powers apart, since each step
-/// of one sum waits for the step before.
+/// Share of [`NEGLIGIBLE`] below which last coefficients are dropped.
+const TRIMMED: f64 = 1e-3;
+
+/// Rounding errors of slopes relative to those of values.
+const SLOPE_ROUNDING: f64 = 1e4;
+
+/// Σ c_j σ^j, with c_j at `offset` + `stride` j of `terms`. Even and odd powers are summed
+/// separately, because each step of one sum waits for the step before.
 #[inline]
 pub(crate) fn horner<S: Scalar>(
     terms: &[S],
@@ -76,12 +82,12 @@ impl<S: Scalar> Series<S> {
         out
     }
 
-    /// Set `degree` to the last coefficient that matters.
+    /// Set `degree` to the last coefficient that is not negligible.
     pub(crate) fn trim(&mut self) {
-        // Slopes carry the rounding of products with values.
-        let value = 1e-3 * NEGLIGIBLE * largest(self.terms(), S::value);
+        // Slopes have rounding errors of products with values.
+        let value = TRIMMED * NEGLIGIBLE * largest(self.terms(), S::value);
         let slope = if S::MOVES {
-            (1e-3 * NEGLIGIBLE * largest(self.terms(), S::slope)).max(1e4 * value)
+            (TRIMMED * NEGLIGIBLE * largest(self.terms(), S::slope)).max(SLOPE_ROUNDING * value)
         } else {
             0.0
         };
@@ -120,11 +126,22 @@ impl<S: Scalar> Series<S> {
     }
 }
 
-/// The largest modulus of what `read` reads.
+/// The largest modulus of the numbers that `read` returns.
 fn largest<S: Scalar>(terms: &[S], read: impl Fn(S) -> f64) -> f64 {
-    // No `f64::max`, whose rule for NaN costs more than all the rest.
+    // Not `f64::max`, whose rule for NaN costs more than the rest of the loop.
     terms.iter().fold(0.0, |m, &c| {
         let size = read(c).abs();
         if size > m { size } else { m }
     })
+}
+
+#[cfg(test)]
+impl Series {
+    /// The polynomial with these coefficients.
+    pub(crate) fn of(coefficients: &[f64]) -> Self {
+        let mut out = Self::constant(0.0);
+        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
+        out.degree = coefficients.len() - 1;
+        out
+    }
 }

@@ -1,4 +1,4 @@
-//! Responses of a loop: its start checked, then run with its hold or in continuous time.
+//! Responses of a loop, sampled or in continuous time, after a check of the start.
 
 use super::linear_loop::{LinearLoop, Start};
 use super::reference::{Reference, finite};
@@ -21,7 +21,7 @@ impl<S: Scalar> LinearLoop<S> {
         self.serve(start, reference, requested, task)
     }
 
-    /// Run until everything requested is served.
+    /// Run until all requested values are stored.
     pub(crate) fn serve(
         &self,
         start: &Start<S>,

@@ -1,17 +1,17 @@
-//! Measures a response on its way, polynomial by polynomial.
+//! Metrics of a response, measured during the run, polynomial by polynomial.
 //!
 //! The extrema of a polynomial are the zeros of its derivative, its crossings of a level the zeros
-//! of what is left after the level is taken off; both are isolated by sign changes in the
-//! Bernstein basis and bisected to the last bit. So nothing between output times is missed, and
-//! no figure depends on a grid of times. A polynomial whose range, bounded by its coefficients,
-//! can change nothing is passed over.
+//! after the level is subtracted. Both are isolated by sign changes in the Bernstein basis and
+//! bisected to the last bit. Nothing between output times is missed, and no metric depends on a
+//! grid of times. A polynomial whose range, bounded by its coefficients, cannot change any metric
+//! is skipped.
 
 use super::level_crossings::crossings;
 use super::metrics::{Criteria, Levels, Metrics, Record};
 use super::series::Series;
 use crate::dde::limits::slack;
 
-/// The measurements of one response between two times.
+/// Measures one response between two times.
 #[derive(Debug, Clone)]
 pub(crate) struct StepMetrics {
     start: f64,
@@ -25,7 +25,7 @@ pub(crate) struct StepMetrics {
 }
 
 impl StepMetrics {
-    /// Of a response from `start` to `end` whose steady state is `steady`.
+    /// For a response from `start` to `end` whose steady state is `steady`.
     pub(crate) fn new(start: f64, end: f64, steady: f64, criteria: Criteria) -> Self {
         let unknown = (f64::NAN, f64::NAN);
         Self {
@@ -51,14 +51,14 @@ impl StepMetrics {
             .map_or(Metrics::UNKNOWN, |levels| self.record.metrics(&levels))
     }
 
-    /// Does the response show that it has settled for good?
+    /// Does the response show that it stays settled?
     pub(crate) fn stays_settled(&self, wait: f64) -> bool {
         self.record.stays_settled(self.end - self.start, wait)
     }
 
     /// The response is `y` of (t − `start`)/`length`, from 0 to `end`.
     pub(crate) fn segment(&mut self, start: f64, length: f64, end: f64, y: &Series) {
-        // What ends with the start may end in a jump there.
+        // A polynomial that ends at the start may end in a jump there.
         if start + end * length <= self.start + slack(self.start, self.start) {
             return;
         }
@@ -79,7 +79,7 @@ impl StepMetrics {
         let (low, high) = range(y);
         let mut zeros = std::mem::take(&mut self.zeros);
 
-        // The places where the output may be greatest or least, in order.
+        // The points at which the output may be greatest or least, in order.
         zeros.clear();
         if may_turn(y) && self.concerns(&levels, low, high) {
             crossings(&y.derivative(), 0.0, &mut zeros);
@@ -104,7 +104,7 @@ impl StepMetrics {
             }
         }
 
-        // The band: from the last place of entry on, if the output ends inside.
+        // The band: from the last entry on, if the output ends inside.
         let outside = |y: f64| (y - levels.steady).abs() > levels.band;
         if outside(last) {
             self.record.inside_since = f64::NAN;
@@ -130,7 +130,7 @@ impl StepMetrics {
         self.zeros = zeros;
     }
 
-    /// Can an output between `low` and `high` change what is known?
+    /// Can an output between `low` and `high` change the record?
     fn concerns(&self, levels: &Levels, low: f64, high: f64) -> bool {
         let record = &self.record;
         let best = if levels.sign > 0.0 { high } else { -low };
@@ -141,7 +141,7 @@ impl StepMetrics {
             || (record.risen.1.is_nan() && best >= levels.rise.0)
     }
 
-    /// The first time at which each level of the rise is reached; `places` cut the response into
+    /// The first time at which each level of the rise is reached. `places` divide the response into
     /// monotone parts.
     fn rise(&mut self, levels: &Levels, y: &Series, places: &[f64], time: impl Fn(f64) -> f64) {
         let reached = |sigma: f64, level: f64| levels.sign * y.at(sigma) >= level;
@@ -203,13 +203,6 @@ fn range(y: &Series) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    fn series(coefficients: &[f64]) -> Series {
-        let mut out = Series::constant(0.0);
-        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
-        out.degree = coefficients.len() - 1;
-        out
-    }
-
     const CRITERIA: Criteria = Criteria {
         rise: (0.1, 0.9),
         settling: 0.02,
@@ -220,8 +213,8 @@ mod tests {
         // y = 4 t (1 − t/2) to t = 2 … back at zero, then up to one in a line.
         for sign in [1.0, -1.0] {
             let mut metrics = StepMetrics::new(0.0, 3.0, sign, CRITERIA);
-            metrics.segment(0.0, 2.0, 1.0, &series(&[0.0, 8.0 * sign, -8.0 * sign]));
-            metrics.segment(2.0, 1.0, 1.0, &series(&[0.0, sign]));
+            metrics.segment(0.0, 2.0, 1.0, &Series::of(&[0.0, 8.0 * sign, -8.0 * sign]));
+            metrics.segment(2.0, 1.0, 1.0, &Series::of(&[0.0, sign]));
             let found = metrics.metrics();
             let close = |a: f64, b: f64| (a - b).abs() < 1e-14;
             assert!(close(found.peak, 2.0) && close(found.peak_time, 1.0));
@@ -238,7 +231,7 @@ mod tests {
     #[test]
     fn what_lies_outside_the_window_does_not_count() {
         let mut metrics = StepMetrics::new(1.0, 2.0, 1.0, CRITERIA);
-        metrics.segment(0.0, 4.0, 1.0, &series(&[5.0, -8.0, 4.0]));
+        metrics.segment(0.0, 4.0, 1.0, &Series::of(&[5.0, -8.0, 4.0]));
         // 5 − 2 t + t²/4 on [1, 2]: from 3.25 down to 2.
         let found = metrics.metrics();
         assert_eq!((found.peak, found.peak_time), (3.25, 0.0));

@@ -1,4 +1,5 @@
-//! The stepper through its public names: closed forms, and its engines against one another.
+//! Loops through their public names: closed forms, and the methods of simulation against one
+//! another.
 
 use proptest::prelude::*;
 
@@ -239,7 +240,7 @@ fn the_grid_is_the_single_call() {
 }
 
 proptest! {
-    /// y at the samples is what the powers of the transition matrix make of the initial state.
+    /// y at the samples equals the powers of the transition matrix times the initial state.
     #[test]
     fn the_transition_matrix_is_the_simulation(
         (kp, kv, lag) in (0.2..3.0, -0.4..0.4_f64, 0.05..1.0),
@@ -265,7 +266,7 @@ proptest! {
         }
     }
 
-    /// A finer and finer hold is no hold.
+    /// The response tends to that in continuous time as the sample time goes to zero.
     #[test]
     fn fast_sampling_tends_to_continuous_time(
         (kp, lag, delay) in (0.3..2.0, 0.05..0.5, 0.05..0.5),
@@ -280,11 +281,11 @@ proptest! {
         };
         let (coarse, fine) = (error(2e-3), error(1e-3));
         prop_assert!(coarse < 0.02);
-        // The hold delays by half a sample: first order.
+        // The hold delays by half a sample: the difference is of first order.
         prop_assert!(fine < 0.65 * coarse + 1e-9, "{coarse} {fine}");
     }
 
-    /// Where the outputs are asked for does not matter.
+    /// The response does not depend on the output times.
     #[test]
     fn outputs_do_not_depend_on_their_neighbours(
         (kp, lag, delay) in (0.3..4.0, 0.02..0.5, 0.0..0.5),
@@ -296,7 +297,7 @@ proptest! {
         let times = grid(3.0, 60);
         let all = step(&plant, &times);
         let one = step(&plant, &times[pick..=pick]);
-        // Elements end at outputs nowhere, so the same sums are taken.
+        // Elements never end at output times, so that the same sums are computed.
         prop_assert_eq!(all.outputs[pick].to_bits(), one.outputs[0].to_bits());
         prop_assert_eq!(all.inputs[pick].to_bits(), one.inputs[0].to_bits());
     }

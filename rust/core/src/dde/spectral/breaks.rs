@@ -1,42 +1,44 @@
-//! Breaking points: where a derivative of the solution jumps, and where that goes from there.
+//! Breaking points: where a derivative of the solution jumps, and which later points follow from
+//! them.
 //!
 //! A jump of the p-th derivative at ξ reaches y through the delay τ at ξ + τ, where the derivative
 //! of order p + 1 jumps; through a delayed derivative the p-th itself does, and at least the first
 //! (Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, section 2.1.2).
-//! Points that agree to rounding are one, with the smaller order. They are followed up to the
-//! order that the method can see, which falls with the number of delays so that no more than about
-//! a hundred descend from one point; what is not followed is left to the error estimate. In a
-//! neutral equation a jump of y′ never ends. Whoever finds it negligible says so by the order 2,
-//! from where on an order is gained each delay: what a delayed derivative hands on unchanged fades
-//! as the first one did.
+//! Points that agree up to rounding errors are merged, with the smaller order. They are followed up
+//! to the order that matters for the method; this order decreases with the number of delays, so
+//! that at most about a hundred points follow from one. Points that are not followed are left to
+//! the error estimate. In a neutral equation a jump of y′ never ends. A caller that finds it
+//! negligible adds the point with order 2, from which on the order rises by one at each delay: a
+//! jump that a delayed derivative passes on unchanged becomes small as the first one did.
 
 use std::collections::BTreeMap;
 
-/// Descendants of one point that are worth an element of their own.
+/// Upper limit on the points that follow from one point. More of them give more and shorter
+/// elements.
 const DESCENDANTS: f64 = 100.0;
-/// Order from which on a jump is below what elements of the largest order see.
+/// Order from which on a jump does not affect elements of the largest order.
 const SMOOTH: u32 = 12;
-/// Points kept ahead of time; the least important ones go first.
+/// Upper limit on the points stored ahead of time; those of the highest order are dropped first.
 const MOST: usize = 4096;
-/// Points closer than this, relative to their time, are one.
+/// Relative distance of times below which two points are merged.
 const SAME: f64 = 1e-13;
 
 /// A time at which a derivative of the solution jumps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BreakingPoint {
-    /// When.
+    /// The time.
     pub time: f64,
     /// The lowest derivative that jumps: 0 for the solution itself.
     pub order: u32,
 }
 
-/// Breaking points still ahead, for constant delays.
+/// Later breaking points for constant delays.
 #[derive(Debug, Clone)]
 pub struct Breaks {
     delays: Vec<f64>,
     neutral: bool,
     smooth: u32,
-    /// Key: the bits of the distance from `origin`, which sort as positive distances do.
+    /// Key: the bits of the distance from `origin`, whose order is that of positive distances.
     ahead: BTreeMap<u64, BreakingPoint>,
     origin: f64,
 }
@@ -60,7 +62,7 @@ impl Breaks {
         self.smooth
     }
 
-    /// Add one point ahead, or lower the order of one that is there.
+    /// Add a point, or lower the order of an existing one.
     pub fn add(&mut self, point: BreakingPoint) {
         let distance = point.time - self.origin;
         if point.order >= self.smooth
@@ -72,7 +74,7 @@ impl Breaks {
         let low = (distance - width).max(0.0).to_bits();
         let high = (distance + width).to_bits();
         if let Some((_, known)) = self.ahead.range_mut(low..=high).next() {
-            // The time that came first stays: that of a jump is exact.
+            // The time that was added first is kept: that of a jump is exact.
             known.order = known.order.min(point.order);
             return;
         }
@@ -88,7 +90,7 @@ impl Breaks {
         }
     }
 
-    /// Add what descends from a point.
+    /// Add the points that follow from a point.
     pub fn follow(&mut self, point: BreakingPoint) {
         let order = if self.neutral && point.order < 2 {
             1
@@ -106,12 +108,12 @@ impl Breaks {
         self.ahead.first_key_value().map(|(_, point)| *point)
     }
 
-    /// How far points at `time` may be from each other and still be one.
+    /// Distance below which points at `time` are merged.
     fn width(&self, time: f64) -> f64 {
         SAME * time.abs().max(self.origin.abs())
     }
 
-    /// Take the points at `time`, and any before it: the lowest order of them.
+    /// Remove the points up to `time`; returns the one with the lowest order.
     pub fn reach(&mut self, time: f64) -> Option<BreakingPoint> {
         let until = time + self.width(time);
         let mut order = None;
@@ -125,12 +127,12 @@ impl Breaks {
         order.map(|order| BreakingPoint { time, order })
     }
 
-    /// Number of points ahead.
+    /// Number of points stored.
     pub fn len(&self) -> usize {
         self.ahead.len()
     }
 
-    /// Whether none are ahead.
+    /// Is no point stored?
     pub fn is_empty(&self) -> bool {
         self.ahead.is_empty()
     }

@@ -5,7 +5,7 @@
 //! (Mason and Handscomb, Chebyshev Polynomials, 2003, eq. 2.52), and
 //! ∫ T_k = T_{k+1} / (2 (k + 1)) − T_{k−1} / (2 (k − 1)) for k ≥ 2 (eq. 2.43).
 
-/// Row k of `table` gets T_k at all `points`, for k below `n`.
+/// Fill row k of `table` with T_k at all `points`, for k below `n`.
 pub(super) fn basis(points: &[f64], n: usize, table: &mut Vec<f64>) {
     let m = points.len();
     table.clear();
@@ -54,7 +54,7 @@ pub(super) fn derivative(coefficients: &[f64], scale: f64, out: &mut [f64]) {
     out.iter_mut().for_each(|d| *d *= scale);
 }
 
-/// ∫ from −1 to x of T_k, where `t` holds T_0 … T_{k+1} at x.
+/// ∫ from −1 to x of T_k, where `t` returns T_0 … T_{k+1} at x.
 pub(super) fn integral(k: usize, t: impl Fn(usize) -> f64) -> f64 {
     let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
     match k {

@@ -1,8 +1,9 @@
 //! The past of a solution: polynomial pieces in a row, each with its time interval.
 //!
 //! Every piece holds Chebyshev coefficients of all components on [start, end]; before the first
-//! start there is nothing. A value at a joint belongs to one of the two pieces, and the caller says
-//! which: a breaking point is never averaged over. Old pieces may be dropped as time goes on.
+//! start nothing is defined. A value at a joint belongs to one of the two pieces, and the caller
+//! states which, so that values at a breaking point are never averaged. Old pieces may be dropped
+//! as time goes on.
 
 use std::collections::VecDeque;
 
@@ -21,7 +22,7 @@ pub struct Piece {
     pub terms: usize,
     /// Coefficients, component by component.
     pub coefficients: Vec<f64>,
-    /// Those of the derivative, or nothing where nobody asks for delayed derivatives.
+    /// Those of the derivative; empty where delayed derivatives are not needed.
     pub slopes: Vec<f64>,
 }
 
@@ -37,14 +38,14 @@ impl Piece {
         }
     }
 
-    /// The same piece with the coefficients of its derivative beside it.
+    /// The same piece together with the coefficients of its derivative.
     #[must_use]
     pub fn with_slopes(mut self) -> Self {
         self.slopes = self.derivative();
         self
     }
 
-    /// Place of a time on [−1, 1].
+    /// Coordinate of a time in [−1, 1].
     pub(super) fn place(&self, time: f64) -> f64 {
         ((time - self.start) - (self.end - time)) / (self.end - self.start)
     }
@@ -85,7 +86,7 @@ impl Piece {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct History {
     pieces: VecDeque<Piece>,
-    /// Pieces before the start of the solution that are still kept.
+    /// Number of stored pieces before the start of the solution.
     given: usize,
 }
 
@@ -98,27 +99,27 @@ impl History {
         }
     }
 
-    /// All pieces kept.
+    /// All stored pieces.
     pub fn pieces(&self) -> impl ExactSizeIterator<Item = &Piece> {
         self.pieces.iter()
     }
 
-    /// Number of pieces kept.
+    /// Number of stored pieces.
     pub fn len(&self) -> usize {
         self.pieces.len()
     }
 
-    /// Whether there is no past at all.
+    /// Is there no past at all?
     pub fn is_empty(&self) -> bool {
         self.pieces.is_empty()
     }
 
-    /// The piece at an index that [`History::locate`] gave.
+    /// The piece at an index from [`History::locate`].
     pub fn piece(&self, index: usize) -> Option<&Piece> {
         self.pieces.get(index)
     }
 
-    /// The last piece of the solution itself, none before its first element is accepted.
+    /// The last piece of the solution itself; none before its first element is accepted.
     pub(super) fn latest(&self) -> Option<&Piece> {
         if self.pieces.len() > self.given {
             self.pieces.back()
@@ -127,7 +128,7 @@ impl History {
         }
     }
 
-    /// Index of the piece in which a time lies, of the later one at a joint.
+    /// Index of the piece that contains a time; at a joint, of the later one.
     pub fn locate(&self, time: f64) -> Option<usize> {
         let index = self.pieces.partition_point(|piece| piece.end <= time);
         Some(index.min(self.pieces.len().checked_sub(1)?))
@@ -142,7 +143,7 @@ impl History {
         )
     }
 
-    /// Drop pieces that end before `time`.
+    /// Remove pieces that end before `time`.
     pub(super) fn forget(&mut self, time: f64) {
         while self.pieces.len() > 1 && self.pieces.front().is_some_and(|piece| piece.end < time) {
             self.pieces.pop_front();

@@ -6,10 +6,9 @@
 //! the stored polynomials. Elements end on breaking points, so that every polynomial approximates
 //! something smooth. Length and degree follow the decay of the Chebyshev coefficients and the
 //! defect of the equation at the start of an element, where that of collocation is largest; both
-//! judge the polynomial everywhere, not only its end. An element whose nodes do not stand for all that
-//! the past holds is shortened.
-//! Not guaranteed: the estimates are local, as in every method of this kind; how errors of the
-//! past grow is the equation's affair.
+//! judge the polynomial everywhere, not only its end. An element whose nodes do not resolve the
+//! stored past is shortened. Not guaranteed: the estimates are local, as in every method of this
+//! kind; how errors of the past grow depends on the equation.
 
 mod banded;
 pub mod breaks;

@@ -1,4 +1,4 @@
-//! What is solved, the caller's side of it, and the solution.
+//! The problem, the interface to the caller's functions, and the solution.
 
 use std::ops::Range;
 
@@ -7,10 +7,19 @@ use super::history::History;
 use super::sparsity::Sparsity;
 use crate::{Error, Task};
 
+/// Least delay relative to the times of a run.
+const RESOLUTION: f64 = 1e-13;
+
+/// Relative rounding error by which a history may be too short.
+const HISTORY_ROUNDING: f64 = 1e-12;
+
+/// Least relative tolerance.
+const LEAST_RTOL: f64 = 1e-14;
+
 /// Arguments of the right-hand side at many nodes; the node runs fastest.
 #[derive(Debug, Clone, Copy)]
 pub struct Columns<'a> {
-    /// Times, one a node.
+    /// Times, one for each node.
     pub t: &'a [f64],
     /// y: component, node.
     pub y: &'a [f64],
@@ -20,17 +29,17 @@ pub struct Columns<'a> {
     pub dz: &'a [f64],
 }
 
-/// The caller's side: the equation, its events, its jumps.
+/// The caller's functions: the equation, its events, its jumps.
 pub trait Equation {
     /// The right-hand side at all nodes, component by component like y.
     fn slope(&mut self, at: Columns<'_>, out: &mut [f64], task: &Task) -> Result<(), Error>;
 
-    /// Whether a call costs much more than what it does for a node: sweeps are then worth saving.
+    /// Does a call cost much more than its work for a node? Sweeps are then worth saving.
     fn is_costly(&self) -> bool {
         false
     }
 
-    /// Some of the event functions at a time.
+    /// Some of the event functions at one time.
     fn events(
         &mut self,
         _t: f64,
@@ -59,13 +68,13 @@ pub struct Event {
 /// A time at which the right-hand side jumps, and perhaps y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
-    /// When.
+    /// The time.
     pub time: f64,
-    /// Whether [`Equation::change`] is called.
+    /// Is [`Equation::change`] called?
     pub changes: bool,
 }
 
-/// What is solved, and how well.
+/// The problem and the required accuracy.
 #[derive(Debug, Clone, Default)]
 pub struct Problem {
     /// Start of the solution.
@@ -76,7 +85,7 @@ pub struct Problem {
     pub initial: Vec<f64>,
     /// The constant delays.
     pub delays: Vec<f64>,
-    /// Whether the right-hand side takes delayed derivatives.
+    /// Does the right-hand side take delayed derivatives?
     pub neutral: bool,
     /// The past, at least as long as the largest delay.
     pub history: History,
@@ -88,32 +97,33 @@ pub struct Problem {
     pub events: Vec<Event>,
     /// Relative tolerance.
     pub rtol: f64,
-    /// Absolute tolerance: one, or one a component.
+    /// Absolute tolerance: one, or one for each component.
     pub atol: Vec<f64>,
     /// Largest length of an element.
     pub longest: f64,
-    /// Times at which y is wanted, ascending; without them every node is given.
+    /// Times at which y is requested, ascending; without them y is returned at every node.
     pub times: Option<Vec<f64>>,
     /// Keep every piece instead of those that a delay still reaches.
     pub keep: bool,
-    /// Which components the right-hand side depends on; found by differences where it is wanted.
+    /// The components on which the right-hand side depends; determined by differences where it is
+    /// not given.
     pub sparsity: Option<Sparsity>,
-    /// Elements tried at most, accepted or not.
+    /// Upper limit on the elements tried, accepted or not.
     pub most: Option<u64>,
 }
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
     /// At the end of the interval.
     Finished,
     /// At a terminal event.
     Event,
-    /// Elements became as short as rounding allows at this time.
+    /// Elements became as short as rounding errors allow, at this time.
     Shrunk(f64),
     /// The right-hand side is not finite from this time on.
     NotFinite(f64),
-    /// As many elements as allowed were tried by this time.
+    /// The upper limit on elements was reached at this time.
     TooMany(f64),
 }
 
@@ -124,25 +134,25 @@ pub struct Solution {
     pub times: Vec<f64>,
     /// y at them, one time after the other.
     pub values: Vec<f64>,
-    /// The pieces kept.
+    /// The stored pieces.
     pub history: History,
-    /// Until where the pieces are the solution.
+    /// End of the solution within the pieces.
     pub end: f64,
     /// Times of the crossings of each event.
     pub event_times: Vec<Vec<f64>>,
     /// y at them, one crossing after the other.
     pub event_values: Vec<Vec<f64>>,
-    /// The breaking points that were hit.
+    /// The breaking points on which elements end.
     pub breaks: Vec<BreakingPoint>,
-    /// Calls of the right-hand side, and nodes in all of them.
+    /// Calls of the right-hand side.
     pub calls: u64,
     /// Nodes at which the right-hand side was evaluated.
     pub nodes: u64,
     /// Elements accepted.
     pub elements: u64,
-    /// Elements tried and refused.
+    /// Elements tried and rejected.
     pub refused: u64,
-    /// How it ended.
+    /// Outcome of the run.
     pub outcome: Outcome,
 }
 
@@ -157,7 +167,7 @@ impl Problem {
         self.delays.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Refuse what makes no problem.
+    /// Check the problem.
     pub fn check(&self) -> Result<(), Error> {
         let refuse = |message: String| Err(Error::argument(message));
         if !(self.start.is_finite() && self.end.is_finite() && self.end > self.start) {
@@ -182,10 +192,10 @@ impl Problem {
                 "the delay {delay} is not above zero: write y itself where the delay is 0"
             ));
         }
-        let resolution = 1e-13 * self.start.abs().max(self.end.abs());
+        let resolution = RESOLUTION * self.start.abs().max(self.end.abs());
         if let Some(delay) = self.delays.iter().find(|delay| **delay <= resolution) {
             return refuse(format!(
-                "the delay {delay} vanishes beside the times of t_span in double precision: leave \
+                "the delay {delay} is lost in the rounding errors of the times of t_span: leave \
                  it out, or shift and scale time"
             ));
         }
@@ -193,7 +203,7 @@ impl Problem {
             return refuse("a delay is infinite: leave it out".to_owned());
         }
         let first = self.history.pieces().next().map(|piece| piece.start);
-        let needed = self.start - self.memory() * (1.0 - 1e-12);
+        let needed = self.start - self.memory() * (1.0 - HISTORY_ROUNDING);
         if let Some(first) = first.filter(|first| *first > needed) {
             return refuse(format!(
                 "the history starts at {first}: give it from {} on, the start minus the largest \
@@ -204,7 +214,7 @@ impl Problem {
         if let Some(value) = self.initial.iter().find(|value| !value.is_finite()) {
             return refuse(format!("y at the start is {value:?}: give finite numbers"));
         }
-        if !(self.rtol >= 1e-14 && self.rtol < 1.0) {
+        if !(self.rtol >= LEAST_RTOL && self.rtol < 1.0) {
             return refuse(format!("rtol={}: give a number from 1e-14 to 1", self.rtol));
         }
         if let Some(atol) = self
@@ -218,7 +228,7 @@ impl Problem {
         }
         if self.atol.len() != 1 && self.atol.len() != self.dim() {
             return refuse(format!(
-                "atol has {} entries for {} components: give one, or one a component",
+                "atol has {} entries for {} components: give one, or one for each component",
                 self.atol.len(),
                 self.dim()
             ));

@@ -30,7 +30,7 @@ pub struct SystemEquations {
     pub direct: Vec<Term>,
 }
 
-/// A vector function of time by pieces.
+/// A vector function of time, in pieces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
     pub(super) track: Track,
@@ -38,7 +38,7 @@ pub struct Signal {
     pub(super) breaks: Vec<usize>,
 }
 
-/// State of affairs at time 0 and before.
+/// Initial values at time 0 and the past.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Past {
     /// x(0), n.
@@ -49,7 +49,7 @@ pub struct Past {
     pub slopes: Option<Signal>,
 }
 
-/// What a run returns.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SystemResponse {
     /// y at the times, one after the other.
@@ -109,7 +109,7 @@ impl Signal {
                 .unwrap_or(0);
             if degree > 0 && !(pair[0].is_finite() && pair[1].is_finite()) {
                 return Err(Error::argument(
-                    "a signal without end changes: only a constant may",
+                    "a piece of a signal without a finite start and end must be constant",
                 ));
             }
             let series = own

@@ -1,4 +1,4 @@
-//! Breaks of what is given: those of history and inputs, and the one at the start.
+//! Breaks of history and inputs, and the break at the start.
 
 use super::equations::Signal;
 use super::jumps::{Break, Jumps};
@@ -7,7 +7,7 @@ use super::terms::Feed;
 use super::track::{Piece, Track};
 use crate::dde::limits::slack;
 
-/// The breaks a given signal has, with bounds from the pieces on both sides.
+/// The breaks of a given signal, with bounds from the pieces on both sides.
 pub(super) fn passed_breaks(signal: &Signal, unit: f64) -> Vec<Break> {
     let width = signal.track.width();
     let pieces: Vec<&Piece> = signal.track.pieces().collect();
@@ -36,7 +36,7 @@ pub(super) fn passed_breaks(signal: &Signal, unit: f64) -> Vec<Break> {
     found
 }
 
-/// The break at 0: what comes before is given, what comes after obeys the equation.
+/// The break at 0: before it the signal is given, after it the equation holds.
 pub(super) fn first_break(
     jumps: &Jumps,
     feeds: &[Vec<Feed>; 3],

@@ -3,17 +3,17 @@
 //!   x′(t) + Σ N_j x′(t − τ_j) = Σ A_j x(t − τ_j) + Σ B_j u(t − τ_j),
 //!   y(t) = Σ C_j x(t − τ_j) + Σ F_j x′(t − τ_j) + Σ D_j u(t − τ_j).
 //!
-//! Method of steps on Legendre elements no longer than the smallest delay: everything delayed is
+//! Method of steps on Legendre elements no longer than the smallest delay: all delayed values are
 //! known, and x′ = A_0 x + g is solved for all coefficients at once ([`solver`]). Elements end on
-//! breaking points. At one, the jumps of all derivatives obey the equation themselves; a bound on
-//! them is carried along ([`jumps`]), and a break that a single polynomial takes to rounding ends
-//! no element any more. Legendre rather than Taylor, because what is smooth again is then read
-//! across the ends of earlier elements without loss, whatever the ratios of the delays, and
-//! because a stiff A_0 restricts the length only while its transients last.
-//! x may jump at 0; in a neutral system x + Σ N_j x(t − τ_j) is what has no later jumps.
+//! breaking points. There the jumps of all derivatives satisfy the equation themselves; a bound on
+//! them is computed ([`jumps`]), and a break that a single polynomial represents up to rounding
+//! errors ends no element any more. Legendre series are used rather than Taylor series, because a
+//! function that has become smooth is then read across the ends of earlier elements without loss,
+//! for any ratios of the delays, and because a stiff A_0 restricts the length only while its
+//! transients last. x may jump at 0; in a neutral system x + Σ N_j x(t − τ_j) has no later jumps.
 //! Guaranteed: series truncated below rounding, normwise in every row of the equation. Not
-//! guaranteed: speed where a delay is tiny against the time, or breaks of a neutral system with
-//! several delays fade slowly: refused beyond a bound.
+//! guaranteed: speed where a delay is very short relative to the time, or where breaks of a neutral
+//! system with several delays become small slowly; beyond a limit such runs are refused.
 
 mod element;
 mod equations;

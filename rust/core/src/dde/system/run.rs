@@ -14,10 +14,10 @@ use super::terms::Feed;
 use super::track::{KINDS, Piece, Track};
 use crate::dde::limits::slack;
 
-/// Elements between two looks at the task.
+/// Elements between two checks for cancellation.
 const CHECK_EVERY: u64 = 256;
 
-/// More elements than anyone waits for.
+/// Upper limit on the number of elements (bounds time and memory).
 const MOST_ELEMENTS: u64 = 20_000_000;
 
 pub(super) fn run(
@@ -132,8 +132,8 @@ pub(super) fn run(
         let mut whole = reach.min(stop - t);
         let tracks = [&states, &slopes, &inputs.track];
         let h = loop {
-            // Equal parts: their delayed counterparts then lie on whole elements, and their
-            // factors serve again.
+            // Equal parts: their delayed counterparts then lie on whole elements, and their factors
+            // can be used again.
             let parts = (whole / suggested - 1e-9).ceil().max(1.0);
             let h = if parts > 1.0 { whole / parts } else { whole };
             if let Some(read) = element.solve(&x, t, h, tolerance, tracks) {
@@ -175,7 +175,7 @@ pub(super) fn run(
         jumps.forget(t);
         t = next;
     }
-    // What is left is the last time itself, just after any break there.
+    // Only the last time itself remains, just after any break there.
     let mut f = vec![0.0; n];
     element.slope_at(t, longest, &x, [&states, &slopes, &inputs.track], &mut f);
     let sizes = vec![[0.0; KINDS]; n];
@@ -242,7 +242,6 @@ fn endless() -> Error {
         what: "the response of the system",
         limit: MOST_ELEMENTS,
         unit: "elements of time",
-        advice: "shorten the time simulated; a delay of almost nothing is better set to zero"
-            .to_owned(),
+        advice: "shorten the time simulated; set delays close to zero to zero".to_owned(),
     }
 }

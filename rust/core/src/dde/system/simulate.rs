@@ -11,7 +11,7 @@ pub struct LinearSystem {
 }
 
 impl LinearSystem {
-    /// Check and keep.
+    /// Check the equations.
     pub fn new(equations: SystemEquations) -> Result<Self, Error> {
         let (n, p, q) = (equations.states, equations.inputs, equations.outputs);
         let groups = [

@@ -1,18 +1,20 @@
 //! Chains of roots of neutral equations.
 //!
 //! Let a be the coefficient of sⁿ without delay (the smallest delay factored out) and b_j those
-//! with delays d_j. Roots of large modulus lie near the roots of the difference part
-//! a + Σ b_j e^(−s d_j), whose real parts are at most C_D, the root of Σ |b_j| e^(−c d_j) = |a|
-//! (Avellar and Hale 1980). C_D is attained or approached if the delays are rationally
-//! independent, and is in any case the supremum over arbitrarily small changes of the delays:
-//! C_D < 0 is what strong stability asks for (Hale and Verduyn Lunel 2002). For commensurate
-//! delays taken as exact, as for every difference equation with one base, the chains may end
-//! further left: that is `commensurate`.
-//! C_D is computed to rounding and no proof leans on it: where a line must lie right of the chains,
-//! `bounds::dominance` tests the inequality itself.
+//! with delays d_j. Roots of large modulus lie near the roots of the difference part a + Σ b_j
+//! e^(−s d_j), whose real parts are at most C_D, the root of Σ |b_j| e^(−c d_j) = |a| (Avellar and
+//! Hale 1980). C_D is attained or approached if the delays are rationally independent, and is in
+//! any case the supremum over arbitrarily small changes of the delays: C_D < 0 is what strong
+//! stability asks for (Hale and Verduyn Lunel 2002). For commensurate delays taken as exact, as for
+//! every difference equation with one base, the chains may end further left;
+//! `counting::exact_delays` computes where. C_D is computed to rounding. No proof depends on it:
+//! where a line must lie right of the chains, `bounds::dominance` tests the inequality itself.
 
 use crate::elementary::{exp, log};
 use crate::quasipoly::{Kind, QuasiPolynomial};
+
+/// Upper limit on the steps of Newton's method or bisection.
+const MAX_STEPS: usize = 200;
 
 /// C_D: −∞ where there is no chain (polynomial, retarded), +∞ for an advanced equation.
 ///
@@ -64,7 +66,7 @@ pub fn chain_abscissa(h: &QuasiPolynomial) -> f64 {
     };
     // Newton from the left of the root of a convex falling function never oversteps it.
     let mut c = low;
-    for _ in 0..200 {
+    for _ in 0..MAX_STEPS {
         let (value, slope) = excess(c);
         if value >= 0.0 {
             low = c;

@@ -1,13 +1,16 @@
-//! Delays that are whole multiples of one base, and the difference part whose period that base gives.
+//! Delays that are whole multiples of one base, and the difference part whose period that base
+//! gives.
 
 use crate::Error;
 use crate::quasipoly::QuasiPolynomial;
 
-/// Ratios of delays are looked for among fractions with denominators up to this.
+/// Largest denominator of the ratios of delays that are tried. A larger one finds more bases and
+/// makes the period of the difference part, which is sampled, longer.
 const MAX_DENOMINATOR: u32 = 64;
 
-/// The largest number of which all differences of delays are whole multiples, to rounding; `None` where
-/// there is none, or less than two delays.
+/// The largest number of which all differences of delays are whole multiples, up to rounding.
+/// `None` where there is no such number, or fewer than two delays.
+///
 ///
 /// ```
 /// use deadtime::{quasipoly::QuasiPolynomial, roots::base_delay};
@@ -25,7 +28,7 @@ pub fn base_delay(h: &QuasiPolynomial) -> Option<f64> {
         .map(|delay| delay - first)
         .collect();
     let least = gaps.first().copied()?;
-    // Differences carry the rounding of the delays themselves.
+    // The differences carry the rounding errors of the delays themselves.
     let size = h.delays().last().copied().unwrap_or(0.0);
     (1..=MAX_DENOMINATOR)
         .map(|q| least / f64::from(q))
@@ -37,7 +40,7 @@ pub fn base_delay(h: &QuasiPolynomial) -> Option<f64> {
         })
 }
 
-/// The terms of the highest power of s, the smallest delay taken out.
+/// The terms with the highest power of s, after the smallest delay is factored out.
 pub(crate) fn difference_part(h: &QuasiPolynomial) -> Result<QuasiPolynomial, Error> {
     let degree = h.degree();
     let leading = |row: &[f64]| row.get(degree).copied().filter(|c| *c != 0.0);

@@ -6,20 +6,20 @@
 //!    all the others together. Both sides divided by |s|ⁿ, this holds beyond a radius if the
 //!    bracket is positive (Cauchy's bound with weights). For b = ∞ it is the condition that the
 //!    line Re s = a lies right of the chains; where it fails, nothing is said.
-//! 2. Near the chains of a neutral equation bound 1 is wide: of the leading terms it compares
-//!    moduli, so that the next powers count with 1/|s| although, along the line, they turn p_j
-//!    and hardly stretch it. With p_j = b_jn sⁿ (1 + w_j), all |s| ≥ r and Re s = x ≥ σ,
-//!    |1 + w_j|² differs from 1 by at most 2 β_j1 |x|/r² + O(1/r²), β_jk = |b_j,n−k / b_jn|. As
-//!    long as r² d_j ≥ β_j1 + 2 β_01 the exponentials e^(−x d_j) outrun the growth of that with x,
-//!    and the sum of |p_j e^(−s d_j) / p_0| is bounded by its terms at x = |σ|.
-//!    Terms of almost equal delays that cancel: `close_delays`.
+//! 2. Near the chains of a neutral equation bound 1 is wide. It compares only moduli of the leading
+//!    terms, so that the next powers count with 1/|s| although, along the line, they change the
+//!    argument of p_j and hardly its modulus. With p_j = b_jn sⁿ (1 + w_j), all |s| ≥ r and Re s =
+//!    x ≥ σ, |1 + w_j|² differs from 1 by at most 2 β_j1 |x|/r² + O(1/r²), β_jk = |b_j,n−k / b_jn|.
+//!    As long as r² d_j ≥ β_j1 + 2 β_01 the exponentials e^(−x d_j) outrun the growth of that with
+//!    x, and the sum of |p_j e^(−s d_j) / p_0| is bounded by its terms at x = |σ|. For terms of
+//!    almost equal delays that cancel, see `close_delays`.
 //! 3. In a strip |Im s| ≤ H, the first row exceeds the others far to the right whatever the
 //!    kind, since each of them carries an e^(−x d). Far to the left: the same for h(−s).
 //!
 //! Inequalities are tested with a relative margin of 1e-9. It covers their rounding: sums of
-//! non-negative numbers lose u per summand, weights are upper bounds (`exp_above`) of exponents that
-//! are wrong by 746 · 3 u at most, or by what `right_edge` adds to them. `cauchy_radius` starts from
-//! a guess but ends with a radius at which the inequality itself was tested.
+//! non-negative numbers lose u per summand, weights are upper bounds (`exp_above`) of exponents
+//! that are wrong by 746 · 3 u at most, or by what `right_edge` adds to them. `cauchy_radius`
+//! starts from a guess but ends with a radius at which the inequality itself was tested.
 
 use num_complex::Complex64;
 
@@ -28,19 +28,35 @@ use super::close_delays::radius_by_groups;
 use crate::elementary::{exp_above, log};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 
+/// Upper limit on the radii tried by bound 2.
+const MAX_ROUNDS: usize = 40;
+
+/// Ratio of two radii at which bound 2 ends: the radius is at most five per cent too large.
+const LEAST_RATIO: f64 = 1.05;
+
+/// Error of an exponent that is a sum of logarithms, relative to 1 and its parts.
+const LOGARITHM_ROUNDING: f64 = 1e-14;
+
+/// First real part tried by bound 3.
+const NEAREST_EDGE: f64 = 1e-6;
+
+/// Real part at which bound 3 is given up.
+const FARTHEST_EDGE: f64 = 1e150;
+
 /// The leading term that exceeds all others together outside a disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Dominance {
     /// Index of the row.
     pub(crate) row: usize,
-    /// Its exceeds all others where |s| is at least this.
+    /// The leading term exceeds all the others where |s| is at least this.
     pub(crate) radius: f64,
 }
 
-/// How a [`Dominance`] is found.
+/// A method of finding a [`Dominance`].
 pub(crate) type Bound = fn(&QuasiPolynomial, (f64, f64)) -> Option<Dominance>;
 
-/// Bounds 1 and 2 on the strip `re`, and that of close delays; `None` where no single term dominates.
+/// Bounds 1 and 2 on the strip `re` and the bound for close delays; `None` where no single term
+/// dominates.
 pub(crate) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
     nearest(h, re, |row, radius| match row {
         0 => along_the_chains(h, re.0, radius).min(radius_by_groups(h, re.0)),
@@ -48,7 +64,7 @@ pub(crate) fn dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance
     })
 }
 
-/// Bounds 1 and 2, which hold for smaller moduli of the coefficients as well.
+/// Bounds 1 and 2 alone. They also hold when the coefficients become smaller in modulus.
 fn dominance_of_moduli(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
     nearest(h, re, |row, radius| match row {
         0 => along_the_chains(h, re.0, radius),
@@ -56,19 +72,20 @@ fn dominance_of_moduli(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance>
     })
 }
 
-/// A radius beyond which there is no root with Re s ≥ `sigma`, nor where moduli of coefficients are smaller but
-/// that of the leading one; `None` where chains may lie there.
+/// A radius beyond which no root has Re s ≥ `sigma`, even if all coefficients except the leading
+/// one become smaller in modulus. `None` where chains may lie there.
 pub(crate) fn radius_right_of(h: &QuasiPolynomial, sigma: f64) -> Option<f64> {
     let found = dominance_of_moduli(h, (sigma, f64::INFINITY))?;
     (found.row == 0).then_some(found.radius * (1.0 + MARGIN))
 }
 
-/// Bound 1 alone, which takes no more than a sum to check.
+/// Bound 1 alone, which a checker can confirm by evaluating one sum.
 pub(crate) fn plain_dominance(h: &QuasiPolynomial, re: (f64, f64)) -> Option<Dominance> {
     nearest(h, re, |_, radius| radius)
 }
 
-/// Bound 1 with the radius of each row `improved`, at its best.
+/// The smallest radius by bound 1 over all rows, after `improved` was applied to the radius of each
+/// row.
 fn nearest(
     h: &QuasiPolynomial,
     re: (f64, f64),
@@ -107,8 +124,8 @@ fn nearest(
     best
 }
 
-/// Bound 2: a radius at most `known`, one of bound 1, beyond which the first row exceeds the others
-/// where Re s ≥ `sigma`, and its leading term the rest of it.
+/// Bound 2: a radius, at most the radius `known` from bound 1, beyond which the first row exceeds
+/// the others where Re s ≥ `sigma` and its leading term exceeds the rest of the row.
 fn along_the_chains(h: &QuasiPolynomial, sigma: f64, known: f64) -> f64 {
     let degree = h.degree();
     let Some((first, own_delay)) = h.terms().next() else {
@@ -164,10 +181,10 @@ fn along_the_chains(h: &QuasiPolynomial, sigma: f64, known: f64) -> f64 {
     };
     let mut high = known;
     let mut ratio = 2.0;
-    for _ in 0..40 {
+    for _ in 0..MAX_ROUNDS {
         if holds(high / ratio) {
             high /= ratio;
-        } else if ratio < 1.05 {
+        } else if ratio < LEAST_RATIO {
             break;
         } else {
             ratio = ratio.sqrt();
@@ -190,7 +207,7 @@ pub(crate) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
     let own_degree = first.len().saturating_sub(1) as f64;
     let own = first.last().copied().unwrap_or(0.0).abs();
     let others: Vec<(&[f64], f64)> = terms.map(|(row, tau)| (row, tau - own_delay)).collect();
-    // From here on every summand below falls with x.
+    // For x from here on, every summand below decreases with x.
     let falling = others
         .iter()
         .map(|(row, gap)| ((row.len() as f64 - 1.0 - own_degree) / gap).max(0.0))
@@ -201,8 +218,9 @@ pub(crate) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
         let powers = own_degree * log(x);
         let summand = |k: usize, c: f64, gap: f64| {
             let (grown, decay) = (k as f64 * log(modulus), gap * x);
-            // Each part is within 1e-14 of 1 + itself, however much of them cancels.
-            let room = 1e-14 * (1.0 + k as f64 + own_degree + grown.abs() + powers.abs() + decay);
+            // Each part is known to 1e-14 of 1 plus its size, even when the parts cancel.
+            let room = LOGARITHM_ROUNDING
+                * (1.0 + k as f64 + own_degree + grown.abs() + powers.abs() + decay);
             c.abs() * exp_above(grown - powers - decay + room)
         };
         let lower = first.iter().rev().skip(1).rev().enumerate();
@@ -214,12 +232,12 @@ pub(crate) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
         }
         sum * (1.0 + MARGIN) < own
     };
-    // A little beyond, for the rounding of the quotient.
-    let mut x = (falling * (1.0 + MARGIN)).max(1e-6);
-    while !holds(x) && x < 1e150 {
+    // A small margin covers the rounding of the quotient.
+    let mut x = (falling * (1.0 + MARGIN)).max(NEAREST_EDGE);
+    while !holds(x) && x < FARTHEST_EDGE {
         x *= 2.0;
     }
-    if x < 1e150 { x } else { f64::INFINITY }
+    if x < FARTHEST_EDGE { x } else { f64::INFINITY }
 }
 
 /// Bound 3 on the other side: no root with |Im s| ≤ `height` has a real part of this or less.

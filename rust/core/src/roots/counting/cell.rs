@@ -1,8 +1,8 @@
 //! Rectangles with a proved number of roots, and their division.
 //!
-//! A cell carries how far arg h turns along each of its edges, so that a cut costs only the new
-//! line and one part of the two edges it meets. Coefficients are real, hence h(s̄) = h(s)‾: a
-//! rectangle that is symmetric about the real axis is kept as its upper half, whose edge on the
+//! A cell stores the change of arg h along each of its edges. A cut then costs only the new line
+//! and one part of each of the two edges that it meets. Coefficients are real, hence h(s̄) = h(s)‾:
+//! a rectangle that is symmetric about the real axis is kept as its upper half, whose edge on the
 //! axis contributes nothing to the winding number of the whole.
 
 use std::f64::consts::{PI, TAU};
@@ -12,10 +12,14 @@ use num_complex::Complex64;
 use super::turn::{Turn, Walk};
 use crate::Error;
 
-/// Shares of a side at which a cut is tried, the next one where a root is in the way.
+/// Positions of a cut, as shares of a side, in the order in which they are tried. The next one is
+/// taken where a root lies on the cut.
 const CUTS: [f64; 9] = [
     0.4871, 0.5417, 0.4393, 0.5823, 0.3911, 0.6307, 0.3301, 0.6907, 0.2703,
 ];
+
+/// Distance stated in the error where the count is not decided, as a share of the width.
+const UNDECIDED_SHARE: f64 = 1e-3;
 
 /// A rectangle and the number of roots in it.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +27,7 @@ pub(crate) struct Cell {
     pub(crate) re: (f64, f64),
     /// For a symmetric cell the upper half, (0, height).
     pub(crate) im: (f64, f64),
-    /// Does the cell stand for itself and its mirror image together?
+    /// Does the cell represent itself together with its mirror image?
     pub(crate) symmetric: bool,
     /// Roots in the rectangle; in both halves of a symmetric one.
     pub(crate) count: u64,
@@ -32,7 +36,7 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// Walk around a rectangle.
+    /// Count the roots of a rectangle by following arg h around it.
     ///
     /// # Errors
     /// Those of [`Walk::walk`].
@@ -64,7 +68,7 @@ impl Cell {
         let unit = if symmetric { PI } else { TAU };
         let count = around.revolutions(unit).ok_or(Error::Contour {
             place: Complex64::new(re.1, im.1),
-            distance: 1e-3 * (re.1 - re.0),
+            distance: UNDECIDED_SHARE * (re.1 - re.0),
         })?;
         Ok(Self {
             re,
@@ -90,16 +94,16 @@ impl Cell {
         re.0 <= s.re && s.re <= re.1 && s.im <= im.1 && (s.im >= im.0 || self.symmetric)
     }
 
-    /// Cut across the longer side.
+    /// Cut the cell across its longer side.
     ///
     /// # Errors
-    /// Those of [`Walk::walk`]; [`Error::Contour`] when every cut meets a root.
+    /// Those of [`Walk::walk`]; [`Error::Contour`] when a root lies on every cut that was tried.
     pub(crate) fn halves(&self, walker: &mut impl Walk) -> Result<(Self, Self), Error> {
         let level = self.height() > self.width();
         self.first_cut(walker, CUTS.into_iter(), level)
     }
 
-    /// Cut off the lowest `share` of the height, or a little more or less.
+    /// Cut off about the lowest `share` of the height.
     ///
     /// # Errors
     /// As [`Cell::halves`].

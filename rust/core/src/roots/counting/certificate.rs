@@ -1,13 +1,13 @@
-//! Proved counts together with what someone else needs to check them.
+//! Proved counts together with everything that an independent checker needs.
 //!
 //! A contour is divided into segments. For each, g = h e^(s τ_c) is enclosed at the middle m,
 //! |g(m) − v| ≤ e, and its slope in the disc about m that reaches to both ends: |g′| ≤ D. Where
-//! e + D r < |v|, r the radius of the disc, g keeps to a disc without 0 along the segment. Whoever
-//! confirms e and D for every segment knows how arg g turns from middle to middle, by less than a
-//! half turn each time, and by −τ_c Im s how arg h turns: the winding number.
-//! D is |g′(m)| + e′ + B r with B the bound of `curvature_around` on |g″|, and a trifle of |v|/r more,
-//! so that a checker that works to so many digits of v can confirm it where g is almost constant. Next to
-//! several roots D is the bound of `taylor`.
+//! e + D r < |v|, r the radius of the disc, g stays in a disc that does not contain 0 along the
+//! segment. A checker that confirms e and D for every segment knows the change of arg g from middle
+//! to middle, which is less than half a turn each time, and with −τ_c Im s the change of arg h: the
+//! winding number. D is |g′(m)| + e′ + B r with B the bound of `curvature_around` on |g″|, plus a
+//! small share of |v|/r, so that a checker with a limited number of digits can confirm D where g is
+//! almost constant. Next to several roots D is the bound of `taylor_bound`.
 //!
 //! The segments are longer or shorter than the steps of `winding`, which proves the same number
 //! from both ends of each step; that number stands in the certificate.
@@ -28,14 +28,19 @@ use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::region::Region;
 use crate::{Error, Task};
 
-/// Share of |v| that error and slope together may take.
+/// Largest share of |v| that the error and the slope together may take. A larger share gives longer
+/// segments and leaves less room for the checker's rounding errors.
 const SHARE: f64 = 0.95;
 
 /// Covers the rounding of the sum that bounds the slope.
 const MARGIN: f64 = 1e-12;
 
-/// More than anyone wants to file.
+/// Upper limit on the number of segments (bounds the size of the certificate).
 const MAX_SEGMENTS: usize = 1_000_000;
+
+/// Length of the next segment tried, in lengths over which g is proved to stay away from 0; it
+/// shrinks to a quarter at most and grows by half at most.
+const STRETCH: f64 = 1.9;
 
 /// The closed path around a rectangle, anticlockwise.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,16 +70,17 @@ pub struct Certificate {
     pub count: u64,
     /// The power of two that h is multiplied by.
     pub scale: i32,
-    /// The common power of s, exact roots at 0.
+    /// The common power of s, which stands for exact roots at 0.
     pub zeros: u32,
-    /// Row and radius: where |s| is at least that, in the strip of the region, the leading term
-    /// of the row exceeds all others together. Given where the imaginary part is open.
+    /// Row and radius: where |s| is at least the radius, in the strip of the region, the leading
+    /// term of the row exceeds all the others together. Given where the imaginary part is open.
     pub beyond: Option<(usize, f64)>,
     /// The (mirrored) region with its open sides closed; a range that does not increase is empty.
     pub closed: Region,
     /// Paths around its parts.
     pub contours: Vec<Contour>,
-    /// The real axis, where it is an edge: in order, without roots or with g monotone.
+    /// The real axis where it is an edge: its parts in order, each without roots or with a monotone
+    /// g.
     pub real: Vec<RealPart>,
 }
 
@@ -192,13 +198,14 @@ fn line(
                 here = end;
                 span = 4.0 * radius;
             }
-            Err(reach) => span = (1.9 * reach).max(0.25 * radius).min(1.5 * radius),
+            Err(reach) => span = (STRETCH * reach).max(0.25 * radius).min(1.5 * radius),
         }
     }
     Ok(())
 }
 
-/// The segment with these ends if it can be proved, else how far g keeps its sense for sure.
+/// The segment with these ends if it can be proved. Otherwise the length over which g is proved to
+/// stay away from 0.
 fn segment(
     walker: &mut Walker<'_>,
     start: Complex64,

@@ -5,18 +5,19 @@
 //! so that the terms of the group with the power sᵏ are e^(−sτ) times
 //!     Σ_{i<m} sᵏ⁺ⁱ Σ_j b_jk (−δ_j)ⁱ/i! + ϑ,  |ϑ| ≤ |s|ᵏ⁺ᵐ Σ_j |b_jk| δ_jᵐ/m! · max(1, e^(−σδ_j)).
 //! Sums over j replace the sums of moduli of bound 1 (`bounds`): coefficients of the size 1/δ whose
-//! differences cancel do not make the radius as large as 1/δ. With k + m ≤ n the bound stays one on
-//! powers up to the degree n, and of the terms with sⁿ themselves it takes the moduli.
+//! differences cancel do not make the radius as large as 1/δ. With k + m ≤ n the bound involves no
+//! power above the degree n; for the terms with sⁿ themselves it uses the moduli.
 
 use super::cauchy::{MARGIN, cauchy_radius};
 use crate::elementary::exp_above;
 use crate::quasipoly::QuasiPolynomial;
 
-/// Delays are almost equal where their distance is below this share of the longest one.
+/// Two delays are almost equal when their distance is below this share of the longest one. A larger
+/// share treats more delays as a group, for which the Taylor remainder is larger.
 const CLOSE: f64 = 0.05;
 
-/// A radius beyond which the leading term of the first row exceeds all others together where Re s ≥ `sigma`;
-/// infinite where no delays are close, or the bound fails.
+/// A radius beyond which the leading term of the first row exceeds all the others together where Re
+/// s ≥ `sigma`. Infinite where no delays are close or the bound fails.
 pub(crate) fn radius_by_groups(h: &QuasiPolynomial, sigma: f64) -> f64 {
     let delays = h.delays();
     let (Some(first), Some(last)) = (delays.first(), delays.last()) else {
@@ -30,8 +31,8 @@ pub(crate) fn radius_by_groups(h: &QuasiPolynomial, sigma: f64) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The radius where delays not more than `gap` apart make a group, Taylor polynomials ending `below` the
-/// degree.
+/// The radius when delays at most `gap` apart form a group and the Taylor polynomials end `below`
+/// the degree.
 fn bound(h: &QuasiPolynomial, sigma: f64, gap: f64, below: usize) -> f64 {
     let degree = h.degree();
     let terms: Vec<(&[f64], f64)> = h.terms().collect();
@@ -71,7 +72,7 @@ fn bound(h: &QuasiPolynomial, sigma: f64, gap: f64, below: usize) -> f64 {
             *total += weight * (sum.abs() + off);
         }
     }
-    // Neither overflow nor 0 · ∞ proves anything.
+    // A sum that overflowed, or 0 · ∞, proves nothing.
     if !sums.iter().all(|sum| sum.is_finite()) {
         return f64::INFINITY;
     }

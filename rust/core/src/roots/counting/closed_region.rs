@@ -7,23 +7,29 @@ use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::chains::chain_abscissa;
 use crate::roots::region::Region;
 
-/// A region with its open sides closed by proved bounds, in the upper half plane as far as
+/// Factor on a proved radius that keeps roots off the edge itself.
+pub(crate) const EDGE_MARGIN: f64 = 1.01;
+
+/// Least radius, for functions with all roots at 0.
+pub(crate) const LEAST_RADIUS: f64 = 1e-100;
+
+/// A region whose open sides are closed by proved bounds, reduced to the upper half plane as far as
 /// symmetry allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Closed {
     pub(crate) re: (f64, f64),
-    /// Height of the part that is symmetric about the real axis, if any.
+    /// Height of the part that is symmetric about the real axis, if there is one.
     pub(crate) symmetric: Option<f64>,
-    /// Imaginary parts of what lies above it, if anything.
+    /// Imaginary parts of the part above it, if there is one.
     pub(crate) above: Option<(f64, f64)>,
-    /// Is the lower edge the real axis? Roots below it do not belong to the region then.
+    /// Is the lower edge the real axis? Roots below it then do not belong to the region.
     pub(crate) half: bool,
-    /// Was the region mirrored at the real axis to bring it here?
+    /// Was the region mirrored at the real axis?
     pub(crate) mirrored: bool,
 }
 
 impl Closed {
-    /// The ranges in parts; `None` when they are empty.
+    /// Split the ranges into parts; `None` when they are empty.
     pub(crate) fn of(re: (f64, f64), im: (f64, f64), mirrored: bool) -> Option<Self> {
         if re.0 >= re.1 || im.0 >= im.1 {
             return None;
@@ -43,8 +49,8 @@ impl Closed {
     }
 }
 
-/// `region`, mirrored where it lies more below the real axis than above, with its open sides
-/// closed; it may turn out empty.
+/// Close the open sides of `region`, after mirroring it at the real axis if most of it lies below.
+/// The result may be empty.
 ///
 /// # Errors
 /// [`Error::Argument`] for a region that cannot be shown to hold finitely many roots.
@@ -62,14 +68,14 @@ pub(crate) fn closed_sides(
         let radius = bound(h, re)
             .map(|d| d.radius)
             .ok_or_else(|| endless(h, re))?;
-        // A little beyond, so that the edge itself is clear.
-        let radius = 1.01 * radius.max(1e-100);
+        // A margin keeps roots off the edge itself.
+        let radius = EDGE_MARGIN * radius.max(LEAST_RADIUS);
         im = (im.0.max(-radius), im.1.min(radius));
         re = (re.0.max(-radius), re.1.min(radius));
     }
     let height = im.0.abs().max(im.1.abs());
     if re.1.is_infinite() || region.re.1.is_infinite() {
-        // Mostly closer than the radius, which chains far up may make large.
+        // Usually closer than the radius, which chains at large |Im s| may make large.
         re.1 = re.1.min(bounds::right_edge(h, height));
     }
     if re.0.is_infinite() {
@@ -89,7 +95,7 @@ fn is_low(region: &Region) -> bool {
     region.im.1 + region.im.0 < 0.0
 }
 
-/// Close the open sides of `region`; `None` when it is empty of roots for sure.
+/// Close the open sides of `region`; `None` when it is proved to hold no roots.
 ///
 /// # Errors
 /// As [`closed_sides`].

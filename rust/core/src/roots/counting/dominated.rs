@@ -1,33 +1,42 @@
-//! Down a vertical line in long steps, as long as one row exceeds all others together.
+//! The change of arg h down a vertical line, in long steps while one row exceeds all the others
+//! together.
 //!
-//! Where |p_c| > Σ_{j≠c} |p_j| e^(−x d_j), g = h e^(s τ_c) = p_c (1 + ζ) with |ζ| < 1: arg g follows
-//! arg p_c, up to the principal argument of g/p_c at the two ends. The exponentials do not turn
-//! in this condition, only polynomials change, so that steps grow with the height and not with
-//! 2π/d. From s down to s − i t, with v = p(s), w = p′(s) and C = P″(|s|), P having the moduli of
-//! the coefficients,
+//! Where |p_c| > Σ_{j≠c} |p_j| e^(−x d_j), g = h e^(s τ_c) = p_c (1 + ζ) with |ζ| < 1: arg g
+//! follows arg p_c, up to the principal argument of g/p_c at the two ends. The arguments of the
+//! exponentials do not enter this condition, only their moduli and the polynomials. The steps
+//! therefore grow with the height and are not limited by 2π/d. From s down to s − i t, with v =
+//! p(s), w = p′(s) and C = P″(|s|), P having the moduli of the coefficients,
 //!     |p| ≥ |v| − t Re(i w v̄)/|v| − C t²/2   and   |p| ≤ |v| − t Re(i w v̄)/|v| + (|w|²/|v| + C) t²/2,
 //! so the condition holds while a quadratic A + B t − K t² is positive; and while
-//! |w| t + C t²/2 < |v|, p_c keeps its half plane.
+//! |w| t + C t²/2 < |v|, p_c stays in one half plane.
 
 use num_complex::Complex64;
 
 use super::turn::Turn;
-use super::winding::{STEP_ERROR, Walker, is_clear};
+use super::winding::{STEP_ERROR, Walker, angle_error, is_clear};
 use crate::elementary::{angle, exp_above};
 use crate::quasipoly::modulus;
 
-/// Share of what the bounds allow.
+/// Share of the proved step length that is used; the rest covers rounding errors.
 const SHARE: f64 = 0.9;
 
-/// A step shorter than this many radians of the fastest exponential is not worth its while.
+/// Shortest step, in radians of the fastest exponential, for which this method costs less than the
+/// steps of `winding`.
 const WORTH: f64 = 6.0;
 
-/// Rounding of a polynomial, relative to its moduli and for each coefficient.
+/// Rounding error of a polynomial, relative to the sum of its moduli and for each coefficient.
 const ROUNDING: f64 = 1e-14;
 
 const MAX_STEPS: usize = 100_000;
 
-/// A polynomial at a point: value, slope, and the same with moduli, up to the second derivative.
+/// A row whose value is below this share of its slope times the height is bounded by its slope.
+const SMALL_VALUE: f64 = 0.1;
+
+/// Covers the rounding errors of weights and of sums of moduli.
+const ENLARGED: f64 = 1.0 + 1e-9;
+
+/// A polynomial at a point: value, slope, and the same sums with moduli, up to the second
+/// derivative.
 struct Row {
     value: Complex64,
     slope: Complex64,
@@ -54,18 +63,19 @@ impl Row {
             slope,
             rounding: rounding * p,
             slope_rounding: 2.0 * rounding * dp,
-            bend: 2.0 * ddp * (1.0 + 1e-9),
+            bend: 2.0 * ddp * ENLARGED,
         }
     }
 
-    /// Change of the modulus with the way down.
+    /// Derivative of the modulus in the downward direction.
     fn lean(&self) -> f64 {
         -(Complex64::I * self.slope * self.value.conj()).re / modulus(self.value)
     }
 }
 
-/// From `from`, Im > 0, as far down as row `leader` is proved to dominate in steps worth taking:
-/// the place reached and how far arg h turned on the way. No way at all is a way.
+/// From `from`, Im > 0, go down as long as row `leader` is proved to dominate in steps of
+/// sufficient length. Returns the point reached and the change of arg h on the way; the point may
+/// be `from` itself.
 pub(crate) fn descend(
     walker: &mut Walker<'_>,
     leader: usize,
@@ -79,8 +89,9 @@ pub(crate) fn descend(
     let weights: Vec<f64> = h
         .delays()
         .iter()
-        .map(|delay| exp_above(-(delay - own_delay) * from.re) * (1.0 + 1e-9))
-        // A weight lost in underflow is not none.
+        .map(|delay| exp_above(-(delay - own_delay) * from.re) * ENLARGED)
+        // A weight that underflows to zero is replaced by a positive number, because the term is
+        // not zero.
         .map(|weight| weight.max(f64::MIN_POSITIVE))
         .collect();
     let span = h
@@ -105,12 +116,12 @@ pub(crate) fn descend(
             slack += STEP_ERROR + f64::EPSILON * turned.abs();
         } else {
             first = Some(own.value);
-            slack += 1.58 * own.rounding / size;
+            slack += angle_error(own.rounding, size);
         }
         last = own.value;
         let step = step(&rows, leader, &weights, here.im).min(here.im);
         if step * span < WORTH {
-            slack += 1.58 * own.rounding / size;
+            slack += angle_error(own.rounding, size);
             break;
         }
         here.im -= step;
@@ -129,14 +140,15 @@ pub(crate) fn descend(
     };
     turned += excess(bottom.value, last) - excess(top.value, first);
     turned -= own_delay * (here.im - from.im);
-    slack += 1.58 * top.value_error / modulus(top.value)
-        + 1.58 * bottom.value_error / modulus(bottom.value)
+    slack += angle_error(top.value_error, modulus(top.value))
+        + angle_error(bottom.value_error, modulus(bottom.value))
         + STEP_ERROR * (4.0 + own_delay * (from.im + here.im));
     let angle = turned;
     (here, Turn { angle, slack })
 }
 
-/// How far down the leader dominates and keeps its half plane; NaN or 0 where nothing is proved.
+/// How far down the leader is proved to dominate and to stay in one half plane; NaN or 0 where
+/// nothing is proved.
 fn step(rows: &[Row], leader: usize, weights: &[f64], height: f64) -> f64 {
     let (mut a, mut b, mut k) = (0.0, 0.0, 0.0);
     let mut half_plane = 0.0;
@@ -153,7 +165,7 @@ fn step(rows: &[Row], leader: usize, weights: &[f64], height: f64) -> f64 {
         } else {
             a -= weight * (size + row.rounding);
             k += 0.5 * weight * row.bend;
-            if size > 0.1 * slope * height {
+            if size > SMALL_VALUE * slope * height {
                 b -= weight * (row.lean() + row.slope_rounding);
                 k += 0.5 * weight * slope * slope / size;
             } else {
@@ -181,7 +193,7 @@ mod tests {
     use crate::quasipoly::QuasiPolynomial;
     use crate::{Error, Task};
 
-    /// Both ways down give the same angle; the long steps get further with less.
+    /// Both methods give the same angle, and the long steps need fewer evaluations.
     fn compare(rows: &[&[f64]], delays: &[f64], from: Complex64) -> Result<f64, Error> {
         let rows = rows.iter().map(|row| row.to_vec()).collect();
         let h = QuasiPolynomial::new(rows, delays.to_vec())?;

@@ -1,11 +1,12 @@
-//! Delays that are whole multiples of one base: what their chains of roots do as long as that is exact.
+//! Chains of roots when the delays are exact multiples of one base.
 //!
-//! The difference part D(s) = Σ b_j e^(−s d_j) is then periodic along vertical lines, a polynomial in
-//! e^(−s base). If D does not wind about 0 over a period of Re s = σ, it has no zeros right of the line, and
-//! |1/D| takes its maximum over that half plane on the line (maximum principle), where samples and a
-//! Lipschitz constant bound it. |D| ≥ δ then gives a radius beyond which δ |s|ⁿ exceeds all lower powers:
-//! right of the line no root lies beyond it, and a rectangle remains to be counted. Rationally independent
-//! delays have no such base, and nearby values of the same delays need not: `neutral` has the bound for both.
+//! The difference part D(s) = Σ b_j e^(−s d_j) is then periodic along vertical lines, a polynomial
+//! in e^(−s base). If D does not wind about 0 over a period of Re s = σ, it has no zeros right of
+//! the line, and |1/D| takes its maximum over that half plane on the line (maximum principle),
+//! where samples and a Lipschitz constant bound it. |D| ≥ δ then gives a radius beyond which δ |s|ⁿ
+//! exceeds all lower powers: right of the line no root lies beyond that radius, and only the roots
+//! of a rectangle have to be counted. Rationally independent delays have no such base, and delays
+//! close to the given ones need not have one; `chains::abscissa` has the bound for both.
 
 use std::f64::consts::PI;
 
@@ -14,17 +15,27 @@ use num_complex::Complex64;
 use super::bounds::right_edge;
 use super::cauchy::cauchy_radius;
 use super::cell::Cell;
+use super::closed_region::{EDGE_MARGIN, LEAST_RADIUS};
 use super::winding::Walker;
 use crate::elementary::exp_above;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
 use crate::roots::chains::{base_delay, chain_abscissa, difference_part};
 use crate::{Error, Task};
 
-/// Most samples of a period.
+/// Upper limit on the samples of a period (bounds the time).
 const MAX_SAMPLES: u32 = 1 << 20;
 
-/// Halvings of the interval that holds the abscissa of the chains.
+/// Upper limit on the bisections of the interval that holds the abscissa of the chains.
 const HALVINGS: u32 = 200;
+
+/// Largest distance to a sample in steps, with the rounding error of the places.
+const SAMPLE_SPACING: f64 = 0.51;
+
+/// Samples of the first attempt; each further one has four times as many.
+const FIRST_SAMPLES: u32 = 256;
+
+/// Covers the rounding errors of weights.
+const ENLARGED: f64 = 1.0 + 1e-9;
 
 /// Is the difference part, of period 2π/`base`, proved to have no zero with Re s ≥ `sigma`?
 fn is_free(
@@ -42,11 +53,12 @@ fn is_free(
     }
 }
 
-/// The real part that the chains of a neutral or difference equation come to as long as the delays are exact,
-/// to rounding; `None` where they have no common base.
+/// The supremum of the real parts of the chains of a neutral or difference equation whose delays
+/// are taken as exact, to rounding. `None` where the delays have no common base.
 ///
 /// # Errors
 /// [`Error::TooMuch`], [`Error::Interrupted`].
+///
 ///
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{chain_abscissa, exact_chain_abscissa}};
@@ -65,8 +77,8 @@ pub fn exact_chain_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<Option<f
     let Some(base) = base_delay(&difference) else {
         return Ok(None);
     };
-    // No zero right of C_D; the product of all |z| is that of the outer coefficients, so not all can be
-    // left of the mean: one of them is at or right of it.
+    // There is no zero right of C_D. The product of all |z| is given by the outer coefficients, so
+    // that at least one zero lies at or right of the mean.
     let mut high = chain_abscissa(h);
     let sizes = difference.coefficients().iter().flatten().map(|c| c.abs());
     let (first, last) = sizes.fold((None, 0.0), |(first, _), c| (first.or(Some(c)), c));
@@ -88,8 +100,8 @@ pub fn exact_chain_abscissa(h: &QuasiPolynomial, task: &Task) -> Result<Option<f
     Ok(Some(high))
 }
 
-/// Above this modulus there is no root with Re s ≥ `sigma`; `None` where the difference part has zeros
-/// there, or delays without a common base.
+/// No root with Re s ≥ `sigma` has a modulus above this number. `None` where the difference part
+/// has zeros there or the delays have no common base.
 pub(crate) fn height_by_period(
     h: &QuasiPolynomial,
     sigma: f64,
@@ -110,7 +122,7 @@ pub(crate) fn height_by_period(
         .sum();
     let half = PI / base;
     let mut walker = Walker::new(&difference, task);
-    let mut samples = 256;
+    let mut samples = FIRST_SAMPLES;
     while samples <= MAX_SAMPLES {
         task.check()?;
         let step = half / f64::from(samples);
@@ -122,7 +134,7 @@ pub(crate) fn height_by_period(
                 modulus(jet.value) - jet.value_error
             })
             .fold(f64::INFINITY, f64::min);
-        let bound = least - 0.51 * step * lipschitz;
+        let bound = least - SAMPLE_SPACING * step * lipschitz;
         if bound > 0.5 * least {
             return Ok(height(h, sigma, bound));
         }
@@ -137,7 +149,7 @@ fn height(h: &QuasiPolynomial, sigma: f64, bound: f64) -> Option<f64> {
     let mut lower = vec![0.0; h.degree()];
     for (row, delay) in h.terms() {
         // Right of the line each exponential is at most that on it.
-        let weight = exp_above(-(delay - first) * sigma) * (1.0 + 1e-9);
+        let weight = exp_above(-(delay - first) * sigma) * ENLARGED;
         for (sum, c) in lower.iter_mut().zip(row) {
             *sum += weight * c.abs();
         }
@@ -146,7 +158,8 @@ fn height(h: &QuasiPolynomial, sigma: f64, bound: f64) -> Option<f64> {
     radius.is_finite().then_some(radius)
 }
 
-/// The rectangle, in the upper half plane, that holds all roots right of Re s = `sigma`, counted.
+/// The rectangle in the upper half plane that holds all roots right of Re s = `sigma`, with their
+/// number.
 pub(crate) fn cell_right_of(
     walker: &mut Walker<'_>,
     sigma: f64,
@@ -156,8 +169,8 @@ pub(crate) fn cell_right_of(
     let Some(height) = height_by_period(h, sigma, task)? else {
         return Ok(None);
     };
-    // A little beyond, so that the edge itself is clear; at least something to walk along.
-    let height = 1.01 * height.max(1e-100);
+    // A margin keeps roots off the edge itself; the height is positive even if all roots are at 0.
+    let height = EDGE_MARGIN * height.max(LEAST_RADIUS);
     let right = right_edge(h, height).max(sigma + height);
     Cell::new(walker, (sigma, right), (0.0, height), true).map(Some)
 }

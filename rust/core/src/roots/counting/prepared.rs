@@ -1,4 +1,5 @@
-//! A function made ready for counting: exact roots at 0 taken out, coefficients scaled.
+//! A function prepared for counting: exact roots at 0 are taken out and the coefficients are
+//! scaled.
 
 use num_complex::Complex64;
 
@@ -6,10 +7,11 @@ use crate::Error;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::region::Region;
 
-/// Coefficients are not scaled down to less than two to this power.
+/// The power of two to which coefficients may be scaled down at most, so that the smallest one does
+/// not underflow.
 const LOWEST_EXPONENT: i32 = -1000;
 
-/// A function made ready: h(s) = factor · sᵏ · `rest`(s) with k = `zeros`.
+/// A prepared function: h(s) = factor · sᵏ · `rest`(s) with k = `zeros`.
 ///
 /// Common powers of s are exact roots at 0 and are taken out. Coefficients are scaled by a power
 /// of two, to a largest one between 1 and 2 unless that would make the smallest one underflow.
@@ -43,7 +45,7 @@ impl Prepared {
         }
         // Exponents and powers of two are exact.
         let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
-        // In two steps: 2^1074 itself overflows.
+        // The factor is applied in two steps, because 2^1074 itself overflows.
         let half = shift / 2;
         let (first, second) = (libm::ldexp(1.0, half), libm::ldexp(1.0, shift - half));
         let lowest = |row: &Vec<f64>| row.iter().take_while(|c| **c == 0.0).count();
@@ -65,7 +67,7 @@ impl Prepared {
         })
     }
 
-    /// Exact roots at 0 in the region.
+    /// Number of exact roots at 0 in the region.
     ///
     /// # Errors
     /// [`Error::Contour`] where 0 lies on an edge other than one on the real axis.

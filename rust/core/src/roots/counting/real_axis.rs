@@ -2,9 +2,9 @@
 //!
 //! On an interval of midpoint m and half-length r, Taylor's formula bounds g from below where it
 //! has no root, and g′ where it has at most one; the signs at the ends then decide. Otherwise the
-//! interval is divided. A double root, or two roots closer than two words can tell, cannot
-//! be decided this way and are reported as a root on the contour. Rounding: SHARE leaves a
-//! thousandth of every value, where moduli, products and sums lose 12 u.
+//! interval is divided. A double root, or two roots that double-double arithmetic cannot separate,
+//! cannot be decided this way and are reported as a root on the contour. Rounding: SHARE leaves a
+//! thousandth of every value; moduli, products and sums have errors of 12 u.
 
 use num_complex::Complex64;
 
@@ -14,7 +14,17 @@ use super::winding::{Walker, is_clear, is_finite};
 use crate::Error;
 use crate::quasipoly::{Jet, modulus};
 
-/// A part of the real axis about which all is known.
+/// Positions of a cut, as shares of an interval, in the order in which they are tried.
+const CUTS: [f64; 7] = [0.4871, 0.5417, 0.4393, 0.6307, 0.3301, 0.75, 0.25];
+
+/// Covers the rounding errors of the bound on the slope.
+const ENLARGED: f64 = 1.0 + 1e-12;
+
+/// Largest share of a value, or of a slope, that its change over the interval may take. The rest
+/// covers rounding errors.
+const SHARE: f64 = 0.999;
+
+/// A part of the real axis with a proved number of roots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RealPart {
     /// No root.
@@ -38,13 +48,11 @@ pub enum RealPart {
     },
 }
 
-/// Share of a value or slope that what it may change by can take.
-const SHARE: f64 = 0.999;
-
-/// Roots of h on the real interval `re`, at whose ends h is known not to be zero; `visit` gets the
-/// parts in ascending order. `curved` is the share of the bound on |g″| r that counts as slope: a
-/// half by Taylor's formula; all of it where the parts are to state the slope in their disc. After `limit` evaluations the interval is
-/// given up: next to a multiple root there is no end of parts.
+/// The number of roots of h on the real interval `re`, at whose ends h is known not to be zero.
+/// `visit` receives the parts in ascending order. `curved` is the share of the bound on |g″| r that
+/// is added to the slope: one half by Taylor's formula, all of it where the parts have to state a
+/// bound on the slope in their disc. The survey gives up after `limit` evaluations, because next to
+/// a multiple root the division does not end.
 pub(crate) fn survey_real(
     walker: &mut Walker<'_>,
     re: (f64, f64),
@@ -64,7 +72,7 @@ pub(crate) fn survey_real(
                 distance: high - low,
             });
         }
-        // The middle is rounded, so the halves differ.
+        // The middle is rounded, so that the halves differ in length.
         let r = (high - middle.re).max(middle.re - low);
         let jet = referred_jet(walker, middle.re);
         let reference = walker.probe.reference();
@@ -72,9 +80,9 @@ pub(crate) fn survey_real(
         let slope = modulus(jet.slope);
         let trifle = TRIFLE * modulus(jet.value) / r;
         let flat = slope + jet.slope_error;
-        let mut steepest = (flat + curved * bend * r) * (1.0 + 1e-12) + trifle;
+        let mut steepest = (flat + curved * bend * r) * ENLARGED + trifle;
         let room = SHARE * modulus(jet.value) - jet.value_error;
-        // Without parts to state, other means end the survey sooner.
+        // Where no parts have to be stated, the tests below end the survey with less work.
         let cluster_suspected =
             curved == 1.0 && bend * r > flat / CLUSTER_SUSPECTED && is_clear(&jet);
         if cluster_suspected && steepest * r >= room {
@@ -118,7 +126,7 @@ pub(crate) fn survey_real(
     Ok(total)
 }
 
-/// The jet at `x`, relative to a term that is not much smaller than another.
+/// The jet at `x`, relative to a term that no other term exceeds by much.
 fn referred_jet(walker: &mut Walker<'_>, x: f64) -> Jet {
     let s = Complex64::new(x, 0.0);
     let jet = walker.jet(s);
@@ -132,20 +140,18 @@ fn referred_jet(walker: &mut Walker<'_>, x: f64) -> Jet {
     walker.jet(s)
 }
 
-/// Is h positive at `x`? `None` where rounding hides it.
+/// Is h positive at `x`? `None` where rounding errors hide the sign.
 fn sign(walker: &mut Walker<'_>, x: f64) -> Option<bool> {
-    // e^(x τ) is positive: the sign of g is that of h, whatever the reference.
+    // e^(x τ) is positive, so that g has the sign of h for every reference.
     let jet = referred_jet(walker, x);
     is_clear(&jet).then_some(jet.value.re > 0.0)
 }
 
-/// A place between and the sign there.
+/// A point between the ends at which the sign is known, with that sign.
 fn place_to_cut(walker: &mut Walker<'_>, low: f64, high: f64) -> Option<(f64, Option<bool>)> {
-    [0.4871, 0.5417, 0.4393, 0.6307, 0.3301, 0.75, 0.25]
-        .into_iter()
-        .find_map(|share| {
-            let cut = low + share * (high - low);
-            let positive = (low < cut && cut < high).then(|| sign(walker, cut))?;
-            positive.map(|_| (cut, positive))
-        })
+    CUTS.into_iter().find_map(|share| {
+        let cut = low + share * (high - low);
+        let positive = (low < cut && cut < high).then(|| sign(walker, cut))?;
+        positive.map(|_| (cut, positive))
+    })
 }

@@ -2,10 +2,12 @@
 
 use num_complex::Complex64;
 
-/// What a checker's digits must be good for, relative to the value.
+/// Share of |v|/r added to the bound on the slope. A checker must compute values to this relative
+/// accuracy.
 pub(crate) const TRIFLE: f64 = 1e-20;
 
-/// Several roots may be near where the bound on g″ allows less than this share of what the slope would.
+/// If the bound on g″ shortens a step to less than this share of what the slope alone would allow,
+/// several roots may be close, and the Taylor bound is tried.
 pub(crate) const CLUSTER_SUSPECTED: f64 = 0.02;
 
 /// A straight line on which g has no zero.

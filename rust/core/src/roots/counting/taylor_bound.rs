@@ -1,23 +1,31 @@
-//! Bounds by the Taylor polynomial of g, next to several roots.
+//! Bounds by the Taylor polynomial of g, for points next to several roots.
 //!
-//! There g″ is as small as a power of the distance to the roots, which no bound of moduli sees. With the
-//! Taylor coefficients a_k of g at m up to the n-th, in two words, their errors e_k, and the bound R of
-//! `remainder` on the next one in the disc of radius r about m (Taylor's formula for g and for g′):
+//! There g″ is as small as a power of the distance to the roots, but a bound by moduli does not
+//! become small. With the Taylor coefficients a_k of g at m up to the n-th, in double-double
+//! arithmetic, their errors e_k, and the bound R of `remainder` on the next one in the disc of
+//! radius r about m (Taylor's formula for g and for g′):
 //!     |g − g(m)| ≤ Σ_{1≤k≤n} (|a_k| + e_k) rᵏ + R rⁿ⁺¹,
 //!     |g′| ≤ Σ_{1≤k≤n} k (|a_k| + e_k) rᵏ⁻¹ + (n + 1) R rⁿ.
-//! The sums lose 4n u of themselves, u = 2⁻⁵³; MARGIN covers that.
+//! The sums have the relative error 4n u, u = 2⁻⁵³, which MARGIN covers.
 
 use num_complex::Complex64;
 
 use crate::quasipoly::{Probe, QuasiPolynomial, expansion, modulus, remainder};
 
-/// Order of the Taylor polynomial.
+/// Order of the Taylor polynomial. A higher order reaches further next to more roots and costs
+/// more.
 const ORDER: usize = 8;
 
 /// Covers the rounding of the sums.
 const MARGIN: f64 = 1e-12;
 
-/// The Taylor polynomial about a point, by moduli.
+/// Ratio of two radii that are tried.
+const SHRINKAGE: f64 = 0.7;
+
+/// Upper limit on the radii that are tried.
+const MAX_ROUNDS: usize = 60;
+
+/// Moduli of the Taylor coefficients about a point.
 pub(crate) struct TaylorBound<'a> {
     h: &'a QuasiPolynomial,
     reference: usize,
@@ -56,13 +64,14 @@ impl<'a> TaylorBound<'a> {
         sum * (1.0 + MARGIN)
     }
 
-    /// How far for sure, up to `most`, g moves by less than `share` of its value and that is known.
+    /// The distance, at most `most`, within which g is proved to change by less than `share` of its
+    /// value.
     pub(crate) fn reach(&self, share: f64, most: f64) -> f64 {
         let room = share * self.value - self.error;
         self.largest(room, most, |taylor, r| taylor.change(r))
     }
 
-    /// The same for the bound on |g′| times the radius.
+    /// The same with the bound on |g′| times the distance in place of the change.
     pub(crate) fn steady_reach(&self, share: f64, most: f64) -> f64 {
         let room = share * self.value - self.error;
         self.largest(room, most, |taylor, r| taylor.slope(r) * r)
@@ -74,17 +83,18 @@ impl<'a> TaylorBound<'a> {
         sum * r * (1.0 + MARGIN)
     }
 
-    /// Bound on the coefficient after the last one, within r.
+    /// Bound on the coefficient after the last one, within distance r.
     fn next(&self, r: f64) -> f64 {
         remainder(self.h, self.reference, self.place, r, ORDER + 1)
     }
 
-    /// A radius for which `bound` is below `room`, in steps from the first that the slope allows.
+    /// A radius for which `bound` is below `room`. The first radius tried is the one that the slope
+    /// alone allows.
     fn largest(&self, room: f64, most: f64, bound: impl Fn(&Self, f64) -> f64) -> f64 {
         let slope = self.sizes.first().copied().unwrap_or(f64::INFINITY);
         let first = (room / slope).min(most).max(0.0);
-        std::iter::successors(Some(first), |r| Some(0.7 * r))
-            .take(60)
+        std::iter::successors(Some(first), |r| Some(SHRINKAGE * r))
+            .take(MAX_ROUNDS)
             .find(|r| bound(self, *r) < room)
             .map_or(0.0, |r| r * (1.0 - MARGIN))
     }
@@ -119,7 +129,8 @@ mod tests {
                     let rim = place + Complex64::from_polar(radius, f64::from(k) * FRAC_PI_8);
                     steepest = steepest.max(modulus(probe.double_double_jet(rim).slope));
                 }
-                // Along the line away from the root it is attained, but for the rest of the terms.
+                // Along the line away from the root the bound is attained, except for the remaining
+                // terms.
                 assert!(steepest <= bound && bound < 1.2 * steepest);
             }
         }
@@ -134,7 +145,8 @@ mod tests {
             let mut probe = Probe::new(&h);
             probe.refer_to_dominant(place);
             let taylor = TaylorBound::new(&probe, place);
-            // (1 + x)³ − 1 = 0.95 and 3 x (1 + x)² = 0.95, found in steps of 0.7.
+            // (1 + x)³ − 1 = 0.95 and 3 x (1 + x)² = 0.95; the radii tried differ by factors of
+            // 0.7.
             let (far, steady) = (taylor.reach(0.95, 1.0), taylor.steady_reach(0.95, 1.0));
             assert!((0.17..0.25).contains(&(far / distance)));
             assert!((0.14..0.21).contains(&(steady / distance)));

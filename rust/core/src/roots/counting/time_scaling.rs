@@ -1,25 +1,25 @@
 //! A unit of time in which the numbers of an equation are moderate.
 //!
-//! With z = s T and T a power of two next to the span of the delays, or for a polynomial next to one over the
-//! size of its roots, h(s) = Σ c_jk T^−k zᵏ e^(−z τ_j/T). Powers of two lose nothing, so that the roots are the
-//! same to the last bit; but powers of s stay within the range of double precision. Equations in a
-//! reasonable unit are left alone.
+//! With z = s T and T a power of two next to the span of the delays, or for a polynomial next to
+//! one over the size of its roots, h(s) = Σ c_jk T^−k zᵏ e^(−z τ_j/T). Scaling by powers of two is
+//! exact, so that the roots keep every bit, and powers of s stay within the range of double
+//! precision. Equations in a reasonable unit are not scaled.
 
 use crate::Error;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
 
-/// Units that differ from the own one by less than two to this power are reasonable.
+/// No scaling is done if T differs from 1 by less than two to this power.
 const REASONABLE: i32 = 30;
 
-/// Quotients of coefficients further apart than two to this power would underflow.
+/// Ratios of coefficients beyond two to this power would underflow; such equations are not scaled.
 const WIDEST: i64 = 1000;
 
-/// Edges of regions that are of use in a unit of time.
+/// Range of edges of regions for which counting in a scaled unit makes sense.
 const MODERATE: std::ops::Range<f64> = 1e-60..1e60;
 
-/// An equation in its own unit of time.
+/// An equation in a scaled unit of time.
 #[derive(Debug, Clone)]
 pub(crate) struct TimeScaling {
     pub(crate) h: QuasiPolynomial,
@@ -28,7 +28,7 @@ pub(crate) struct TimeScaling {
 }
 
 impl TimeScaling {
-    /// `None` where the unit that h comes in is good enough, or no other is better.
+    /// The scaled equation; `None` where the given unit is good enough or no other one is better.
     pub(crate) fn of(h: &QuasiPolynomial) -> Option<Self> {
         let power = unit_of_time(h)?;
         if power.abs() <= REASONABLE {
@@ -62,7 +62,7 @@ impl TimeScaling {
         Some(Self { h, unit })
     }
 
-    /// As [`of`](Self::of), where the edges of `region` are moderate in that unit, too.
+    /// As [`of`](Self::of), if the edges of `region` are moderate in the scaled unit as well.
     pub(crate) fn within(h: &QuasiPolynomial, region: &Region) -> Option<Self> {
         let own = Self::of(h)?;
         let Region { re, im } = own.region(region);
@@ -71,12 +71,12 @@ impl TimeScaling {
         ends.into_iter().all(moderate).then_some(own)
     }
 
-    /// A real part or frequency in the own unit.
+    /// A real part or frequency in the scaled unit.
     pub(crate) fn scaled(&self, x: f64) -> f64 {
         x * self.unit
     }
 
-    /// A region in the own unit.
+    /// A region in the scaled unit.
     pub(crate) fn region(&self, region: &Region) -> Region {
         let range = |(low, high)| (self.scaled(low), self.scaled(high));
         Region {
@@ -85,7 +85,7 @@ impl TimeScaling {
         }
     }
 
-    /// Roots in the unit that h came in; `region` where they were sought, if it was given.
+    /// Roots in the given unit. `region` is where they were sought, if it was given.
     pub(crate) fn returned(&self, mut set: RootSet, region: Option<Region>) -> RootSet {
         for root in &mut set.roots {
             *root /= self.unit;
@@ -101,7 +101,7 @@ impl TimeScaling {
         set
     }
 
-    /// An error in the unit that h came in.
+    /// An error in the given unit.
     pub(crate) fn explained(&self, error: Error) -> Error {
         match error {
             Error::Contour { place, distance } => Error::Contour {
@@ -137,7 +137,7 @@ fn unit_of_time(h: &QuasiPolynomial) -> Option<i32> {
     if highest == lowest {
         return None;
     }
-    // The roots are of the size of this quotient to the power 1/(highest − lowest).
+    // The roots are of the order of this quotient to the power 1/(highest − lowest).
     let fall = libm::ilogb(*row.last()?) - libm::ilogb(*row.get(lowest)?);
     let powers = i32::try_from(highest - lowest).ok()?;
     Some(fall / powers)

@@ -12,7 +12,7 @@ pub(crate) struct Turn {
 }
 
 impl Turn {
-    /// The line walked backwards.
+    /// The same line in the opposite direction.
     pub(crate) fn reversed(self) -> Self {
         Self {
             angle: -self.angle,
@@ -20,7 +20,7 @@ impl Turn {
         }
     }
 
-    /// Both lines, one after the other.
+    /// This line followed by `next`.
     pub(crate) fn then(self, next: Self) -> Self {
         Self {
             angle: self.angle + next.angle,
@@ -28,13 +28,14 @@ impl Turn {
         }
     }
 
-    /// What is left of this line when `part` of it is taken away.
+    /// The rest of this line after `part` is removed.
     pub(crate) fn without(self, part: Self) -> Self {
         self.then(part.reversed())
     }
 
-    /// The whole number of `unit`s in a closed path; `None` where the slack leaves room for
-    /// another: the true one is within 1/4 + 1/4 of the sum (the sums of a few edges lose u each).
+    /// The number of `unit`s in a closed path; `None` where the slack allows more than one number.
+    /// The true number is within 1/4 + 1/4 of the sum; the sums of a few edges have errors of u
+    /// each.
     pub(crate) fn revolutions(self, unit: f64) -> Option<u64> {
         let number = (self.angle / unit).round();
         let off = (self.angle - number * unit).abs();
@@ -42,12 +43,12 @@ impl Turn {
     }
 }
 
-/// Who knows how far arg h turns along a line parallel to an axis.
+/// Computes the change of arg h along lines parallel to an axis.
 pub(crate) trait Walk {
     /// Change of arg h from `from` to `to`.
     ///
     /// # Errors
-    /// [`Error::Contour`] where a root lies on the line or too close to it, [`Error::TooMuch`],
+    /// [`Error::Contour`] where a root lies on the line or too close to it; [`Error::TooMuch`],
     /// [`Error::Interrupted`].
     fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error>;
 }

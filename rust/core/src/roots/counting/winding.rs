@@ -1,21 +1,21 @@
-//! How far arg h turns along a straight line: proved.
+//! The change of arg h along a straight line, proved.
 //!
 //! With c the term that dominates, arg h = arg g − τ_c Im s. From a point z with computed value v
 //! (error at most e) and slope w (error e′), Taylor's formula along the line gives for every point
 //! within r: |g − v| ≤ (|w| + e′) r + B r²/2 + e, with B a bound on |g″| there. As long as this is
 //! at most 0.95 |v|, g stays in a disc that does not hold 0 and arg g within 72° of arg v. Two
-//! neighbouring points whose reaches meet therefore differ in argument by less than 144°: their
-//! principal difference is the true one. Since each computed value serves both its neighbours,
-//! their errors cancel in the sum but at the two ends and where c changes; `slack` adds those up,
-//! and what computing a difference costs: with u = 2⁻⁵³, the two directions u each, their product
-//! √5 u, `angle` 8 u (together below 13 u), τ_c Δy 3 u of itself, the sum u of itself.
-//! Terms that are small on the way need no Taylor formula: what they change g by is at most their moduli at
-//! both places, and the formula holds for the others.
-//! SHARE and the factors next to 1 leave far more room than the rounding of the test itself takes:
-//! that is 20 u at most, and e is known to carry 2 per cent to spare.
+//! neighbouring points whose reaches meet therefore differ in argument by less than 144°, so that
+//! their principal difference is the true one. Since each computed value serves both its
+//! neighbours, the errors cancel in the sum except at the two ends and where c changes. `slack` is
+//! the sum of these errors and of those of computing a difference: with u = 2⁻⁵³, the two
+//! directions have errors of u each, their product √5 u, `angle` 8 u (together below 13 u), τ_c Δy
+//! the relative error 3 u, the sum u. Terms that stay small along the step need no Taylor formula:
+//! they change g by at most their moduli at both points, and the formula is applied to the other
+//! terms. SHARE and the factors next to 1 leave far more room than the rounding errors of the test
+//! itself need: these are 20 u at most, and e is 2 per cent larger than necessary.
 //!
-//! Where |v| < 4e in double precision the point is evaluated in two words; where that does not tell
-//! a root from none either: an error with the place, never a guess.
+//! Where |v| < 4e in double precision, the point is evaluated in double-double arithmetic. Where
+//! this does not separate the value from zero either, the result is an error with the location.
 
 use num_complex::Complex64;
 
@@ -25,60 +25,99 @@ use crate::elementary::angle;
 use crate::quasipoly::{Jet, Probe, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
-/// Share of |v| that g may move by.
+/// Largest share of |v| by which g may change. A larger share gives longer steps and larger
+/// differences of arguments; below 1 the argument stays within 90°.
 const SHARE: f64 = 0.95;
 
-/// Evaluations between two looks at the task.
+/// Evaluations between two checks for cancellation.
 const CHECK_EVERY: u64 = 1024;
 
-/// Evaluations in two words that a walker spends before it takes a place for a root: past a multiple one
-/// the steps become as short as a power of its distance.
+/// Double-double evaluations after which a point that double precision cannot decide counts as a
+/// root. Past a multiple root the steps become as short as a power of its distance.
 const MAX_DOUBLE_DOUBLE: u32 = 500;
 
 /// Evaluations after which a computation is given up.
 pub(crate) const MAX_EVALUATIONS: u64 = 20_000_000;
 
-/// Hints kept of a walk, the first ones.
+/// Upper limit on the hints kept of one line; the first ones are kept.
 const MAX_HINTS: usize = 1000;
 
-/// Outside these, underflow or overflow could matter and values prove nothing.
+/// Range of values in which underflow and overflow cannot matter. Values outside prove nothing.
 const USABLE: std::ops::Range<f64> = 1e-270..1e290;
 
 /// Error of one computed difference of arguments: 16 u and more than 3 u of τ_c Δy.
 pub(crate) const STEP_ERROR: f64 = 8.0 * f64::EPSILON;
 
-/// Error of an angle, in rad, that an end of a line may have: some dozens of ends add up.
+/// Largest error of the argument, in rad, at an end of a line. Some dozens of ends add up.
 const MOST_UNCERTAIN: f64 = 0.01;
 
-/// Slopes count as at least this of the value, so that one can divide by them.
+/// Lower limit on the slope relative to the value, so that it can be divided by.
 const LEAST_SLOPE: f64 = 1e-100;
 
-/// Steps of less than this angle of the fastest exponential tell of several roots nearby.
+/// Steps shorter than this angle of the fastest exponential indicate several roots nearby.
 const TIGHT: f64 = 1e-3;
 
-/// Share of the value that terms may have which are counted by their size alone.
+/// Largest share of the value that terms may have that are bounded by their moduli alone. A larger
+/// share lets more terms be bounded so and shortens the step of the others.
 const PERTURBATION_SHARE: f64 = 0.3;
 
-/// Evaluations along a line before such terms are looked for: short steps find the hints.
+/// Evaluations along a line after which terms are bounded by their moduli. Before, steps are short
+/// and find hints.
 const EAGER_LIMIT: u64 = 500;
 
-/// How many times further these may let a step go; there are no more hints on the way then.
+/// Upper limit on how much longer these bounds may make a step. No hints are found within a step.
 const LONGEST_GAIN: f64 = 1e6;
 
-/// Walks along lines; keeps the probe, the budget and the hints of roots nearby.
+/// Factor on a proved length that covers its rounding error.
+const ROUNDED_DOWN: f64 = 1.0 - 1e-12;
+
+/// Upper limit on the spans tried for one reach, and the factors by which they shrink: at least to
+/// this many times what was proved, at most by this share.
+const MAX_REACH_ROUNDS: usize = 40;
+
+/// The next span tried, as a multiple of the length proved with the last one.
+const GROWN: f64 = 3.0;
+
+/// Least factor between two spans.
+const LEAST_SHRINKAGE: f64 = 0.125;
+
+/// A reach below this share of what the slope alone allows indicates several roots nearby.
+const FAR_BELOW_SLOPE: f64 = 0.02;
+
+/// Spans tried with dominated terms; each is a quarter of the one before.
+const DOMINATED_ROUNDS: usize = 4;
+
+/// Length of a step, in reaches of its first point: the reach of its end has to cover the rest.
+const STRETCH: f64 = 1.9;
+
+/// Factor on the length of a step that could not be proved.
+const SHORTENED: f64 = 0.999;
+
+/// Upper limit on the lengths tried for one step.
+const MAX_STEP_ATTEMPTS: usize = 8;
+
+/// Relative rounding error of the ends of a line.
+const PLACE_ROUNDING: f64 = 1e-15;
+
+/// Upper limit on the doublings of the distance at which a line is proved to be free of roots.
+const MAX_ASIDE: usize = 200;
+
+/// Follows arg h along lines. Keeps the probe, the number of evaluations and the hints of roots
+/// nearby.
 pub(crate) struct Walker<'a> {
     pub(crate) probe: Probe<'a>,
     pub(crate) task: &'a Task,
-    /// Where Newton's step from the points closest to a root leads to.
+    /// Ends of Newton's steps from the points closest to a root.
     pub(crate) hints: Vec<Complex64>,
     checked: u64,
     limit: u64,
     /// The largest delay less the smallest, in s.
     span: f64,
     double_doubles: u32,
-    /// The last place where that was needed.
+    /// The last point that needed double-double arithmetic.
     double_double_at: Option<Complex64>,
-    /// Evaluations from which on a line is walked in the longest steps that can be proved.
+    /// Number of evaluations from which on the line is followed in the longest steps that can be
+    /// proved.
     eager_until: u64,
 }
 
@@ -87,7 +126,7 @@ impl<'a> Walker<'a> {
         Self::with_limit(h, task, MAX_EVALUATIONS)
     }
 
-    /// A walker that gives up after `limit` evaluations.
+    /// A walker that returns an error after `limit` evaluations.
     pub(crate) fn with_limit(h: &'a QuasiPolynomial, task: &'a Task, limit: u64) -> Self {
         Self {
             probe: Probe::new(h),
@@ -102,12 +141,12 @@ impl<'a> Walker<'a> {
         }
     }
 
-    /// Take places where double precision does not tell a root from none for roots.
+    /// Treat points that double precision cannot separate from a root as roots.
     pub(crate) fn keep_to_doubles(&mut self) {
         self.double_doubles = MAX_DOUBLE_DOUBLE;
     }
 
-    /// Look at the task and at the budget now and then.
+    /// Check for cancellation and for the limit on evaluations.
     pub(crate) fn pause(&mut self) -> Result<(), Error> {
         let spent = self.probe.evaluations();
         if spent < self.checked + CHECK_EVERY {
@@ -126,18 +165,19 @@ impl<'a> Walker<'a> {
         Ok(())
     }
 
-    /// The jet at `s`, in two words where double precision does not tell the value from zero.
+    /// The jet at `s`, in double-double arithmetic where double precision does not separate the
+    /// value from zero.
     pub(crate) fn jet(&mut self, s: Complex64) -> Jet {
         self.jet_unless(s, is_clear)
     }
 
-    /// The jet at an end of a line, where the error of its angle counts: in two words also where it
-    /// would be more than a little.
+    /// The jet at an end of a line, where the error of the argument counts: in double-double
+    /// arithmetic also where this error would be larger than [`MOST_UNCERTAIN`].
     fn end_jet(&mut self, s: Complex64) -> Jet {
         self.jet_unless(s, |jet| is_clear(jet) && uncertainty(jet) < MOST_UNCERTAIN)
     }
 
-    /// The jet at `s`, in two words unless it is `good` in one.
+    /// The jet at `s`, in double-double arithmetic unless the one in double precision is `good`.
     fn jet_unless(&mut self, s: Complex64, good: impl Fn(&Jet) -> bool) -> Jet {
         let jet = self.probe.jet(s);
         if good(&jet) || !is_finite(&jet) || self.double_doubles >= MAX_DOUBLE_DOUBLE {
@@ -168,7 +208,7 @@ impl<'a> Walker<'a> {
         }
     }
 
-    /// The error of a line that cannot be proved to be clear of roots at `place`.
+    /// The error for a line that cannot be proved to be free of roots at `place`.
     pub(crate) fn blocked(&mut self, place: Complex64) -> Error {
         self.probe.jet(place);
         if self.probe.largest_term() < USABLE.start {
@@ -176,7 +216,7 @@ impl<'a> Walker<'a> {
         }
         let mut distance =
             4.0 * f64::EPSILON * modulus(place).max(f64::MIN_POSITIVE / f64::EPSILON);
-        for _ in 0..200 {
+        for _ in 0..MAX_ASIDE {
             let aside = [1.0, -1.0].map(|sign| Complex64::new(sign * distance, 0.0));
             let up = aside.map(|step| step * Complex64::I);
             if [aside, up]
@@ -191,7 +231,8 @@ impl<'a> Walker<'a> {
         Error::Contour { place, distance }
     }
 
-    /// How far from `s` along the line (unit vector `along`), up to `most`, g keeps its sense.
+    /// The distance from `s` along the line (unit vector `along`), at most `most`, within which arg
+    /// g is bounded.
     fn reach(&self, jet: &Jet, s: Complex64, along: Complex64, most: f64) -> f64 {
         // Relative to the value, so that no square leaves the range.
         let unit = modulus(jet.value);
@@ -200,25 +241,25 @@ impl<'a> Walker<'a> {
         let size = modulus(s);
         let mut span = most.min(room / slope);
         let mut best = 0.0f64;
-        for _ in 0..40 {
+        for _ in 0..MAX_REACH_ROUNDS {
             let bend = self.probe.curvature(size + span, along.re * span) / unit;
             let r = within(room, slope, bend);
-            // Where the bound overflows nothing is known: `min` would take the span for it.
+            // Where the bound overflows nothing is known: `min` would return the span.
             if !r.is_nan() {
-                best = best.max(r.min(span) * (1.0 - 1e-12));
+                best = best.max(r.min(span) * ROUNDED_DOWN);
             }
             if best >= 0.25 * span {
                 break;
             }
-            // The bound grows exponentially with the span: come down in steps, not at once.
-            span = (3.0 * best).max(0.125 * span);
+            // The bound grows exponentially with the span, so that the span is reduced in steps.
+            span = (GROWN * best).max(LEAST_SHRINKAGE * span);
         }
-        // Not where the slope is all that is in the way.
+        // Not where the slope alone limits the step.
         let farthest = room / slope;
         let cluster_suspected = if self.double_double_at == Some(s) {
             best < 0.5 * most.min(farthest)
         } else {
-            best * self.span < TIGHT && best < 0.02 * farthest
+            best * self.span < TIGHT && best < FAR_BELOW_SLOPE * farthest
         };
         if cluster_suspected {
             best = best.max(TaylorBound::new(&self.probe, s).reach(SHARE, most));
@@ -229,7 +270,7 @@ impl<'a> Walker<'a> {
         best.max(self.reach_by_dominated_terms(jet, s, along, most.min(LONGEST_GAIN * best)))
     }
 
-    /// The same where fast terms are so small that their size is bound enough.
+    /// The same where fast terms are so small that their moduli are a sufficient bound.
     fn reach_by_dominated_terms(
         &self,
         jet: &Jet,
@@ -240,7 +281,7 @@ impl<'a> Walker<'a> {
         let unit = modulus(jet.value);
         let size = modulus(s);
         let mut span = most;
-        for _ in 0..4 {
+        for _ in 0..DOMINATED_ROUNDS {
             let place = (size + span, along.re * span);
             let Some(dominated) = self
                 .probe
@@ -252,7 +293,7 @@ impl<'a> Walker<'a> {
             let slope = ((modulus(dominated.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
             let r = within(room, slope, dominated.bend / unit);
             if r >= 0.25 * span {
-                return r.min(span) * (1.0 - 1e-12);
+                return r.min(span) * ROUNDED_DOWN;
             }
             span *= 0.25;
         }
@@ -279,7 +320,7 @@ impl<'a> Walker<'a> {
             slack: uncertainty(&jet),
         };
         let mut guess = f64::INFINITY;
-        // Newton's corrections at the last two points: a local minimum hints at a root.
+        // Newton's corrections at the last two points: a local minimum indicates a root.
         let mut before = (f64::INFINITY, f64::INFINITY);
         while here != to {
             self.pause()?;
@@ -306,12 +347,13 @@ impl<'a> Walker<'a> {
             jet = ahead;
         }
         turn.slack += uncertainty(&jet);
-        // Rounding of the places themselves, times the delay they are multiplied by.
-        turn.slack += 1e-15 * self.probe.delay() * (from.im.abs() + to.im.abs());
+        // Rounding errors of the points themselves, times the delay by which they are multiplied.
+        turn.slack += PLACE_ROUNDING * self.probe.delay() * (from.im.abs() + to.im.abs());
         Ok(turn)
     }
 
-    /// The next point and its jet: as far as both reaches cover, else as far as the own one.
+    /// The next point and its jet: as far as both reaches cover the step, or else as far as the
+    /// reach of `here` alone.
     fn step(
         &mut self,
         here: Complex64,
@@ -322,10 +364,10 @@ impl<'a> Walker<'a> {
         let mut length = if reach >= rest {
             rest
         } else {
-            rest.min(1.9 * reach)
+            rest.min(STRETCH * reach)
         };
         let mut overflows = false;
-        for attempt in 0..8 {
+        for attempt in 0..MAX_STEP_ATTEMPTS {
             let next = if length >= rest {
                 to
             } else {
@@ -355,10 +397,10 @@ impl<'a> Walker<'a> {
                 return Ok((next, ahead));
             }
             if gone <= reach && attempt > 0 {
-                // The own reach covers the step, so only rounding is in the way.
+                // The reach of `here` covers the step; only rounding errors remain.
                 return Err(self.blocked(next));
             }
-            length = (0.999 * reach).min(length * 0.999);
+            length = (SHORTENED * reach).min(length * SHORTENED);
         }
         Err(if overflows {
             overflow(here)
@@ -370,7 +412,7 @@ impl<'a> Walker<'a> {
 
 /// The largest r with `slope` r + `bend` r²/2 at most `room`.
 fn within(room: f64, slope: f64, bend: f64) -> f64 {
-    // By the slope, whose square may leave the range.
+    // Relative to the slope, whose square may leave the range.
     let bent = 2.0 * (bend / slope) * (room / slope);
     2.0 * (room / slope) / (1.0 + (1.0 + bent).sqrt())
 }
@@ -388,7 +430,7 @@ pub(crate) fn is_finite(jet: &Jet) -> bool {
         && jet.slope_error.is_finite()
 }
 
-/// Is the value known to within a quarter?
+/// Is the error at most a quarter of the value?
 pub(crate) fn is_clear(jet: &Jet) -> bool {
     let size = modulus(jet.value);
     size >= 4.0 * jet.value_error && USABLE.contains(&size)
@@ -396,8 +438,13 @@ pub(crate) fn is_clear(jet: &Jet) -> bool {
 
 /// Bound on the error of arg g.
 fn uncertainty(jet: &Jet) -> f64 {
-    // asin t ≤ (π/2) t
-    1.58 * jet.value_error / modulus(jet.value)
+    angle_error(jet.value_error, modulus(jet.value))
+}
+
+/// Bound on the error of the angle of a number of modulus `size` that is known to within `error`:
+/// asin t ≤ (π/2) t.
+pub(crate) fn angle_error(error: f64, size: f64) -> f64 {
+    1.58 * error / size
 }
 
 fn unit(value: Complex64) -> Complex64 {

@@ -10,10 +10,10 @@ use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
 use crate::{Error, Task};
 
-/// More roots than anyone can have meant to list.
+/// Upper limit on the number of roots in a list (bounds memory and time).
 const MAX_ROOTS: u64 = 1_000_000;
 
-/// Exact roots at 0, as a disc of their own or in the one that reaches there.
+/// Add exact roots at 0, to the disc that contains 0 or as a disc of their own.
 pub(crate) fn add_zeros(discs: &mut Vec<Disc>, zeros: u32) {
     if zeros == 0 {
         return;
@@ -35,8 +35,9 @@ pub(crate) fn add_zeros(discs: &mut Vec<Disc>, zeros: u32) {
 
 /// Every root in a region.
 ///
-/// Open sides are closed by proved bounds. Roots on the real axis belong to a region whose lower
-/// (or upper) edge it is; a disc that meets that edge counts with all its roots.
+/// Open sides are closed by proved bounds. If the lower or upper edge of the region is the real
+/// axis, roots on that axis belong to the region. A disc that meets that edge counts with all its
+/// roots.
 ///
 /// # Errors
 /// As [`count`](super::count); [`Error::CountMismatch`] where double precision does not suffice
@@ -74,7 +75,7 @@ fn roots_as_given(h: &QuasiPolynomial, region: &Region, task: &Task) -> Result<R
     Ok(RootSet::new(discs, *region))
 }
 
-/// Discs that hold all roots of a closed region.
+/// Discs that hold all the roots of a closed region.
 pub(crate) fn all_discs(walker: &mut impl Seek, closed: &Closed) -> Result<Vec<Disc>, Error> {
     let mut discs = Vec::new();
     let Closed { re, .. } = *closed;
@@ -100,7 +101,8 @@ pub(crate) fn all_discs(walker: &mut impl Seek, closed: &Closed) -> Result<Vec<D
     Ok(discs)
 }
 
-/// Discs, Im ≥ 0, that hold the roots of a cell: disjoint, inside, and adding up to its count.
+/// Discs, Im ≥ 0, that hold the roots of a cell: disjoint, inside the cell, and with multiplicities
+/// that add up to its count.
 pub(crate) fn locate(walker: &mut impl Seek, cell: Cell) -> Result<Vec<Disc>, Error> {
     if cell.count > MAX_ROOTS {
         return Err(Error::TooMuch {

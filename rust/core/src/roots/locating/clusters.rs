@@ -1,29 +1,30 @@
-//! Roots so close together that no Newton iteration tells them apart: one disc for all of them.
+//! Roots so close together that Newton's iteration cannot separate them: one disc for all of them.
 //!
-//! With the Taylor coefficients a_k of g at z up to the n-th, in two words and with their errors e_k, and a
-//! bound R on the next one in the disc of radius t, g has exactly m roots within every r ≤ t for which
+//! With the Taylor coefficients a_k of g at z up to the n-th, in double-double arithmetic and with
+//! their errors e_k, and a bound R on the next one in the disc of radius t, g has exactly m roots
+//! within every r ≤ t for which
 //!     (|a_m| − e_m) rᵐ > Σ_{k≤n, k≠m} (|a_k| + e_k) rᵏ + R rⁿ⁺¹
-//! (Pellet 1881, by Rouché's theorem against a_m (s − z)ᵐ). It is tested at radii a factor of two apart,
-//! about the zero of the (m − 1)-st derivative next to z: where the m roots coincide it is theirs. The
-//! smallest m for which a radius is found is taken. Divided by rᵐ, the sums lose (2n + 6) u of themselves; a
-//! margin of 1e-9 covers that.
+//! (Pellet 1881, by Rouché's theorem against a_m (s − z)ᵐ). The inequality is tested at radii a
+//! factor of two apart, about the zero of the (m − 1)-st derivative next to z, which is the m-fold
+//! root where the m roots coincide. The smallest m for which a radius is found is taken. Divided by
+//! rᵐ, the sums have the relative error (2n + 6) u, which a margin of 1e-9 covers.
 
 use num_complex::Complex64;
 
 use crate::quasipoly::{Expansion, Probe, expansion, modulus, remainder};
 use crate::roots::disc::Disc;
 
-/// Most roots in one disc.
+/// Upper limit on the number of roots in one disc.
 const MOST: usize = 20;
 
-/// Taylor coefficients beyond the m-th: the bound of the one after them, a sum of moduli, may be far
-/// above what cancellation leaves of it.
+/// Number of Taylor coefficients beyond the m-th. The bound on the next one is a sum of moduli,
+/// which may be far above the true coefficient where terms cancel.
 const BEYOND: usize = 6;
 
-/// Relative radius at which the search for the least one begins.
+/// Smallest radius tried, relative to |z|.
 const LEAST: f64 = 4.0 * f64::EPSILON;
 
-/// Relative radius up to which a single root is sought among others.
+/// Largest radius, relative to |z|, for the disc of a single root among others.
 const CLOSE: f64 = 1e-3;
 
 const MARGIN: f64 = 1e-9;
@@ -40,12 +41,12 @@ pub(crate) fn cluster(probe: &mut Probe<'_>, z: Complex64, most: f64) -> Option<
         if modulus(center - z) > most {
             continue;
         }
-        // One more step: the first was as long as the cluster is wide.
+        // One more step, because the first one was as long as the cluster is wide.
         let again = expansion(h, reference, center, m);
         center = self::centre(&again, center, m).unwrap_or(center);
         let mut disc = proved(probe, center, m, most);
         if disc.is_some_and(|disc| disc.is_on_axis()) && center.im != 0.0 {
-            // A disc that holds its own mirror image is centred on the axis.
+            // A disc that contains its own mirror image is centred on the axis.
             disc = proved(probe, Complex64::new(center.re, 0.0), m, most);
         }
         if disc.is_some() {
@@ -55,8 +56,8 @@ pub(crate) fn cluster(probe: &mut Probe<'_>, z: Complex64, most: f64) -> Option<
     None
 }
 
-/// The disc about the only root next to `z`, if one is proved; others may be so close that their distance is
-/// a small share of |z|.
+/// The disc of the only root next to `z`, if it can be proved. Other roots may be at a distance
+/// that is a small share of |z|.
 pub(crate) fn single(probe: &Probe<'_>, z: Complex64) -> Option<Disc> {
     let most = CLOSE * modulus(z);
     let disc = proved(probe, z, 1, most)?;
@@ -96,12 +97,12 @@ fn proved(probe: &Probe<'_>, center: Complex64, m: usize, most: f64) -> Option<D
     };
     let mut radius = LEAST * modulus(center).max(1e-9 * most);
     if radius <= 0.0 {
-        // At 0, where nothing tells how small a disc is to be.
+        // At 0 there is no scale for the smallest radius.
         return None;
     }
     while !holds(radius) {
         radius *= 2.0;
-        // Also where a value is not a number.
+        // This also holds where a value is not a number.
         if radius.is_nan() || radius > most {
             return None;
         }
@@ -133,13 +134,13 @@ mod tests {
         assert!(found.is_some_and(|disc| {
             disc.center == Complex64::ZERO && disc.multiplicity == 2 && disc.radius < 1e-13
         }));
-        // Twice a radius of 0 is 0: the search for a larger one once did not end.
+        // Twice a radius of 0 is 0: the search for a larger radius once did not end.
         for multiplicity in 1..4 {
             for most in [0.0, f64::MIN_POSITIVE, f64::NAN] {
                 assert!(proved(&probe, Complex64::ZERO, multiplicity, most).is_none());
             }
         }
-        // Nor does |z| = 0 tell how far a single root is to be sought.
+        // |z| = 0 gives no scale for the search of a single root either.
         let simple = QuasiPolynomial::new(vec![vec![-1.0, 2.0], vec![1.0]], vec![0.0, 1.0])?;
         assert!(single(&Probe::new(&simple), Complex64::ZERO).is_none());
         Ok(())

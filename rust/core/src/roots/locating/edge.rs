@@ -1,11 +1,12 @@
-//! Roots on the edge of a region, or so close to it that the edge cannot be walked.
+//! Roots on the edge of a region, or so close to it that arg h cannot be followed along the edge.
 //!
-//! Nothing is shifted in silence. The region is widened by a little, all roots of the wider one are located,
-//! each in a disc proved to hold it, and every disc is then inside the region, outside, or meets an edge.
-//! If none meets an edge, those inside are what was asked for, proved. Otherwise no count in double
-//! precision decides: the caller says to which side such roots belong, or gets them with their places.
-//! A real edge is none for simple real roots, which have the axis for their symmetry and belong to the
-//! region; several in a disc may as well be pairs beside it.
+//! The edge is never moved silently. The region is widened slightly and all roots of the wider one
+//! are located, each in a disc proved to hold it. Every disc then lies inside the region, outside
+//! it, or meets an edge. If none meets an edge, those inside are the proved answer. Otherwise
+//! double precision cannot decide: the caller states to which side such roots belong, or receives
+//! an error with their locations. An edge on the real axis is no obstacle for simple real roots,
+//! which lie exactly on it and belong to the region; several roots in a disc may be pairs beside
+//! it.
 
 use super::all_roots::roots;
 use crate::quasipoly::{QuasiPolynomial, modulus};
@@ -14,25 +15,27 @@ use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
 use crate::{Error, Task};
 
-/// Relative widths by which a region is widened, until its edges are clear.
+/// Relative widths by which a region is widened, tried in this order until its edges are free of
+/// roots.
 const MARGINS: [f64; 7] = [1e-6, 8e-6, 6e-5, 5e-4, 4e-3, 3e-2, 0.1];
 
 /// To which side roots on an edge belong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Edge {
-    /// None: they are an error that names them.
+    /// To neither side: such roots are an error that names them.
     #[default]
     Refused,
-    /// The inside: the region is closed.
+    /// To the inside: the region is closed.
     Inside,
-    /// The outside: the region is open.
+    /// To the outside: the region is open.
     Outside,
 }
 
 /// As [`count`], roots on the edge being treated as `edge` says.
 ///
 /// # Errors
-/// As [`count`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be located.
+/// As [`count`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be
+/// located.
 ///
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Edge, Region, count_with_edge}};
@@ -60,7 +63,8 @@ pub fn count_with_edge(
 /// As [`roots`], roots on the edge being treated as `edge` says.
 ///
 /// # Errors
-/// As [`roots`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be located.
+/// As [`roots`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be
+/// located.
 pub fn roots_with_edge(
     h: &QuasiPolynomial,
     region: &Region,
@@ -81,7 +85,7 @@ enum Side {
     Outside,
 }
 
-/// The roots of `region`, taken from a wider one; `refusal` where that fails.
+/// The roots of `region`, selected from those of a wider one; `refusal` where that fails.
 fn sorted(
     h: &QuasiPolynomial,
     region: &Region,
@@ -94,7 +98,7 @@ fn sorted(
             Ok(set) => set,
             Err(Error::Contour { .. }) => continue,
             Err(error) if error.ends_all() => return Err(error),
-            // Such as a chain of roots within the margin.
+            // For example, a chain of roots within the margin.
             Err(_) => return Err(refusal),
         };
         let sides: Vec<Side> = (0..set.roots.len())
@@ -120,8 +124,8 @@ fn sorted(
     Err(refusal)
 }
 
-/// The region with its finite edges moved out by `margin` times the least of its sides and the spacing at
-/// which chains repeat; a real edge, which is no obstacle, remains.
+/// The region with its finite edges moved out by `margin` times the smaller of its shorter side and
+/// the spacing of chains. An edge on the real axis stays where it is.
 fn widened(h: &QuasiPolynomial, region: &Region, margin: f64) -> Region {
     let Region { re, im } = *region;
     let delays = h.delays();
@@ -131,7 +135,7 @@ fn widened(h: &QuasiPolynomial, region: &Region, margin: f64) -> Region {
     let size = if size.is_finite() {
         size
     } else {
-        // Nothing but an edge or two.
+        // The region is a half plane or a quarter plane.
         [re.0, re.1, im.0, im.1]
             .into_iter()
             .filter(|end| end.is_finite())
@@ -162,7 +166,7 @@ fn side(set: &RootSet, i: usize, region: &Region) -> Side {
     } else {
         (center.im - im.0, im.1 - center.im)
     };
-    // Rounding of a difference that decides is less than u of the larger number.
+    // The rounding error of a difference that decides is less than u times the larger number.
     let room = radius + f64::EPSILON * modulus(*center);
     let room = if *radius == 0.0 { 0.0 } else { room };
     let gaps = [center.re - re.0, re.1 - center.re, low, high];

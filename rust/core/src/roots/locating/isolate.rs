@@ -1,11 +1,11 @@
-//! All roots of a region: divide it into cells with proved counts, iterate within.
+//! All roots of a region: cells with proved counts, and Newton's iteration in each.
 //!
 //! In a cell Newton's iteration starts from the roots found just below, shifted by the spacing
 //! 2π/(τ_max − τ_min) at which chains repeat, then from points of the golden-ratio sequence; every
-//! limit becomes a disc proved to hold exactly its multiplicity. A cell is done when its discs add
-//! up to its count; else it is cut. Where values drown in rounding, the cluster is taken as one
-//! disc. At the end the discs are disjoint, lie inside the region and add up to its count: then
-//! none is missing, whatever the search did.
+//! limit becomes a disc proved to hold exactly its multiplicity. A cell is complete when its discs
+//! add up to its count; otherwise it is cut. Where rounding errors exceed the values, a cluster is
+//! enclosed in one disc. At the end the discs are disjoint, lie inside the region and add up to its
+//! count. This proves that none is missing, independently of how the search went.
 
 use std::f64::consts::TAU;
 
@@ -17,18 +17,22 @@ use crate::Error;
 use crate::roots::counting::{Cell, Walk, Walker};
 use crate::roots::disc::{Disc, RESOLVED};
 
-/// Cells with more roots missing are cut before anything is tried.
+/// Cells with more missing roots than this are cut before Newton's iteration is tried in them.
 const MOST_MISSING: u64 = 10;
 
-/// After so many cuts in a row that part nothing, a cluster is tried for.
+/// Number of consecutive cuts that separate no roots after which a cluster is assumed.
 const IDLE_CUTS: u32 = 8;
 
-/// Fractional parts of multiples of these fill a square evenly: powers of the plastic number.
+/// Fractional parts of multiples of these numbers (powers of the plastic number) fill a square
+/// evenly.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
-/// Who can iterate towards a root, besides walking along lines.
+/// Starts around a cluster: angle of the first one in rad, distance as a share of the radius.
+const AROUND: (f64, f64) = (0.3, 0.7);
+
+/// Walks along lines and iterates towards roots.
 pub(crate) trait Seek: Walk {
-    /// Look at the task and at the budget now and then.
+    /// Check for cancellation and for the limit on evaluations.
     fn pause(&mut self) -> Result<(), Error>;
 
     /// Newton's iteration from `start` as long as it stays in `window`.
@@ -38,14 +42,14 @@ pub(crate) trait Seek: Walk {
         window: &dyn Fn(Complex64) -> bool,
     ) -> Result<Outcome, Error>;
 
-    /// The smallest disc about the cluster at `place`, not wider than `most`, in which the number
-    /// of roots can be proved.
+    /// The smallest disc about the cluster at `place`, at most `most` wide, in which the number of
+    /// roots can be proved.
     fn cluster(&mut self, place: Complex64, most: f64) -> Result<Option<Disc>, Error>;
 
     /// The largest delay less the smallest, in s.
     fn delay_span(&self) -> f64;
 
-    /// The disc, shrunk to 0 where all its roots are known to be exactly there.
+    /// The disc, shrunk to the point 0 where all its roots are known to be exactly there.
     fn at_zero_if_exact(&self, disc: Disc) -> Disc;
 }
 
@@ -76,7 +80,7 @@ impl Seek for Walker<'_> {
     }
 }
 
-/// Discs found so far, by height of their centre.
+/// Discs found so far, ordered by the imaginary part of their centre.
 pub(crate) struct Search<'w, W: Seek> {
     walker: &'w mut W,
     found: Vec<Disc>,
@@ -89,7 +93,7 @@ impl<'w, W: Seek> Search<'w, W> {
         Self::with(walker, Vec::new())
     }
 
-    /// A search that knows some disjoint discs already.
+    /// A search that starts with disjoint discs that are already known.
     pub(crate) fn with(walker: &'w mut W, mut found: Vec<Disc>) -> Self {
         found.sort_by(|a, b| a.center.im.total_cmp(&b.center.im));
         let widest = found
@@ -105,7 +109,8 @@ impl<'w, W: Seek> Search<'w, W> {
         }
     }
 
-    /// Iterate from `starts`; those discs are kept whose centre `wanted` holds.
+    /// Iterate from `starts` as long as the iterates stay in `window`, and keep the discs of simple
+    /// roots.
     pub(crate) fn iterate_from(
         &mut self,
         starts: &[Complex64],
@@ -120,26 +125,26 @@ impl<'w, W: Seek> Search<'w, W> {
         Ok(())
     }
 
-    /// Roots in the discs right of Re s = `sigma` and in their mirror images.
+    /// Number of roots in the discs right of Re s = `sigma` and in their mirror images.
     pub(crate) fn weight_right_of(&self, sigma: f64) -> u64 {
         let right = |disc: &&Disc| disc.center.re - disc.radius > sigma;
         self.found.iter().filter(right).map(Disc::weight).sum()
     }
 
-    /// Does a disc known hold no other root than its own as far as `place`, or its mirror image? Newton's
-    /// iteration from there would lead to it again.
+    /// Is `place`, or its mirror image, within the isolation radius of a known disc? Newton's
+    /// iteration from there would lead to that root again.
     pub(crate) fn knows(&self, place: Complex64) -> bool {
         let place = Complex64::new(place.re, place.im.abs());
         let mut near = self.found.iter();
         near.any(|disc| (disc.center - place).norm() < disc.isolation)
     }
 
-    /// The discs, ordered by the height of their centres.
+    /// The discs, ordered by the imaginary part of their centres.
     pub(crate) fn found(&self) -> &[Disc] {
         &self.found
     }
 
-    /// Roots located in the cell.
+    /// Number of roots located in the cell.
     fn located(&self, cell: &Cell) -> u64 {
         let from = if cell.symmetric { -1.0 } else { cell.im.0 };
         let start = self.found.partition_point(|disc| disc.center.im < from);
@@ -158,7 +163,7 @@ impl<'w, W: Seek> Search<'w, W> {
             .sum()
     }
 
-    /// Keep a disc unless its root is known; a cluster swallows the discs inside it.
+    /// Keep a disc unless its root is known. A cluster replaces the discs inside it.
     fn insert(&mut self, disc: Disc) -> bool {
         let disc = self.walker.at_zero_if_exact(disc);
         let reach = self.widest + disc.radius;
@@ -232,7 +237,7 @@ impl<'w, W: Seek> Search<'w, W> {
         cell.width().max(cell.height()) > 64.0 * f64::EPSILON * size
     }
 
-    /// Iterate within the cell; is everything found?
+    /// Iterate within the cell. Are all its roots found?
     fn try_here(&mut self, cell: &Cell) -> Result<bool, Error> {
         let margin = cell.width() + cell.height();
         let (re, im) = (cell.re, cell.im);
@@ -281,7 +286,7 @@ impl<'w, W: Seek> Search<'w, W> {
         Ok(self.located(cell) == cell.count)
     }
 
-    /// Iterate from around a cluster; are its roots found one by one?
+    /// Iterate from points around a cluster. Are its roots found one by one?
     fn parted(&mut self, cluster: &Disc) -> Result<bool, Error> {
         let Disc {
             center,
@@ -297,7 +302,7 @@ impl<'w, W: Seek> Search<'w, W> {
             let near = found
                 .iter()
                 .filter(|disc| (disc.center - center).norm() + disc.radius <= radius);
-            // Those off the axis stand for their mirror images, if these are inside as well.
+            // Discs off the axis stand for their mirror images, if these are inside as well.
             let weight = |disc: &Disc| {
                 if cluster.is_on_axis() {
                     disc.weight()
@@ -310,8 +315,8 @@ impl<'w, W: Seek> Search<'w, W> {
         let starts = 3 * multiplicity;
         for k in 0..starts {
             self.walker.pause()?;
-            let angle = 0.3 + TAU * f64::from(k) / f64::from(starts);
-            let start = center + Complex64::from_polar(0.7 * radius, angle);
+            let angle = AROUND.0 + TAU * f64::from(k) / f64::from(starts);
+            let start = center + Complex64::from_polar(AROUND.1 * radius, angle);
             if let Outcome::Simple(disc) = self.walker.newton(start, &window)? {
                 self.insert(disc);
             }
@@ -348,7 +353,7 @@ impl<'w, W: Seek> Search<'w, W> {
     }
 
     fn mismatch(&self, counted: u64, cell: &Cell) -> Error {
-        // What is counted on one side of an edge may have its disc's centre on the other.
+        // A root counted on one side of an edge may have the centre of its disc on the other side.
         let beyond = |from: f64, to: f64, x: f64| (from - x).max(x - to).max(0.0);
         let reaches = |disc: &&Disc| {
             let Disc { center, radius, .. } = **disc;
@@ -367,7 +372,7 @@ impl<'w, W: Seek> Search<'w, W> {
             counted,
             found: found.map(|disc| (disc.center, disc.multiplicity)).collect(),
             advice: format!(
-                "near {:e}{:+e}i double precision does not tell the roots apart; another unit of \
+                "near {:e}{:+e}i double precision does not separate the roots; another unit of \
                  time or a less expanded form of the equation may help",
                 0.5 * (cell.re.0 + cell.re.1),
                 cell.im.1
@@ -376,7 +381,7 @@ impl<'w, W: Seek> Search<'w, W> {
     }
 }
 
-/// The k-th of points that fill the cell evenly.
+/// The k-th point of a sequence that fills the cell evenly.
 fn even(cell: &Cell, k: usize) -> Complex64 {
     let part = |share: f64| (0.5 + (k as f64 + 1.0) * share).fract();
     Complex64::new(

@@ -1,9 +1,9 @@
 //! Vertical lines with a known number of roots to their right, in search of the rightmost roots.
 //!
-//! Newton's iteration from the points where the walk along a line came closest to a root tells where
-//! the next line should be: just left of the roots wanted. Where it tells nothing, lines step to the
-//! left, by growing steps but never all the way to the chains of a neutral equation or to a line that
-//! could not be counted, and back by bisection. A first line that cannot be counted is moved to the right.
+//! Newton's iteration from the points where a line comes closest to a root determines the next
+//! line: just left of the roots wanted. Where it finds nothing, the lines move to the left, by
+//! growing steps that never reach the chains of a neutral equation or a line that could not be
+//! counted, and back by bisection. A first line that cannot be counted is moved to the right.
 
 use std::f64::consts::PI;
 
@@ -18,107 +18,121 @@ use crate::roots::disc::Disc;
 use crate::roots::region::Region;
 use crate::{Error, Task};
 
-/// Lines tried before giving up.
+/// Upper limit on the lines tried.
 const MAX_LINES: usize = 400;
 
-/// Lines given up because a cluster reaches across them.
+/// Upper limit on the lines abandoned because a cluster reaches across them.
 const MAX_EVASIONS: u32 = 20;
 
-/// A line this close to the chains, in units of one over the longest delay, is as good as on them.
+/// Distance from the chains, in units of one over the longest delay, below which a line counts as
+/// being on them. A smaller one finds roots closer to the chains and costs more.
 const CHAIN_MARGIN: f64 = 1e-4;
 
-/// Roots closer to the chains than this, in the same unit, are not told from them; where no line that close
-/// could be counted, that is an error.
+/// Distance from the chains, in the same unit, below which roots are not distinguished from them.
+/// If no line this close could be counted, the result is an error.
 const NEAR_CHAINS: f64 = 1e-3;
 
-/// Evaluations after which the first line is given up: those that hug the chains cost without end. Every
-/// one after it may cost half as much, but not less than the second number.
+/// Evaluations after which the first line is abandoned, because lines very close to the chains cost
+/// without bound. Each later line may cost half as much, but at least the second number.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
 const LEAST_PER_LINE: u64 = 100_000;
 
-/// A first line on which a root lies is moved by this share of one over the longest delay at least: right beside
-/// the root it would cost more than one further away.
+/// Least shift of a first line on which a root lies, as a share of one over the longest delay. A
+/// line right beside the root would cost more evaluations.
 const ASIDE: f64 = 1e-3;
 
-/// A line that would have to be moved further than this, in the same unit, meets something else than a
-/// root.
+/// Largest shift, in the same unit. A line that has to be moved further meets something other than
+/// a root.
 const MOST_ASIDE: f64 = 1e6;
 
-/// Times that a line is moved aside before it is walked in two words.
+/// Shifts of a line before double-double arithmetic is used on it.
 const IN_DOUBLES: u32 = 4;
 
-/// Times that a line is moved aside.
+/// Upper limit on the shifts of a line.
 const MAX_ASIDE: u32 = 20;
 
-/// Lines given up before the search ends with what it has: next to the chains that is all there is to know,
-/// where there are none a root is still to be found.
+/// Lines abandoned before the search ends with what it has: next to chains nothing more can be
+/// known; without chains a root must still be found.
 const MAX_GIVEN_UP: [u32; 2] = [3, 8];
 
-/// Times that the first line, where it cannot be counted, is moved to the right.
+/// Upper limit on moves to the right of a first line that cannot be counted.
 const MAX_MOVES: u32 = 6;
 
-/// Newton iterations from a line, besides two for every root wanted.
+/// Newton iterations started from a line, in addition to two for every root wanted.
 const MORE_STARTS: usize = 12;
 
-/// Share of the distance to the chains, or to a line given up, that the next line keeps.
+/// Share of the distance to the chains, or to an abandoned line, that the next line keeps.
 const APPROACH: f64 = 0.2;
 
-/// The same where it is not the chains, and a root may be anywhere between.
+/// The same without chains, where a root may be anywhere in between.
 const SLOW_APPROACH: f64 = 0.7;
 
-/// Share of the way from a root to the chains, or to its neighbour, at which a line is laid.
+/// Position of a line between a root and the chains, or the next root, as a share of the distance.
 const CLEARANCE: f64 = 0.3;
 
-/// The distance from the chains at which the search ends; `step` is one over the longest delay.
+/// Relative distance of two lines at which the search between them ends.
+const CLOSE_LINES: f64 = 1e-3;
+
+/// A line is accepted with at most this many times the wanted roots, plus the second number.
+const ENOUGH: [u64; 2] = [4, 16];
+
+/// Factor on the clearance for every abandoned line.
+const CLOSER: f64 = 0.1;
+
+/// Least shift of a line relative to its real part.
+const LEAST_MOVE: f64 = 1e-12;
+
+/// The distance from the chains at which the search ends. `step` is one over the longest delay.
 pub(crate) fn chain_margin(step: f64) -> f64 {
     CHAIN_MARGIN * step
 }
 
-/// Is the line Re s = `sigma` so close to the chains, `step` being one over the longest delay, that roots
-/// between are not told from these?
+/// Is the line Re s = `sigma` so close to the chains that roots in between are not distinguished
+/// from them? `step` is one over the longest delay.
 pub(crate) fn is_beside_chains(sigma: f64, chain: f64, step: f64) -> bool {
     sigma - chain <= NEAR_CHAINS * step
 }
 
-/// The error where no root lies right of `sigma`, but that line is not close to the chains.
+/// The error for the case that no root lies right of `sigma`, but that line is not close to the
+/// chains.
 pub(crate) fn between_lines(sigma: f64, chain: f64) -> Error {
     Error::TooMuch {
         what: "the search for the rightmost root",
         limit: EVALUATIONS_PER_LINE,
         unit: "evaluations on a line",
         advice: format!(
-            "no root lies right of Re s = {sigma:.6}, but what lies between that and the chains of \
+            "no root lies right of Re s = {sigma:.6}, but the roots between that line and the chains of \
              roots at Re s = {chain:.6} could not be counted; use count with both ends of im, or \
              give delays that are almost equal one value"
         ),
     }
 }
 
-/// What a line may cost.
+/// Limits on the work for one line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
-    /// Evaluations after which it is given up.
+    /// Evaluations after which the line is abandoned.
     pub(crate) limit: u64,
-    /// Are places evaluated in two words where doubles do not tell a root from none? A line meets such
-    /// places next to roots only, and there is mostly another line to take.
+    /// Is double-double arithmetic used where double precision does not separate a value from zero?
+    /// A line meets such points only next to roots, and usually another line can be taken.
     pub(crate) double_double: bool,
 }
 
-/// What the search for rightmost roots has to know of a function.
+/// The operations on a function that the search for rightmost roots needs.
 pub(crate) trait Spectrum {
     type Walker<'a>: Seek
     where
         Self: 'a;
 
-    /// A walker that gives up after `limit` evaluations.
+    /// A walker that returns an error after `limit` evaluations.
     fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> Self::Walker<'a>;
 
-    /// The number of roots right of Re s = `sigma`, and where walking there hinted at roots, as far as
-    /// `effort` allows.
+    /// The number of roots right of Re s = `sigma` and the hints found along that line, within the
+    /// limits of `effort`.
     fn line(&self, sigma: f64, effort: Effort, task: &Task)
     -> Result<(u64, Vec<Complex64>), Error>;
 
-    /// Where roots may be that no line comes close to.
+    /// Points near which roots may lie that no line comes close to.
     fn far_starts(&self) -> Vec<Complex64>;
 
     /// The upper half of a rectangle with all roots right of Re s = `sigma`, if there are any.
@@ -172,7 +186,7 @@ impl Spectrum for QuasiPolynomial {
     }
 }
 
-/// A line, and what is known of the half plane to its right.
+/// A line with the number of roots to its right.
 #[derive(Debug, Clone)]
 pub(crate) struct Line {
     pub(crate) sigma: f64,
@@ -180,20 +194,20 @@ pub(crate) struct Line {
     pub(crate) hints: Vec<Complex64>,
 }
 
-/// Lines for which the count is known.
+/// The search state: lines whose count is known.
 pub(crate) struct Lines<'a, S: Spectrum> {
     spectrum: &'a S,
     task: &'a Task,
-    /// Discs found from the hints of any line, by no order.
+    /// Discs found from the hints of all lines, in no order.
     known: Vec<Disc>,
     chain: f64,
     /// The chains, or the rightmost line that could not be counted.
     barrier: f64,
     given_up: u32,
-    /// Times that the first line was moved to the right, and why at first.
+    /// How often the first line was moved to the right, and the error that was the first reason.
     moved: u32,
     refused: Option<Error>,
-    /// Evaluations that the next line may cost.
+    /// Upper limit on the evaluations of the next line.
     limit: u64,
     /// Least distance to the barrier.
     margin: f64,
@@ -245,14 +259,14 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         }
     }
 
-    /// Was the line moved aside as far as one that is known to have too few roots?
+    /// Was the line moved at least as far right as one that is known to have too few roots?
     fn is_behind(&self, line: &Line, wanted: u64) -> bool {
         let known = self.few.as_ref();
         line.count < wanted && known.is_some_and(|few| few.sigma <= line.sigma)
     }
 
-    /// Forget `line` and take up one further left; `false` when that has been done too often or
-    /// leads onto the chains.
+    /// Discard `line` and continue with one further left. `false` when that was done too often or
+    /// would lead onto the chains.
     pub(crate) fn evade(&mut self, line: &Line, distance: f64) -> bool {
         self.evasions += 1;
         self.start = line.sigma - 2.0 * distance * f64::from(self.evasions);
@@ -261,8 +275,8 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         self.start > self.chain && self.evasions < MAX_EVASIONS
     }
 
-    /// A line with at least `wanted` roots to its right, and not many more if that is cheap; with
-    /// fewer, and `true`, where no line further left can be counted.
+    /// A line with at least `wanted` roots to its right, and not many more if that is cheap. With
+    /// fewer roots, and `true`, where no line further left can be counted.
     pub(crate) fn find(&mut self, wanted: u64) -> Result<(Line, bool), Error> {
         if let Some(line) = self.enough.take_if(|line| line.count < wanted) {
             self.few = Some(line);
@@ -281,12 +295,13 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                     }
                     let ahead = few.sigma - self.step;
                     match self.beyond_known_roots(&few, wanted)? {
-                        // Further left than that there may be many that no hint tells of.
+                        // Further left there may be many roots for which there is no hint.
                         Some(sigma) if sigma >= ahead => sigma,
                         _ => {
                             self.step *= 1.5;
-                            // Never onto the barrier, only most of the way: a line costs as
-                            // much as its distance is small, so halving it would pay twice.
+                            // The line never moves onto the barrier, only most of the way. The cost
+                            // of a line is inversely proportional to its distance, so that halving
+                            // the distance would double it.
                             let share = if free { SLOW_APPROACH } else { APPROACH };
                             let kept = share * (few.sigma - self.barrier);
                             ahead.max(self.barrier + kept.max(0.99 * self.margin))
@@ -296,7 +311,9 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 (few, Some(enough)) => {
                     let right = few.as_ref().map_or(f64::INFINITY, |few| few.sigma);
                     let gap = right - enough.sigma;
-                    if enough.count <= 4 * wanted + 16 || gap <= 1e-3 * enough.sigma.abs() {
+                    if enough.count <= ENOUGH[0] * wanted + ENOUGH[1]
+                        || gap <= CLOSE_LINES * enough.sigma.abs()
+                    {
                         return Ok((enough.clone(), false));
                     }
                     let step = self.step.min(0.5 * gap);
@@ -310,7 +327,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                     self.barrier = self.barrier.max(sigma);
                 }
                 Ok(line) => self.sort_in(line, wanted),
-                // Too close to the chains, or too far left for double precision.
+                // The line is too close to the chains, or too far left for double precision.
                 Err(error @ (Error::TooMuch { .. } | Error::Argument(_)))
                     if self.enough.is_none() =>
                 {
@@ -332,7 +349,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 Err(error) => return Err(error),
             }
         }
-        // What kept from the first line says more than that no other one served.
+        // The error of the first line is more informative than the number of lines tried.
         Err(self.refused.take().unwrap_or(Error::TooMuch {
             what: "the search for a line right of which the rightmost roots lie",
             limit: MAX_LINES as u64,
@@ -341,8 +358,8 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         }))
     }
 
-    /// A line just left of the `wanted` rightmost roots, as far as the hints of a line tell: right
-    /// of the next one, of the barrier, and left of `line` itself.
+    /// A line just left of the `wanted` rightmost roots, as far as the hints of a line show them:
+    /// right of the next root and of the barrier, and left of `line` itself.
     fn beyond_known_roots(&mut self, line: &Line, wanted: u64) -> Result<Option<f64>, Error> {
         let mut starts = line.hints.clone();
         starts.sort_by(|a, b| b.re.total_cmp(&a.re));
@@ -366,21 +383,22 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             return Ok(None);
         };
         let edge = last.center.re - last.radius;
-        // Those that tie with it, a pair that is listed twice among them, do not count as next.
+        // Roots with the same real part, such as a pair that is listed twice, do not count as next.
         let next = places
             .map(|disc| disc.center.re + disc.radius)
             .find(|right| *right < edge)
             .unwrap_or(f64::NEG_INFINITY);
         let free = edge - next.max(self.barrier);
-        // The closer to the root, the more lines have been given up.
-        let share = (0..self.given_up).fold(CLEARANCE, |share, _| 0.1 * share);
+        // The more lines were abandoned, the closer to the root the next one is.
+        let share = (0..self.given_up).fold(CLEARANCE, |share, _| CLOSER * share);
         let sigma = edge - (share * free).min(self.step);
-        let further = line.sigma - sigma > 1e-3 * self.margin;
+        let further = line.sigma - sigma > CLOSE_LINES * self.margin;
         Ok((sigma > self.barrier && further).then_some(sigma))
     }
 
-    /// Places near the lower end of a line, of which its hints may tell nothing: where one row
-    /// dominates it is not walked, and the hints kept are the first ones, from far up.
+    /// Points near the lower end of a line, for which there may be no hints: where one row
+    /// dominates, the line is not followed in short steps, and only the first hints, those at large
+    /// |Im s|, are kept.
     fn low_starts(&self, sigma: f64) -> Vec<Complex64> {
         let spacing = 0.5 * PI * self.first_step;
         (0..MORE_STARTS)
@@ -388,7 +406,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             .collect()
     }
 
-    /// Newton's iteration from the hints, until the discs right of `sigma` add up to `count`.
+    /// Apply Newton's iteration to the hints until the discs right of `sigma` add up to `count`.
     fn learn(&mut self, hints: &[Complex64], count: u64, sigma: f64) -> Result<(), Error> {
         let mut walker = self.spectrum.walker(self.task, MAX_EVALUATIONS);
         let mut search = Search::with(&mut walker, std::mem::take(&mut self.known));
@@ -405,8 +423,8 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         Ok(())
     }
 
-    /// Discs, Im ≥ 0, that hold all roots right of a line: the one given, or one further right with `n` discs
-    /// or more where not all those of the one given are found.
+    /// Discs, Im ≥ 0, that hold all the roots right of a line: the given one, or one further right
+    /// with at least `n` discs where not all roots of the given one are found.
     pub(crate) fn discs_right_of(
         &mut self,
         line: &Line,
@@ -436,14 +454,14 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         Ok((discs, line.sigma))
     }
 
-    /// The known discs right of a line, if they hold all roots there.
+    /// The known discs right of a line, if they hold all the roots there.
     fn known_right_of(&self, line: &Line) -> Option<Vec<Disc>> {
         let right = |disc: &&Disc| disc.center.re - disc.radius > line.sigma;
         let discs: Vec<Disc> = self.known.iter().filter(right).copied().collect();
         (discs.iter().map(Disc::weight).sum::<u64>() == line.count).then_some(discs)
     }
 
-    /// A line left of the first `n` known discs, right of the next one.
+    /// A line left of the first `n` known discs and right of the next one.
     fn beside_the_first(&mut self, n: usize) -> Option<f64> {
         self.known
             .sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
@@ -462,11 +480,12 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         Some(edge - (CLEARANCE * (edge - next)).min(self.first_step))
     }
 
-    /// Count right of `sigma`, or of a line nearby where a root is in the way: further left at first, where
-    /// that root counts.
+    /// Count right of `sigma`, or of a nearby line where a root lies on it: further left at first,
+    /// so that this root is counted.
     fn counted(&self, sigma: f64) -> Result<Line, Error> {
         let mut at = sigma;
-        // A line between roots that are known has its place, the first one may be anywhere nearby.
+        // A line between known roots has to stay between them; the first line may be anywhere
+        // nearby.
         let free = self.few.is_none() && self.enough.is_none();
         let least = if free { ASIDE * self.first_step } else { 0.0 };
         let mut aside = -1.0;
@@ -485,7 +504,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                     });
                 }
                 Err(error @ Error::Contour { distance, .. }) => {
-                    let distance = distance.max(1e-12 * sigma.abs()).max(least);
+                    let distance = distance.max(LEAST_MOVE * sigma.abs()).max(least);
                     let moved = sigma + aside * distance;
                     at = if moved > self.chain {
                         moved
@@ -510,7 +529,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
     }
 }
 
-/// Discs, Im ≥ 0, that hold all roots right of a line, cell by cell.
+/// Discs, Im ≥ 0, that hold all the roots right of a line, found cell by cell.
 pub(crate) fn half_plane_discs<S: Spectrum>(
     spectrum: &S,
     sigma: f64,

@@ -1,14 +1,15 @@
 //! One root: Newton's iteration, and a disc proved to hold it alone.
 //!
 //! Simple roots. At the last iterate z let a = |g(z)| + e, b = |g′(z)| − e′ (e, e′ the rounding
-//! bounds) and B a bound on |g″| in the disc of radius t. On a circle of radius r ≤ t with
-//! a + B r²/2 < b r, g differs from g′(z)(s − z) by less than the size of the latter: by Rouché's
-//! theorem g has exactly one root within r. The least such r is the radius claimed, the largest
-//! the radius of isolation; margins of 1e-9 cover the rounding of these few operations.
+//! bounds) and B a bound on |g″| in the disc of radius t. On a circle of radius r ≤ t with a + B
+//! r²/2 < b r, g differs from g′(z)(s − z) by less than the size of the latter: by Rouché's theorem
+//! g has exactly one root within r. The least such r is the radius of the disc, the largest the
+//! radius of isolation. Margins of 1e-9 cover the rounding errors of these few operations.
 //!
-//! Where double precision proves no disc, or only a wide one, jets in two words are tried.
-//! Next to other roots, where B exceeds |g″| by far, Taylor coefficients in two words decide (`cluster`).
-//! Roots that two words do not tell apart are a matter of `cluster`.
+//! Where double precision proves no disc, or only a wide one, double-double arithmetic is tried.
+//! Next to other roots, where B exceeds |g″| by far, Taylor coefficients in double-double
+//! arithmetic decide (`clusters`). Roots that cannot be separated are enclosed together
+//! (`clusters`).
 
 use num_complex::Complex64;
 
@@ -19,24 +20,39 @@ use crate::roots::disc::Disc;
 
 const MAX_STEPS: u32 = 60;
 
-/// Relative radius above which a disc is worth evaluations in two words.
+/// Relative radius above which a disc is improved in double-double arithmetic.
 const PRECISE_ENOUGH: f64 = 1e-12;
 
-/// A value of less than this share of its error leaves nothing for another step to win.
+/// If the value is below this share of its error, another step cannot improve it.
 const ARRIVED: f64 = 0.25;
 
-/// Squares of slopes outside these leave the range of double precision.
+/// Limits on slopes whose squares stay in the range of double precision.
 const LEAST: f64 = 1e-150;
 const MOST: f64 = 1e150;
+
+/// Factors that cover the rounding errors of radii.
+const SHRUNK: f64 = 1.0 - 1e-9;
+
+/// The same upwards.
+const ENLARGED: f64 = 1.0 + 1e-9;
+
+/// Range of the ratio of two steps in which several roots are assumed.
+const STEADY: std::ops::Range<f64> = 0.45..0.95;
+
+/// Largest imaginary part of that ratio.
+const STEADY_TURN: f64 = 0.05;
+
+/// Upper limit on the radii of isolation that are tried.
+const MAX_ISOLATIONS: usize = 12;
 
 /// How a Newton iteration ended.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Outcome {
-    /// In a simple root, Im ≥ 0.
+    /// At a simple root, Im ≥ 0.
     Simple(Disc),
-    /// Where values are lost in rounding although no simple root is proved.
+    /// At a point where rounding errors exceed the value, but no simple root is proved.
     Stalled(Complex64),
-    /// Nowhere, or outside the window.
+    /// At no root, or outside the window.
     Lost,
 }
 
@@ -67,12 +83,13 @@ pub(crate) fn newton(
         let next = z - step;
         let ahead = next.is_finite() && window(next);
         if small || lost_in_rounding {
-            // Next to a multiple root the slope is lost as well, and the step may lead anywhere.
+            // Next to a multiple root the slope is inaccurate as well, and the step may be wrong by
+            // any factor.
             let end = if ahead { next } else { z };
             let disc = simple_disc(probe, end, Probe::jet);
             return match disc {
                 Some(disc) if disc.radius <= PRECISE_ENOUGH * modulus(end) => Outcome::Simple(disc),
-                // A root at 0 has no digits to win.
+                // The radius of a root at 0 cannot be small relative to its modulus.
                 Some(disc)
                     if disc.center.norm() <= disc.radius
                         && probe.function().order_at_zero(1) == 1 =>
@@ -90,8 +107,8 @@ pub(crate) fn newton(
     Outcome::Lost
 }
 
-/// Newton's iteration in two words, from where double precision no longer leads anywhere; `known` is
-/// what it could prove.
+/// Newton's iteration in double-double arithmetic, from where double precision makes no progress.
+/// `known` is the disc that double precision could prove.
 fn newton_in_double_double(
     probe: &mut Probe<'_>,
     start: Complex64,
@@ -122,11 +139,11 @@ fn newton_in_double_double(
         .map_or(Outcome::Stalled(z), Outcome::Simple)
 }
 
-/// How many times a step of Newton's iteration is taken: at an m-fold root, and for some while near
-/// m roots, each is (m − 1)/m of the one before, and m of them lead there.
+/// The multiple of Newton's step that is taken. At an m-fold root, and at some distance from m
+/// close roots, each step is (m − 1)/m of the one before, so that m steps lead to the root.
 fn multiple(step: Complex64, before: Complex64) -> f64 {
     let ratio = step * before.conj() / before.norm_sqr();
-    let steady = (0.45..0.95).contains(&ratio.re) && ratio.im.abs() < 0.05;
+    let steady = STEADY.contains(&ratio.re) && ratio.im.abs() < STEADY_TURN;
     if steady {
         (1.0 / (1.0 - ratio.re)).round()
     } else {
@@ -134,8 +151,8 @@ fn multiple(step: Complex64, before: Complex64) -> f64 {
     }
 }
 
-/// The disc of a simple root next to `z`, if one can be proved from values `at` places; one that meets
-/// the real axis is centred there.
+/// The disc of a simple root next to `z`, if it can be proved from the jets that `at` returns. A
+/// disc that meets the real axis is centred on it.
 fn simple_disc<'a>(
     probe: &mut Probe<'a>,
     z: Complex64,
@@ -150,7 +167,8 @@ fn simple_disc<'a>(
     if disc.center == foot {
         return Some(disc);
     }
-    // The disc about the axis shows the same root: it is then the only one and its own mirror image.
+    // The disc about the axis holds the same root, which is then the only one and its own mirror
+    // image.
     let jet = at(probe, foot);
     let real = disc_from(probe, foot, &jet)?;
     let same = (disc.center - foot).norm() + disc.radius <= real.isolation;
@@ -165,15 +183,16 @@ fn disc_from(probe: &Probe<'_>, z: Complex64, jet: &Jet) -> Option<Disc> {
         return None;
     }
     let size = modulus(z);
-    // Radii at which the linear part wins, with the curvature of the disc of radius t.
+    // Radii at which the linear part exceeds the rest, with the curvature bound of the disc of
+    // radius t.
     let radii = |t: f64| {
         let bend = probe.curvature_around(size + t, t);
-        let root = b * b * (1.0 - 1e-9) - 2.0 * bend * a;
+        let root = b * b * SHRUNK - 2.0 * bend * a;
         (root > 0.0).then(|| {
             let root = root.sqrt();
             (
-                2.0 * a / (b + root) * (1.0 + 1e-9),
-                ((b + root) / bend).min(t) * (1.0 - 1e-9),
+                2.0 * a / (b + root) * ENLARGED,
+                ((b + root) / bend).min(t) * SHRUNK,
             )
         })
     };
@@ -182,9 +201,10 @@ fn disc_from(probe: &Probe<'_>, z: Complex64, jet: &Jet) -> Option<Disc> {
     if radius > isolation {
         return None;
     }
-    // The linear part wins up to 2 b over the curvature, and that is known where the disc is small.
+    // The linear part exceeds the rest up to 2 b over the curvature, and this is known where the
+    // disc is small.
     let mut t = b / probe.curvature_around(size, 0.0);
-    for _ in 0..12 {
+    for _ in 0..MAX_ISOLATIONS {
         match radii(t) {
             Some((least, most)) if least < most && least <= isolation => {
                 isolation = isolation.max(most);

@@ -2,10 +2,12 @@
 //! that holds them.
 //!
 //! A line Re s = σ is sought with at least the wanted number of roots to its right, but not many
-//! more (`lines`). If the discs known add up to the count of a line, all is known, else the half plane
-//! is searched cell by cell. Right of the chains of a neutral equation there may be fewer roots than
-//! wanted, or none at all: the chains themselves then lead, and the set holds what there is. That there is
-//! none takes a line next to the chains: one further right, left of which nothing could be counted, is an error.
+//! more (`lines`). If the known discs add up to the count of a line, all roots to its right are
+//! known; otherwise the half plane is searched cell by cell. Right of the chains of a neutral
+//! equation there may be fewer roots than wanted, or none at all. The chains are then the rightmost
+//! part of the spectrum, and the set holds the roots there are. The statement that there is none
+//! needs a line next to the chains; if only a line further right could be counted, the result is an
+//! error.
 
 use super::all_roots::add_zeros;
 use super::exact_abscissa::exact_abscissa;
@@ -18,7 +20,7 @@ use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
 use crate::{Error, Task};
 
-/// Most roots that can be asked for.
+/// Upper limit on the roots that can be requested.
 const MAX_WANTED: usize = 10_000;
 
 /// The `n` rightmost roots, not counting those with Im < 0, together with their mirror images.
@@ -59,14 +61,15 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
     }
 }
 
-/// The number of roots right of the imaginary axis and the rightmost root, the axis being walked
-/// once for both.
+/// The number of roots right of the imaginary axis and the rightmost root, with one pass along the
+/// axis for both.
 ///
 /// The first is that of [`count_right_of`](super::count_right_of) at 0, the second that of
 /// [`rightmost`] for one root.
 ///
 /// # Errors
-/// As for these two: both in the pair, where the other may still be known.
+/// As for these two. The pair holds one result each, because one may be known where the other is
+/// not.
 pub fn unstable_and_rightmost(
     h: &QuasiPolynomial,
     task: &Task,
@@ -96,7 +99,8 @@ pub fn unstable_and_rightmost(
     }
 }
 
-/// [`rightmost`], not advanced; `axis` is what is known of the right half plane.
+/// [`rightmost`] for equations that are not advanced. `axis` is what is already known of the right
+/// half plane.
 fn search(
     prepared: &Prepared,
     n: usize,
@@ -123,7 +127,8 @@ fn search(
     leading(h, n, axis, chain, task, listed)
 }
 
-/// The `n` rightmost roots right of the chains; `listed` completes the discs right of a line.
+/// The `n` rightmost roots right of the chains. `listed` completes the list of discs right of a
+/// line.
 pub(crate) fn leading<S: Spectrum>(
     spectrum: &S,
     n: usize,
@@ -147,7 +152,8 @@ pub(crate) fn leading<S: Spectrum>(
         };
         let discs = listed(discs, sigma);
         if discs.len() >= n || last {
-            // Right of its chains a neutral equation may have none, a retarded one always has.
+            // Right of its chains a neutral equation may have no root; a retarded one always has
+            // roots.
             return if !discs.is_empty() || is_beside_chains(sigma, chain, lines.step_of_delays()) {
                 Ok(first(discs, n, sigma))
             } else if chain == f64::NEG_INFINITY {
@@ -156,16 +162,17 @@ pub(crate) fn leading<S: Spectrum>(
                 Err(between_lines(sigma, chain))
             };
         }
-        // A pair counts twice in the half plane but once in the list.
+        // A pair counts twice in the half plane and once in the list.
         wanted = line.count + n as u64 - discs.len() as u64;
     }
 }
 
 /// The largest real part of a root, or the abscissa of the chains if that is larger.
 ///
-/// Roots between the chains and a line right beside them (the `region` of [`rightmost`]) are not told from
-/// the chains; where no line that close could be counted and no root was found, that is an error. With `strong` the chains are those that arbitrarily
-/// small changes of the delays can bring about; without, delays with a common base are taken as exact.
+/// Roots between the chains and a line right beside them (the `region` of [`rightmost`]) are not
+/// distinguished from the chains. Where no line that close could be counted and no root was found,
+/// the result is an error. With `strong` the chains are those that arbitrarily small changes of the
+/// delays can bring about; without, delays with a common base are taken as exact.
 ///
 /// # Errors
 /// As [`rightmost`]; [`Error::Argument`] where there is no root.
@@ -194,16 +201,17 @@ pub fn spectral_abscissa(h: &QuasiPolynomial, strong: bool, task: &Task) -> Resu
     Ok(abscissa)
 }
 
-/// There is a rightmost root, but none was met.
+/// The error for a rightmost root that exists but was not found.
 fn beyond_reach() -> Error {
     Error::argument(
         "no line that could be counted has a root to its right: the numbers of this equation \
-         differ too much in size for double precision; leave out time constants of almost \
-         nothing, or choose another unit of time",
+         differ too much in size for double precision; leave out time constants close to zero, \
+              or choose another unit of time",
     )
 }
 
-/// The first `n` of all discs right of `sigma`, more where the next ones tie with them.
+/// The first `n` of all discs right of `sigma`, and more where the next ones cannot be ordered
+/// after them.
 pub(crate) fn first(mut discs: Vec<Disc>, n: usize, sigma: f64) -> RootSet {
     discs.sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
     let left = |disc: &Disc| disc.center.re - disc.radius;

@@ -2,10 +2,10 @@
 //!
 //! From h(s; p) = 0 follows ds/dp = −(∂h/∂p) / h′(s). For the coefficient a of sᵏ e^(−sτ) that is
 //! −sᵏ e^(−sτ) / h′(s); for a delay τ_j it is s p_j(s) e^(−sτ_j) / h′(s), the sum over the row of
-//! −s a times the former. With the delay τ_c of the term that dominates, e^(sτ_c) cancels:
-//! h′ e^(sτ_c) = g′ at a root, so that nothing overflows. The root is first improved by Newton's
-//! iteration and proved to be simple; a multiple one moves like a root of the change, with no
-//! derivative.
+//! −s a times the former. With the delay τ_c of the term that dominates, e^(sτ_c) cancels: h′
+//! e^(sτ_c) = g′ at a root, so that nothing overflows. The root is first improved by Newton's
+//! iteration and proved to be simple. A multiple root has no derivative: it moves like a fractional
+//! power of the change.
 
 use num_complex::Complex64;
 
@@ -16,12 +16,12 @@ use crate::roots::counting::{Prepared, Walker};
 use crate::roots::disc::Disc;
 use crate::{Error, Task};
 
-/// A cluster of roots is sought within this of the given place, relative to the place or to one
-/// over the longest delay.
+/// A cluster of roots is sought within this distance of the given point, relative to its modulus or
+/// to one over the longest delay.
 const NEARBY: f64 = 0.1;
 
-/// Derivatives of the simple root of h at `near` by the coefficients of sᵏ e^(−sτ), for each pair
-/// (τ, k) of `terms`, whether h has such a term or not. The first number is the root itself.
+/// The simple root of h at `near` and its derivatives with respect to the coefficients of sᵏ
+/// e^(−sτ), for each pair (τ, k) of `terms`, whether h has such a term or not.
 ///
 /// # Errors
 /// [`Error::Argument`] where `near` is no root, or the root is not simple to working precision.
@@ -50,7 +50,7 @@ pub fn sensitivity(
     let root = simple_root(h, near, task)?;
     let mut probe = Probe::new(h);
     probe.refer_to_dominant(root);
-    // Near another root the slope is small, and its terms are not.
+    // Near another root the slope is small although its terms are not.
     let slope = probe.double_double_jet(root).slope;
     let size = modulus(slope);
     let per_slope = |value: Complex64| -(value / size) * (slope.conj() / size);
@@ -64,7 +64,7 @@ pub fn sensitivity(
 /// The simple root that `near` belongs to.
 fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Complex64, Error> {
     let prepared = Prepared::new(h)?;
-    // Coefficients near 1, unless a power of s was taken out with the factor.
+    // The coefficients are near 1, unless a power of s was taken out together with the factor.
     let scaled = if prepared.zeros == 0 {
         &prepared.rest
     } else {
@@ -86,10 +86,10 @@ fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Comp
         Outcome::Stalled(place) => {
             let many = match cluster(&mut walker.probe, place, reach) {
                 Some(disc) => format!(
-                    "{} roots lie within {:.1e} of {}, not told apart in two words of double precision",
+                    "{} roots lie within {:.1e} of {}, which double-double arithmetic does not separate",
                     disc.multiplicity, disc.radius, disc.center
                 ),
-                None => format!("the function is lost in rounding near {place}"),
+                None => format!("rounding errors exceed the function near {place}"),
             };
             Err(Error::argument(format!(
                 "the root {near} is not simple: {many}. A multiple root has no derivative, it \

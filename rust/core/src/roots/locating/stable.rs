@@ -1,9 +1,10 @@
 //! Stability: is every root proved to lie left of the imaginary axis?
 //!
 //! Where the undelayed leading coefficient outweighs the delayed ones, a count of the right half
-//! plane decides; where that takes long, or cannot be done, one root proved to lie right of the axis
-//! (`unstable`). A neutral equation for which it does not is not strongly stable. With delays
-//! taken as exact it may still be stable if these are whole multiples of one base (`commensurate`).
+//! plane decides. Where the count takes long or fails, one root proved to lie right of the axis
+//! decides as well (`unstable`). A neutral equation whose undelayed leading coefficient does not
+//! outweigh the delayed ones is not strongly stable. With delays taken as exact it may still be
+//! stable if these are whole multiples of one base (`counting::exact_delays`).
 
 use super::unstable::has_unstable_root;
 use crate::quasipoly::{Kind, QuasiPolynomial};
@@ -11,14 +12,15 @@ use crate::roots::chains::chain_abscissa;
 use crate::roots::counting::{Prepared, Walker, cell_right_of, dominance, half_plane};
 use crate::{Error, Task};
 
-/// Evaluations along the axis before a root right of it is looked for.
+/// Evaluations along the axis before a root right of it is searched for.
 const AT_A_GLANCE: u64 = 5_000;
 
 /// Is every root proved to lie left of the imaginary axis?
 ///
 /// With `strong`, also under arbitrarily small changes of the delays; without, delays that are
-/// whole multiples of a common one, to rounding, are taken as exactly that. `false` also where a
-/// root lies on the axis or too close to it to tell, and for an advanced equation.
+/// whole multiples of a common one, to rounding, are taken as exactly that. The answer is also
+/// `false` where a root lies on the axis or too close to it to decide, and for an advanced
+/// equation.
 ///
 /// # Errors
 /// [`Error::Argument`] for the zero function; [`Error::TooMuch`]; [`Error::Interrupted`].

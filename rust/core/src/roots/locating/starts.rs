@@ -1,6 +1,6 @@
 //! Starts for Newton's iteration towards roots of very different size.
 //!
-//! Nothing is proved here: where the roots lie is settled by the discs that the iteration ends in.
+//! Nothing is proved here: the discs in which the iteration ends prove where the roots are.
 
 use std::f64::consts::PI;
 
@@ -8,8 +8,9 @@ use num_complex::Complex64;
 
 use crate::elementary::{exp, log, sin_cos};
 
-/// Where the roots of a polynomial would be if only two of its terms counted at a time: on circles of radii
-/// that the upper hull of the points (k, log |c_k|) tells (Pellet 1881, Ostrowski 1940).
+/// The roots that a polynomial would have if only two of its terms counted at a time. They lie on
+/// circles whose radii follow from the upper hull of the points (k, log |c_k|) (Pellet 1881,
+/// Ostrowski 1940).
 pub(crate) fn tropical_roots(row: &[f64]) -> Vec<Complex64> {
     let points: Vec<(usize, f64)> = row
         .iter()

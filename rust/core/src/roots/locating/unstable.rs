@@ -1,9 +1,9 @@
-//! One root proved to lie right of the imaginary axis: enough to say that an equation is not stable.
+//! One root proved to lie right of the imaginary axis, which proves that an equation is not stable.
 //!
-//! Where the leading term outweighs the others only far out, the axis is long and a count of the half
-//! plane costly; a single disc right of the axis settles the question. On a ray from 0 two terms can cancel
-//! where the largest one gives way to another: there Newton's iteration is worth starting. Nothing follows
-//! where no disc is found.
+//! Where the leading term outweighs the others only far out, the axis is long and a count of the
+//! half plane costly; a single disc right of the axis answers the question. On a ray from 0 two
+//! terms can cancel where the largest term changes; Newton's iteration starts from these points. If
+//! no disc is found, nothing is decided.
 
 use std::f64::consts::PI;
 
@@ -22,17 +22,17 @@ const RAYS: [f64; 6] = [0.0, 0.25, 0.5, 0.8, 1.1, 1.4];
 /// Heights above the real axis, in half turns of the exponentials.
 const HEIGHTS: [f64; 6] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0];
 
-/// Hints of a walk that are followed, the rightmost ones.
+/// Upper limit on the hints from which Newton's iteration is started; the rightmost ones are used.
 const MOST_HINTS: usize = 24;
 
-/// Changes that are followed on a ray.
+/// Upper limit on the changes of the largest term that are used on a ray.
 const MOST_CHANGES: usize = 6;
 
-/// Powers of two between which a radius is sought.
+/// Powers of two between which a radius is searched for.
 const EXPONENTS: std::ops::Range<i32> = -300..300;
 
-/// Is a root of `h` found and proved to lie right of the imaginary axis? `hints` are places to start from,
-/// besides those that the terms tell.
+/// Is a root of `h` found and proved to lie right of the imaginary axis? `hints` are starting
+/// points in addition to those that the terms give.
 ///
 /// # Errors
 /// [`Error::Interrupted`].
@@ -47,7 +47,7 @@ pub(crate) fn has_unstable_root(
     leads_right(&mut Walker::with_limit(h, task, MAX_EVALUATIONS), &starts)
 }
 
-/// The hints right of the axis that are worth following.
+/// The rightmost hints right of the axis.
 pub(crate) fn rightmost_first(mut hints: Vec<Complex64>) -> Vec<Complex64> {
     hints.retain(|hint| hint.re > 0.0);
     hints.sort_by(|a, b| b.re.total_cmp(&a.re));
@@ -70,7 +70,7 @@ pub(crate) fn leads_right<W: Seek>(walker: &mut W, starts: &[Complex64]) -> Resu
     Ok(false)
 }
 
-/// Places in the right half plane where two terms are as large as each other and no other is larger.
+/// Points in the right half plane where two terms have the same modulus and no other is larger.
 pub(crate) fn balances(h: &QuasiPolynomial) -> Vec<Complex64> {
     let Some(first) = h.delays().first().copied() else {
         return Vec::new();
@@ -115,7 +115,7 @@ impl Term {
     }
 }
 
-/// The largest radii, to a bit or so, at which another term becomes the largest on the ray.
+/// The largest radii, to about one bit, at which another term becomes the largest on the ray.
 fn changes(terms: &[Term], cosine: f64) -> Vec<f64> {
     let largest = |r: f64| {
         let sizes = terms.iter().map(|term| term.at(r, cosine)).enumerate();
@@ -163,7 +163,7 @@ mod tests {
     fn a_root_far_right_of_the_axis_is_found() {
         assert_eq!(found(&[&[0.0, 1.0], &[1e8, 0.5]], &[0.0, 1.0]), Ok(true));
         assert_eq!(found(&[&[-1e8, 1.0], &[1.0]], &[0.0, 1.0]), Ok(true));
-        // Along the positive axis s gives way to 30 before the delayed term counts.
+        // Along the positive axis s exceeds 30 before the delayed term matters.
         assert_eq!(found(&[&[30.0, 1.0], &[1e8, 0.4]], &[0.0, 4.6]), Ok(true));
         assert_eq!(
             found(&[&[1e12, 1e-3, 1.0], &[1e12]], &[0.0, 1e-3]),

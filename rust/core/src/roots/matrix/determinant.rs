@@ -7,7 +7,7 @@ use super::outer::Leading;
 use super::system::CharacteristicMatrix;
 use super::walker::{MAX_EVALUATIONS, MatrixWalker};
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::counting::{Cell, Closed};
+use crate::roots::counting::{Cell, Closed, EDGE_MARGIN};
 use crate::roots::locating::{
     Effort, Spectrum, all_discs, balances, first, half_plane_discs, leading, leads_right,
     rightmost_first,
@@ -16,19 +16,19 @@ use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
 use crate::{Error, Task};
 
-/// Most roots that can be asked for.
+/// Upper limit on the roots that can be requested.
 const MAX_WANTED: usize = 1000;
 
-/// Factorisations after which a line is given up.
+/// Factorisations after which a line is abandoned.
 const EVALUATIONS_PER_LINE: u64 = 100_000;
 
-/// Factorisations along the axis before a root right of it is looked for.
+/// Factorisations along the axis before a root right of it is searched for.
 const AT_A_GLANCE: u64 = 2_000;
 
-/// Radii of half planes are at least this times the rate of the system: roots at 0 need room.
+/// Least radius of a half plane, relative to the rate of the system, so that roots at 0 are inside.
 const LEAST_RADIUS: f64 = 1e-6;
 
-/// A system with its bounds, ready to be searched.
+/// A system with the bounds that a search needs.
 struct Prepared<'s> {
     system: &'s CharacteristicMatrix,
     leading: Leading,
@@ -44,9 +44,9 @@ impl<'s> Prepared<'s> {
 
     /// The upper half of a rectangle with all roots right of `sigma`; `None` where there is none.
     fn cell(&self, walker: &mut MatrixWalker<'_>, sigma: f64) -> Result<Option<Cell>, Error> {
-        // A little beyond, so that the edge itself is clear.
+        // A margin keeps roots off the edge itself.
         let least = LEAST_RADIUS * self.system.rate();
-        let radius = 1.01 * self.leading.radius(sigma, walker.task())?.max(least);
+        let radius = EDGE_MARGIN * self.leading.radius(sigma, walker.task())?.max(least);
         if sigma >= radius {
             return Ok(None);
         }
@@ -89,7 +89,7 @@ impl Spectrum for Prepared<'_> {
     }
 }
 
-/// The region in the upper half plane, as far as symmetry allows, its open sides closed.
+/// The region in the upper half plane, as far as symmetry allows, with its open sides closed.
 ///
 /// # Errors
 /// [`Error::Argument`] where an open side cannot be closed, or the determinant is zero.
@@ -111,7 +111,7 @@ fn close(
             ));
         }
         let least = LEAST_RADIUS * system.rate();
-        let radius = 1.01 * Leading::new(system)?.radius(re.0, task)?.max(least);
+        let radius = EDGE_MARGIN * Leading::new(system)?.radius(re.0, task)?.max(least);
         re = (re.0.max(-radius), re.1.min(radius));
         im = (im.0.max(-radius), im.1.min(radius));
     }
@@ -120,13 +120,13 @@ fn close(
 
 /// The number of roots of det M in a region, with multiplicity.
 ///
-/// Open sides are closed by norms, which takes an invertible E. Roots on the real axis belong to a
-/// region whose lower (or upper) edge it is.
+/// Open sides are closed by norms, which needs an invertible E. If the lower or upper edge of the
+/// region is the real axis, roots on that axis belong to the region.
 ///
 /// # Errors
-/// [`Error::Argument`] for a bad region, one that cannot be shown to hold finitely many roots, or
-/// a determinant that is zero everywhere; [`Error::Contour`] where a root lies on the edge or too
-/// close to it to tell the side; [`Error::TooMuch`]; [`Error::Interrupted`].
+/// [`Error::Argument`] for a bad region, one that cannot be shown to hold finitely many roots, or a
+/// determinant that is zero everywhere; [`Error::Contour`] where a root lies on the edge, or so
+/// close to it that its side cannot be decided; [`Error::TooMuch`]; [`Error::Interrupted`].
 ///
 /// ```
 /// use deadtime::{Task, roots::{Region, matrix::{CharacteristicMatrix, count}}};
@@ -142,7 +142,7 @@ pub fn count(system: &CharacteristicMatrix, region: &Region, task: &Task) -> Res
         return Ok(0);
     };
     if closed.half {
-        // Which roots are real is known from where they are.
+        // The discs tell which roots are real.
         return Ok(roots(system, region, task)?.counted);
     }
     let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
@@ -242,8 +242,8 @@ pub fn spectral_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<f
     Ok(abscissa)
 }
 
-/// Lower and upper bound of C_D in 1/s, the supremum of the real parts of chains with delays free
-/// to vary; −∞ for both without delayed derivatives.
+/// Lower and upper bound of C_D in 1/s, the supremum of the real parts of chains when the delays
+/// may vary. Both are −∞ without delayed derivatives.
 ///
 /// With more than four delayed derivatives the upper bound is that of their norms.
 ///
@@ -272,7 +272,8 @@ pub fn is_invertible(system: &CharacteristicMatrix) -> bool {
 }
 
 /// Is every root proved to lie left of the imaginary axis, and stay there when delays change by
-/// arbitrarily little? `false` also where a root lies on the axis or too close to it to tell.
+/// arbitrarily little? The answer is also `false` where a root lies on the axis or too close to it
+/// to decide.
 ///
 /// # Errors
 /// [`Error::Argument`] for an E that cannot be inverted; [`Error::TooMuch`];
@@ -308,8 +309,8 @@ pub fn is_stable(system: &CharacteristicMatrix, task: &Task) -> Result<bool, Err
     }
 }
 
-/// A function with the norms of the matrices as coefficients, the roots of which are as large as those of
-/// det M, or so.
+/// A function whose coefficients are the norms of the matrices. Its roots have about the size of
+/// those of det M.
 fn by_norms(system: &CharacteristicMatrix) -> Result<QuasiPolynomial, Error> {
     let norm = |matrix: &[Vec<f64>]| {
         let sums = matrix.iter().map(|row| row.iter().map(|x| x.abs()).sum());

@@ -1,18 +1,20 @@
-//! What is proved about det M around one point s.
+//! Proved statements about det M around one point s.
 //!
 //! Row i of M is multiplied by e^(s τ_c(i)), rows and columns by powers of two (`balance`), so that
-//! nothing overflows: arg det M = arg det G − T Im s with T = Σ τ_c(i). Let R be the computed inverse
-//! of G(s), G(s) R = I − Y, |Y| ≤ α in the Frobenius norm, K a matrix and κ a number. With
+//! nothing overflows: arg det M = arg det G − T Im s with T = Σ τ_c(i). Let R be the computed
+//! inverse of G(s), G(s) R = I − Y, |Y| ≤ α in the Frobenius norm, K a matrix and κ a number. With
 //!     G(s + δ) R = (1 + κ δ)(I + Z),  Z = (−Y + δ (K − κ I) + (rest))/(1 + κ δ),
 //! as long as f ≥ |Z| stays below 1 along the step, the argument of det G changes by n arg(1 + κ δ)
 //! up to |arg det(I + Z)| ≤ |tr Z| + |tr Z²|/2 + … ≤ t − log(1 − f) − f. The trace t is bounded
 //! apart, which makes the bound independent of n where delays touch few rows. Two choices of K:
-//! G′(s) R with Taylor's second-order rest, |e^z − 1 − z| ≤ min(|z|²/2 g, 1 + g + |z|), g = max(1, e^Re z),
-//! or only the part of G′ R that is free of exponentials, |e^z − 1| ≤ min(|z|, 2) g: where sE dominates
-//! that reaches far. κ = tr K/n takes out what all of G has in common.
+//! G′(s) R with Taylor's second-order rest, |e^z − 1 − z| ≤ min(|z|²/2 g, 1 + g + |z|), g = max(1,
+//! e^Re z), or only the part of G′ R that is free of exponentials, |e^z − 1| ≤ min(|z|, 2) g: where
+//! sE dominates that reaches far. κ = tr K/n takes out the factor that all of G has in common.
 //!
-//! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d), derived as in
-//! `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x| in the exponent); a row of products with R at most as many u more as it has entries. Both are in `loss`.
+//! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d),
+//! derived as in `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x|
+//! in the exponent); a row of products with R at most as many u more as it has entries. Both are in
+//! `loss`.
 
 use std::f64::consts::LN_2;
 
@@ -25,25 +27,40 @@ use crate::Error;
 use crate::elementary::{angle, exp, sin_cos};
 use crate::quasipoly::modulus;
 
-/// Bound on |Z| along a step.
+/// Largest bound on |Z| along a step. A larger one gives longer steps and wider angles.
 const MOST: f64 = 0.8;
 
-/// Bound on its trace. −log(1 − 0.8) − 0.8 + 0.35 < 1.17: both sides of a step stay below 2.34.
+/// Largest bound on its trace. −log(1 − 0.8) − 0.8 + 0.35 < 1.17: both sides of a step stay below
+/// 2.34.
 const MOST_TRACE: f64 = 0.35;
 
-/// √n α below this: the argument is known within twice that, and 2.34 + 6 · 0.021 < 3.14 · 0.8.
+/// √n α must be below this: the argument is then known within twice that, and 2.34 + 6 · 0.021 <
+/// 3.14 · 0.8.
 const CLEAR: f64 = 0.02;
 
-/// Covers the rounding of the sums and products that make up a bound.
+/// Covers the rounding errors of the sums and products in a bound.
 const MARGIN: f64 = 1.0 + 1e-9;
 
-/// Above what underflow can do to a row.
+/// Larger than every effect of underflow on a row.
 const FLOOR: f64 = 1e-150;
 
-/// What a size lost in underflow counts for: it must not hide what it grows to.
+/// Lower limit that replaces a size lost in underflow, because the size may grow along the step.
 const LEAST: f64 = 1e-150;
 
-/// One delay's part of one row of G, times R.
+/// Upper limit on the lengths tried for one reach.
+const MAX_ROUNDS: usize = 100;
+
+/// Residual below which the inverse is accurate enough for a step of Newton's iteration.
+const RESOLVED: f64 = 0.1;
+
+/// Ratio of the bounds of a reach at which the search for it ends.
+const CLOSE_LENGTHS: f64 = 0.9;
+
+/// Points, in units of the rate. A matrix that is not singular everywhere is regular in double
+/// precision at one of them.
+const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
+
+/// The part of one delay in one row of G, times R.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     /// τ − τ_c(i).
@@ -65,11 +82,11 @@ struct Expansion {
     spread: f64,
     /// |tr K − n κ|, and bounds on errors of K's diagonal.
     trace: f64,
-    /// Are exponentials expanded to the first order, or not at all?
+    /// Are the exponentials expanded to the first order, or not at all?
     with_delays: bool,
 }
 
-/// A point and what is known around it.
+/// A point and what is proved around it.
 #[derive(Debug, Clone)]
 pub(super) struct LocalEnclosure {
     pub(super) s: Complex64,
@@ -86,7 +103,7 @@ pub(super) struct LocalEnclosure {
     rows: Vec<Vec<Part>>,
 }
 
-/// How far a step may go: along which expansion, and its length.
+/// The expansion that allows the longest step, and the length of that step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reach {
     pub(super) length: f64,
@@ -94,7 +111,7 @@ pub(super) struct Reach {
 }
 
 impl LocalEnclosure {
-    /// What is proved around `s`; `None` where M(s) is too close to a singular matrix.
+    /// The enclosure at `s`; `None` where M(s) is too close to a singular matrix.
     pub(super) fn new(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
         Self::tried(system, s).filter(Self::is_clear)
     }
@@ -104,12 +121,12 @@ impl LocalEnclosure {
         self.size.sqrt() * self.residual <= CLEAR && self.angle.is_finite()
     }
 
-    /// Is the inverse good for a step of Newton's?
+    /// Is the inverse accurate enough for a step of Newton's iteration?
     pub(super) fn is_resolved(&self) -> bool {
-        self.residual < 0.1
+        self.residual < RESOLVED
     }
 
-    /// The same without the demand that anything be proved: for Newton's iteration.
+    /// The same without any proof, for Newton's iteration.
     pub(super) fn tried(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
         let n = system.size();
         let Balanced {
@@ -169,7 +186,8 @@ impl LocalEnclosure {
         })
     }
 
-    /// How far along the unit vector `along`, up to `most`, the argument is bound to what is expected.
+    /// The distance along the unit vector `along`, at most `most`, within which the argument is
+    /// close to the expected one.
     pub(super) fn reach(&self, along: Complex64, most: f64) -> Reach {
         let mut best = Reach {
             length: 0.0,
@@ -195,13 +213,13 @@ impl LocalEnclosure {
                     0.5 * high
                 };
             }
-            for _ in 0..100 {
+            for _ in 0..MAX_ROUNDS {
                 if holds(guess) {
                     low = guess;
                 } else {
                     high = guess;
                 }
-                if low > 0.9 * high || high < 1e-300 {
+                if low > CLOSE_LENGTHS * high || high < 1e-300 {
                     break;
                 }
                 guess = if low == 0.0 {
@@ -222,7 +240,7 @@ impl LocalEnclosure {
         best
     }
 
-    /// Change of arg det G that is expected over a step within a reach.
+    /// The expected change of arg det G over a step within a reach.
     pub(super) fn expected(&self, reach: Reach, step: Complex64) -> f64 {
         let common = self
             .expansions
@@ -274,7 +292,7 @@ impl LocalEnclosure {
     }
 }
 
-/// Gap, e^(−x d) and e^(−s d) less their power of two for pairs of delays, each computed once.
+/// Gap, e^(−x d) and e^(−s d) without their power of two for pairs of delays, each computed once.
 struct Weights<'a> {
     delays: &'a [f64],
     s: Complex64,
@@ -301,7 +319,7 @@ impl<'a> Weights<'a> {
         let found = if gap == 0.0 {
             (0.0, 1.0, Complex64::ONE)
         } else {
-            // What is left of e^(−x d) without its power of two, which is in the entries.
+            // The rest of e^(−x d) without its power of two, which is in the entries.
             let weight = exp(-gap * self.s.re - exponent(gap, self.s.re) * LN_2);
             let (sine, cosine) = sin_cos(gap * self.s.im);
             (gap, weight, Complex64::new(weight * cosine, -weight * sine))
@@ -312,14 +330,14 @@ impl<'a> Weights<'a> {
         found
     }
 
-    /// What rounding costs the products of a term with R, relative to the sum of moduli.
+    /// The rounding error of the products of a term with R, relative to the sum of moduli.
     fn loss(&self, term: &Term, terms: usize, gap: f64) -> f64 {
         let reach = self.s.re.abs() + self.s.im.abs();
         ROUNDING * ((16 + terms + term.entries.len()) as f64 + 8.0 * gap.abs() * reach)
     }
 }
 
-/// Sums over the rows of G′ R: everything, and what is free of exponentials.
+/// Sums over the rows of G′ R: all of it, and the part that is free of exponentials.
 struct Sums {
     first: Sum,
     zeroth: Sum,
@@ -331,7 +349,7 @@ struct Sums {
     on_value: (Vec<f64>, Vec<f64>),
 }
 
-/// A choice of K, row by row; of K − κ I only norms are wanted.
+/// A choice of K, row by row. Of K − κ I only norms are needed.
 struct Sum {
     row: (Vec<f64>, Vec<f64>),
     /// Σ of squares off the diagonal, the diagonal, the trace.
@@ -487,10 +505,6 @@ fn add_multiple(row: &mut (Vec<f64>, Vec<f64>), factor: f64, (re, im): (&[f64], 
     }
 }
 
-/// Points, in units of the rate, at one of which a matrix that is regular at all is so in double
-/// precision.
-const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
-
 /// # Errors
 /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
 pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> {
@@ -502,8 +516,8 @@ pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> 
         return Ok(());
     }
     Err(Error::argument(
-        "the determinant of the characteristic matrix is zero for every s, or cannot be told \
-         from it: the equations do not determine the state, look for rows of E, N and A that \
+        "the determinant of the characteristic matrix is zero for every s, or too close to zero \
+         to decide: the equations do not determine the state, look for rows of E, N and A that \
          depend on one another, or for entries that differ too much in size",
     ))
 }

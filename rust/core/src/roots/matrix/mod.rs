@@ -1,12 +1,14 @@
 //! Roots of det M(s), M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), without expanding the determinant.
 //!
-//! `system` holds the matrices, `balance` scales them at a point, `factor` their factors and inverses with rounding bounds, `local_enclosure`
-//! what is proved about det M around a point; `walker` makes walks and Newton's iteration of that,
-//! with which rectangles are counted, divided and searched as for one function (`roots::cell`,
-//! `roots::isolate`). `outer` bounds roots of half planes by norms, `difference` knows the chains of
-//! neutral systems. Nothing is lost to the size of coefficients: what is proved is proved for the
-//! matrices as given. A root is as well determined as M is regular next to it; where rounding hides
-//! which side of a line it is on, there is an error, never a guess.
+//! `system` holds the matrices, `balance` scales them at a point, `factor` their factors and
+//! inverses with rounding bounds, `local_enclosure` what is proved about det M around a point;
+//! `walker` follows arg det M along lines and iterates by Newton's method, so that rectangles are
+//! counted, divided and searched as for one function (`counting::cell`, `locating::isolate`).
+//! `outer` bounds the roots of half planes by norms, `difference` bounds the chains of neutral
+//! systems. `determinant` answers the questions. All statements are proved for the matrices as
+//! given, however large or small their entries are. The accuracy of a root depends on how regular M
+//! is next to it; where rounding errors hide on which side of a line it lies, the result is an
+//! error.
 
 mod balance;
 mod determinant;

@@ -1,14 +1,15 @@
-//! What one box of parameters knows of a family: centre, slopes, and how far both may be off.
+//! A family expanded about the centre of a box of parameters: values, slopes, and bounds on both
+//! over the box.
 //!
-//! Row j of h e^(s τ_r) is P_j(s; p) e^(−s d_j(p)), P_j = Σ_k b_jk(p) s^k. For each b = b_jk a box with
-//! centre c and half widths r holds b(c), its slopes ∂_i b(c), and majorants over the box: of |b|,
-//! |∂_i b| and |∂_i ∂_l b|, all formed from the moduli of the terms at |c_i| + r_i. Majorants are
-//! sums and products of numbers ≥ 0 and lose no more than `digits` u of themselves; users leave
-//! 1e-9 for it.
+//! Row j of h e^(s τ_r) is P_j(s; p) e^(−s d_j(p)), P_j = Σ_k b_jk(p) s^k. For each b = b_jk a box
+//! with centre c and half widths r holds b(c), its slopes ∂_i b(c), and majorants over the box: of
+//! |b|, |∂_i b| and |∂_i ∂_l b|, all formed from the moduli of the terms at |c_i| + r_i. Majorants
+//! are sums and products of numbers ≥ 0 with a relative error of at most `digits` u; their users
+//! leave a margin of 1e-9.
 
 use super::reduced::{Monomial, Reduced};
 
-/// A box: its two corners.
+/// A box, given by its two corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Range<const D: usize> {
     pub(crate) low: [f64; D],
@@ -20,7 +21,7 @@ impl<const D: usize> Range<D> {
         std::array::from_fn(|i| self.low[i] + 0.5 * (self.high[i] - self.low[i]))
     }
 
-    /// Upper bounds of how far the box reaches from `centre`.
+    /// Upper bounds on the distance from `centre` to the faces of the box.
     fn half(&self, centre: &[f64; D]) -> [f64; D] {
         std::array::from_fn(|i| {
             let reach = (centre[i] - self.low[i]).max(self.high[i] - centre[i]);
@@ -28,7 +29,7 @@ impl<const D: usize> Range<D> {
         })
     }
 
-    /// Two halves along a parameter; `None` where there is no number between its ends.
+    /// The two halves along a parameter; `None` where there is no number between its ends.
     pub(crate) fn halves(&self, parameter: usize) -> Option<(f64, [Self; 2])> {
         let (low, high) = (*self.low.get(parameter)?, *self.high.get(parameter)?);
         let middle = low + 0.5 * (high - low);
@@ -114,20 +115,20 @@ fn product<const D: usize>(
 /// A row over the box.
 #[derive(Debug, Clone)]
 pub(crate) struct ExpansionRow<const D: usize> {
-    /// d_j at the centre.
+    /// d_j at the centre of the box.
     pub(crate) delay: f64,
     pub(crate) slopes: [f64; D],
     /// |∂_i d_j|.
     pub(crate) rates: [f64; D],
-    /// How far d_j may be from that.
+    /// Bound on the change of d_j over the box.
     pub(crate) spread: f64,
     /// Majorant of |d_j|.
     pub(crate) longest: f64,
-    /// What `delay` was added up from, in moduli: at least `longest`.
+    /// Sum of the moduli from which `delay` was added up: at least `longest`.
     pub(crate) size: f64,
     /// Ascending powers of s.
     pub(crate) coefficients: Vec<Coefficient<D>>,
-    /// Does the row depend on parameters?
+    /// Does the row depend on the parameters?
     pub(crate) moves: bool,
 }
 
@@ -136,12 +137,13 @@ pub(crate) struct ExpansionRow<const D: usize> {
 pub(crate) struct BoxExpansion<const D: usize> {
     pub(crate) rows: Vec<ExpansionRow<D>>,
     pub(crate) half: [f64; D],
-    /// Roundings to count for each value, besides those of the delays: see `value_set`.
+    /// Number of roundings to count for each value, in addition to those of the delays: see
+    /// `value_set`.
     pub(crate) roundings: f64,
 }
 
 impl<const D: usize> BoxExpansion<D> {
-    /// Room for what boxes of `reduced` know.
+    /// Memory for the expansion of `reduced` about a box.
     pub(crate) fn new(reduced: &Reduced<'_, D>) -> Self {
         let rows: Vec<ExpansionRow<D>> = reduced
             .rows
@@ -172,7 +174,7 @@ impl<const D: usize> BoxExpansion<D> {
         }
     }
 
-    /// Learn what there is to know of the box `range`.
+    /// Compute the expansion about the box `range`.
     pub(crate) fn adopt(&mut self, reduced: &Reduced<'_, D>, range: &Range<D>) {
         let centre = range.centre();
         self.half = range.half(&centre);

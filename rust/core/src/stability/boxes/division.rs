@@ -1,13 +1,14 @@
 //! Ranges of parameters divided into boxes with a proved number of unstable roots.
 //!
-//! A box that cannot be proved is halved, along the parameter that stands most in the way; the
-//! largest boxes come first. The tree ends when the undecided ones together are no more than the
-//! wanted share of the ranges, or there are too many boxes. Boxes are taken in groups of a fixed size,
-//! in parallel, their results in order: the tree is the same for any number of threads.
+//! A box that cannot be proved is halved along the parameter that contributes most to the bound;
+//! the largest boxes come first. The division ends when the undecided boxes together are no more
+//! than the wanted share of the ranges, or there are too many boxes. Boxes are judged in groups of
+//! a fixed size, in parallel, and their results are used in order, so that the tree is the same for
+//! any number of threads.
 //!
-//! Proved means: every member of the closed box, written with the family's coefficients as they
-//! stand, has that many roots with Re s > 0 and none on the axis (or infinitely many to its right,
-//! as [`super::Cell`] judges chains).
+//! Proved means: every member of the closed box, with the family's coefficients taken as exact, has
+//! that many roots with Re s > 0 and none on the axis (or infinitely many to its right, in the
+//! sense in which [`crate::stability::Cell`] judges chains).
 
 use std::collections::VecDeque;
 
@@ -20,18 +21,22 @@ use crate::stability::cell::UNKNOWN;
 use crate::stability::family::Family;
 use crate::{Error, Task, memory};
 
-/// Most parameters that may vary.
+/// Upper limit on the parameters that may vary (the number of boxes grows exponentially with it).
 const MOST_PARAMETERS: usize = 3;
 
-/// Boxes taken at a time.
+/// Boxes judged in one group. A larger group keeps more threads busy and judges more boxes than
+/// necessary at the end.
 const GROUP: usize = 128;
 
-/// When to stop.
+/// What memory is requested for, in errors.
+const BOXES: &str = "the list of boxes";
+
+/// When to stop the division.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Share of the ranges that may stay undecided.
     pub undecided: f64,
-    /// Most boxes.
+    /// Upper limit on the number of boxes.
     pub boxes: usize,
 }
 
@@ -40,8 +45,8 @@ pub struct Limits {
 pub enum Node {
     /// A box, by its index.
     Leaf(usize),
-    /// Halves below and above `at` of a parameter; `first` is the node of the lower one, the upper
-    /// one follows it.
+    /// Divided at `at`; `first` is the node of the lower half, the node of the upper half follows
+    /// it.
     Halved {
         /// The index of the parameter.
         parameter: usize,
@@ -52,14 +57,15 @@ pub enum Node {
     },
 }
 
-/// What [`proved_boxes`] found; one entry a parameter and box, those of a box together.
+/// Result of [`proved_boxes`]. Ends have one entry for each box and parameter, those of a box next
+/// to each other.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Boxes {
     /// Lower ends.
     pub low: Vec<f64>,
     /// Upper ends.
     pub high: Vec<f64>,
-    /// Number of unstable roots, −1 for infinitely many, −2 where undecided; one a box.
+    /// Number of unstable roots for each box; −1 for infinitely many, −2 where undecided.
     pub unstable: Vec<i32>,
     /// The tree, root first.
     pub nodes: Vec<Node>,
@@ -69,7 +75,7 @@ pub struct Boxes {
 
 /// Divide `ranges`, one for each parameter of the family, into proved boxes.
 ///
-/// A range may be a point; up to three may not.
+/// At most three ranges may have a positive width.
 ///
 /// # Errors
 /// [`Error::Argument`] for ranges that are not finite or reversed, too many of them, a delay that
@@ -105,11 +111,11 @@ pub fn proved_boxes(
     }
 }
 
-/// The parameters that vary, if the ranges make sense.
+/// The indices of the parameters that vary, after a check of the ranges.
 pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>, Error> {
     if ranges.len() != family.names().len() {
         return Err(Error::argument(format!(
-            "{} ranges for {} parameters ({}): give one range a parameter",
+            "{} ranges for {} parameters ({}): give one range for each parameter",
             ranges.len(),
             family.names().len(),
             family.names().join(", ")
@@ -160,10 +166,7 @@ pub(crate) fn reduce<'a, const D: usize>(
     Ok((reduced, whole))
 }
 
-/// What memory is asked for.
-const BOXES: &str = "the list of boxes";
-
-/// A box that waits for its verdict.
+/// A box that is still to be judged.
 struct Waiting<const D: usize> {
     claim: Claim<D>,
     node: usize,
@@ -198,7 +201,7 @@ impl<'a, const D: usize> Tree<'a, D> {
             share: 1.0,
         }]);
         while tree.boxes.undecided > limits.undecided && !waiting.is_empty() {
-            // Each box judged makes one more at most.
+            // Judging a box adds at most one box.
             let room = limits
                 .boxes
                 .saturating_sub(tree.boxes.unstable.len() + waiting.len());
@@ -401,7 +404,7 @@ mod tests {
 
     #[test]
     fn the_radius_is_that_of_the_closed_form() {
-        // Kv = 0: stable for Kp T < π/2, reached where both have grown by the radius.
+        // Kv = 0: stable for Kp T < π/2. The radius is where both parameters have grown by it.
         let point = [2.0, 0.0, 0.36];
         let found = stability_radius(
             &velocity(),

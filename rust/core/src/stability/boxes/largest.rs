@@ -1,10 +1,11 @@
-//! One large box of parameters, all of it stable.
+//! One large stable box of parameters.
 //!
-//! The stable boxes of a tree are drawn on a grid of cells; the largest box of full cells (that holds a
-//! point, if one is given) is found by trying all ranges of the first axes and, of the cells full in all
-//! of them, the longest run along the last. It is proved anew as a whole. Then its faces are pushed
-//! outwards in turn, the slab in front of each being proved, until no face moves by the tolerance.
-//! The result is proved; that no larger box exists is not.
+//! The stable boxes of a tree are drawn on a grid of cells; the largest box of full cells (that
+//! holds a point, if one is given) is found by trying all ranges of the first axes and, of the
+//! cells full in all of them, the longest run along the last. It is proved again as a whole. Then
+//! its faces are moved outwards in turn, with a proof for each slab that is added, until no face
+//! moves by more than the tolerance. The result is proved to be stable; it is not proved to be the
+//! largest such box.
 
 use std::ops::Range as Indices;
 
@@ -18,17 +19,19 @@ use crate::stability::specification::Specification;
 use crate::{Error, Task};
 
 /// Cells along each axis and share of the ranges left undecided, for one, two and three parameters.
+/// More cells find a larger first box and take more time.
 const GRIDS: [(usize, f64); 3] = [(4096, 1e-4), (256, 2e-3), (32, 2e-2)];
 
-/// Most boxes of the tree, of the proof of the first box and of that of a slab.
+/// Upper limits on the boxes of the tree, of the proof of the first box and of the proof of a slab
+/// (bound the time).
 const TREE: usize = 300_000;
 const WHOLE: usize = 100_000;
 const SLAB: usize = 1000;
 
 /// A stable box within `ranges`, as large as could be found; `None` where there is none.
 ///
-/// With `around`, one value a parameter, it holds that point. `tol` is what faces are moved by at
-/// last, as a part of the ranges.
+/// With `around`, one value for each parameter, the box contains that point. `tol` is the smallest
+/// move of a face, as a share of the ranges.
 ///
 /// # Errors
 /// As [`proved_boxes`]; [`Error::Argument`] also for a point outside the ranges.
@@ -44,7 +47,7 @@ pub fn largest_stable_box(
         let inside = |((low, high), value): (&(f64, f64), &f64)| low <= value && value <= high;
         if point.len() != ranges.len() || !ranges.iter().zip(point).all(inside) {
             return Err(Error::argument(
-                "the point to be held lies outside the ranges",
+                "the point that the box has to contain lies outside the ranges",
             ));
         }
     }
@@ -117,7 +120,7 @@ fn search<const D: usize>(
     let start = match (start, point) {
         (Some(range), _) => range,
         (None, Some(point)) => {
-            // Nothing on the grid: grow the point itself.
+            // No cell of the grid is full: start from the point itself.
             if judge(
                 &family.at(&reduced.values_at(&point))?,
                 Specification::default(),
@@ -145,7 +148,7 @@ fn search<const D: usize>(
     Ok(Some(low.into_iter().zip(high).collect()))
 }
 
-/// Which cells of the grid are full of stable boxes?
+/// Which cells of the grid lie wholly in stable boxes?
 fn drawn<const D: usize>(
     boxes: &Boxes,
     count: usize,
@@ -160,7 +163,7 @@ fn drawn<const D: usize>(
             continue;
         }
         let (low, high) = (place(low), place(high));
-        // Along each axis: cells, and the part of each that is covered.
+        // Along each axis: the cells, and the covered part of each.
         let parts: [Vec<(usize, f64)>; D] = std::array::from_fn(|i| {
             let width = whole.high[i] - whole.low[i];
             if width == 0.0 {
@@ -192,7 +195,7 @@ fn drawn<const D: usize>(
 
 type Found = Option<(usize, Vec<Indices<usize>>)>;
 
-/// The largest box of full cells, with its number of cells.
+/// The largest box of full cells, with the number of its cells.
 fn best(full: &[bool], shape: &[usize], held: Option<&[usize]>) -> Found {
     let (&length, rest) = shape.split_first()?;
     let own = held.and_then(|held| held.first().copied());
@@ -245,7 +248,7 @@ fn longest_run(full: &[bool], held: Option<usize>) -> Found {
     longest.map(|run| (run.len(), vec![run]))
 }
 
-/// Push the faces of a stable box outwards.
+/// Move the faces of a stable box outwards.
 fn grow<const D: usize>(
     reduced: &Reduced<'_, D>,
     mut range: Range<D>,

@@ -1,10 +1,10 @@
-//! One box of parameters: has every member the same number of offending roots?
+//! One box of parameters: have all members the same number of roots that violate the specification?
 //!
-//! If no member has a root on the edge of what is demanded and none comes from infinity, the number of roots
-//! right of it is that at the centre, where it is counted. The edge up to the radius W of `unbounded_frequency`
-//! is divided into stretches, each in halves until `value_set` proves it clear of roots or the box is
-//! too large for that. What a box has proved holds for its parts: a part looks only at the stretches
-//! that are left.
+//! If no member has a root on the edge of the specification and none comes from infinity, all
+//! members have the number of violating roots that is counted at the centre. The edge up to the
+//! radius W of `unbounded_frequency` is divided into stretches, each of which is halved until
+//! `value_set` proves it free of roots or the box is too large for a proof. A proof for a box holds
+//! for its parts, so that a part examines only the stretches that are left.
 
 use std::collections::VecDeque;
 
@@ -19,17 +19,19 @@ use crate::stability::specification::Piece;
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
-/// Stretches that a box may fail on before it is divided.
+/// Stretches that may fail before a box is divided. A larger number tests more of the edge of boxes
+/// that are too large.
 const FAILURES: usize = 1;
 
-/// Looks that a box may take before it is divided.
+/// Tests of stretches after which a box is divided.
 const LOOKS: usize = 20_000;
 
-/// What is left to prove on a box.
+/// A box and what is still to be proved for it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Claim<const D: usize> {
     pub(crate) range: Range<D>,
-    /// Stretches of the edge not known to be clear, the hardest last; `None` where no W is known.
+    /// Stretches of the edge not yet proved free of roots, the hardest last; `None` where W is not
+    /// known.
     pub(crate) stretches: Option<Vec<Stretch>>,
 }
 
@@ -41,25 +43,26 @@ pub(crate) struct Stretch {
     pub(crate) to: f64,
 }
 
-/// What is known of a box before its members are counted.
+/// What is proved for a box before its members are counted.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Examined {
     /// No member has a root on the edge, none comes from infinity.
     Clear,
-    /// Every member has infinitely many offending roots.
+    /// Every member has infinitely many violating roots.
     Endless,
-    /// Not known: the parameter that stands most in the way, and the stretches that are left.
+    /// Nothing is proved: the parameter that contributes most to the bound, and the stretches that
+    /// are left.
     Open(Option<usize>, Option<Vec<Stretch>>),
 }
 
-/// What came of it.
+/// The verdict about a box.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Verdict {
-    /// All members have so many offending roots, or [`ENDLESS`].
+    /// All members have this number of violating roots, or [`ENDLESS`].
     Proved(i32),
-    /// The box is to be halved along the parameter, its halves inherit the stretches.
+    /// The box has to be halved along this parameter; its halves inherit the stretches.
     Halve(usize, Option<Vec<Stretch>>),
-    /// No parameter makes a difference to what is missing.
+    /// No parameter influences what is missing for a proof.
     Stuck,
 }
 
@@ -72,7 +75,7 @@ impl<const D: usize> Claim<D> {
     }
 }
 
-/// Judge a box; `expansion` is room for what it knows.
+/// Judge a box; `expansion` is memory for its expansion.
 pub(crate) fn judge_box<const D: usize>(
     reduced: &Reduced<'_, D>,
     claim: &Claim<D>,
@@ -90,14 +93,14 @@ pub(crate) fn judge_box<const D: usize>(
                     return Ok(Verdict::Proved(cell.unstable));
                 }
             }
-            // The centre is beyond double precision.
+            // The member at the centre cannot be formed in double precision.
             (largest(&expansion.half), Some(Vec::new()))
         }
     };
     Ok(parameter.map_or(Verdict::Stuck, |i| Verdict::Halve(i, left)))
 }
 
-/// Is a box clear of roots on the edge?
+/// Is a box proved to have no roots on the edge?
 pub(crate) fn examine<const D: usize>(
     reduced: &Reduced<'_, D>,
     claim: &Claim<D>,
@@ -157,7 +160,7 @@ pub(crate) fn examine<const D: usize>(
         return Ok(Examined::Clear);
     }
     left.extend(failed);
-    // Where nothing failed, the work was too much.
+    // No stretch failed, but the limit on tests was reached.
     Ok(Examined::Open(
         largest(&shares.unwrap_or(expansion.half)),
         Some(left),
@@ -182,7 +185,7 @@ fn stretches_within(edge: &[Piece], radius: f64) -> Vec<Stretch> {
     stretches.filter(|stretch| stretch.to > 0.0).collect()
 }
 
-/// The index of the largest share, if there is one above zero.
+/// The index of the largest share, if one is above zero.
 fn largest<const D: usize>(shares: &[f64; D]) -> Option<usize> {
     let mut best = (0.0, None);
     for (index, share) in shares.iter().enumerate() {
@@ -193,18 +196,19 @@ fn largest<const D: usize>(shares: &[f64; D]) -> Option<usize> {
     best.1
 }
 
-/// What a box holds, as far as it was looked at.
+/// What is proved or found for a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Finding {
     /// Every member is stable.
     Stable,
-    /// Some are not: so many unstable roots, or [`ENDLESS`].
+    /// At least one member has this number of unstable roots, or [`ENDLESS`].
     Unstable(i32),
     /// Neither could be proved.
     Unknown,
 }
 
-/// Prove that every member of a box is stable, in at most so many boxes, or find one that is not.
+/// Prove that every member of a box is stable, in at most the given number of boxes, or find one
+/// that is not.
 pub(crate) fn find_unstable<const D: usize>(
     reduced: &Reduced<'_, D>,
     range: Range<D>,

@@ -1,11 +1,12 @@
 //! How far may parameters move away from a point before stability is lost?
 //!
-//! The distance of p from the point is the largest |p_i − point_i| / scale_i: balls are boxes. Boxes
-//! are judged nearest first. A stable one is done with; a proved unstable one bounds the radius by
-//! its nearest point, a witness; any other is halved. No unstable member is nearer than the nearest
-//! box that is left, so the radius lies between its distance and that of the witness. Witnesses are
-//! also looked for a little beyond the nearest boxes: as these shrink onto the boundary of stability,
-//! one is met. Distances from below are reduced by 8 u, which outweighs their rounding.
+//! The distance of p from the point is the largest |p_i − point_i| / scale_i: balls are boxes.
+//! Boxes are judged in order of their distance. A stable box needs no more work; a box proved to be
+//! unstable bounds the radius by its nearest point, a witness; any other box is halved. No unstable
+//! member is nearer than the nearest box that is left, so the radius lies between its distance and
+//! that of the witness. Witnesses are also searched for slightly beyond the nearest boxes, since
+//! these shrink towards the boundary of stability. Lower bounds on distances are reduced by 8 u,
+//! which exceeds their rounding errors.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -19,27 +20,27 @@ use crate::stability::family::Family;
 use crate::stability::specification::Specification;
 use crate::{Error, Task};
 
-/// The first radius looked at, the factor to the next, and their number.
+/// The first radius tried, the factor to the next one, and the number of radii.
 const FIRST: f64 = 1.0 / 64.0;
 const FACTOR: f64 = 4.0;
 const TRIALS: usize = 11;
 
-/// New boxes from one search for a witness to the next, at most.
+/// Upper limit on new boxes between two searches for a witness.
 const TRY_EVERY: usize = 16;
 
-/// What [`stability_radius`] found.
+/// Result of [`stability_radius`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radius {
-    /// Proved: every member within this distance is stable.
+    /// Every member within this distance is proved to be stable.
     pub radius: f64,
-    /// No larger radius is known to be possible: a witness lies at this distance, or parameters cannot
-    /// go further; infinite where neither was met.
+    /// Upper bound on the radius: a witness lies at this distance, or the parameters cannot move
+    /// further. Infinite where neither was found.
     pub upper: f64,
     /// The nearest member found that is not stable.
     pub witness: Option<Vec<f64>>,
 }
 
-/// A box on the heap, the nearest on top.
+/// A box on the heap, ordered so that the nearest one is on top.
 struct Near<const D: usize> {
     distance: f64,
     order: usize,
@@ -69,13 +70,13 @@ impl<const D: usize> Ord for Near<D> {
 
 /// The distance from `point`, in units of `scales`, within which every member is stable.
 ///
-/// One scale for each parameter, 0 for those that do not move. `tol` is the relative width of
-/// the interval from `radius` to `upper`, `boxes` the most boxes to look at in each of the trials.
+/// One scale for each parameter, 0 for those that do not move. `tol` is the relative width of the
+/// interval from `radius` to `upper`, `boxes` the upper limit on the boxes of each trial.
 /// Parameters that delays depend on stay at or above 0.
 ///
 /// # Errors
-/// [`Error::Argument`] where the member at `point` is not stable or cannot be judged, for scales that
-/// are not finite or negative, or more than three above 0; [`Error::Interrupted`].
+/// [`Error::Argument`] where the member at `point` is not stable or cannot be judged, for scales
+/// that are not finite or negative, or more than three above 0; [`Error::Interrupted`].
 pub fn stability_radius(
     family: &Family,
     point: &[f64],
@@ -85,7 +86,7 @@ pub fn stability_radius(
 ) -> Result<Radius, Error> {
     if scales.len() != point.len() {
         return Err(Error::argument(format!(
-            "{} scales for {} parameters: give one a parameter",
+            "{} scales for {} parameters: give one for each parameter",
             scales.len(),
             point.len()
         )));
@@ -116,7 +117,7 @@ pub fn stability_radius(
     let ranges = |radius: f64| -> Vec<(f64, f64)> {
         let ends = point.iter().zip(scales).enumerate();
         ends.map(|(index, (value, scale))| {
-            // Outwards, by what the products and sums lose.
+            // Rounded outwards by the errors of the products and sums.
             let reach = radius * scale * (1.0 + 4.0 * f64::EPSILON);
             let room = if *scale == 0.0 {
                 0.0
@@ -143,7 +144,7 @@ pub fn stability_radius(
         let mut wanted = ranges(radius);
         let mut last = false;
         if family.check_delays(&wanted).is_err() {
-            // A delay would be negative: as far as it is not.
+            // A delay would become negative: only up to there.
             let (mut low, mut high) = (best.radius, radius);
             for _ in 0..50 {
                 let middle = 0.5 * (low + high);
@@ -186,7 +187,7 @@ pub fn stability_radius(
     Ok(best)
 }
 
-/// Where from, how far and how well.
+/// The point, the scales and the limits of a search.
 struct Place<'a> {
     point: &'a [f64],
     scales: &'a [f64],
@@ -213,7 +214,7 @@ impl Place<'_> {
         (nearest, distance)
     }
 
-    /// The nearest point of a box, moved away from the point by a part of the tolerance.
+    /// The nearest point of a box, moved away from the point by a share of the tolerance.
     fn beyond<const D: usize>(&self, range: &Range<D>) -> [f64; D] {
         let mut place = self.nearest(range).0;
         for (slot, index) in place.iter_mut().zip(self.varying) {
@@ -307,7 +308,7 @@ impl Place<'_> {
         }
         let left = heap.peek().map_or(f64::INFINITY, |near| near.distance);
         let below = left.min(upper).min(barrier);
-        // All of the box is proved stable: not a bit less than was asked for.
+        // The whole box is proved stable: return exactly the radius that was requested.
         let radius = if below >= self.radius && upper == f64::INFINITY {
             self.radius
         } else {

@@ -1,8 +1,8 @@
-//! A family over the parameters that vary, the others put in.
+//! A family over the parameters that vary, with values put in for the others.
 //!
 //! Delays are taken relative to one row, the reference: h e^(s τ_r) has the zeros of h and, on the
-//! imaginary axis, its modulus. What the sums and products below lose is counted by `digits`, in
-//! units of u = 2⁻⁵³ relative to the moduli of the summands: one for each factor and summand.
+//! imaginary axis, its modulus. `digits` counts the rounding errors of the sums and products below,
+//! in units of u = 2⁻⁵³ relative to the moduli of the summands: one for each factor and summand.
 
 use crate::Error;
 use crate::stability::family::{Affine, Family};
@@ -13,17 +13,17 @@ use crate::stability::specification::{Piece, Specification};
 pub(crate) struct Reduced<'a, const D: usize> {
     /// The whole family.
     pub(crate) family: &'a Family,
-    /// Values of all its parameters; those that vary are put in their `places`.
+    /// Values of all its parameters; those that vary are stored at their `places`.
     values: Vec<f64>,
-    /// Where the varying parameters stand; `None` for one that is not there.
+    /// Indices of the varying parameters; `None` for one that does not exist.
     places: [Option<usize>; D],
     pub(crate) rows: Vec<Row<D>>,
     /// The highest power of s.
     pub(crate) degree: usize,
-    /// What is demanded of its roots, and the edge of that.
+    /// The specification for the roots, and the edge of the region that it excludes.
     pub(crate) specification: Specification,
     pub(crate) edge: Vec<Piece>,
-    /// Roundings that a coefficient may have seen.
+    /// Number of rounding errors in a coefficient.
     pub(crate) digits: f64,
 }
 
@@ -33,9 +33,9 @@ pub(crate) struct Row<const D: usize> {
     /// The delay, relative to the reference, where all varying parameters are zero.
     pub(crate) delay: f64,
     pub(crate) slopes: [f64; D],
-    /// Sum of the moduli of what `delay` was added up from.
+    /// Sum of the moduli from which `delay` was added up.
     pub(crate) size: f64,
-    /// As `slopes`, of moduli.
+    /// The same as `slopes`, with moduli.
     pub(crate) slope_sizes: [f64; D],
     pub(crate) monomials: Vec<Monomial<D>>,
 }
@@ -49,7 +49,7 @@ pub(crate) struct Monomial<const D: usize> {
 }
 
 impl<'a, const D: usize> Reduced<'a, D> {
-    /// The family with `values` put in but for the parameters at `places`.
+    /// The family with `values` put in, except for the parameters at `places`.
     pub(crate) fn new(family: &'a Family, values: &[f64], places: &[usize]) -> Self {
         let mut own = [None; D];
         for (slot, place) in own.iter_mut().zip(places) {
@@ -106,7 +106,7 @@ impl<'a, const D: usize> Reduced<'a, D> {
         reduced
     }
 
-    /// The same family, this being demanded of its roots.
+    /// The same family with this specification.
     pub(crate) fn with_specification(self, specification: Specification) -> Self {
         Self {
             specification,
@@ -115,12 +115,12 @@ impl<'a, const D: usize> Reduced<'a, D> {
         }
     }
 
-    /// Rows of one delay become one.
+    /// Merge rows with the same delay.
     fn merge(&mut self) {
         let mut merged: Vec<Row<D>> = Vec::with_capacity(self.rows.len());
         for row in self.rows.drain(..) {
             let same = |known: &&mut Row<D>| {
-                // As members merge them.
+                // By the same rule as members of a family merge them.
                 known.slopes == row.slopes
                     && (known.delay - row.delay).abs() <= 4.0 * f64::EPSILON * row.size
             };
@@ -134,7 +134,7 @@ impl<'a, const D: usize> Reduced<'a, D> {
         self.rows = merged;
     }
 
-    /// Count all delays from the smallest one at `centre`.
+    /// Take all delays relative to the smallest one at `centre`.
     pub(crate) fn refer_to_first(&mut self, centre: &[f64; D]) {
         let delay = |row: &Row<D>| {
             let moved = row.slopes.iter().zip(centre).map(|(s, c)| s * c);
@@ -160,7 +160,7 @@ impl<'a, const D: usize> Reduced<'a, D> {
         }
     }
 
-    /// The index in the family of a parameter that varies.
+    /// The index in the family of a varying parameter.
     pub(crate) fn place(&self, parameter: usize) -> usize {
         self.places.get(parameter).copied().flatten().unwrap_or(0)
     }
@@ -176,7 +176,7 @@ impl<'a, const D: usize> Reduced<'a, D> {
         values
     }
 
-    /// Refuse a family every member of which has a root at 0: no box of it could be judged.
+    /// Refuse a family of which every member has a root at 0, because no box of it could be proved.
     pub(crate) fn refuse_root_at_zero(&self) -> Result<(), Error> {
         let mut sums: Vec<([u32; D], f64, f64)> = Vec::new();
         let constants = self.rows.iter().flat_map(|row| &row.monomials);

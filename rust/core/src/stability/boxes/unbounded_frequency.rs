@@ -2,38 +2,43 @@
 //!
 //! Let n be the highest degree, a(p) the coefficient of sⁿ in the row of the smallest delay, b_j(p)
 //! those of the others, d_j(p) ≥ 0 their delays relative to it, e_j = e^(−x d_j).
-//! 1. If min |a| > Σ max |b_j e_j| over the box, the leading term of that row exceeds all others outside
-//!    one disc, for Re s ≥ x and all p: the roots there are bounded, and as p moves their number
-//!    changes only through roots on the edge of what is demanded. W is a radius for which
+//! 1. If min |a| > Σ max |b_j e_j| over the box, the leading term of that row exceeds all others
+//!    outside one disc, for Re s ≥ x and all p: the roots there are bounded, and as p moves their
+//!    number changes only through roots on the edge of the specification. W is a radius for which
 //!    min |a| > Σ max |a_k| W^(k−n) + Σ max |b_jk e_j| W^(k−n).
-//! 2. For x = 0, only roots on the axis matter. On s = iw, powers of the same parity are collinear, the others perpendicular:
-//!    |P_j| / wⁿ ≤ (A_j² + B_j²)^(1/2) with A_j, B_j the sums of |b_jk| w^(k−n) over n − k even and odd,
-//!    and the first row is at least |a| − Σ |a_k| w^(k−n), n − k = 2, 4, …. The one rises with w,
-//!    the others fall: an inequality at W holds beyond. (Comparing moduli of whole rows, it holds
-//!    from a far smaller W than one between the terms where chains lie close to the axis.)
-//! 3. If Σ min |b_j e_j| > max |a|, all d_j > 0 and no two of them equal, infinitely many roots lie right
-//!    of the line for every p, robustly: under arbitrarily small changes of the delays (Avellar and
-//!    Hale 1980); with one b_j that exceeds all others and a, as it stands.
+//! 2. For x = 0, only roots on the axis matter. On s = iw, powers of the same parity are collinear,
+//!    the others perpendicular: |P_j| / wⁿ ≤ (A_j² + B_j²)^(1/2) with A_j, B_j the sums of |b_jk|
+//!    w^(k−n) over n − k even and odd, and the first row is at least |a| − Σ |a_k| w^(k−n), n − k =
+//!    2, 4, …. The former rises with w, the others fall: an inequality at W holds beyond.
+//!    (Comparing moduli of whole rows, it holds from a far smaller W than one between the terms
+//!    where chains lie close to the axis.)
+//! 3. If Σ min |b_j e_j| > max |a|, all d_j > 0 and no two of them equal, infinitely many roots lie
+//!    right of the line for every p, robustly: under arbitrarily small changes of the delays
+//!    (Avellar and Hale 1980); with one b_j that exceeds all others and a, as it stands.
 //!
-//! Inequalities are tested with a relative margin of 1e-9, far above the rounding of such sums.
+//! Inequalities are tested with a relative margin of 1e-9, far above the rounding errors of such
+//! sums.
 
 use super::box_expansion::{BoxExpansion, ExpansionRow};
 use crate::elementary::exp;
 
 const MARGIN: f64 = 1e-9;
 
-/// What the largest terms say of a box.
+/// Ratio of the bounds at which the bisection for the radius ends.
+const WIDTH: f64 = 1.05;
+
+/// What is proved for large |s| over a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum UnboundedFrequency<const D: usize> {
     /// All members have infinitely many unstable roots.
     Endless,
-    /// No member has a root on the edge beyond this |s|, nor one from infinity.
+    /// No member has a root on the edge beyond this |s|, and no root comes from infinity.
     Bounded(f64),
-    /// Neither is proved; the part of each parameter in what is missing.
+    /// Neither is proved; the contribution of each parameter to what is missing.
     Open([f64; D]),
 }
 
-/// Least and largest value of d_j − d_i over the box, rounding included.
+/// Least and largest value of d_j − d_i over the box, including rounding errors.
 fn gap<const D: usize>(
     from: &ExpansionRow<D>,
     to: &ExpansionRow<D>,
@@ -48,21 +53,21 @@ fn gap<const D: usize>(
         least -= reach;
     }
     let rounding = 16.0 * f64::EPSILON * (from.size + to.size);
-    // A parameter alone, or a number, is never less than its range says.
+    // A single parameter, or a number, is never less than its range states.
     let plain = rounding > 0.0 && least.abs() <= rounding && to.is_plain() && from.is_plain();
     let least = if plain { 0.0 } else { least - rounding };
     (least, centre + spread + rounding)
 }
 
 impl<const D: usize> ExpansionRow<D> {
-    /// Zero, or a positive multiple of one parameter.
+    /// Is this zero, or a positive multiple of one parameter?
     fn is_plain(&self) -> bool {
         let moving = self.slopes.iter().filter(|slope| **slope != 0.0).count();
         moving <= 1 && self.slopes.iter().all(|slope| *slope >= 0.0)
     }
 }
 
-/// Bounds on e^(−x d) for delays within a gap.
+/// Bounds on e^(−x d) for delays within a range.
 fn weights(line: f64, gap: (f64, f64)) -> (f64, f64) {
     if line == 0.0 {
         return (1.0, 1.0);
@@ -74,7 +79,7 @@ fn weights(line: f64, gap: (f64, f64)) -> (f64, f64) {
     )
 }
 
-/// Judge the tail of a box, roots right of Re s = `line` being looked for.
+/// Judge large |s| over a box, for roots right of Re s = `line`.
 pub(crate) fn unbounded_frequency<const D: usize>(
     expansion: &BoxExpansion<D>,
     degree: usize,
@@ -137,7 +142,8 @@ pub(crate) fn unbounded_frequency<const D: usize>(
     UnboundedFrequency::Open(shares(expansion, degree))
 }
 
-/// What each parameter adds to the uncertainty of the leading terms, or of the order of the delays.
+/// The contribution of each parameter to the uncertainty of the leading terms, or of the order of
+/// the delays.
 fn shares<const D: usize>(expansion: &BoxExpansion<D>, degree: usize) -> [f64; D] {
     let leading = |i: usize| {
         let slope = |row: &ExpansionRow<D>| {
@@ -156,7 +162,7 @@ fn shares<const D: usize>(expansion: &BoxExpansion<D>, degree: usize) -> [f64; D
     })
 }
 
-/// The radius W, on the `axis` that of 2., within some percent of the least one.
+/// The radius W, on the `axis` that of item 2, within a few per cent of the least one.
 fn radius<const D: usize>(
     expansion: &BoxExpansion<D>,
     own: usize,
@@ -217,7 +223,7 @@ fn radius<const D: usize>(
             }
         }
     }
-    while high > 1.05 * low {
+    while high > WIDTH * low {
         let middle = (low * high).sqrt();
         if holds(middle) {
             high = middle;

@@ -1,19 +1,22 @@
 //! Is h(s; p) ≠ 0 for all p in a box and all s in a stretch of the edge?
 //!
-//! With centres c, s_0 and p = c + δ, s = s_0 + ηe, |δ_i| ≤ r_i, |η| ≤ ρ, |e| = 1, Taylor's theorem gives
+//! With centres c, s_0 and p = c + δ, s = s_0 + ηe, |δ_i| ≤ r_i, |η| ≤ ρ, |e| = 1, Taylor's theorem
+//! gives
 //!     h = h_0 + Σ δ_i ∂_i h + η ∂_η h + E,  |E| ≤ ½ Σ_ab x_a x_b max |∂_a ∂_b h|,  x = (r, ρ),
-//! the first part of which fills a zonotope. It lies clear of 0 by more than |E| if, for some n,
+//! the first part of which fills a zonotope. Its distance from 0 exceeds |E| if, for some n,
 //!     |Re n̄ h_0| − Σ_a |Re n̄ ∂_a h| x_a > |n| max |E|.
-//! Tried are the normals of the edges, one of which separates 0 from a polygon if any line does, and
-//! h_0 itself (for the disc around it). With f = P e^(−sd), dashes for ∂/∂s, w = |s|, W = |e^(−sd)|:
+//! The n tried are the normals of the edges, one of which separates 0 from a polygon if any line
+//! does, and h_0 itself (for the disc around it). With f = P e^(−sd), dashes for ∂/∂s, w = |s|, W =
+//! |e^(−sd)|:
 //!     ∂_i f = (P_i − s d_i P) e^(…),  ∂_η f = e (P′ − d P) e^(…),
 //!     |∂_η² f| ≤ W (|P″| + 2|d P′| + d²|P|),  |∂_η ∂_i f| ≤ W (|P_i′| + |d P_i| + |d_i| (|P| + w|P′| + w|d P|)),
 //!     |∂_i ∂_l f| ≤ W (|P_il| + w (|d_i P_l| + |d_l P_i|) + w² |d_i d_l P|),
-//! bounded by majorants at the upper end of the stretch. Or one row outweighs the others: |f_j| stays within
-//! max W ((|P_j′| + |Re e| |d P_j|) ρ + Σ (|P_i| + |Re s| |d_i P_j|) r_i) of its value at s_0. Rounding: as in `quasipoly::probe`,
-//! a value or slope of degree n is wrong by at most u (16 (n + 1) + 4 m + 16 wS) of its majorant for m rows, S
-//! the sum of the moduli that make up d, plus `digits` of the coefficients; directions and products with them
-//! lose 32 u more. The same again is left for a member being formed in double precision.
+//! bounded by majorants at the upper end of the stretch. Alternatively one row exceeds the others:
+//! |f_j| stays within max W ((|P_j′| + |Re e| |d P_j|) ρ + Σ (|P_i| + |Re s| |d_i P_j|) r_i) of its
+//! value at s_0. Rounding: as in `quasipoly::probe`, a value or slope of degree n is wrong by at
+//! most u (16 (n + 1) + 4 m + 16 wS) of its majorant for m rows, S the sum of the moduli that make
+//! up d, plus `digits` of the coefficients; directions and products with them have errors of 32 u
+//! more. The same amount is added again, because members are formed in double precision.
 
 use num_complex::Complex64;
 
@@ -22,23 +25,36 @@ use crate::elementary::{exp, sin_cos};
 use crate::quasipoly::modulus;
 use crate::stability::specification::Piece;
 
-/// Half an ulp of 1, with room for what the bounds lose in being computed.
+/// Half an ulp of 1, enlarged by the rounding errors of computing the bounds.
 const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
-/// Far above all that underflow can do; the square is a normal number.
+/// Far above every effect of underflow; its square is a normal number.
 const FLOOR: f64 = 1e-150;
 
-/// Below this nothing is claimed.
+/// No statement is made about values below this.
 const SMALLEST: f64 = 1e-140;
 
-/// What a look at one stretch of the edge says.
+/// Relative length of a stretch below which it is not divided.
+const FINEST: f64 = 1e-13;
+
+/// Covers the rounding errors of a bound.
+const ROOM: f64 = 1.0 + 1e-9;
+
+/// If h changes along a stretch by less than this many times what it changes over the box, and a
+/// member may have a root in the middle of the stretch, the stretch is not divided: the box is.
+const COARSE: f64 = 0.3;
+
+/// The same limit, wherever the members' roots are.
+const FINE: f64 = 0.1;
+
+/// Result of testing one stretch of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Look<const D: usize> {
     /// No member has a root there.
     Clear,
-    /// The stretch is too long to tell.
+    /// The stretch is too long for a proof.
     Long,
-    /// The box is too large to tell; the part of each parameter in that.
+    /// The box is too large for a proof; the contribution of each parameter to that.
     Wide([f64; D]),
 }
 
@@ -53,7 +69,7 @@ struct Stretch {
     reals: (f64, f64),
 }
 
-/// s z; on the imaginary axis with half the work.
+/// s z, at half the cost on the imaginary axis.
 #[inline(always)]
 fn times<const AXIS: bool>(s: Complex64, z: Complex64) -> Complex64 {
     if AXIS {
@@ -97,9 +113,6 @@ impl Stretch {
     }
 }
 
-/// Room for the rounding of a bound.
-const ROOM: f64 = 1.0 + 1e-9;
-
 /// First and second order of h around the middle of a stretch.
 struct Expansion<const D: usize> {
     value: Complex64,
@@ -109,9 +122,9 @@ struct Expansion<const D: usize> {
     bend: f64,
     mixed: [f64; D],
     bends: [[f64; D]; D],
-    /// What the largest row exceeds the others by, all over box and stretch.
+    /// The least excess of the largest row over the others, all over box and stretch.
     excess: f64,
-    /// Bound on what rounding does to the zonotope.
+    /// Bound on the rounding errors of the zonotope.
     rounding: f64,
 }
 
@@ -220,7 +233,7 @@ impl<const D: usize> Expansion<D> {
         own
     }
 
-    /// Second order in the parameters alone, each with its part in it.
+    /// Second order in the parameters alone, with the share of each.
     fn remainder(&self, half: &[f64; D]) -> [f64; D] {
         std::array::from_fn(|i| {
             let sum: f64 = self.bends[i].iter().zip(half).map(|(b, r)| b * r).sum();
@@ -228,7 +241,7 @@ impl<const D: usize> Expansion<D> {
         })
     }
 
-    /// Does a line separate 0 from all values, s being within `rho`?
+    /// Does a line separate 0 from all values when s is within `rho`?
     fn is_clear(&self, half: &[f64; D], rho: f64, rest: f64) -> bool {
         let mixed: f64 = self.mixed.iter().zip(half).map(|(m, r)| m * r).sum();
         let rest = rest + rho * (mixed + 0.5 * rho * self.bend);
@@ -240,7 +253,7 @@ impl<const D: usize> Expansion<D> {
                 reach += along(*slope) * r;
             }
             let excess = along(self.value) - reach;
-            // Where squares lose no digits.
+            // Scaled so that the squares stay in range.
             let size = n.norm_sqr();
             excess > SMALLEST
                 && size > SMALLEST * SMALLEST
@@ -253,7 +266,7 @@ impl<const D: usize> Expansion<D> {
     }
 }
 
-/// Look at the stretch of a piece of the edge from `from` to `to`.
+/// Test the stretch of a piece of the edge from `from` to `to`.
 pub(crate) fn look<const D: usize>(
     expansion: &BoxExpansion<D>,
     piece: &Piece,
@@ -269,7 +282,8 @@ pub(crate) fn look<const D: usize>(
     if own.is_clear(half, rho, rest) || own.excess > own.rounding {
         return Look::Clear;
     }
-    // Seen along the way on which h moves with s, only the parameters can lead away from 0.
+    // Perpendicular to the direction in which h moves with s, only the parameters can lead away
+    // from 0.
     let along = |z: &Complex64| {
         let size = own.turn.norm_sqr().sqrt();
         if size > 0.0 {
@@ -283,8 +297,8 @@ pub(crate) fn look<const D: usize>(
         std::array::from_fn(|i| (along(&own.slopes[i]) + mixed(i)) * half[i] + remainder[i]);
     let spread: f64 = shares.iter().sum();
     let pace = own.turn.norm_sqr().sqrt() * rho;
-    // Nothing is to be learnt where an exponential overflows.
-    let finest = rho <= 1e-13 * to || pace <= own.rounding || !own.rounding.is_finite();
+    // Where an exponential overflows, nothing is proved.
+    let finest = rho <= FINEST * to || pace <= own.rounding || !own.rounding.is_finite();
     if finest || (pace < COARSE * spread && !own.is_clear(half, 0.0, rest)) {
         return Look::Wide(shares);
     }
@@ -294,7 +308,8 @@ pub(crate) fn look<const D: usize>(
     Look::Long
 }
 
-/// h, its slopes along the parameters and along the edge, at one place of a piece.
+/// h and its derivatives with respect to the parameters and along the edge, at one point of a
+/// piece.
 pub(crate) fn tangent<const D: usize>(
     expansion: &BoxExpansion<D>,
     piece: &Piece,
@@ -303,10 +318,3 @@ pub(crate) fn tangent<const D: usize>(
     let own = Expansion::new(expansion, &Stretch::new(piece, t, t));
     (own.value, own.slopes, own.turn)
 }
-
-/// A stretch on which h moves less than this many times what the box does is not divided if a
-/// member may well have a root in its middle.
-const COARSE: f64 = 0.3;
-
-/// As COARSE, wherever the members' roots are.
-const FINE: f64 = 0.1;

@@ -1,7 +1,8 @@
 //! Roots of A + k B, followed as k varies, several of them and several values of k at a time.
 //!
-//! From the last two values of k the next roots are extrapolated (cubic, with the slopes ds/dk = −B/h′), and each is
-//! settled on from there and proved by itself (`settle`). A root that is lost costs what comes after it only.
+//! From the last two values of k the next roots are extrapolated (cubic, with the slopes ds/dk =
+//! −B/h′), and each root is refined from there and proved by itself (`certify`). If a root is lost,
+//! only the values of k after it are repeated.
 
 use num_complex::Complex64;
 
@@ -10,16 +11,17 @@ use super::plane::{Around, Plane};
 use crate::quasipoly::modulus;
 use crate::simd::{Columns, SHORT, sweep};
 
-/// Roots that are followed at most.
+/// Upper limit on the roots that are followed.
 const FOLLOWED: usize = 4;
 
-/// Values of k at a time.
+/// Values of k processed together.
 const STRETCH: usize = 16;
 
 /// Elements of a block.
 const ELEMENTS: usize = FOLLOWED * STRETCH;
 
-/// Starts lie within this share of the radius of their bounds, what Newton's steps lead to within half of it.
+/// Starts lie within this share of the radius of their bounds; points that Newton's steps lead to,
+/// within half of it.
 const NEAR_CENTER: f64 = 0.4;
 
 /// A simple root and its disc.
@@ -30,7 +32,7 @@ pub(crate) struct Root {
 }
 
 impl Root {
-    /// Does it stand for its mirror image as well? `None` where that cannot be told.
+    /// Does it stand for its mirror image as well? `None` where this cannot be decided.
     pub(crate) fn weight(&self) -> Option<i32> {
         if self.s.im == 0.0 {
             Some(1)
@@ -48,7 +50,7 @@ struct Knot {
     slope: Complex64,
 }
 
-/// A root on its way along k.
+/// A root followed along k.
 #[derive(Debug, Clone)]
 struct Branch {
     around: Around,
@@ -61,7 +63,7 @@ impl Branch {
     fn extrapolation(&self) -> impl Fn(f64) -> Complex64 + use<> {
         let (old, new) = (self.before, self.now);
         let span = if new.k == old.k { 1.0 } else { new.k - old.k };
-        // In powers of t from the newer root on; at t = −1 lies the older one.
+        // In powers of t, with t = 0 at the newer root and t = −1 at the older one.
         let (d0, d1) = (old.slope * span, new.slope * span);
         let gap = new.s - old.s;
         let (square, cube) = if new.k == old.k {
@@ -84,7 +86,7 @@ impl Branch {
         };
         if farthest(self.around.center) > NEAR_CENTER * self.around.radius {
             let center = start(*points.get(points.len() / 2)?);
-            // Where single steps are taken starts are poor, and Newton's method goes far.
+            // Where single steps are taken, the starts are poor and Newton's steps long.
             let needed = if points.len() > 1 {
                 farthest(center) / NEAR_CENTER
             } else {
@@ -96,13 +98,13 @@ impl Branch {
     }
 }
 
-/// Several roots on their way along k.
+/// Several roots followed along k.
 #[derive(Debug, Clone)]
 pub(crate) struct Branches {
     all: Vec<Branch>,
     arguments: Columns<ARGUMENTS, ELEMENTS>,
     values: Columns<VALUES, ELEMENTS>,
-    /// Values of k in a block, those of them at which no root is lost, and those asked for.
+    /// Values of k in a block, how many of them lose no root, and how many were requested.
     width: usize,
     ahead: usize,
     next: usize,
@@ -123,13 +125,14 @@ impl Branches {
         }
     }
 
-    /// No root is followed any more.
+    /// Follow no root any more.
     pub(crate) fn clear(&mut self) {
         self.all.clear();
         (self.ahead, self.next, self.stretch) = (0, 0, 1);
     }
 
-    /// Follow the roots next to these at k, [`FOLLOWED`] at most; none at all where one of them is not proved to be simple.
+    /// Follow the roots next to these at k, at most [`FOLLOWED`]. No root is followed where one of
+    /// them is not proved to be simple.
     pub(crate) fn start(&mut self, plane: &Plane, roots: impl Iterator<Item = Complex64>, k: f64) {
         self.clear();
         for s in roots.take(FOLLOWED) {
@@ -153,8 +156,8 @@ impl Branches {
         }
     }
 
-    /// Put down the roots at the first of the values of k that are still to come; false where one of them is lost, or
-    /// would be the mirror image of one that is followed as well.
+    /// Store the roots at the first of the remaining values of k. Returns false where one of them
+    /// is lost, or would be the mirror image of another one that is followed.
     pub(crate) fn advance(&mut self, plane: &Plane, points: &[f64], roots: &mut Vec<Root>) -> bool {
         if self.next == self.ahead && !self.all.is_empty() {
             self.pass(self.next);
@@ -176,7 +179,7 @@ impl Branches {
         true
     }
 
-    /// Put down the roots at the next k of the block.
+    /// Store the roots at the next k of the block.
     fn put(&mut self, roots: &mut Vec<Root>) {
         let [re, im, radius, ..] = &self.values;
         roots.clear();
@@ -190,7 +193,7 @@ impl Branches {
         self.next += 1;
     }
 
-    /// Go on from the last of the `taken` values of k that have been asked for.
+    /// Continue after the `taken` values of k that were requested.
     fn pass(&mut self, taken: usize) {
         for place in 0..self.all.len() {
             let knot = |index| self.knot(place, index);
@@ -204,7 +207,7 @@ impl Branches {
         (self.ahead, self.next) = (0, 0);
     }
 
-    /// At how many of the first `width` of these k, one after the other, every root is found.
+    /// The number of consecutive k, among the first `width`, at which every root is found.
     fn follow(&mut self, plane: &Plane, points: &[f64], width: usize) -> usize {
         (self.width, self.ahead, self.next) = (width, 0, 0);
         let points = points.get(..width).unwrap_or_default();
@@ -236,7 +239,7 @@ impl Branches {
         }
         let elements = self.all.len() * self.width;
         let [.., within] = &mut self.arguments;
-        // What fills the last vectors is nowhere near.
+        // The elements that fill the last vectors are not used.
         let filled = elements.next_multiple_of(SHORT).min(ELEMENTS);
         within[elements..filled].fill(-1.0);
         sweep(&Certify(plane), &self.arguments, &mut self.values, elements);
@@ -268,7 +271,7 @@ impl Branches {
         for index in 0..limit {
             let column = place * self.width + index;
             let s = Complex64::new(re[column], im[column]);
-            // Newton's step from next to a multiple root leads anywhere.
+            // Newton's step from a point next to a multiple root is unreliable.
             let near = modulus(s - last) <= plane.unit(modulus(last));
             if !(radius[column].is_finite() && s.im >= 0.0 && near) {
                 return index;

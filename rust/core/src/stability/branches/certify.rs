@@ -1,42 +1,45 @@
 //! The disc of the root of A + k B next to a start, one in each lane.
 //!
-//! Newton's step leads from s₀ to s₁. Let a = |h′(s₀)| − e₁, η = (|h(s₀)| + e₀)/a, and M bound |h″| within 2η of s₀.
-//! If M η ≤ a/4, then by Rouché's theorem exactly one root lies within 2η of s₀: on that circle
-//! |h′ (s − s₀)| ≥ 2aη exceeds |h(s₀)| + e₀ + M (2η)²/2 ≤ 1.5 aη. By Taylor's formula at s₀ it lies within
-//! (2Mη² + e₀ + 2 e₁ η)/a of s₁ (Kantorovich 1948), besides the rounding of s₁ itself. e₀ and e₁ are bounds on
-//! rounding (`plane`), which also cover coefficients that are sums of a few rounded products.
+//! Newton's step leads from s₀ to s₁. Let a = |h′(s₀)| − e₁, η = (|h(s₀)| + e₀)/a, and M bound |h″|
+//! within 2η of s₀. If M η ≤ a/4, then by Rouché's theorem exactly one root lies within 2η of s₀:
+//! on that circle |h′ (s − s₀)| ≥ 2aη exceeds |h(s₀)| + e₀ + M (2η)²/2 ≤ 1.5 aη. By Taylor's
+//! formula at s₀ it lies within (2Mη² + e₀ + 2 e₁ η)/a of s₁ (Kantorovich 1948), apart from the
+//! rounding error of s₁ itself. e₀ and e₁ are bounds on rounding errors (`plane`), which also cover
+//! coefficients that are sums of a few rounded products.
 //!
-//! What is found, and whether, depends on nothing but the lane's own start.
+//! The result in a lane depends only on the start in that lane.
 
 use super::plane::Plane;
 use crate::simd::{Complex, Kernel, Real, Simd};
 
-/// A radius as wide as this, relative to the root, is worth another step.
+/// Relative radius above which another step is made.
 const PRECISE_ENOUGH: f64 = 1e-13;
 
-/// A radius that rounding keeps wider is taken up to this, relative to the root or to one over the longest delay.
+/// Largest accepted radius, relative to the root or to one over the longest delay, where rounding
+/// errors keep it wide.
 const WIDEST: f64 = 1e-11;
 
-/// Steps before a branch is taken for lost.
+/// Steps after which a branch counts as lost.
 const MAX_STEPS: u32 = 8;
 
-/// Rounding of the bounds themselves.
+/// Covers the rounding errors of the bounds themselves.
 const ROOM: f64 = 1.0 + 1e-9;
 
-/// Squares of moduli in this range have lost nothing.
+/// Range in which squares of moduli are accurate.
 const SQUARES: std::ops::Range<f64> = 1e-280..1e300;
 
-/// Added to a square it outweighs what underflow took.
+/// Added to a square, this exceeds every effect of underflow.
 const TINY: f64 = 1e-300;
+
+/// Number of arguments: start, k, the three bounds there, the centre of these and how far starts
+/// may be from it.
+pub(crate) const ARGUMENTS: usize = 9;
+
+/// Number of values: root, radius, ds/dk. The radius is infinite where nothing is proved.
+pub(crate) const VALUES: usize = 5;
 
 /// The discs of the roots next to starting values.
 pub(crate) struct Certify<'a>(pub(crate) &'a Plane);
-
-/// Start, k, the three bounds there, the centre of these and how far starts may be from it.
-pub(crate) const ARGUMENTS: usize = 9;
-
-/// Root, radius, ds/dk; the radius is infinite where nothing is proved.
-pub(crate) const VALUES: usize = 5;
 
 impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
     #[inline(always)]
@@ -86,7 +89,7 @@ impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
     }
 }
 
-/// A bound on |s − t|, larger by √2 at most.
+/// A bound on |s − t| that is at most √2 times as large.
 #[inline(always)]
 fn distance<S: Simd>(s: Complex<S>, t: Complex<S>) -> Real<S> {
     let gap = s - t;
@@ -128,7 +131,7 @@ mod tests {
         for column in 0..64 {
             let k = 0.5 + 0.3 * column as f64;
             let root = lambertw(Complex64::new(-k, 0.0), (column % 5) as i64);
-            // From right there to too far away.
+            // From the root itself to too far away.
             let start = root + Complex64::from_polar(1e-12 * 1.55f64.powi(column as i32), k);
             let around = plane.around(start, 0.2).unwrap();
             let [error, slope_error, bend] = around.bounds(k);

@@ -1,14 +1,15 @@
 //! The rightmost roots of a row: followed from cell to cell, and proved to be the rightmost.
 //!
-//! A few roots of each cell, with discs, are known from their `branch`es. That none lies further right is
-//! told by counts on vertical lines: the crossings of one line give the counts of the whole row at once
-//! (`row`). Where the count right of a line is the number of followed roots there, and one at least is
-//! among them, these are all, and the largest real part is the abscissa. A line serves
-//! as long as no root that is not followed passes it. Where nothing fits the cell is
-//! searched alone, which also finds the roots to follow from there.
+//! A few roots of each cell, with discs, are known from their `branch`es. Counts on vertical lines
+//! prove that no root lies further right: the crossings of one line give the counts of the whole
+//! row at once (`row`). If the count right of a line equals the number of followed roots there,
+//! which must be at least one, these are all the roots, and the largest real part is the abscissa.
+//! A line can be used until a root that is not followed crosses it. Where no line can be used, the
+//! cell is searched alone, which also finds the roots to follow from there.
 //!
-//! Chains of a neutral equation are the abscissa where no root lies right of a line as close to them as the
-//! search in a single cell would go; a root closer than a few times that is left to that search.
+//! The chains of a neutral equation are the abscissa if no root lies right of a line as close to
+//! them as the search in a single cell would go. Roots closer than a few times that distance are
+//! left to that search.
 
 use super::branch::{Branches, Root};
 use super::plane::Plane;
@@ -19,20 +20,27 @@ use crate::stability::cell::{Cell, judge, with_abscissa};
 use crate::stability::crossings::{Members, Row};
 use crate::{Error, Task};
 
-/// Roots as far behind the first one are followed, in units of one over the longest delay.
+/// Distance behind the first root, in units of one over the longest delay, up to which roots are
+/// followed.
 const NEARBY: f64 = 1.5;
 
-/// Lines a row may have before its cells are searched alone.
+/// Upper limit on the lines of a row; then its cells are searched alone.
 const MAX_LINES: usize = 64;
 
-/// Cells to either side that have to lie left of the chains as well.
+/// Number of cells on either side that also have to lie left of the chains.
 const BESIDE: usize = 2;
 
 /// Roots closer to the chains than this many margins are left to the search in a single cell.
 const CLOSE_TO_CHAINS: f64 = 10.0;
 
-/// Rounding of a distance.
+/// Covers the rounding error of a distance.
 const ROOM: f64 = 1.0 + 1e-9;
+
+/// Least gap between roots, in units of the scale, into which a line is put.
+const LEAST_GAP: f64 = 1e-3;
+
+/// Distance of lines, in units of the scale, below which they are the same.
+const SAME_LINE: f64 = 1e-6;
 
 /// The counts of a row right of one line.
 struct Line {
@@ -40,11 +48,11 @@ struct Line {
     row: Row,
 }
 
-/// What is known of the rightmost root.
+/// What is known about the rightmost root.
 enum Known {
-    /// It is this far right.
+    /// Its real part.
     Isolated(f64),
-    /// All roots are left of the chains, or approach them.
+    /// All roots are left of the chains or approach them.
     Chains,
     Nothing,
 }
@@ -59,12 +67,12 @@ struct Leading<'a> {
     /// A length over which roots differ, 1/s.
     scale: f64,
     lines: Vec<Line>,
-    /// The line that served last.
+    /// Index of the line that was used last.
     last: usize,
     branches: Branches,
-    /// The roots of the cell, from the right.
+    /// The roots of the cell, the rightmost first.
     roots: Vec<Root>,
-    /// Did the last cell that was searched alone have no root right of its chains?
+    /// Had the last cell that was searched alone no root right of its chains?
     chains_led: bool,
 }
 
@@ -106,7 +114,7 @@ impl Members<'_> {
 }
 
 impl<'a> Leading<'a> {
-    /// `None` where the row has no crossings to count by.
+    /// `None` where the row has no crossings from which to count.
     fn new(
         members: &'a Members<'a>,
         a: &QuasiPolynomial,
@@ -147,7 +155,7 @@ impl<'a> Leading<'a> {
             return Ok(Known::Nothing);
         };
         let mut roots = std::mem::take(&mut self.roots);
-        // Without the one that is lost the others may lie far to the left, where lines are long.
+        // Without the root that is lost the others may lie far to the left, where lines are long.
         let mut known = None;
         if self.branches.advance(&self.plane, points, &mut roots) {
             roots.sort_by(|p, q| q.s.re.total_cmp(&p.s.re));
@@ -157,11 +165,12 @@ impl<'a> Leading<'a> {
         known.map_or_else(|| self.search(index, k), Ok)
     }
 
-    /// What lines tell of the cell, if one fits.
+    /// What the lines prove for the cell, if one can be used.
     fn by_lines(&mut self, index: usize, roots: &[Root]) -> Result<Option<Known>, Error> {
         let close = CLOSE_TO_CHAINS * self.margin;
         let Some(first) = roots.first().filter(|root| root.s.re > self.chain - close) else {
-            // A line next to the chains is dear: laid only where a search has found nothing else.
+            // A line next to the chains is costly: it is counted only where a search has found no
+            // root.
             return if self.chains_led {
                 self.by_chains(index)
             } else {
@@ -208,8 +217,8 @@ impl<'a> Leading<'a> {
                 self.lines.len() - 1
             }
         };
-        // A root between the line and the chains is found by a search in a single cell; it comes out, or goes
-        // in, a few cells away at most.
+        // A root between the line and the chains is found by a search in a single cell. It appears
+        // or disappears within a few cells.
         let around = index.saturating_sub(BESIDE)
             ..=index
                 .saturating_add(BESIDE)
@@ -231,7 +240,7 @@ impl<'a> Leading<'a> {
         Some(cell.unstable)
     }
 
-    /// Are the roots right of a line all there are, and one at least?
+    /// Are the roots right of a line all there are, and at least one?
     fn fits(&self, place: usize, index: usize, roots: &[Root]) -> bool {
         let Some(sigma) = self.lines.get(place).map(|line| line.sigma) else {
             return false;
@@ -264,10 +273,10 @@ impl<'a> Leading<'a> {
             }
         }
         let sigma = match best {
-            Some((gap, middle)) if gap > 1e-3 * self.scale => middle,
+            Some((gap, middle)) if gap > LEAST_GAP * self.scale => middle,
             _ => first - 0.5 * self.scale,
         };
-        // The further left, the longer the line until no root can cross it.
+        // The further left a line is, the longer it is up to where no root can cross it.
         let sigma = sigma
             .max(0.5 * (floor + first))
             .max(first - NEARBY * self.scale);
@@ -275,11 +284,11 @@ impl<'a> Leading<'a> {
             && self
                 .lines
                 .iter()
-                .all(|line| (line.sigma - sigma).abs() > 1e-6 * self.scale))
+                .all(|line| (line.sigma - sigma).abs() > SAME_LINE * self.scale))
         .then_some(sigma)
     }
 
-    /// Search the cell alone, and follow what is found.
+    /// Search the cell alone, and follow the roots that are found.
     fn search(&mut self, index: usize, k: f64) -> Result<Known, Error> {
         self.branches.clear();
         let Some(h) = (self.members.member)(index) else {
@@ -298,8 +307,8 @@ impl<'a> Leading<'a> {
                 Known::Nothing
             });
         };
-        // Those close behind are followed too. Not the next ones, wherever they are: next to the chains
-        // the search for them has no end.
+        // Roots close behind are followed too, but not the next ones at any distance: next to the
+        // chains the search for them does not end.
         let behind = (first.re - NEARBY * self.scale).max(0.5 * (self.chain + first.re));
         let others = match roots(&h, &Region::right_of(behind), self.task) {
             Ok(others) => others,
@@ -307,13 +316,13 @@ impl<'a> Leading<'a> {
             Err(_) => found.clone(),
         };
         let upper = others.roots.iter().filter(|root| root.im >= 0.0);
-        // All of them or none: those behind a multiple root prove nothing without it.
+        // All of them or none: the roots behind a multiple root prove nothing without it.
         self.branches.start(&self.plane, upper.copied(), k);
         Ok(Known::Isolated(first.re))
     }
 }
 
-/// Do no two discs meet?
+/// Are all discs disjoint?
 fn are_apart(roots: &[Root]) -> bool {
     roots.iter().enumerate().all(|(place, one)| {
         roots

@@ -1,9 +1,10 @@
-//! A + k B anywhere: value and derivative in lanes, and bounds around a place.
+//! A + k B at any point: value and derivative in SIMD lanes, and bounds around a point.
 //!
-//! Bounds on A⁽ⁱ⁾ within r of a centre are Σ (P⁽ⁱ⁾ …)(|s| + r) e^(−d (Re s − r)) with the moduli of the coefficients, as
-//! in `pencil`, and so is the rounding ε. That of `pencil` is derived without fused operations; with them a complex
-//! product loses 2 u (Jeannerod, Kornerup, Louvet and Muller 2017) in place of √5 u, and a step of Horner's rule
-//! 2 u of the moduli of its summands in place of 3.3 u: the same ε covers both.
+//! Bounds on A⁽ⁱ⁾ within r of a centre are Σ (P⁽ⁱ⁾ …)(|s| + r) e^(−d (Re s − r)) with the moduli of
+//! the coefficients, as in `pencil`, and so is the bound ε on rounding errors. That of `pencil` is
+//! derived without fused operations; with them a complex product loses 2 u (Jeannerod, Kornerup,
+//! Louvet and Muller 2017) in place of √5 u, and a step of Horner's rule 2 u of the moduli of its
+//! summands in place of 3.3 u: the same ε covers both.
 
 use num_complex::Complex64;
 
@@ -12,17 +13,17 @@ use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::simd::{Complex, Simd};
 use crate::stability::crossings::{sizes, united};
 
-/// Bounds hold at least as far as this around the place they were made for, in units of one over the longest delay
-/// and of |s|.
+/// Least radius of bounds around a point, in units of one over the longest delay and of |s|. Larger
+/// bounds hold for longer and are wider.
 const AROUND: f64 = 0.1;
 
-/// And at most so far, in units of one over the longest delay: exponentials grow by e^0.5.
+/// Largest radius of bounds, in units of one over the longest delay: exponentials grow by e^0.5.
 const FARTHEST: f64 = 0.5;
 
-/// Rounding of the bounds themselves.
+/// Covers the rounding errors of the bounds themselves.
 const ROOM: f64 = 1.0 + 1e-9;
 
-/// Weights outside this are none of double precision's business.
+/// Range of exponentials that double precision can use.
 const USABLE: std::ops::Range<f64> = 1e-250..1e250;
 
 /// Evaluates A + k B and its derivatives anywhere.
@@ -90,7 +91,7 @@ impl Plane {
         }
     }
 
-    /// Bounds that hold as far as `needed` around a place, if that is not too far, or farther.
+    /// Bounds that hold at distance `needed` around a point, if that is not too far, or further.
     pub(crate) fn around(&self, center: Complex64, needed: f64) -> Option<Around> {
         let size = modulus(center);
         let unit = self.unit(size);

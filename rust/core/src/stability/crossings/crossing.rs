@@ -1,15 +1,17 @@
-//! Where roots of A + k B cross the edge of what is demanded (`specification`) as k varies: all of them, proved.
+//! Where roots of A + k B cross the edge of the specification as k varies: all crossings, proved.
 //!
-//! They are the zeros of F (`pencil`) on its pieces, up to where no root lies. From a point on, Taylor's
-//! formula with the bound on F‴ proves over some length that F keeps its sign ("clear"), that F′ does
-//! ("monotone"), or that any crossing there has |k| beyond the range. Where what two neighbouring points prove meets, the signs of F at both tell whether
-//! there is exactly one zero between them or none. On the real axis F vanishes, simply if F′ ≠ 0 there.
+//! They are the zeros of F (`pencil`) on its pieces, up to where no root lies. From a point on,
+//! Taylor's formula with the bound on F‴ proves over some length that F keeps its sign ("clear"),
+//! that F′ does ("monotone"), or that any crossing there has |k| beyond the range. Where the
+//! lengths of two neighbouring points meet, the signs of F at both show whether there is exactly
+//! one zero between them or none. On the real axis F vanishes, simply if F′ ≠ 0 there.
 //!
-//! At a simple zero k = −Re(A/B), and as k grows the root goes to the left where F′ > 0, to the right
-//! where F′ < 0: with A/B + k = 0 and D = d(A/B)/ds, ds/dk = −1/D, whose part along the normal −ic of the edge to the
-//! right has the sign of −Im(c D) = −F′/|B|². Two roots cross, s and its mirror image, or one that is real. Where neither can be proved, next to a double zero
-//! of F, the crossing is reported with an interval of k and no direction: what it does to the count is
-//! for others to find out. Each k comes with an interval that is proved to hold it.
+//! At a simple zero k = −Re(A/B), and as k grows the root goes to the left where F′ > 0, to the
+//! right where F′ < 0: with A/B + k = 0 and D = d(A/B)/ds, ds/dk = −1/D, whose part along the
+//! normal −ic of the edge to the right has the sign of −Im(c D) = −F′/|B|². Two roots cross, s and
+//! its mirror image, or one that is real. Where neither can be proved, next to a double zero of F,
+//! the crossing is reported with an interval of k and without a direction; its effect on the count
+//! is found by counting (`row`). Each k has an interval that is proved to contain it.
 
 use num_complex::Complex64;
 
@@ -17,23 +19,48 @@ use super::pencil::{Bounds, Pencil, Point};
 use crate::quasipoly::modulus;
 use crate::{Error, Task};
 
-/// Points tried along one line before it is given up.
+/// Upper limit on the points along one line.
 const MAX_POINTS: u32 = 2_000_000;
 
-/// Lengths lose this share, for the rounding of the inequalities that gave them.
+/// Factor on proved lengths that covers the rounding errors of the inequalities.
 const SHARE: f64 = 1.0 - 1e-9;
 
-/// A place that cannot be resolved is left behind by a step of this, relative to ω and one over the
-/// longest delay, doubled until it is.
+/// First step, relative to ω and to one over the longest delay, past a point that cannot be
+/// resolved. It is doubled until the next point can be.
 const LEAST_STEP: f64 = 1e-9;
 
-/// Doublings of that step.
+/// Upper limit on the doublings of that step.
 const MAX_DOUBLINGS: u32 = 60;
 
-/// Newton steps for one zero.
+/// Upper limit on Newton's steps for one zero.
 const MAX_ITERATIONS: u32 = 30;
 
-/// One place where roots cross the line, or may.
+/// Length of the next step tried, in lengths of the last one.
+const STRIDE: f64 = 2.5;
+
+/// First points tried off the real axis, as shares of a step.
+const STARTS: [f64; 5] = [1.0, 0.7, 0.4, 0.2, 0.1];
+
+/// Bounds are computed at least this factor ahead.
+const AHEAD: f64 = 1.05;
+
+/// Length of a step, in reaches of its first point.
+const STRETCH: f64 = 1.9;
+
+/// Factors on the reach and on the length of a step that could not be proved.
+const SHORTENED: (f64, f64) = (0.999, 0.6);
+
+/// Covers the rounding errors of radii and bounds.
+const ENLARGED: f64 = 1.0 + 1e-9;
+
+/// Share of the length tried at which a length of the cubic is accepted.
+const CLOSE_LENGTHS: f64 = 0.7;
+
+/// The next length tried for the cubic: as a multiple of the last result, and at least as a share
+/// of the last trial.
+const TRIALS: (f64, f64) = (1.6, 0.125);
+
+/// A point where roots cross the line, or may cross it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Crossing {
     /// The imaginary part of the root, 1/s.
@@ -44,8 +71,8 @@ pub(crate) struct Crossing {
     pub(crate) low: f64,
     /// Its other end.
     pub(crate) high: f64,
-    /// Roots that go to the right as k grows, less those that go to the left; `None` where that is not
-    /// known, nor whether any cross at all.
+    /// Roots that move to the right as k grows minus those that move to the left; `None` where it
+    /// is not known whether any cross at all.
     pub(crate) jump: Option<i32>,
     /// B there, where ω = 0.
     pub(crate) slope_at_zero: Option<f64>,
@@ -57,7 +84,7 @@ enum Sense {
     Clear,
     /// The sign of F′.
     Monotone(f64),
-    /// |A| > |k| |B| for all k of the range: what crosses here is of no concern.
+    /// |A| > |k| |B| for all k of the range: a crossing here is outside the range.
     Beyond,
 }
 
@@ -67,10 +94,11 @@ struct Reach {
     sense: Sense,
 }
 
-/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece begin on the
-/// real axis?
+/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece
+/// begin on the real axis?
 ///
-/// `None` where it cannot be searched: B vanishes where A does, or precision is used up.
+/// `None` where the piece cannot be searched: A and B vanish together, or double precision does not
+/// suffice.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.
@@ -102,7 +130,7 @@ pub(crate) fn crossings(
         let Some(next) = search.advance(&here, stride) else {
             return Ok(None);
         };
-        stride = 2.5 * (next.t - here.t);
+        stride = STRIDE * (next.t - here.t);
         here = next;
     }
     Ok(None)
@@ -110,7 +138,7 @@ pub(crate) fn crossings(
 
 struct Search<'a> {
     pencil: &'a Pencil,
-    /// A length over which the pencil does not change much.
+    /// A length over which the pencil changes little.
     step: f64,
     bounds: Bounds,
     range: (f64, f64),
@@ -131,7 +159,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Bounds that hold from `low`, beyond which all is done, to `high`.
+    /// Bounds that hold from `low`, up to which everything is known, to `high`.
     fn bounds_to(&mut self, low: f64, high: f64) -> Option<Bounds> {
         if high > self.bounds.reach {
             self.bounds = self.pencil.bounds(low, high, self.step)?;
@@ -139,7 +167,8 @@ impl<'a> Search<'a> {
         Some(self.bounds)
     }
 
-    /// The first point of a piece that begins off the real axis, or one beyond it where the sign of F is known.
+    /// The first point of a piece that begins off the real axis, or one beyond it where the sign of
+    /// F is known.
     fn enter(&mut self) -> Option<Point> {
         let first = self.pencil.at(0.0);
         if self.is_clear(&first) {
@@ -149,7 +178,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Deal with the real axis and return a point beyond it where the sign of F is known.
+    /// Treat the start on the real axis and return a point beyond it where the sign of F is known.
     fn start(&mut self) -> Option<Point> {
         let zero = self.pencil.at(0.0);
         let slope = zero.f[1];
@@ -160,7 +189,7 @@ impl<'a> Search<'a> {
             let length = quadratic(room, -bend, -0.5 * self.bounds.third) * SHARE;
             self.record(&zero, 0.0, Some(if slope > 0.0 { -1 } else { 1 }))?;
             let limit = self.top.min(self.bounds.reach);
-            for share in [1.0, 0.7, 0.4, 0.2, 0.1] {
+            for share in STARTS {
                 let next = self.pencil.at((share * length).min(limit));
                 if self.is_clear(&next) {
                     return Some(next);
@@ -174,7 +203,8 @@ impl<'a> Search<'a> {
         point.f[0].abs() > self.bounds.error[0]
     }
 
-    /// How far from `point`, forwards or backwards, one sense holds; the longest of them.
+    /// The length, forwards or backwards from `point`, over which one of the statements holds; the
+    /// longest of them.
     fn reach(&self, point: &Point, direction: f64, most: f64, bounds: &Bounds) -> Reach {
         let [value, slope, bend] = point.f;
         let (slope, error) = (direction * slope, bounds.error);
@@ -196,7 +226,7 @@ impl<'a> Search<'a> {
         let largest = self.largest();
         let excess = modulus(point.a)
             - bounds.rounding * bounds.a[0]
-            - largest * (modulus(point.b) + bounds.rounding * bounds.b[0]) * (1.0 + 1e-9);
+            - largest * (modulus(point.b) + bounds.rounding * bounds.b[0]) * ENLARGED;
         let beyond = (excess / (bounds.modulus[0] + largest * bounds.modulus[1])).min(most);
         let (length, sense) = if beyond > clear && beyond > monotone {
             (beyond, Sense::Beyond)
@@ -216,13 +246,14 @@ impl<'a> Search<'a> {
         self.range.0.abs().max(self.range.1.abs())
     }
 
-    /// The next point: at most as far as both prove what lies between, or past what cannot be resolved.
+    /// The next point: at most as far as both points prove what lies between, or past what cannot
+    /// be resolved.
     fn advance(&mut self, here: &Point, stride: f64) -> Option<Point> {
         let rest = self.top - here.t;
-        let bounds = self.bounds_to(here.t, 1.05 * here.t + 0.5 * self.step)?;
+        let bounds = self.bounds_to(here.t, AHEAD * here.t + 0.5 * self.step)?;
         let most = rest.min(stride).min(bounds.reach - here.t);
         let own = self.reach(here, 1.0, most, &bounds);
-        let mut length = (1.9 * own.length).min(most);
+        let mut length = (STRETCH * own.length).min(most);
         for attempt in 0..6 {
             if here.t + length <= here.t {
                 break;
@@ -242,17 +273,17 @@ impl<'a> Search<'a> {
                     return Some(next);
                 }
             }
-            // The own reach is enough if only the sign at its end is known.
+            // One reach suffices if only the sign at its end is known.
             length = if attempt == 0 {
-                0.999 * own.length
+                SHORTENED.0 * own.length
             } else {
-                0.6 * length
+                SHORTENED.1 * length
             };
         }
         self.skip(here)
     }
 
-    /// Leave a place behind where neither F nor F′ is known to keep its sign.
+    /// Step past a point where neither F nor F′ is known to keep its sign.
     fn skip(&mut self, here: &Point) -> Option<Point> {
         let mut step = LEAST_STEP * here.t.max(self.step);
         for _ in 0..MAX_DOUBLINGS {
@@ -263,7 +294,7 @@ impl<'a> Search<'a> {
             if end >= self.top || (self.is_clear(&next) && ahead.length > 0.25 * step) {
                 let half = 0.5 * (end - here.t);
                 let middle = self.pencil.at(here.t + half);
-                self.record(&middle, half * (1.0 + 1e-9), None)?;
+                self.record(&middle, half * ENLARGED, None)?;
                 return Some(next);
             }
             step *= 2.0;
@@ -286,8 +317,9 @@ impl<'a> Search<'a> {
             let [value, slope, bend] = best.f;
             let error = self.bounds.error;
             if value.abs() <= 4.0 * error[0] && slope != 0.0 {
-                // Within this distance F changes its sign if |F′| stays above half of what it is here.
-                let radius = 2.0 * (value.abs() + error[0]) / slope.abs() * (1.0 + 1e-9);
+                // Within this distance F changes its sign if |F′| stays above half of its value
+                // here.
+                let radius = 2.0 * (value.abs() + error[0]) / slope.abs() * ENLARGED;
                 let loss = error[1] + radius * (bend.abs() + error[2] + radius * self.bounds.third);
                 if loss < 0.5 * slope.abs() {
                     return self.record(&best, radius, jump);
@@ -313,10 +345,10 @@ impl<'a> Search<'a> {
         }
         let half = 0.5 * (high - low);
         let middle = self.pencil.at(low + half);
-        self.record(&middle, half * (1.0 + 1e-9), jump)
+        self.record(&middle, half * ENLARGED, jump)
     }
 
-    /// Note the crossing within `radius` of `point`, if its k may lie in the range.
+    /// Store the crossing within `radius` of `point`, if its k may lie in the range.
     fn record(&mut self, point: &Point, radius: f64, jump: Option<i32>) -> Option<()> {
         let bounds = self.bounds_to(point.t - radius, point.t + radius)?;
         let (a, b) = (modulus(point.a), modulus(point.b));
@@ -332,8 +364,7 @@ impl<'a> Search<'a> {
         }
         // −Re(A/B), and |A/B − Â/B̂| ≤ (δA + |Â/B̂| δB)/(|B̂| − δB).
         let gain = -(point.a.re * point.b.re + point.a.im * point.b.im) / (b * b);
-        let error =
-            (off_a + a / b * off_b) / (b - off_b) * (1.0 + 1e-9) + 8.0 * f64::EPSILON * a / b;
+        let error = (off_a + a / b * off_b) / (b - off_b) * ENLARGED + 8.0 * f64::EPSILON * a / b;
         let (low, high) = (gain - error, gain + error);
         if high >= self.range.0 && low <= self.range.1 {
             self.found.push(Crossing {
@@ -349,7 +380,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Up to where a + b t + c t² > 0.
+/// The t up to which a + b t + c t² > 0.
 fn quadratic(a: f64, b: f64, c: f64) -> f64 {
     if a <= 0.0 {
         return 0.0;
@@ -366,25 +397,26 @@ fn quadratic(a: f64, b: f64, c: f64) -> f64 {
     }
 }
 
-/// Up to where, at most, a + b t + c t² − d t³ is known to be positive: t³ ≤ T t² for t ≤ T.
+/// The t, at most `most`, up to which a + b t + c t² − d t³ is proved to be positive: t³ ≤ T t² for
+/// t ≤ T.
 fn cubic(a: f64, b: f64, c: f64, d: f64, most: f64) -> f64 {
     let (mut trial, mut best) = (most, 0.0f64);
     for _ in 0..4 {
         let root = quadratic(a, b, c - d * trial);
         best = best.max(root.min(trial));
-        if root >= 0.7 * trial {
+        if root >= CLOSE_LENGTHS * trial {
             break;
         }
-        trial = (1.6 * root).max(0.125 * trial);
+        trial = (TRIALS.0 * root).max(TRIALS.1 * trial);
     }
     best
 }
 
-/// Is there exactly one zero between two points, or none? `None` where their reaches do not tell.
+/// Is there exactly one zero between two points, or none? `None` where their reaches do not decide.
 fn between(left: &Point, right_of: Reach, right: &Point, left_of: Reach) -> Option<bool> {
     let gap = right.t - left.t;
     let differ = (left.f[0] > 0.0) != (right.f[0] > 0.0);
-    // One of them alone may reach all the way.
+    // One of them alone may reach the whole way.
     if right_of.length >= gap {
         return settled(right_of.sense, differ);
     }

@@ -1,15 +1,16 @@
 //! Crossings of the imaginary axis as one gain varies.
 //!
-//! The members h = A + k B, k in [low, high], have all their roots with Re s ≥ 0 within one radius: there the
-//! moduli of the exponentials are at most one, so that with p the least modulus of the leading
-//! coefficient of the smallest delay, q the sum of the largest ones of all other terms in sⁿ and c_j
-//! that of all terms in sʲ, h = 0, Re s ≥ 0 and |s| = r imply (p − q) rⁿ ≤ Σ_{j<n} c_j rʲ,
-//! which holds for no r beyond the positive zero of the difference (Cauchy 1829). The moduli of a + k b, greatest at
-//! the ends of the range, are widened by SLACK (|a| + |k b|), which covers the two roundings of each; p, q and c_j
-//! are then sums of numbers ≥ 0, of m terms at most, and with Horner's rule in 1/r each side loses no more than (m + 2n + 4) u of
-//! itself: for m ≤ 10⁵ and n ≤ 1000, as families have, less than 2e-11, and ROOM is left for it. Up to that r, `crossing` finds every
-//! crossing, with proof. Where p ≤ q there is no such radius: the leading term vanishes, or chains of
-//! roots of a neutral equation may lead; that is refused.
+//! The members h = A + k B, k in [low, high], have all their roots with Re s ≥ 0 within one radius:
+//! there the moduli of the exponentials are at most one, so that with p the least modulus of the
+//! leading coefficient of the smallest delay, q the sum of the largest ones of all other terms in
+//! sⁿ and c_j that of all terms in sʲ, h = 0, Re s ≥ 0 and |s| = r imply (p − q) rⁿ ≤ Σ_{j<n} c_j
+//! rʲ, which holds for no r beyond the positive zero of the difference (Cauchy 1829). The moduli of
+//! a + k b, greatest at the ends of the range, are widened by SLACK (|a| + |k b|), which covers the
+//! two roundings of each; p, q and c_j are then sums of numbers ≥ 0, of m terms at most, and with
+//! Horner's rule in 1/r each side has a relative error of at most (m + 2n + 4) u. For m ≤ 10⁵ and n
+//! ≤ 1000, the limits of families, this is less than 2e-11, which ROOM covers. Up to that r,
+//! `crossing` finds every crossing, with proof. Where p ≤ q there is no such radius, because the
+//! leading term vanishes or chains of a neutral equation may be rightmost; this case is refused.
 
 use num_complex::Complex64;
 
@@ -20,13 +21,13 @@ use crate::stability::family::Family;
 use crate::stability::specification::Piece;
 use crate::{Error, Task};
 
-/// Room for the rounding of sums of moduli.
+/// Relative margin for the rounding errors of sums of moduli.
 const ROOM: f64 = 1e-9;
 
-/// Four roundings.
+/// Relative error of four roundings.
 const SLACK: f64 = 2.0 * f64::EPSILON;
 
-/// A place where roots cross the imaginary axis as a gain grows.
+/// A value of the gain at which roots cross the imaginary axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// The gain.
@@ -37,17 +38,18 @@ pub struct Place {
     pub high: f64,
     /// Imaginary part of the root, zero or positive, 1/s.
     pub omega: f64,
-    /// Roots that go to the right as the gain grows, less those that go to the left; `None` where that is not known,
-    /// nor whether any cross at all.
+    /// Roots that move to the right as the gain grows minus those that move to the left; `None`
+    /// where it is not known whether any cross at all.
     pub jump: Option<i32>,
 }
 
-/// All places where a member of `family` has a root on the imaginary axis, by increasing frequency, as
-/// the parameter with index `parameter` varies in `range`; `values` holds the others.
+/// All values in `range` of the parameter with index `parameter` at which the member of `family`
+/// has a root on the imaginary axis, by increasing frequency. `values` holds the other parameters.
 ///
 /// # Errors
-/// [`Error::Argument`] where the family is not affine in the parameter, its leading terms do not outweigh all
-/// others in the whole range, a root stays at 0, or precision does not suffice; [`Error::Interrupted`].
+/// [`Error::Argument`] where the family is not affine in the parameter, its leading terms do not
+/// outweigh all others in the whole range, a root stays at 0, or precision does not suffice;
+/// [`Error::Interrupted`].
 ///
 /// ```
 /// use deadtime::{Task, stability::{Affine, Family, Term, crossings_along}};
@@ -80,7 +82,7 @@ pub fn crossings_along(
     family.check_delays(&ranges)?;
     let Some((constant, slope)) = family.split(parameter) else {
         return Err(Error::argument(format!(
-            "{name} enters otherwise than as a factor of some terms"
+            "{name} does not enter only as a factor of terms"
         )));
     };
     let mut bare = values.to_vec();
@@ -180,7 +182,7 @@ fn radius(
     Ok(beyond(others, excess))
 }
 
-/// A radius r with `leading` rⁿ > Σ c_j rʲ, next to the smallest.
+/// A radius r with `leading` rⁿ > Σ c_j rʲ, close to the smallest one.
 fn beyond(others: &[f64], leading: f64) -> f64 {
     if others.iter().all(|c| *c == 0.0) {
         return 0.0;

@@ -1,15 +1,16 @@
-//! A pencil A(s) + k B(s) on a straight line s = s₀ + c t, |c| = 1, and the function whose zeros are its crossings.
+//! A pencil A(s) + k B(s) on a straight line s = s₀ + c t, |c| = 1, and the function whose zeros
+//! are its crossings.
 //!
-//! With the delays counted from one of B's, F(t) = Im(A B*) vanishes where some real k makes
-//! A + k B zero at s, and there k = −Re(A/B) (D-subdivision: Neimark 1949). F and its first two
-//! derivatives in t come from A, A′, A″ and those of B; |F‴| ≤ A₃B₀ + 3A₂B₁ + 3A₁B₂ + A₀B₃, where A_i bounds
-//! |A⁽ⁱ⁾| by the moduli of its coefficients on a stretch of the line.
+//! With the delays counted from one of B's, F(t) = Im(A B*) vanishes where some real k makes A + k
+//! B zero at s, and there k = −Re(A/B) (D-subdivision: Neimark 1949). F and its first two
+//! derivatives in t come from A, A′, A″ and those of B; |F‴| ≤ A₃B₀ + 3A₂B₁ + 3A₁B₂ + A₀B₃, where
+//! A_i bounds |A⁽ⁱ⁾| by the moduli of its coefficients on a stretch of the line.
 //!
-//! Rounding, as derived in `quasipoly::probe`: A, A′ and A″ of degree n with m terms are within
-//! ε A_i, ε = u (12n + m + 16 + 4 d (|x| + |y|)), d the largest delay. Coefficients and delays that are
-//! themselves sums of a few rounded products change A by u (8 + 8 d (|x| + |y|)) A₀ at most, which ε includes:
-//! what is proved holds for both. Then F⁽ⁱ⁾ is within 2.25 ε times the product of bounds that bounds it: 2 ε + ε² from the
-//! factors, 3 u from their product.
+//! Rounding, as derived in `quasipoly::probe`: A, A′ and A″ of degree n with m terms are within ε
+//! A_i, ε = u (12n + m + 16 + 4 d (|x| + |y|)), d the largest delay. Coefficients and delays that
+//! are themselves sums of a few rounded products change A by u (8 + 8 d (|x| + |y|)) A₀ at most,
+//! which ε includes, so that the proofs hold for both. Then F⁽ⁱ⁾ is within 2.25 ε times the product
+//! of bounds that bounds it: 2 ε + ε² from the factors, 3 u from their product.
 
 use num_complex::Complex64;
 
@@ -17,17 +18,17 @@ use crate::elementary::{exp, sin_cos};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::stability::specification::Piece;
 
-/// Bounds hold this much beyond the place they were asked for, and a delay's worth more, so that they need
-/// not be renewed at every step.
+/// Bounds are computed for this factor more than requested, plus one step, so that they need not be
+/// renewed at every step.
 const AHEAD: f64 = 1.1;
 
-/// Rounding of the bounds themselves, and of inequalities with them.
+/// Covers the rounding errors of the bounds themselves and of inequalities with them.
 const ROOM: f64 = 1.0 + 1e-9;
 
-/// Underflow cannot change sums that are larger by so much.
+/// Range in which underflow cannot change a sum.
 const USABLE: std::ops::Range<f64> = 1e-250..1e280;
 
-/// The rows of A and B with one delay d, and |e^(−s d)| where it is the same all along.
+/// The rows of A and B with one delay d, and |e^(−s d)| where it is constant along the line.
 #[derive(Debug, Clone)]
 struct Row {
     a: Vec<f64>,
@@ -48,7 +49,7 @@ pub(crate) struct Pencil {
 /// Value and first two derivatives.
 type Jet = [Complex64; 3];
 
-/// What is known at one t.
+/// The values at one t.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Point {
     pub(crate) t: f64,
@@ -67,7 +68,7 @@ pub(crate) struct Bounds {
     /// A₀, A₁.
     pub(crate) a: [f64; 2],
     pub(crate) b: [f64; 2],
-    /// On how fast |A| and |B| change.
+    /// On the rate of change of |A| and |B|.
     pub(crate) modulus: [f64; 2],
     /// On |F‴|.
     pub(crate) third: f64,
@@ -106,7 +107,8 @@ impl Pencil {
         })
     }
 
-    /// A step along the line in which the exponentials turn by 1 rad at most; infinite without delays.
+    /// A step along the line in which the arguments of the exponentials change by at most 1 rad;
+    /// infinite without delays.
     pub(crate) fn step(&self) -> f64 {
         1.0 / self.longest
     }
@@ -144,12 +146,12 @@ impl Pencil {
         }
     }
 
-    /// Bounds from `low` to a little more than `high`, by `step` or so; `None` where they leave the range of
-    /// double precision.
+    /// Bounds from `low` to slightly more than `high`, about one `step`; `None` where they leave
+    /// the range of double precision.
     pub(crate) fn bounds(&self, low: f64, high: f64, step: f64) -> Option<Bounds> {
         let reach = AHEAD * high + step;
         let ends = [low, reach].map(|t| self.line.from + self.line.along * t);
-        // A modulus is largest, and an exponential of the real part, at one of the ends.
+        // A modulus is largest at one of the ends, and so is an exponential of the real part.
         let size = modulus(ends[0]).max(modulus(ends[1])) * ROOM;
         let heaviest = |row: &Row| {
             let [first, last] = ends.map(|s| exp(-row.delay * s.re));
@@ -175,8 +177,8 @@ impl Pencil {
                 }
             }
         }
-        // How fast a modulus changes does not depend on which of the delays the others are counted from if the
-        // line is upright; if not, from the own one.
+        // On an upright line the rate of change of a modulus does not depend on the reference
+        // delay; otherwise each row is taken relative to its own delay.
         let modulus = [0, 1].map(|which| {
             let from = |origin: f64| {
                 self.rows
@@ -212,7 +214,7 @@ impl Pencil {
     }
 }
 
-/// Delays of either, increasing, with the rows of both.
+/// The delays of A and B, increasing, with the rows of both.
 pub(crate) fn united(a: &QuasiPolynomial, b: &QuasiPolynomial) -> Vec<(f64, Vec<f64>, Vec<f64>)> {
     let mut delays: Vec<f64> = a.delays().iter().chain(b.delays()).copied().collect();
     delays.sort_by(f64::total_cmp);

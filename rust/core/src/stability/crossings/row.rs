@@ -1,10 +1,10 @@
-//! One row of a map: a gain k varies, all else is fixed.
+//! One row of a map: a gain k varies, everything else is fixed.
 //!
-//! Where the members A + k B have the same leading terms for all k, their offending roots lie within
-//! one radius, and their number changes at the crossings of the edge only (`crossing`). One proved
-//! count anchors each run of cells between crossings whose effect is not known; the others follow by
-//! addition. Cells within the interval of a crossing, or closer to it than MARGIN, are judged alone, as
-//! are all cells of a row for which none of this holds.
+//! Where the members A + k B have the same leading terms for all k, their violating roots lie
+//! within one radius, and their number changes only at crossings of the edge (`crossing`). One
+//! proved count is made for each run of cells between crossings whose effect is not known; the
+//! other counts follow by addition. Cells within the interval of a crossing, or closer to it than
+//! MARGIN, are judged alone, as are all cells of a row for which none of this holds.
 
 use std::ops::Range;
 
@@ -17,11 +17,11 @@ use crate::stability::specification::Specification;
 use crate::status::CellStatus;
 use crate::{Error, Task, memory};
 
-/// Cells closer to a crossing than this, relative to the largest |k| of the row, are judged alone: a proved count of
-/// one of them may refuse what the crossing decides.
+/// Cells closer to a crossing than this, relative to the largest |k| of the row, are judged alone,
+/// because a separate count of such a cell may be undecided where the crossing decides.
 const MARGIN: f64 = 1e-9;
 
-/// What memory is asked for.
+/// What memory is requested for, in errors.
 const ROW: &str = "a row of the map";
 
 /// Cells with a common count and status.
@@ -32,12 +32,12 @@ pub(crate) struct Span {
     pub(crate) cell: Cell,
 }
 
-/// What is known of a row.
+/// Result for a row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Row {
     /// All cells, in order.
     pub(crate) spans: Vec<Span>,
-    /// Cell by cell, where they are asked for.
+    /// The abscissa of each cell, where requested.
     pub(crate) abscissas: Vec<f64>,
 }
 
@@ -66,7 +66,7 @@ impl Row {
         Ok(Self { spans, abscissas })
     }
 
-    /// A cell whose count holds.
+    /// A cell whose count is proved.
     pub(crate) fn cell(&self, index: usize) -> Option<Cell> {
         let place = self.spans.partition_point(|span| span.end <= index);
         let span = self.spans.get(place)?;
@@ -83,9 +83,9 @@ pub(crate) struct Members<'a> {
     pub(crate) points: &'a [f64],
     /// The member of a cell; `None` where it cannot be formed.
     pub(crate) member: &'a dyn Fn(usize) -> Option<QuasiPolynomial>,
-    /// Roots that offend against it are counted.
+    /// The specification whose violating roots are counted.
     pub(crate) specification: Specification,
-    /// A cell whose count is known already, and its index.
+    /// The index of a cell whose count is already known, and that cell.
     pub(crate) anchor: Option<(usize, Cell)>,
 }
 
@@ -112,7 +112,7 @@ impl Members<'_> {
         }
     }
 
-    /// All cells alike.
+    /// All cells with the same result.
     fn uniform(&self, cell: Cell) -> Row {
         let end = self.points.len();
         Row {
@@ -125,7 +125,8 @@ impl Members<'_> {
         }
     }
 
-    /// Every member has the chains of the hull, whose leading terms are theirs: if these decide, for all.
+    /// Every member has the chains of the hull, whose leading terms it shares. If these chains
+    /// decide, they decide for all members.
     fn led_by_chains(&self, hull: &QuasiPolynomial) -> Option<Cell> {
         let (unstable, status) =
             by_chain(hull, chain_abscissa(hull), self.specification.leftmost())?;
@@ -136,7 +137,7 @@ impl Members<'_> {
         })
     }
 
-    /// The same members, roots right of `line` being counted.
+    /// The same members, with the roots right of `line` counted.
     pub(crate) fn right_of(self, line: f64) -> Self {
         Self {
             specification: Specification::left_of(line),
@@ -145,7 +146,7 @@ impl Members<'_> {
         }
     }
 
-    /// Counts as far as crossings give them; no spans where they do not.
+    /// The counts as far as crossings give them; no spans where they do not.
     ///
     /// # Errors
     /// [`Error::Interrupted`] alone.
@@ -186,7 +187,7 @@ impl Members<'_> {
         }
     }
 
-    /// [`found`](Self::found), of parts that are known.
+    /// The same as [`found`](Self::found), for known A and B.
     fn crossings(
         &self,
         a: &QuasiPolynomial,
@@ -196,7 +197,7 @@ impl Members<'_> {
         let Some((range, hull)) = self.range().zip(self.hull(a, b)) else {
             return Ok(None);
         };
-        // Where chains lead, or may, every cell says so by itself.
+        // Where chains are rightmost, or may be, every cell is judged alone.
         let leftmost = self.specification.leftmost();
         if chain_abscissa(&hull) >= leftmost {
             return Ok(None);
@@ -221,10 +222,10 @@ impl Members<'_> {
         Ok(Some(all))
     }
 
-    /// Cells by the crossings between them.
+    /// Cells from the crossings between them.
     fn between(&self, crossings: &[Crossing], task: &Task) -> Result<Row, Error> {
         let windows = self.windows(crossings);
-        // What lies between the windows, and the jump to the next of them.
+        // The cells between the windows, and the jump to the next window.
         let mut free: Vec<(usize, usize, Option<i32>)> = Vec::with_capacity(windows.len() + 1);
         let mut start = 0;
         for window in &windows {
@@ -267,8 +268,8 @@ impl Members<'_> {
         })
     }
 
-    /// A cell next to a crossing of s = 0, by the sign of h(0): as h(0)/B(0) = k − k₀ grows past zero, so does the
-    /// count by the jump. `below` is the cell before.
+    /// A cell next to a crossing of s = 0, by the sign of h(0): as h(0)/B(0) = k − k₀ grows past
+    /// zero, the count changes by the jump. `below` is the cell before.
     fn beside_zero(&self, window: &Window, below: Cell, index: usize) -> Option<Cell> {
         let jump = window.jump.filter(|_| window.rises_at_zero.is_some())?;
         let h = (self.member)(index)?;
@@ -276,7 +277,8 @@ impl Members<'_> {
         let mut constants = constants.filter(|c| **c != 0.0);
         let sum =
             constants.next().copied().unwrap_or(0.0) + constants.next().copied().unwrap_or(0.0);
-        // The rounded sum of two numbers has the sign of their sum; that of more need not.
+        // The rounded sum of two numbers has the sign of their sum; the rounded sum of more numbers
+        // may not.
         if constants.next().is_some() {
             return None;
         }
@@ -294,7 +296,8 @@ impl Members<'_> {
         })
     }
 
-    /// Cells too close to a crossing to be told from it, those without a cell between them merged.
+    /// Cells too close to a crossing to be separated from it; windows without a cell between them
+    /// are merged.
     fn windows(&self, crossings: &[Crossing]) -> Vec<Window> {
         let largest = self.points.iter().fold(0.0, |most, k| k.abs().max(most));
         let margin = MARGIN * largest;
@@ -322,7 +325,7 @@ impl Members<'_> {
         windows
     }
 
-    /// The cell of each part of a run, whose jumps are known, from a count in the longest of them.
+    /// The cell of each part of a run whose jumps are known, from one count in the longest part.
     fn anchored(
         &self,
         run: &[(usize, usize, Option<i32>)],
@@ -356,7 +359,7 @@ impl Members<'_> {
         let cells = run.iter().map(|part| {
             let cell = Cell { unstable, ..anchor };
             unstable += jump(part);
-            // Less than none would contradict the proofs: such cells are counted one by one.
+            // A negative count would contradict the proofs: such cells are counted one by one.
             (cell.unstable >= 0).then_some(cell)
         });
         Ok(cells.collect())
@@ -385,17 +388,18 @@ impl Members<'_> {
     }
 }
 
-/// Cells whose count is not known from the crossings, and what they do to it together.
+/// Cells whose count is not known from the crossings, and the change of the count across all of
+/// them.
 struct Window {
     from: usize,
     to: usize,
     jump: Option<i32>,
-    /// Where all there is is a root crossing s = 0: does h(0) grow with k?
+    /// If the only crossing is a root at s = 0: does h(0) grow with k?
     rises_at_zero: Option<bool>,
 }
 
-/// A quasi-polynomial whose coefficients are in modulus the largest of all members, those of the leading term
-/// the smallest; `None` where the members do not share their leading terms.
+/// A quasi-polynomial whose coefficients are in modulus the largest of all members, those of the
+/// leading term the smallest; `None` where the members do not share their leading terms.
 fn hull(a: &QuasiPolynomial, b: &QuasiPolynomial, range: (f64, f64)) -> Option<QuasiPolynomial> {
     let degree = a.degree();
     let rows = united(a, b);
@@ -410,7 +414,7 @@ fn hull(a: &QuasiPolynomial, b: &QuasiPolynomial, range: (f64, f64)) -> Option<Q
             let ends = [range.0, range.1].map(|k| constant + k * slope);
             let largest = ends[0].abs().max(ends[1].abs());
             if power < degree {
-                // Each end loses three roundings.
+                // Each end has three rounding errors.
                 row.push(
                     largest * (1.0 + 4.0 * f64::EPSILON) + 4.0 * f64::EPSILON * constant.abs(),
                 );
@@ -430,7 +434,7 @@ fn hull(a: &QuasiPolynomial, b: &QuasiPolynomial, range: (f64, f64)) -> Option<Q
     }
     let hull = QuasiPolynomial::new(sizes, delays).ok()?;
     let leads = hull.degree() == degree && !matches!(hull.kind(), Kind::Advanced);
-    // With a leading term that varies, the equation must be retarded for all members alike.
+    // If a leading term varies, the equation must be retarded for all members.
     let varies = b.degree() >= degree;
     (leads && !(varies && hull.kind() != Kind::Retarded && hull.kind() != Kind::Polynomial))
         .then_some(hull)

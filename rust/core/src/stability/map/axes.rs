@@ -1,8 +1,8 @@
-//! The axes of a map, and what is asked of it.
+//! The axes of a map, and the question it answers.
 
-use crate::Task;
 use crate::stability::family::Family;
 use crate::stability::specification::Specification;
+use crate::{Error, Task};
 
 /// One axis of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,22 +13,60 @@ pub struct Axis<'a> {
     pub points: &'a [f64],
 }
 
+impl Axis<'_> {
+    /// The least and the largest point; `None` where there is no point.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where a point is not finite.
+    pub(crate) fn range(&self) -> Result<Option<(f64, f64)>, Error> {
+        if let Some(point) = self.points.iter().find(|point| !point.is_finite()) {
+            return Err(Error::argument(format!(
+                "{point} on an axis: its points must be finite"
+            )));
+        }
+        let low = self.points.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = self
+            .points
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        Ok((!self.points.is_empty()).then_some((low, high)))
+    }
+}
+
+/// Check that the axes name two parameters of the family.
+///
+/// # Errors
+/// [`Error::Argument`] where they do not.
+pub(crate) fn check_parameters(family: &Family, axes: [Axis<'_>; 2]) -> Result<(), Error> {
+    let count = family.names().len();
+    let [first, second] = axes;
+    if first.parameter == second.parameter || first.parameter.max(second.parameter) >= count {
+        return Err(Error::argument(format!(
+            "axes along parameters {} and {} of {count}: a map needs two different ones",
+            first.parameter, second.parameter
+        )));
+    }
+    Ok(())
+}
+
 /// How the count of a cell is proved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Proof {
-    /// By all crossings of its row, or the proof that a block of cells has none, and one count for all in between.
+    /// By all crossings of its row, or by the proof that a block of cells has none, and one count
+    /// for all cells in between.
     #[default]
     Curves,
-    /// By a count of its own.
+    /// By a separate count.
     Cells,
 }
 
-/// What is asked of a map.
+/// The question that a map answers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
-    /// Roots that offend against this are counted.
+    /// The specification whose violating roots are counted.
     pub specification: Specification,
-    /// Is the spectral abscissa asked for too?
+    /// Is the spectral abscissa requested as well?
     pub abscissa: bool,
     /// How counts are proved.
     pub proof: Proof,

@@ -1,11 +1,12 @@
 //! A block of cells of a map, in one or two directions, judged together.
 //!
-//! Each cell stands for the part of the ranges that is closer to it than to its neighbours, so that parts of
-//! neighbours touch. A block is halved, between cells, until no member of a part has a root on the edge of what is
-//! demanded (`prove`), or it is one cell. Parts without such roots that touch have one count, since roots
-//! change sides only through the edge: one cell of each connected set of parts is counted. What is left,
-//! single cells along the boundaries, is judged alone. A cell that is counted by its part lies half the distance to its neighbour away from
-//! a boundary, except at an end of an axis.
+//! Each cell represents the part of the ranges that is closer to it than to its neighbours, so that
+//! the parts of neighbours touch. A block is halved, between cells, until no member of a part has a
+//! root on the edge of the specification (`prove`), or the part is one cell. Parts without such
+//! roots that touch have one count, since roots change sides only through the edge: one cell of
+//! each connected set of parts is counted. The remaining single cells along the boundaries are
+//! judged alone. A cell that is counted by its part is at least half the distance to its neighbour
+//! away from a boundary, except at an end of an axis.
 
 use crate::stability::boxes::{BoxExpansion, Claim, Examined, Range, Reduced, Stretch, examine};
 use crate::stability::cell::{Cell, ENDLESS, judge};
@@ -32,7 +33,8 @@ impl<const D: usize> Block<D> {
         std::array::from_fn(|i| self.start[i] + self.length(i) / 2)
     }
 
-    /// Two halves, along the direction if it has cells to part, else along the longest one.
+    /// Two halves, along `direction` if the block has several cells in it, otherwise along the
+    /// longest side.
     fn halves(&self, direction: Option<usize>) -> Option<[Self; 2]> {
         let direction = direction
             .filter(|direction| self.length(*direction) > 1)
@@ -46,7 +48,7 @@ impl<const D: usize> Block<D> {
         Some([low, high])
     }
 
-    /// Places of its cells in an array of the cells of `whole`, which contains it.
+    /// Indices of its cells in an array of the cells of `whole`, which contains the block.
     fn places(&self, whole: &Self) -> impl Iterator<Item = usize> + use<D> {
         let own = *self;
         let whole = *whole;
@@ -70,7 +72,7 @@ pub(crate) struct Grid<'a, const D: usize> {
     pub(crate) points: [&'a [f64]; D],
 }
 
-/// Cells of a block that have something in common.
+/// Cells of a block with the same finding.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Part<const D: usize> {
     pub(crate) block: Block<D>,
@@ -81,14 +83,14 @@ pub(crate) struct Part<const D: usize> {
 pub(crate) enum Finding {
     /// No member has a root on the edge.
     Clear,
-    /// Infinitely many roots offend.
+    /// Infinitely many roots violate the specification.
     Endless,
-    /// One cell, for which nothing is proved but on the rest of the edge.
+    /// One cell, with the part of the edge for which nothing is proved.
     Open(Option<Vec<Stretch>>),
 }
 
 impl<const D: usize> Grid<'_, D> {
-    /// The ranges for which the cells of a block stand.
+    /// The ranges that the cells of a block represent.
     pub(crate) fn range(&self, block: &Block<D>) -> Range<D> {
         let border = |i: usize, index: usize| {
             let at = |index: usize| self.points[i].get(index).copied();
@@ -105,7 +107,7 @@ impl<const D: usize> Grid<'_, D> {
         }
     }
 
-    /// Count delays from the one that is the smallest at the middle of the block.
+    /// Take delays relative to the one that is the smallest at the middle of the block.
     pub(crate) fn refer_to_middle(&mut self, block: &Block<D>) {
         let centre = self.range(block).centre();
         self.reduced.refer_to_first(&centre);
@@ -116,7 +118,7 @@ impl<const D: usize> Grid<'_, D> {
         std::array::from_fn(|i| self.points[i].get(cell[i]).copied().unwrap_or(f64::NAN))
     }
 
-    /// A cell by itself.
+    /// Judge a cell alone.
     ///
     /// # Errors
     /// [`Error::Interrupted`] alone.
@@ -167,7 +169,7 @@ impl<const D: usize> Grid<'_, D> {
         Ok(parts)
     }
 
-    /// Judge a block: its cells by parts that are alike.
+    /// Judge the cells of a block, by parts with the same finding.
     ///
     /// # Errors
     /// [`Error::Interrupted`] alone.
@@ -180,7 +182,7 @@ impl<const D: usize> Grid<'_, D> {
         let sets = connected(&parts, &whole);
         let mut anchors: Vec<Option<Cell>> = vec![None; parts.len()];
         let mut cells = Vec::with_capacity(parts.len());
-        // The largest part of a set is the first of them to be counted.
+        // The largest part of a set comes first and is counted.
         for (part, set) in parts.iter().zip(&sets) {
             let known = match (&part.finding, anchors.get_mut(*set)) {
                 (Finding::Endless, _) => Some(Cell {
@@ -205,7 +207,7 @@ impl<const D: usize> Grid<'_, D> {
         Ok(cells)
     }
 
-    /// Every cell of a part by itself.
+    /// Judge every cell of a part alone.
     fn alone(
         &self,
         block: &Block<D>,
@@ -223,7 +225,7 @@ impl<const D: usize> Grid<'_, D> {
     }
 }
 
-/// For every part the index of the largest one that is connected to it by clear parts.
+/// For every part the index of the largest part that is connected to it by clear parts.
 fn connected<const D: usize>(parts: &[Part<D>], whole: &Block<D>) -> Vec<usize> {
     let mut sets: Vec<usize> = (0..parts.len()).collect();
     let is_clear = |index: usize| {
@@ -253,7 +255,7 @@ fn connected<const D: usize>(parts: &[Part<D>], whole: &Block<D>) -> Vec<usize> 
                 continue;
             }
             let (one, other) = (root(&mut sets, *owner), root(&mut sets, *next));
-            // Ties go to the first, so that there is one answer.
+            // Of parts of equal size the first is taken, so that the answer is unique.
             let keep = (size(one), other) >= (size(other), one);
             let (large, small) = if keep { (one, other) } else { (other, one) };
             if let Some(set) = sets.get_mut(small) {
@@ -267,7 +269,7 @@ fn connected<const D: usize>(parts: &[Part<D>], whole: &Block<D>) -> Vec<usize> 
         .collect()
 }
 
-/// The index that stands for a set, paths being shortened on the way.
+/// The representative of a set; paths are shortened on the way.
 fn root(sets: &mut [usize], mut index: usize) -> usize {
     while let Some(next) = sets.get(index).copied().filter(|next| *next != index) {
         let beyond = sets.get(next).copied().unwrap_or(next);

@@ -1,8 +1,9 @@
 //! Counts and boundaries of a map whose family is affine in neither of its parameters.
 //!
-//! The map is cut into blocks of a fixed size, so that results do not depend on the number of threads; each is
-//! divided as far as its boundaries require (`block`). The cost grows with the length of the boundaries and with the
-//! number of blocks, not of cells. Boundaries are the crossings of its rows (`row_search`), joined as those of any map.
+//! The map is cut into blocks of a fixed size, so that results do not depend on the number of
+//! threads; each is divided as far as its boundaries require (`block`). The cost grows with the
+//! length of the boundaries and with the number of blocks, not of cells. Boundaries are the
+//! crossings of its rows (`row_search`), joined as those of any map.
 
 use rayon::prelude::*;
 
@@ -15,10 +16,12 @@ use crate::stability::crossings::Crossing;
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
-/// Cells a side of a block.
+/// Cells along one side of a block. Larger blocks prove more cells at once and give fewer tasks for
+/// the threads.
 const SIDE: usize = 64;
 
-/// The family of a map over its grid; `None` where points are in disorder, or a root stays on the edge.
+/// The family of a map over its grid; `None` where points are not in order, or a root stays on the
+/// edge.
 pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
     let [first, second] = map.axes;
     let places = [first.parameter, second.parameter];
@@ -35,7 +38,8 @@ pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
 /// The index of the axis along the rows, and the crossings of each.
 pub(crate) type Crossed = (usize, Vec<Vec<Crossing>>);
 
-/// The crossings of the edge along every row, which runs along the axis with more points, and the index of that.
+/// The crossings of the edge along every row, and the index of the axis along the rows: that with
+/// more points.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.

@@ -21,7 +21,7 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// Nothing unstable.
+    /// A map with all counts zero.
     pub(crate) fn stable(cells: usize) -> Result<Self, Error> {
         Ok(Self {
             unstable: memory::filled("the map", 0, cells)?,
@@ -30,7 +30,7 @@ impl Chart {
         })
     }
 
-    /// Write the rows down, as lines of the given width or as its columns.
+    /// Write the results of the rows into lines of the given width, or into columns.
     pub(crate) fn fill(&mut self, rows: &[Row], width: usize, columns: bool) -> Result<(), Error> {
         let blocks = self
             .unstable
@@ -39,7 +39,7 @@ impl Chart {
         blocks.enumerate().for_each(|(block, (unstable, status))| {
             let top = block * BLOCK;
             let lines = unstable.len() / width;
-            // A row meets the block in these of its cells, and has them at these places.
+            // The cells of the row that lie in the block, and where they are in it.
             let shown = if columns {
                 rows
             } else {

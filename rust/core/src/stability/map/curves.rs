@@ -1,12 +1,25 @@
 //! Boundaries of a map: the crossings of its rows joined to curves.
 //!
-//! Along a curve ω and the gain k change continuously from row to row, and the direction of crossing stays
-//! the same until the curve turns back. A crossing is joined to the one in the next row that is closest to where the
-//! last two led, if that is mutual and their directions agree; where two curves of opposite directions end
-//! side by side in the same row, they are the two arms of one that turns back there. Only the order of the
-//! points is a matter of judgement: every point is a proved crossing.
+//! Along a curve ω and the gain k change continuously from row to row, and the direction of
+//! crossing stays the same until the curve turns back. A crossing is joined to the one in the next
+//! row that is closest to the point extrapolated from the last two, if the same holds in the other
+//! direction and their directions agree. Where two curves of opposite directions end side by side
+//! in the same row, they are the two arms of one curve that turns back there. Every point is a
+//! proved crossing; only the order of the points is heuristic.
 
 use crate::stability::crossings::Crossing;
+
+/// Neighbours in the next row that are compared, on either side.
+const WINDOW: usize = 3;
+
+/// Two points further apart than this share of the range, in k or in ω relative to the largest, are
+/// not joined.
+const FARTHEST: f64 = 0.2;
+
+/// Largest gap, in lengths of their last steps, at which two arms are joined. For a parabola whose
+/// top lies less than a row, h, above the last one, by δ, the gap is 2√δ/(√(δ + h) − √δ) ≤ 2/(√2 −
+/// 1) = 4.83 steps.
+const TURN: f64 = 5.5;
 
 /// A point of a boundary.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,17 +34,7 @@ pub struct Vertex {
     pub jump: i32,
 }
 
-/// Neighbours in the next row that are looked at, to either side.
-const WINDOW: usize = 3;
-
-/// Two points further apart than this share of the range, in k or in ω relative to the largest, are not joined.
-const FARTHEST: f64 = 0.2;
-
-/// Arms that turn back are joined if the gap between them is no more than this many of their last steps: for a parabola whose
-/// top lies less than a row, h, above the last one, by δ, it is 2√δ/(√(δ + h) − √δ) ≤ 2/(√2 − 1) = 4.83 of them.
-const TURN: f64 = 5.5;
-
-/// A curve as it grows: its last two points in (k, ω).
+/// A curve under construction: its last two points in (k, ω).
 struct Arm {
     vertices: Vec<Vertex>,
 }
@@ -41,7 +44,7 @@ impl Arm {
         self.vertices.last()
     }
 
-    /// Where the next row should meet it.
+    /// The expected point in the next row.
     fn expected(&self) -> Option<(f64, f64)> {
         let last = self.last()?;
         let before = self.vertices.len().checked_sub(2);
@@ -159,7 +162,7 @@ pub(crate) fn join(rows: &[Vec<Crossing>], range: (f64, f64)) -> Vec<Vec<Vertex>
         group.push(arm);
     }
     whole.extend(turned(group, scale));
-    // In the order of the rows again, as far as a curve has one.
+    // In the order of the rows, as far as a curve has one.
     for curve in &mut whole {
         if let (Some(first), Some(last)) = (curve.first(), curve.last())
             && first.row > last.row

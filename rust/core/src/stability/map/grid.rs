@@ -1,16 +1,17 @@
 //! Stability over two parameters of a family.
 //!
 //! Counts: if the family is affine in one of the two, every value of the other makes a row, whose
-//! crossings of the line give all its cells (`row`); the cost grows with the number of rows and of crossings, not
-//! of cells. Otherwise blocks of cells are divided along the boundaries (`blocks`). With `Proof::Cells`, and for the
-//! abscissa of a family that is affine in neither, every cell is judged alone. Either way a cell
-//! equals [`judge`] of the family's member there, and results have the same bits for any number of threads.
-//! What cannot be formed (an overflow of a coefficient) is an undecided cell; delays that become negative
-//! are refused before any work is done.
+//! crossings of the edge give all its cells (`row`); the cost grows with the number of rows and of
+//! crossings, not of cells. Otherwise blocks of cells are divided along the boundaries (`blocks`).
+//! With `Proof::Cells`, and for the abscissa of a family that is affine in neither, every cell is
+//! judged alone. In each case a cell equals [`judge`] of the family's member there, and results
+//! have the same bits for any number of threads. A member that cannot be formed, because a
+//! coefficient overflows, is an undecided cell; delays that become negative are refused before any
+//! work is done.
 
 use rayon::prelude::*;
 
-use super::axes::{Axis, Map, Proof, Question, put};
+use super::axes::{Axis, Map, Proof, Question, check_parameters, put};
 use super::blocks;
 use super::chart::Chart;
 use super::curves::{Vertex, join};
@@ -21,7 +22,7 @@ use crate::stability::family::Family;
 use crate::stability::specification::Specification;
 use crate::{Error, Task, memory};
 
-/// More cells than anyone can look at.
+/// Upper limit on the number of cells (bounds memory and time).
 const MAX_CELLS: usize = 50_000_000;
 
 /// Judge the members of `family` over two of its parameters; `values` holds the others.
@@ -48,7 +49,7 @@ pub fn map(
     if cells == 0 {
         return Ok(Chart::default());
     }
-    // Before the work, what it is for: a count and a status a cell, and an abscissa.
+    // The memory is reserved before the work: a count and a status for each cell, and an abscissa.
     memory::room::<[u8; 5]>("the map", cells)?;
     memory::room::<f64>("the map", if question.abscissa { cells } else { 0 })?;
     if question.proof == Proof::Cells {
@@ -72,8 +73,9 @@ pub struct Boundaries {
     pub curves: Vec<Vec<Vertex>>,
 }
 
-/// The curves on which roots lie on the edge of what is demanded; `None` where the family is affine in neither parameter
-/// and a root of all members stays at 0, or points are in disorder.
+/// The curves on which roots lie on the edge of the specification. `None` where the family is
+/// affine in neither parameter and a root of all members stays at 0, or where points are not in
+/// order.
 ///
 /// # Errors
 /// As for [`map`].
@@ -113,7 +115,8 @@ pub fn boundaries(
     }))
 }
 
-/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it cannot be formed.
+/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it
+/// cannot be formed.
 ///
 /// # Errors
 /// As for [`map`].
@@ -184,16 +187,10 @@ impl Map<'_> {
     }
 }
 
-/// The number of cells, if the arguments make sense.
+/// The number of cells, after a check of the arguments.
 fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, Error> {
-    let count = family.names().len();
+    check_parameters(family, axes)?;
     let [first, second] = axes;
-    if first.parameter == second.parameter || first.parameter.max(second.parameter) >= count {
-        return Err(Error::argument(format!(
-            "axes along parameters {} and {} of {count}: a map needs two different ones",
-            first.parameter, second.parameter
-        )));
-    }
     let cells = first.points.len().saturating_mul(second.points.len());
     if cells > MAX_CELLS {
         return Err(Error::TooMuch {
@@ -201,7 +198,7 @@ fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, 
             limit: MAX_CELLS as u64,
             unit: "cells",
             advice: format!(
-                "{} by {} is more than a picture holds: take fewer points, or several maps of \
+                "{} by {} points were requested: take fewer points, or several maps of \
                  smaller ranges",
                 first.points.len(),
                 second.points.len()
@@ -209,16 +206,9 @@ fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, 
         });
     }
     let mut ranges: Vec<(f64, f64)> = values.iter().map(|value| (*value, *value)).collect();
-    for Axis { parameter, points } in axes {
-        if let Some(point) = points.iter().find(|point| !point.is_finite()) {
-            return Err(Error::argument(format!(
-                "{point} on an axis: its points must be finite"
-            )));
-        }
-        let low = points.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if let (false, Some(range)) = (points.is_empty(), ranges.get_mut(parameter)) {
-            *range = (low, high);
+    for axis in axes {
+        if let (Some(ends), Some(range)) = (axis.range()?, ranges.get_mut(axis.parameter)) {
+            *range = ends;
         }
     }
     if cells > 0 {

@@ -1,12 +1,13 @@
 //! Crossings of the edge along a row whose family need not be affine in its parameter p.
 //!
-//! The row is divided as a `block` of one direction; cells that stay open are divided further, in p, about the
-//! zeros (t, p) of h(s(t); p) on the edge that Newton's method finds there:
+//! The row is divided as a `block` of one direction; cells that stay open are divided further, in
+//! p, about the zeros (t, p) of h(s(t); p) on the edge that Newton's method finds there:
 //!     (∂_t h, ∂_p h) (δt, δp) = −h, as two real equations.
-//! What is further than CLOSE of a cell from such a zero is proved clear of roots on the edge. The clear intervals
-//! between two gaps have one count, which is taken at one member, and their difference is what crosses in the gap
-//! between them. So the list is complete but for gaps whose crossings cancel, or beyond which infinitely many roots offend; ω and p
-//! are those of the zero found, which is within the gap.
+//! All values further than CLOSE of a cell from such a zero are proved to have no roots on the
+//! edge. The clear intervals between two gaps have one count, which is made at one member, and the
+//! difference of two counts is the number of roots that cross in the gap between them. The list is
+//! therefore complete except for gaps whose crossings cancel, or beyond which infinitely many roots
+//! violate the specification; ω and p are those of the zero that was found within the gap.
 
 use super::block::{Block, Finding, Grid};
 use crate::stability::boxes::{BoxExpansion, Claim, Examined, Range, Stretch, examine, tangent};
@@ -14,17 +15,21 @@ use crate::stability::crossings::Crossing;
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
-/// Half the width of a gap about a crossing, relative to the cell it lies in.
+/// Half the width of a gap about a crossing, relative to the cell it lies in. A smaller gap
+/// separates more crossings and needs more proofs.
 const CLOSE: f64 = 1.0 / 1024.0;
 
-/// Newton steps for one zero.
+/// Upper limit on Newton's steps for one zero.
 const MAX_STEPS: u32 = 12;
 
-/// A step as small as this, relative to the frequency and to the cell, is the last.
+/// Newton's iteration ends with a step of this size, relative to the frequency and to the cell.
 const SMALL: f64 = 1e-10;
 
-/// Stretches of a cell from which a zero is sought.
+/// Stretches of a cell from which a zero is searched for.
 const STARTS: usize = 3;
+
+/// Relative difference of frequencies below which two zeros are the same.
+const SAME_ZERO: f64 = 1e-6;
 
 /// A zero of h on the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,14 +38,14 @@ struct Zero {
     omega: f64,
 }
 
-/// What is known of an interval of the parameter.
+/// What is proved of an interval of the parameter.
 #[derive(Debug, Clone, PartialEq)]
 enum Known {
     /// No member has a root on the edge.
     Clear,
-    /// Infinitely many roots offend.
+    /// Infinitely many roots violate the specification.
     Endless,
-    /// Nothing but these zeros.
+    /// Only that these zeros lie in it.
     Gap(Vec<Zero>),
 }
 
@@ -51,7 +56,7 @@ struct Interval {
     known: Known,
 }
 
-/// What is to be done with an interval.
+/// What remains to be done with an interval.
 enum Todo {
     Look(Claim<1>),
     Keep(Interval),
@@ -120,7 +125,7 @@ impl Grid<'_, 1> {
             let zero = stretches
                 .as_ref()
                 .and_then(|stretches| self.zero(&claim.range, stretches, near, expansion));
-            // Numbers too close to each other cannot be parted.
+            // Numbers too close to each other cannot be separated.
             let parts =
                 high - low > 2.0 * near && near > 4.0 * f64::EPSILON * low.abs().max(high.abs());
             let Some(stretches) = stretches.filter(|_| parts) else {
@@ -157,7 +162,7 @@ impl Grid<'_, 1> {
         Ok(())
     }
 
-    /// A zero in a range, or next to it, by Newton's method from the middle of stretches.
+    /// A zero in a range or next to it, by Newton's method from the middle of the stretches.
     fn zero(
         &self,
         range: &Range<1>,
@@ -184,8 +189,9 @@ impl Grid<'_, 1> {
                 let dp = (turn.im * value.re - turn.re * value.im) / area;
                 t += dt;
                 gain += dp;
-                // Roots come in pairs, and the edge begins on the real axis; far away is another zero.
-                // (That at an end of the gap of a zero is not to be found again.)
+                // Roots come in pairs, and the edge begins on the real axis; a zero far away is
+                // another one. (A zero at an end of the gap of another zero must not be found
+                // again.)
                 let within = gain >= low - 0.5 * near && gain <= high + 0.5 * near;
                 if !(within && t.abs() <= 2.0 * stretch.to) {
                     return None;
@@ -200,7 +206,7 @@ impl Grid<'_, 1> {
         })
     }
 
-    /// What crosses in each gap, from counts on both sides.
+    /// The number of roots that cross in each gap, from the counts on both sides.
     fn counted(&self, intervals: &[Interval], task: &Task) -> Result<Vec<Crossing>, Error> {
         let mut crossings = Vec::new();
         let mut before: Option<i32> = None;
@@ -230,7 +236,7 @@ impl Grid<'_, 1> {
     }
 }
 
-/// The jump of a gap shared among its zeros.
+/// The jump of a gap, distributed over its zeros.
 fn shared(gap: &Interval, jump: i32) -> Vec<Crossing> {
     let Known::Gap(zeros) = &gap.known else {
         return Vec::new();
@@ -252,7 +258,7 @@ fn shared(gap: &Interval, jump: i32) -> Vec<Crossing> {
     zeros.iter().map(crossing).collect()
 }
 
-/// Intervals of one kind that touch become one, the same zero counting once.
+/// Merge touching intervals of one kind; a zero in both counts once.
 fn united(intervals: Vec<Interval>) -> Vec<Interval> {
     let mut united: Vec<Interval> = Vec::with_capacity(intervals.len());
     for next in intervals {
@@ -269,7 +275,7 @@ fn united(intervals: Vec<Interval>) -> Vec<Interval> {
                 for zero in zeros {
                     let same = |other: &Zero| {
                         let off = (other.omega - zero.omega).abs();
-                        off <= 1e-6 * other.omega.max(zero.omega)
+                        off <= SAME_ZERO * other.omega.max(zero.omega)
                     };
                     if !own.iter().any(same) {
                         own.push(zero);
@@ -327,7 +333,7 @@ mod tests {
     fn crossings_of_a_square_are_the_closed_form() {
         let points: Vec<f64> = (0..50).map(|i| -3.03 + 0.15 * f64::from(i)).collect();
         let found = along(&points, 0.0);
-        // w = K², w/2 = π/2 + 2πn; at K = 0 a real root comes to 0 and goes back.
+        // w = K², w/2 = π/2 + 2πn; at K = 0 a real root reaches 0 and returns.
         let mut expected = Vec::new();
         for n in 0..3 {
             let omega = PI + 4.0 * PI * f64::from(n);

@@ -1,5 +1,5 @@
-//! All rows of a map: a gain in which the family is affine varies along each, the other parameter from one to
-//! the next.
+//! All rows of a map. Along a row a gain varies in which the family is affine; the other parameter
+//! varies from row to row.
 
 use super::axes::{Axis, Map, put, put_value};
 use super::chart::Chart;
@@ -18,10 +18,11 @@ pub(crate) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// `None` where the family is affine in neither parameter, or points are in disorder.
+    /// `None` where the family is affine in neither parameter, or points are not in order.
     ///
-    /// Leading terms that do not vary along a row keep its roots within bounds; with a term without s in
-    /// B, a root at 0 crosses within rows, not between them; more cells a row cost less.
+    /// Preferred is the axis along which the leading terms do not vary, which bounds the roots of a
+    /// row; then one for which B has a term without s, so that a root at 0 crosses within rows and
+    /// not between them; then the longer rows, which cost less for each cell.
     pub(crate) fn of(map: &'a Map<'a>) -> Option<Self> {
         let candidates = map.axes.iter().enumerate().filter_map(|(along, axis)| {
             let (constant, slope) = map.family.split(axis.parameter)?;
@@ -83,8 +84,8 @@ impl<'a> Rows<'a> {
         self.each(|_, members| Ok(members.found(self.map.task)?.unwrap_or_default()))
     }
 
-    /// The counts along one column, the middle one, where the family is affine in the other parameter as well: they
-    /// anchor all rows.
+    /// The counts along the middle column, where the family is affine in the other parameter as
+    /// well. All rows start their counts from it.
     fn middle_column(&self) -> Result<Option<(usize, Row)>, Error> {
         let (axis, across) = (self.axis(), self.across());
         let column = axis.points.len() / 2;
@@ -117,7 +118,7 @@ impl<'a> Rows<'a> {
         Ok(Some((column, row)))
     }
 
-    /// Do the same for all rows.
+    /// Apply `work` to all rows, in parallel.
     fn each<T: Default + Send>(
         &self,
         work: impl Fn(usize, Members<'_>) -> Result<T, Error> + Sync,

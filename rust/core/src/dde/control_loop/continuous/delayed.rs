@@ -14,7 +14,8 @@ use super::pieces::{Order, Piece, Pieces, REPORTED, SMOOTH};
 use super::saturation::{Mode, Stretch, stretches};
 use crate::dde::control_loop::series::{DEGREE, Series};
 
-/// Room left when an element is shortened, so that the bound on its series holds with margin.
+/// Factor on the length of a shortened element, so that the bound on its series holds with a
+/// margin.
 const MARGIN: f64 = 0.95;
 
 pub(super) fn run<S: Scalar>(
@@ -68,8 +69,8 @@ pub(super) fn run<S: Scalar>(
         let stop = piece.end.earlier(jump).earlier(impulses.next());
         let mut h = stop - t;
         let mut next = stop;
-        // Events at one time that move at different speeds: an element of no length, but for
-        // its slope. It hands on the command and serves no output.
+        // Events at one time that move at different speeds: the element between them has length
+        // zero, but its length has a derivative. It passes the command on and provides no output.
         let is_instant = S::MOVES && h.value() <= tolerance;
         if is_instant {
             h = h.pinned(0.0);
@@ -158,15 +159,15 @@ fn clipped<S: Scalar>(u: &Series<S>, mode: Mode, limit: Option<S>) -> Series<S> 
     }
 }
 
-/// How the command stands to its limit at σ = 0.
+/// The mode of the command at σ = 0.
 fn at_start<S: Scalar>(u: &Series<S>, limit: Option<S>) -> Mode {
     limit.map_or(Mode::Free, |limit| {
         Mode::of(u.coefficients[0].value(), limit.value())
     })
 }
 
-/// How breaks pass through the loop: an integration raises the order by one, a direct path keeps
-/// it.
+/// The orders of breaks behind the loop: an integration raises the order by one, a direct path
+/// keeps it.
 struct Orders {
     command_is_direct: bool,
     output_is_direct: bool,
@@ -190,7 +191,8 @@ impl Orders {
         }
     }
 
-    /// Of the command, where w breaks with order `arriving` and the reference may jump.
+    /// Order of the break of the command where w breaks with order `arriving` and the reference may
+    /// jump.
     fn of_command(&self, arriving: Order, jumps: bool) -> Order {
         let passed = Self::pass(arriving, self.command_is_direct);
         if jumps {
@@ -200,7 +202,7 @@ impl Orders {
         }
     }
 
-    /// Of the output.
+    /// Order of the break of the output, likewise.
     fn of_output(&self, arriving: Order, jumps: bool) -> Order {
         let passed = Self::pass(arriving, self.output_is_direct);
         if jumps {

@@ -2,10 +2,10 @@
 //!
 //! For L < 1, or for any L ≠ 1 without a limit, w = sat(v) with v = (K x + M r)/(1 − L) is its one
 //! solution. The loop is then linear where |v| ≤ limit and has a constant command elsewhere; an
-//! element ends where v crosses the limit. The two fields agree there, so the state passes
-//! through and never slides. v is known to rounding of its parts, so a crossing counts only if
-//! v gets clear of the limit by more than that: else rounding alone could change the mode for
-//! ever, in steps of time too short to change the state.
+//! element ends where v crosses the limit. The two fields agree there, so that the state passes
+//! through and never slides. v is known up to the rounding errors of its parts. A crossing
+//! therefore counts only if v leaves the limit by more than these errors; otherwise rounding errors
+//! could change the mode without end, in steps of time too short to change the state.
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, dot, saturate};
 use crate::dde::control_loop::reference::Reference;
@@ -19,16 +19,20 @@ use super::expansion::Expansion;
 use super::saturation::{Mode, Stretch, stretches};
 use crate::dde::control_loop::series::Series;
 
-/// Changes of mode without progress in time after which the mode is kept: rounding at the limit.
+/// Changes of mode without progress in time after which the mode is kept, because only rounding
+/// errors at the limit cause them.
 const MOST_CHANGES: u32 = 2;
 
-/// Room left when an element is shortened.
+/// Factor on the length of a shortened element.
 const MARGIN: f64 = 0.95;
 
-/// Rounding of v, relative to the sum of its parts.
+/// Rounding error of v, relative to the sum of its parts.
 const NOISE: f64 = 16.0 * f64::EPSILON;
 
-/// Does v get more than `noise` beyond the limit that `mode` and the mode of the stretch share?
+/// Parts of an interval at which v is compared with the limit.
+const PROBES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+
+/// Does v leave the limit that `mode` and the mode of the stretch share by more than `noise`?
 fn is_clear<S: Scalar>(
     v: &Series<S>,
     stretch: &Stretch,
@@ -36,7 +40,7 @@ fn is_clear<S: Scalar>(
     limit: f64,
     noise: f64,
 ) -> bool {
-    [0.25, 0.5, 0.75, 1.0].into_iter().any(|part| {
+    PROBES.into_iter().any(|part| {
         let sigma = stretch.start + part * (stretch.end - stretch.start);
         let v = v.at(S::from(sigma)).value();
         match (mode, stretch.mode) {

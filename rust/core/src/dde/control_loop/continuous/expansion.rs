@@ -1,18 +1,24 @@
-//! Taylor polynomials in a local coordinate σ ∈ [0, 1], and the state's expansion in them.
+//! The Taylor expansion of the state on one element.
 
 use crate::dde::control_loop::linear_loop::Equations;
 use crate::dde::control_loop::series::{DEGREE, NEGLIGIBLE, Series, horner};
 use crate::dde::scalar::Scalar;
 
-/// A state this small throughout its element is as good as zero; it keeps subnormal numbers, which
-/// have no relative precision, from shortening the element.
+/// A state this small throughout its element counts as zero, so that subnormal numbers, which have
+/// no relative precision, do not shorten the element.
 const NOTHING: f64 = 1e-280;
 
-/// An element is tried no longer than this over the norm of A balanced, which keeps coefficients
-/// from overflowing.
+/// Length of the first element tried, times the norm of the balanced A. A longer one would let
+/// coefficients overflow.
 const TRIAL: f64 = 16.0;
 
-/// 1/1, 1/2, …: what an integration divides by.
+/// Part of an element below which it is not shortened further.
+const SHORTEST: f64 = 1e-9;
+
+/// Largest factor of one shortening, so that the approach from above ends.
+const LEAST_SHORTENING: f64 = 0.999;
+
+/// 1/1, 1/2, …: factors of an integration.
 const PARTS: [f64; DEGREE] = {
     let mut parts = [1.0; DEGREE];
     let mut j = 1;
@@ -23,7 +29,7 @@ const PARTS: [f64; DEGREE] = {
     parts
 };
 
-/// x on one element, and how long the element is.
+/// x on one element, and the length of the element.
 #[derive(Debug)]
 pub(crate) struct Expansion<S = f64> {
     n: usize,
@@ -35,7 +41,7 @@ pub(crate) struct Expansion<S = f64> {
 }
 
 impl<S: Scalar> Expansion<S> {
-    /// For x′ = A x + …, A being the equations' own or a closed-loop one.
+    /// For x′ = A x + …, where A is that of the equations or of the closed loop.
     pub(crate) fn new(a: &[S], n: usize) -> Self {
         let norm = crate::dde::propagator::balanced_norm(a, n);
         Self {
@@ -50,8 +56,8 @@ impl<S: Scalar> Expansion<S> {
         }
     }
 
-    /// Expand x′ = A x + B w + g over an element of length `h` that starts at `x`; the part of
-    /// the element, in (0, 1], on which the truncated series is exact to rounding.
+    /// Expand x′ = A x + B w + g over an element of length `h` that starts at `x`. Returns the part
+    /// of the element, in (0, 1], on which the truncated series is exact to rounding.
     pub(crate) fn expand(
         &mut self,
         a: &[S],
@@ -61,7 +67,7 @@ impl<S: Scalar> Expansion<S> {
         w: &Series<S>,
         h: S,
     ) -> f64 {
-        // The same code for every n; the small ones are compiled with n known.
+        // The same code for every n; small n are compiled as constants.
         match self.n {
             1 if a[0].is_nothing() => self.integrate(b[0], g[0], x[0], w, h),
             1 => self.fill(1, a, b, g, x, w, h),
@@ -72,7 +78,7 @@ impl<S: Scalar> Expansion<S> {
         self.sound_part()
     }
 
-    /// The recursion of one state without feedback: no term waits for the one before.
+    /// The recursion for one state without feedback, in which no term depends on the one before.
     fn integrate(&mut self, b: S, g: S, x: S, w: &Series<S>, h: S) {
         self.degree = (w.degree + 1).min(DEGREE);
         let input = b * h;
@@ -119,8 +125,8 @@ impl<S: Scalar> Expansion<S> {
         }
     }
 
-    /// Largest part of the element on which the last coefficients are negligible beside the
-    /// largest one, and the same of their slopes.
+    /// Largest part of the element on which the last coefficients, and their slopes, are negligible
+    /// relative to the largest one.
     fn sound_part(&self) -> f64 {
         if self.degree < DEGREE - 1 {
             return 1.0;
@@ -133,9 +139,9 @@ impl<S: Scalar> Expansion<S> {
         }
     }
 
-    /// What remains of `part` of the element when the last coefficients are made negligible;
-    /// both they and the largest shrink with the element, so the bound takes a few rounds. `read`
-    /// gives what is to be negligible `beside` what.
+    /// `part` of the element, shortened until the last coefficients are negligible. Both they and
+    /// the largest coefficient shrink with the element, so that several rounds are needed. `read`
+    /// returns what has to be negligible relative to `beside`.
     fn shortened(&self, mut part: f64, read: impl Fn(S) -> f64, beside: impl Fn(S) -> f64) -> f64 {
         for i in 0..self.n {
             loop {
@@ -149,11 +155,11 @@ impl<S: Scalar> Expansion<S> {
                     largest = largest.max(beside(term) * power);
                     power *= part;
                 }
-                // A step of a thousandth ends the approach from above.
-                if ratio >= 1.0 || part < 1e-9 {
+                // Steps of one thousandth end the approach from above.
+                if ratio >= 1.0 || part < SHORTEST {
                     break;
                 }
-                part *= ratio.min(0.999);
+                part *= ratio.min(LEAST_SHORTENING);
             }
         }
         part
@@ -233,7 +239,8 @@ impl<S: Scalar> Expansion<S> {
         }
     }
 
-    /// Σ |k_i| max |x_i| on the element, or somewhat more: what rounding of `row` x is relative to.
+    /// Σ |k_i| max |x_i| on the element, or slightly more. The rounding error of `row` x is
+    /// relative to it.
     pub(crate) fn size(&self, row: &[S]) -> f64 {
         (0..=self.degree)
             .map(|j| {

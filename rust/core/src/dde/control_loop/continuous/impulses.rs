@@ -1,25 +1,25 @@
 //! Impulses of the command on their way to the plant.
 //!
-//! A jump of the reference under an ideal derivative makes one. On arrival x jumps by B times its
-//! weight, and with L ≠ 0 the command answers with another impulse, L times as heavy.
+//! A jump of the reference under an ideal derivative causes an impulse. On its arrival x jumps by B
+//! times its weight, and with L ≠ 0 the command has another impulse of L times that weight.
 
 use std::collections::VecDeque;
 
 use crate::dde::scalar::{Scalar, is_reached};
 
-/// An impulse lighter than this part of the heaviest one so far is let go.
+/// Impulses lighter than this share of the heaviest one so far are dropped.
 const LIGHT: f64 = 1e-20;
 
 /// Times of arrival and weights, in order of time.
 #[derive(Debug, Default)]
 pub(super) struct Impulses<S = f64> {
     waiting: VecDeque<(S, S)>,
-    /// Of the values and of the slopes.
+    /// The heaviest weight so far, and the largest slope of one.
     heaviest: (f64, f64),
 }
 
 impl<S: Scalar> Impulses<S> {
-    /// An impulse that arrives at `time`, after all those that wait.
+    /// Add an impulse that arrives at `time`, after all those in the queue.
     pub(super) fn push(&mut self, time: S, weight: S) {
         let (value, slope) = (weight.value().abs(), weight.slope().abs());
         self.heaviest = (self.heaviest.0.max(value), self.heaviest.1.max(slope));
@@ -42,7 +42,7 @@ impl<S: Scalar> Impulses<S> {
         weight
     }
 
-    /// Time of the next arrival, infinite if nothing waits.
+    /// Time of the next arrival, infinite if the queue is empty.
     pub(super) fn next(&self) -> S {
         self.waiting
             .front()

@@ -1,9 +1,9 @@
 //! The delayed command as a queue of pieces, and the order of the breaks between them.
 //!
-//! Every break comes back one delay later, one order smoother (or, in a neutral loop, no smoother
-//! at all), so the pieces of one delay grow in number with every jump there has been. Two
-//! neighbours whose polynomials are the same function to rounding become one piece again: a break
-//! that has faded below rounding costs nothing any more.
+//! Every break returns one delay later, one order smoother (in a neutral loop, with the same
+//! order), so that the number of pieces in one delay grows with every jump. Two neighbours whose
+//! polynomials are the same function to rounding are merged into one piece, so that a break that
+//! has become smaller than rounding errors costs nothing.
 
 use std::collections::VecDeque;
 
@@ -14,28 +14,29 @@ use crate::memory::push_back;
 
 use crate::dde::control_loop::series::Series;
 
-/// Pieces in the queue beyond which the run is given up.
+/// Upper limit on the pieces in the queue (bounds memory and time).
 const MOST_PIECES: usize = 1_000_000;
+
+/// No break.
+pub(super) const SMOOTH: Order = u8::MAX;
+
+/// Highest order of a break that is reported; breaks of higher order are too small to be seen in a
+/// plot or a fit.
+pub(super) const REPORTED: Order = 10;
+
+/// Two polynomials are merged if the sum of the differences of their coefficients is below this
+/// share of the largest one.
+const SAME: f64 = 4.0 * f64::EPSILON;
+
+/// The same for slopes, which have rounding errors of products with values. Slopes are derivatives
+/// with respect to a parameter in units of its own size, so that both are comparable.
+const SAME_SLOPE: f64 = 256.0 * f64::EPSILON;
+
+/// Factor by which the recorded longest length shrinks with each piece.
+const FORGET: f64 = 0.998;
 
 /// The lowest derivative that jumps at a breaking point; [`SMOOTH`] where none does.
 pub(super) type Order = u8;
-
-/// No break at all.
-pub(super) const SMOOTH: Order = u8::MAX;
-
-/// Breaks up to this order are reported; later ones are below what a plot or a fit can see.
-pub(super) const REPORTED: Order = 10;
-
-/// Two polynomials whose coefficients differ by less than this part of the largest one, in the
-/// sum, are one.
-const SAME: f64 = 4.0 * f64::EPSILON;
-
-/// The same of their slopes, which carry the rounding of products with values: slopes are those
-/// with respect to a parameter in units of its own size, so that both are of one kind.
-const SAME_SLOPE: f64 = 256.0 * f64::EPSILON;
-
-/// What is left, one piece later, of the length of the longest.
-const FORGET: f64 = 0.998;
 
 /// w(t) = series((t − origin)/scale) from `start` to `end`.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +62,7 @@ impl<S: Scalar> Piece<S> {
         }
     }
 
-    /// w over [t, t + h] in σ ∈ [0, 1].
+    /// w over [t, t + h] as a polynomial in σ ∈ [0, 1].
     pub(super) fn local(&self, t: S, h: S) -> Series<S> {
         if self.series.degree == 0 {
             return self.series;
@@ -75,7 +76,7 @@ impl<S: Scalar> Piece<S> {
         self.series.shifted(offset, h / self.scale)
     }
 
-    /// Is this piece, continued, the other one?
+    /// Is the other piece a continuation of this one?
     fn continues_as(&self, other: &Self) -> bool {
         let length = other.end - other.start;
         let mine = self.local(other.start, length);
@@ -92,22 +93,22 @@ impl<S: Scalar> Piece<S> {
     }
 }
 
-/// The pieces not yet used up, first one first; never empty.
+/// The remaining pieces in order; never empty.
 #[derive(Debug)]
 pub(super) struct Pieces<S = f64> {
     front: Piece<S>,
     rest: VecDeque<Piece<S>>,
     end: S,
     delay: S,
-    /// Length of the longest of the latest pieces: two that are longer together would only be
-    /// cut again.
+    /// Length of the longest of the latest pieces. Two pieces that are longer together are not
+    /// merged, because they would be cut again.
     longest: f64,
-    /// Order of a break lost in a piece too short to keep.
+    /// Order of a break inside a piece too short to be stored.
     dropped: Order,
 }
 
 impl<S: Scalar> Pieces<S> {
-    /// Constant `command` until the first command of the run arrives.
+    /// The constant `command` until the first command of the run arrives.
     pub(super) fn new(command: S, delay: S) -> Self {
         Self {
             front: Piece::constant(command, delay),
@@ -123,7 +124,7 @@ impl<S: Scalar> Pieces<S> {
         &self.front
     }
 
-    /// Leave behind what ends at `t`; the order of the break passed.
+    /// Remove what ends at `t`; returns the order of the break that is passed.
     pub(super) fn reach(&mut self, t: S) -> Order {
         let mut order = SMOOTH;
         while is_reached(self.front.end, t, slack(t, self.delay)) {
@@ -136,8 +137,8 @@ impl<S: Scalar> Pieces<S> {
         order
     }
 
-    /// Append a piece; one shorter than rounding is left to its neighbour, and equal constants
-    /// become one piece.
+    /// Append a piece. A piece shorter than rounding errors is given to its neighbour, and equal
+    /// constants are merged.
     pub(super) fn push(&mut self, mut piece: Piece<S>) -> Result<(), Error> {
         self.longest = (FORGET * self.longest).max((piece.end - piece.start).value());
         piece.order = piece.order.min(self.dropped);
@@ -171,8 +172,7 @@ impl<S: Scalar> Pieces<S> {
                 limit: MOST_PIECES as u64,
                 unit: "pieces of the command in one delay",
                 advice:
-                    "shorten the time simulated or the list of reference jumps, and set a lag of \
-                         almost nothing to zero"
+                    "shorten the time simulated or the list of reference jumps, and set lags close to zero to zero"
                         .to_owned(),
             });
         }

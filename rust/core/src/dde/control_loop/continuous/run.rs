@@ -16,7 +16,8 @@ pub(crate) fn run<S: Scalar>(
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
     if plant.delay().value() > 0.0 {
-        // No element is longer than the delay: work without end is refused before it starts.
+        // No element is longer than the delay, so that a run that would exceed the limit on
+        // elements is refused before it starts.
         if requested.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
             return Err(endless());
         }

@@ -1,19 +1,19 @@
 //! Where a polynomial on [0, 1] lies within ±limit, and where beyond.
 //!
 //! The zeros of p ∓ limit are isolated in the Bernstein basis: the number of sign changes of the
-//! coefficients bounds the number of zeros and equals it when it is 0 or 1 (Descartes' rule), so
-//! an interval with more is halved (de Casteljau) and one with a single change is bisected to the
-//! last bit. No crossing is missed; a touching that does not come clear of the limit within 2⁻⁴⁰
-//! of the interval is no crossing, and neither is rounding noise around the limit.
-//! Crossings are those of the values, and carry no slope: the limited command is continuous
-//! there, so where exactly a moving crossing is put changes the response in second order only.
+//! coefficients bounds the number of zeros and equals it when it is 0 or 1 (Descartes' rule), so an
+//! interval with more is halved (de Casteljau) and one with a single change is bisected to the last
+//! bit. No crossing is missed. A contact that leaves the limit for less than 2⁻⁴⁰ of the interval
+//! is no crossing, and neither are rounding errors around the limit. Crossings are those of the
+//! values and have no slope: the limited command is continuous there, so that a shift of a crossing
+//! changes the response in second order only.
 
 use crate::dde::scalar::Scalar;
 
 use crate::dde::control_loop::level_crossings::{crossings, value_at};
 use crate::dde::control_loop::series::Series;
 
-/// How the command stands to its limit.
+/// Where the command is relative to its limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
     /// |u| ≤ limit.
@@ -36,7 +36,7 @@ impl Mode {
     }
 }
 
-/// A stretch of [0, 1] in one mode.
+/// An interval of [0, 1] in one mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stretch {
     pub(super) mode: Mode,
@@ -44,7 +44,7 @@ pub(super) struct Stretch {
     pub(super) end: f64,
 }
 
-/// The stretches of `u` on [0, 1], in order; neighbours differ in mode.
+/// The intervals of `u` on [0, 1], in order; neighbours differ in mode.
 pub(super) fn stretches<S: Scalar>(u: &Series<S>, limit: f64, out: &mut Vec<Stretch>) {
     out.clear();
     let whole = |mode| Stretch {
@@ -93,13 +93,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn series(coefficients: &[f64]) -> Series {
-        let mut out = Series::constant(0.0);
-        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
-        out.degree = coefficients.len() - 1;
-        out
-    }
-
     /// Π (σ − root).
     fn with_roots(roots: &[f64]) -> Series {
         let mut out = vec![1.0];
@@ -109,7 +102,7 @@ mod tests {
                 out[i] = if i > 0 { out[i - 1] } else { 0.0 } - root * out[i];
             }
         }
-        series(&out)
+        Series::of(&out)
     }
 
     fn found(u: &Series, limit: f64) -> Vec<Stretch> {
@@ -120,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_line_through_both_limits_is_cut_at_both() {
-        let modes = found(&series(&[-4.0, 8.0]), 1.0);
+        let modes = found(&Series::of(&[-4.0, 8.0]), 1.0);
         let expected = [
             (Mode::Low, 0.0, 0.375),
             (Mode::Free, 0.375, 0.625),
@@ -136,7 +129,7 @@ mod tests {
     #[test]
     fn touching_the_limit_is_no_crossing() {
         // 1 − (σ − 1/3)², up to rounding.
-        let modes = found(&series(&[1.0 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        let modes = found(&Series::of(&[1.0 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
         assert!(
             modes
                 .iter()
@@ -147,20 +140,23 @@ mod tests {
     #[test]
     fn a_peak_just_over_the_limit_is_found() {
         // 1 + 1e-12 − (σ − 1/3)² is over the limit for 2e-6 around 1/3.
-        let modes = found(&series(&[1.0 + 1e-12 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        let modes = found(
+            &Series::of(&[1.0 + 1e-12 - 1.0 / 9.0, 2.0 / 3.0, -1.0]),
+            1.0,
+        );
         assert_eq!(modes.len(), 3);
         assert!((modes[1].end - modes[1].start - 2e-6).abs() < 1e-9);
     }
 
     #[test]
     fn standing_on_the_limit_is_free() {
-        assert_eq!(found(&series(&[1.0]), 1.0).len(), 1);
-        assert_eq!(found(&series(&[1.0, 1e-17, -1e-17]), 1.0).len(), 1);
-        assert_eq!(found(&series(&[1.0, -0.5]), 1.0)[0].mode, Mode::Free);
+        assert_eq!(found(&Series::of(&[1.0]), 1.0).len(), 1);
+        assert_eq!(found(&Series::of(&[1.0, 1e-17, -1e-17]), 1.0).len(), 1);
+        assert_eq!(found(&Series::of(&[1.0, -0.5]), 1.0)[0].mode, Mode::Free);
     }
 
     proptest! {
-        /// Every root apart from its neighbours is a cut, to its conditioning.
+        /// Every root at some distance from its neighbours is found, to its conditioning.
         #[test]
         fn all_roots_are_cuts(mut roots in prop::collection::vec(0.0_f64..1.0, 1..9)) {
             roots.sort_by(f64::total_cmp);
@@ -177,18 +173,18 @@ mod tests {
                     .filter(|other| *other != root)
                     .map(|other| (root - other).abs())
                     .product();
-                // Rounding of the shift by 1000 over the slope at the root.
+                // The rounding error of the shift by 1000 over the slope at the root.
                 prop_assert!((stretch.start - root).abs() < 1e-11 / slope);
             }
         }
 
-        /// On either side of every cut the mode is that of the polynomial.
+        /// On either side of every crossing the mode is that of the polynomial.
         #[test]
         fn modes_are_those_of_the_values(
             coefficients in prop::collection::vec(-3.0..3.0, 1..12),
             sigmas in prop::collection::vec(0.0_f64..1.0, 40),
         ) {
-            let u = series(&coefficients);
+            let u = Series::of(&coefficients);
             let modes = found(&u, 1.0);
             prop_assert_eq!(modes[0].start, 0.0);
             prop_assert_eq!(modes[modes.len() - 1].end, 1.0);

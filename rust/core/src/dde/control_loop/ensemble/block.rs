@@ -1,4 +1,4 @@
-//! Sixteen sampled loops side by side, in columns.
+//! Sixteen sampled loops processed together, one in each column.
 
 use crate::Error;
 use crate::dde::control_loop::linear_loop::dot;
@@ -8,19 +8,20 @@ use crate::dde::propagator::Propagator;
 
 use super::sets::Sets;
 
-/// Sets in a block: two vectors of the widest instruction set.
+/// Number of loops in a block: two vectors of the widest instruction set.
 pub(super) const SETS: usize = 16;
 
-/// Most states that the lanes hold: an integrator, the integral of the error, and a filter.
+/// Most states for which the vectorised code is compiled: an integrator, the integral of the error,
+/// and a filter.
 pub(super) const MOST_STATES: usize = 4;
 
-/// More samples than this, and the sets run one by one, where they can be interrupted.
+/// Loops with more samples than this run one by one, so that they can be cancelled.
 const MOST_SAMPLES: f64 = 1e6;
 
-/// A number of each set.
+/// One number for each loop of a block.
 pub(super) type Column = [f64; SETS];
 
-/// x + F x + Γ w + g over one part of a sample, g being what the reference adds.
+/// x + F x + Γ w + g over one part of a sample, where g is the contribution of the reference.
 #[derive(Debug)]
 pub(super) struct Hold {
     /// F, row-major.
@@ -29,7 +30,7 @@ pub(super) struct Hold {
     pub(super) push: Vec<Column>,
 }
 
-/// The numbers of the sets of a block, whose delays hold equally many whole samples.
+/// The numbers of the loops of a block. Their delays hold equally many whole samples.
 #[derive(Debug)]
 pub(super) struct Block {
     pub(super) states: usize,
@@ -50,12 +51,12 @@ pub(super) struct Block {
     pub(super) sample_time: Column,
     /// Time from a sample to the arrival of a command.
     pub(super) arrival: Column,
-    /// Time by which the output runs ahead.
+    /// Time by which the output is read ahead.
     pub(super) ahead: Column,
 }
 
-/// Whole samples in the delay of a loop that the lanes can take: one with a hold whose output
-/// between events is a line, c A = 0 and c E = 0, and cannot jump.
+/// Whole samples in the delay of a loop that the vectorised code can run: a sampled loop whose
+/// output between events is a line (c A = 0 and c E = 0) and cannot jump.
 pub(super) fn samples_in_delay(row: &Row<'_>, span: f64) -> Option<usize> {
     let n = row.b.len();
     let numbers = [row.l, row.m, row.delay, row.sample_time];
@@ -78,14 +79,15 @@ pub(super) fn samples_in_delay(row: &Row<'_>, span: f64) -> Option<usize> {
 }
 
 impl Block {
-    /// No lane takes more samples than this for `span` seconds of its output.
+    /// Upper limit on the samples of any lane for `span` seconds of its output.
     pub(super) fn most_samples(&self, span: f64) -> usize {
         let lanes = self.sample_time.iter().zip(&self.ahead);
         let longest = lanes.map(|(step, ahead)| (span + ahead) / step);
         self.samples + longest.fold(0.0, f64::max).ceil() as usize
     }
 
-    /// Of at most [`SETS`] sets that hold equally many samples; the last one fills the block up.
+    /// A block of at most [`SETS`] loops with equally many samples; the last loop fills the unused
+    /// columns.
     pub(super) fn new(sets: &Sets<'_>, members: &[usize]) -> Result<Self, Error> {
         let n = sets.states;
         let nothing = [0.0; SETS];
@@ -136,7 +138,7 @@ impl Hold {
     fn fill(&mut self, lane: usize, row: &Row<'_>, h: f64, reference: f64) {
         let n = row.b.len();
         if row.a.iter().all(|a| *a == 0.0) {
-            // What the propagator gives as well, without its work.
+            // The result of the propagator, at less cost.
             for i in 0..n {
                 self.drive[i][lane] = row.b[i] * h;
                 self.push[i][lane] = row.e[i] * h * reference;

@@ -1,4 +1,4 @@
-//! Outputs of the sets of a block at given times, on the lines that their responses consist of.
+//! Outputs of the loops of a block at given times, interpolated on the lines of their responses.
 
 use crate::Error;
 use crate::memory::{collected, room};
@@ -9,7 +9,7 @@ use super::sets::Outcome;
 use super::through::{Visitor, through};
 use super::walk::{Line, Sink, store};
 
-/// What memory is asked for.
+/// What memory is requested for, in errors.
 const RESPONSES: &str = "the sweep";
 
 /// Outputs of the first `count` sets at `times` after the start.
@@ -37,7 +37,7 @@ pub(super) fn responses(
         .collect()
 }
 
-/// Outputs where lines meet: at every sample, and at every arrival where there are any between.
+/// Outputs where lines meet: at every sample, and at every arrival in between.
 #[derive(Default)]
 struct Corners {
     outputs: Vec<Column>,

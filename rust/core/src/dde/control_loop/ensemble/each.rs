@@ -1,4 +1,4 @@
-//! One set by the engine of a single loop.
+//! One loop, run by the code for single loops.
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::metrics::{Criteria, Metrics};
@@ -59,7 +59,7 @@ pub(super) fn response(
     )
 }
 
-/// Metrics with the outcome that they show.
+/// Metrics together with the outcome that they show.
 pub(super) fn judged(metrics: Metrics, stays_settled: bool) -> (Metrics, Outcome) {
     let outcome = if metrics.settling_time.is_nan() {
         Outcome::Unsettled
@@ -71,7 +71,8 @@ pub(super) fn judged(metrics: Metrics, stays_settled: bool) -> (Metrics, Outcome
     (metrics, outcome)
 }
 
-/// The loop, and the time by which its output runs ahead; none where the numbers make no loop.
+/// The loop and the time by which its output is read ahead; none where the numbers are not those of
+/// a loop.
 fn loop_of(sets: &Sets<'_>, set: usize) -> Result<Option<(LinearLoop, f64)>, Error> {
     let row = sets.row(set)?;
     Ok(row.checked().ok().map(|plant| (plant, sets.ahead(&row))))

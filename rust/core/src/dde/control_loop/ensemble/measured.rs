@@ -1,4 +1,4 @@
-//! Metrics of the sets of a block, from the lines that their responses consist of.
+//! Metrics of the loops of a block, from the lines of their responses.
 
 use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics, Record};
 use crate::simd::{Mask, Real, Simd};
@@ -9,7 +9,7 @@ use super::sets::Outcome;
 use super::through::{Visitor, through};
 use super::walk::{Line, Sink, load, store};
 
-/// Metrics of the first `goals.len()` sets; a goal is the steady state, NaN for the last output.
+/// Metrics of the first `goals.len()` loops. A goal is the steady state, NaN for the last output.
 pub(super) fn metrics(
     block: &Block,
     goals: &[f64],
@@ -69,7 +69,7 @@ pub(super) fn metrics(
     .collect()
 }
 
-/// The last output of each set.
+/// The last output of each loop.
 struct LastOutput(Column);
 
 struct Last<S: Simd> {
@@ -108,7 +108,7 @@ impl Visitor for LastOutput {
     }
 }
 
-/// Records of all sets, in columns.
+/// Records of all loops, in columns.
 struct Measured {
     sign: Column,
     steady: Column,
@@ -116,8 +116,8 @@ struct Measured {
     risen: Column,
     band: Column,
     quiet_band: Column,
-    /// Top, bottom, each with its time; begin and end of the rise; extremes after it; since when
-    /// inside; until when unsettled.
+    /// Maximum and minimum, each with its time; begin and end of the rise; extremes after it; since
+    /// when inside the band; until when unsettled.
     parts: [Column; 10],
     lost: Column,
 }
@@ -137,7 +137,7 @@ impl Measured {
     }
 }
 
-/// The record of each lane as it grows.
+/// The record of each lane during a run.
 struct Growing<S: Simd> {
     end: Real<S>,
     sign: Real<S>,
@@ -147,7 +147,7 @@ struct Growing<S: Simd> {
     level: [Real<S>; 2],
     top: [Real<S>; 2],
     bottom: [Real<S>; 2],
-    /// When the levels were reached, and where they are still to be.
+    /// When the levels were reached; NaN where they have not been.
     reached: [Real<S>; 2],
     pending: [Mask<S>; 2],
     after: [Real<S>; 2],
@@ -174,7 +174,7 @@ impl<S: Simd> Sink<S> for Growing<S> {
             lower.select(end, self.bottom[1]),
         ];
 
-        // With the sign, every step goes up.
+        // After multiplication by the sign, every step goes up.
         let up = Line {
             first: line.first * self.sign,
             last: last * self.sign,

@@ -3,20 +3,20 @@
 use crate::Error;
 use crate::dde::control_loop::row::{Row, width};
 
-/// What became of one set.
+/// Outcome of one set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Outcome {
-    /// Simulated, and settled where metrics were asked for.
+    /// Simulated, and settled where metrics were requested.
     Ok = 0,
     /// Outside its settling band at the end of the time simulated.
     Unsettled = 1,
-    /// Grown beyond all bounds before the end.
+    /// The response exceeded all limits before the end.
     Diverged = 2,
-    /// Not simulated: numbers outside what a loop can have, or more work than is sensible.
+    /// Not simulated: the numbers are not those of a loop, or the work exceeds a limit.
     Refused = 3,
-    /// Inside its settling band at the end, but not so long or so close that the response itself
-    /// shows that it stays there.
+    /// Inside its settling band at the end, but not long or close enough for the response itself to
+    /// show that it stays there.
     Doubtful = 4,
 }
 
@@ -25,22 +25,22 @@ pub enum Outcome {
 pub struct Sets<'a> {
     /// Number of states.
     pub states: usize,
-    /// A row a set: A, B, E, K, C, L, M, D, impulse, delay, sample time (0 for none), limit
-    /// (∞ for none).
+    /// One row for each set: A, B, E, K, C, L, M, D, impulse, delay, sample time (0 for none),
+    /// limit (∞ for none).
     pub rows: &'a [f64],
     /// Height of the step.
     pub amplitude: f64,
-    /// Is the delay in the measurement, so that the output runs ahead by it?
+    /// Is the delay in the measurement, so that the output is read ahead by it?
     pub is_ahead: bool,
 }
 
 impl<'a> Sets<'a> {
-    /// How many.
+    /// Number of sets.
     pub fn len(&self) -> usize {
         self.rows.len() / width(self.states)
     }
 
-    /// None at all?
+    /// Is there no set?
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -51,7 +51,7 @@ impl<'a> Sets<'a> {
         Row::new(self.states, row.unwrap_or_default())
     }
 
-    /// Time by which the output runs ahead of the stepper's.
+    /// Time by which the output is read ahead of the simulation.
     pub(super) fn ahead(&self, row: &Row<'_>) -> f64 {
         if self.is_ahead { row.delay } else { 0.0 }
     }

@@ -9,21 +9,21 @@ use crate::dde::control_loop::metrics::{Criteria, Metrics};
 use crate::memory::{filled, push, reserved, room};
 use crate::{Error, Task};
 
-/// What memory is asked for.
+/// What memory is requested for, in errors.
 const SWEEP: &str = "the sweep";
 
-/// Results held before they are put in their places: enough to keep all threads busy.
+/// Results held before they are written to their places: enough to keep all threads busy.
 const AT_ONCE: usize = 1 << 14;
 
-/// Values of responses held so: no more than a share of what one array of results takes.
+/// Upper limit on the values of responses held at a time (bounds memory to a share of the result).
 const VALUES_AT_ONCE: usize = 1 << 22;
 
-/// The whole samples in the delay of a set, and the set.
+/// The number of whole samples in the delay of a set, and the index of the set.
 type Alike = (usize, usize);
 
 impl Sets<'_> {
-    /// The sets for the lanes with the whole samples in their delay, those of equal numbers one
-    /// after the other, and the sets that are left, for responses of `span` seconds.
+    /// The sets for the vectorised code, ordered by the number of whole samples in their delay, and
+    /// the remaining sets, for responses of `span` seconds.
     fn sorted(&self, span: f64) -> Result<(Vec<Alike>, Vec<usize>), Error> {
         let mut fit = Vec::new();
         let mut left = Vec::new();
@@ -37,8 +37,8 @@ impl Sets<'_> {
         Ok((fit, left))
     }
 
-    /// Work on all sets, `side_by_side` on blocks and `alone` on single ones; `keep` is given every
-    /// set with its result, after at most `at_once` of them were held.
+    /// Process all sets, blocks with `side_by_side` and single sets with `alone`. `keep` receives
+    /// every set with its result; at most `at_once` results are held before.
     fn each<T: Send>(
         &self,
         (span, at_once): (f64, usize),
@@ -113,8 +113,8 @@ pub fn metrics(
     Ok(found)
 }
 
-/// Outputs of every response at `times` after its start (increasing, ≥ 0, s), a row a set; rows of
-/// sets that diverge or are refused are NaN.
+/// Outputs of every response at `times` after its start (increasing, ≥ 0, s), one row for each set.
+/// Rows of sets that diverge or are refused are NaN.
 pub fn responses(
     sets: &Sets<'_>,
     times: &[f64],

@@ -1,4 +1,4 @@
-//! The lanes against the engine of a single loop.
+//! The vectorised code against the code for single loops.
 
 use super::*;
 use crate::Task;
@@ -22,7 +22,7 @@ fn row(kp: f64, ki: Option<f64>, delay: f64, limit: f64) -> Vec<f64> {
     states.into_iter().chain(numbers).collect()
 }
 
-/// Metrics of a set by the engine of a single loop.
+/// Metrics of a set by the code for single loops.
 fn alone(sets: &Sets<'_>, set: usize, span: f64) -> Metrics {
     let found = each::metrics(sets, set, f64::NAN, span, &CRITERIA, &Task::new());
     found.map_or(Metrics::UNKNOWN, |(metrics, _)| metrics)
@@ -51,7 +51,7 @@ proptest! {
         let found = metrics(&sets, &goals, span, &CRITERIA, &Task::new());
         prop_assert!(found.is_ok());
         for (set, (found, _)) in found.into_iter().flatten().enumerate() {
-            // A response that has settled is farthest from zero where rounding says so.
+            // After settling, rounding errors decide where the response is farthest from zero.
             let truth = Metrics { peak_time: found.peak_time, ..alone(&sets, set, span) };
             for (found, truth) in found.to_array().into_iter().zip(truth.to_array()) {
                 prop_assert!(

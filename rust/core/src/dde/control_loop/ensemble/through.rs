@@ -1,4 +1,4 @@
-//! A walk through all lanes of a block, vector pair by vector pair.
+//! A pass through all lanes of a block, one pair of vectors after the other.
 
 use pulp::WithSimd;
 
@@ -7,15 +7,16 @@ use crate::simd::{Instructions, Real, Simd};
 use super::block::{Block, SETS};
 use super::walk::{Sink, load, walk};
 
-/// A walk through all lanes of a block.
+/// A pass through all lanes of a block.
 struct Through<'a, T> {
     block: &'a Block,
-    /// Time after the start at which it ends.
+    /// Time after the start at which the pass ends.
     span: f64,
     visitor: T,
 }
 
-/// Makes a sink for each pair of vectors, and takes it back with the lanes that were lost.
+/// Creates a sink for each pair of vectors, and receives it back together with the lanes that
+/// diverged.
 pub(super) trait Visitor {
     type Kept;
 
@@ -49,7 +50,7 @@ impl<T: Visitor> WithSimd for Through<'_, T> {
     }
 }
 
-/// Walk through all lanes with `visitor`, for `span` seconds from the start of each output.
+/// Run all lanes with `visitor`, for `span` seconds from the start of each output.
 pub(super) fn through<T: Visitor>(block: &Block, span: f64, visitor: T) -> T::Kept {
     Instructions::chosen().run(Through {
         block,

@@ -1,7 +1,7 @@
 //! Sample by sample through a block, one set in each lane.
 //!
 //! Between a sample and the arrival of a command, and from there to the next sample, every output
-//! of a block is a line; a [`Sink`] is shown each of them once.
+//! of a block is a line; a [`Sink`] receives each of them once.
 
 use crate::dde::limits::DIVERGED;
 use crate::simd::{Mask, Real, Simd};
@@ -18,7 +18,7 @@ pub(super) struct Line<S: Simd> {
 }
 
 impl<S: Simd> Line<S> {
-    /// Cut off what comes after `end`.
+    /// Remove the part after `end`.
     #[inline(always)]
     pub(super) fn until(self, end: Real<S>) -> Self {
         let beyond = self.end.gt(end);
@@ -34,7 +34,7 @@ impl<S: Simd> Line<S> {
         }
     }
 
-    /// When the line is at `level`, which lies between its ends.
+    /// The time at which the line reaches `level`, which lies between its ends.
     #[inline(always)]
     pub(super) fn time_of(self, level: Real<S>) -> Real<S> {
         let part = (level - self.first) / (self.last - self.first);
@@ -42,7 +42,7 @@ impl<S: Simd> Line<S> {
     }
 }
 
-/// Who is shown the lines.
+/// Receives the lines of a response.
 pub(super) trait Sink<S: Simd> {
     fn line(&mut self, line: Line<S>);
 }
@@ -56,7 +56,7 @@ pub(super) fn load<S: Simd>(simd: S, column: &Column, pair: usize) -> Real<S> {
     }
 }
 
-/// Put a vector pair in its place in a column.
+/// Store a vector pair in its place in a column.
 #[inline(always)]
 pub(super) fn store<S: Simd>(column: &mut Column, pair: usize, value: Real<S>) {
     if let Some(place) = S::as_mut_simd_f64s(column)
@@ -69,7 +69,7 @@ pub(super) fn store<S: Simd>(column: &mut Column, pair: usize, value: Real<S>) {
     }
 }
 
-/// One part of a sample in lanes.
+/// One part of a sample, in all lanes.
 struct Step<S: Simd, const N: usize> {
     growth: [[Real<S>; N]; N],
     drive: [Real<S>; N],
@@ -107,7 +107,7 @@ impl<S: Simd, const N: usize> Step<S, N> {
     }
 }
 
-/// Walk to `end`, a time for each lane; the lanes whose response leaves all bounds before.
+/// Run to `end`, a time for each lane. Returns the lanes whose response exceeds all limits before.
 #[inline(always)]
 pub(super) fn walk<S: Simd, const N: usize>(
     simd: S,
@@ -150,7 +150,7 @@ pub(super) fn walk<S: Simd, const N: usize>(
         if !running.any() {
             return lost;
         }
-        // m + 1 samples ago is one place ahead in a ring of m + 2.
+        // Index of m + 1 samples ago: one place ahead in a ring of length m + 2.
         let place = number % length;
         let before = commands.get((place + 1) % length).copied().unwrap_or(zero);
         let u = row(&k, &x, l.mul_add(before, command));

@@ -1,8 +1,9 @@
-//! A transport delay as block diagrams have it: values kept once a step, read by straight lines.
+//! A transport delay as in block-diagram tools: one value for each step, linear interpolation
+//! between them.
 
 use std::collections::VecDeque;
 
-/// Times within this part of a step of one another are one.
+/// Two times closer than this share of a step are equal.
 pub(super) const SLACK: f64 = 1e-9;
 
 /// Values of a signal at whole steps, the latest last.
@@ -13,12 +14,12 @@ pub(super) struct Buffer {
     /// Number of the step that `values` starts with.
     first: usize,
     values: VecDeque<f64>,
-    /// Values that have to be kept.
+    /// Number of values that have to be kept.
     needed: usize,
 }
 
 impl Buffer {
-    /// For reading back up to `delay`, in steps.
+    /// A buffer that can be read back up to `delay`, in steps.
     pub(super) fn new(before: f64, delay: f64) -> Self {
         Self {
             before,
@@ -37,10 +38,10 @@ impl Buffer {
         }
     }
 
-    /// The signal at `time` in steps: constant before the first value, straight lines between
-    /// values, and the last of them prolonged beyond the latest value.
+    /// The signal at `time` in steps: constant before the first value, linear between values, and
+    /// extrapolated linearly beyond the latest value.
     pub(super) fn read(&self, time: f64) -> f64 {
-        // A whole step missed by rounding only is that step.
+        // A time that differs from a whole step only by rounding errors is that step.
         let whole = time.round();
         let time = if (time - whole).abs() <= SLACK {
             whole

@@ -1,4 +1,4 @@
-//! The run of a loop in fixed steps.
+//! Simulation of a loop in fixed steps.
 
 use crate::dde::control_loop::linear_loop::{dot, saturate};
 use crate::dde::control_loop::reference::Reference;
@@ -9,10 +9,10 @@ use crate::{Error, Task};
 use super::buffer::{Buffer, SLACK};
 use super::solver::Solver;
 
-/// Steps between two looks at the task.
+/// Steps between two checks for cancellation.
 const CHECK_EVERY: usize = 4096;
 
-/// More steps than anyone waits for; their outputs fill 0.8 GB.
+/// Upper limit on the number of steps; their outputs take 0.8 GB.
 const MOST_STEPS: usize = 50_000_000;
 
 /// Plant and controller; matrices row-major.
@@ -44,7 +44,7 @@ pub struct Blocks {
     pub reference_derivative: f64,
 }
 
-/// Where the delay sits.
+/// Where the delay is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Path {
     /// Between controller and plant.
@@ -53,14 +53,14 @@ pub enum Path {
     Measurement,
 }
 
-/// What surrounds the blocks, and how the run is made.
+/// Delay, limit and sampling of the loop, and how it is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Td, s.
     pub delay: f64,
     /// Its place.
     pub path: Path,
-    /// Bound of abs(u).
+    /// Bound of |u|; none where there is no limit.
     pub limit: Option<f64>,
     /// Whole steps between two samples of the controller; none in continuous time.
     pub sample_steps: Option<usize>,
@@ -72,7 +72,7 @@ pub struct Settings {
     pub steps: usize,
 }
 
-/// State of affairs at the start.
+/// Initial values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rest {
     /// x_p, then x_c.
@@ -168,14 +168,14 @@ struct Simulation<'a> {
     late: Buffer,
     /// The command of the latest sample.
     held: Option<f64>,
-    /// What an ideal derivative differentiates, at the latest whole step.
+    /// The input of the ideal derivative at the latest whole step.
     last: Option<f64>,
     /// Its difference quotient there.
     quotient: f64,
 }
 
 impl Simulation<'_> {
-    /// Reach the whole step `k`: y and u there, the buffer and the hold brought up to date.
+    /// Advance to the whole step `k`: returns y and u there and updates the buffer and the hold.
     fn arrive(&mut self, x: &[f64], k: usize) -> (f64, f64) {
         if self
             .settings
@@ -198,7 +198,7 @@ impl Simulation<'_> {
         (now.y, now.u)
     }
 
-    /// x′ at the part `node` of step `k`.
+    /// x′ at the fraction `node` of step `k`.
     fn slope(&self, x: &[f64], k: usize, node: f64, slope: &mut [f64]) {
         let blocks = self.blocks;
         let now = self.signals(x, k as f64 + node, node);
@@ -230,7 +230,7 @@ impl Simulation<'_> {
             self.late
                 .read(time - self.settings.delay / self.settings.step)
         } else {
-            // Nothing is in between, and no feedthrough either (checked).
+            // There is no delay in between, and no feedthrough either (checked).
             match self.settings.path {
                 Path::Command => self.command(controller, inner, r, since),
                 Path::Measurement => inner,
@@ -274,8 +274,8 @@ impl Simulation<'_> {
         saturate(u, self.settings.limit)
     }
 
-    /// The difference quotient of what is differentiated, now `value`, `since` steps after the
-    /// latest whole one.
+    /// The difference quotient of the input of the derivative, which is now `value`, `since` steps
+    /// after the latest whole step.
     fn since_last(&self, value: f64, since: f64) -> f64 {
         match self.last {
             _ if since == 0.0 => self.quotient,

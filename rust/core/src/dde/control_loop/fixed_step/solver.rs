@@ -59,7 +59,7 @@ mod tests {
         for (name, solver) in Solver::NAMED {
             let formula = solver.tableau();
             assert_eq!(formula.nodes.len(), formula.weights.len(), "{name}");
-            // The published coefficients of ode8 are fractions good to 18 digits.
+            // The published coefficients of ode8 are fractions with an accuracy of 18 digits.
             let sum: f64 = formula.weights.iter().sum();
             assert!((sum - 1.0).abs() < 1e-15, "{name}: {sum}");
             for (node, row) in formula.nodes.iter().zip(formula.rows) {

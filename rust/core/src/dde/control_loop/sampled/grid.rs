@@ -1,9 +1,9 @@
-//! Poles of many sampled loops at once: the kernel behind stability maps of sampled loops.
+//! Poles of many sampled loops at once, for stability maps.
 //!
-//! A cell is one loop. Its model is read from arrays that hold either one entry for all cells
-//! or one entry a cell, so that a map over gains shares A, B and the delay. Each cell is computed
-//! alone, so results have the same bits for any number of threads. A pole offends against a decay σ
-//! outside the circle |z| = e^(−σ Ts).
+//! A cell is one loop. Its model is read from arrays with either one entry for all cells or one
+//! entry for each cell, so that a map over gains shares A, B and the delay. Each cell is computed
+//! alone, so that results have the same bits for any number of threads. A pole violates a decay σ
+//! if it lies outside the circle |z| = e^(−σ Ts).
 
 use rayon::prelude::*;
 
@@ -13,11 +13,11 @@ use crate::{Error, Task, memory};
 
 use super::transition::{Sample, check_size, eigenvalues};
 
-/// |z| closer to the circle than this, relative to the larger of it and 1, is neither inside nor
-/// outside: rounding of the eigenvalues.
+/// Distance of |z| from the circle, relative to the larger of it and 1, below which rounding errors
+/// of the eigenvalues hide the side.
 const ON_THE_CIRCLE: f64 = 1e-12;
 
-/// Cells handed to a thread at a time.
+/// Cells in one task of a thread.
 const CHUNK: usize = 64;
 
 /// Models of many loops with one sample time; every array is one entry or `cells` entries long.
@@ -43,14 +43,14 @@ pub struct LoopCells<'a> {
     pub sample_time: &'a [f64],
 }
 
-/// What is found in one cell.
+/// Result for one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellPoles {
     /// ln(ρ)/Ts with ρ the largest |z|, 1/s.
     pub abscissa: f64,
     /// Number of poles outside the circle.
     pub unstable: i32,
-    /// Whether the count is sure.
+    /// Is the count certain?
     pub status: CellStatus,
 }
 

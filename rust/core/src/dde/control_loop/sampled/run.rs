@@ -12,10 +12,10 @@ use crate::{Error, Task};
 use super::timing::Timing;
 use super::window::{Window, Windows};
 
-/// Samples between two looks at the task.
+/// Samples between two checks for cancellation.
 const CHECK_EVERY: u64 = 1024;
 
-/// More samples than anyone waits for.
+/// Upper limit on the number of samples (bounds the time).
 const MOST_SAMPLES: u64 = 100_000_000;
 
 pub(crate) fn run<S: Scalar>(
@@ -47,7 +47,7 @@ pub(crate) fn run<S: Scalar>(
     let phase = start.sample_phase;
     let mut cursor = reference.cursor();
     if phase > 0.0 {
-        // The run begins inside the interval that follows sample −1.
+        // The run begins inside the interval after sample −1.
         walk.held = S::from(cursor.value());
         walk.partial(-1, sample_time - S::from(phase), S::default())?;
     }
@@ -123,29 +123,32 @@ struct Walk<'a, S> {
     scratch: Vec<S>,
     /// The reference as held since the last sample.
     held: S,
-    /// For measurements, which begin with the first sample.
+    /// For metrics, which begin at the first sample.
     windows: Option<Windows>,
     requested: RequestedOutput<'a, S>,
 }
 
 impl<S: Scalar> Walk<'_, S> {
-    /// m as a sample number.
+    /// m as a signed number.
     fn lag(&self) -> i64 {
         self.timing.samples as i64
     }
 
-    /// From sample `k` at time `now` to the next one.
+    /// The command computed at sample `k`, and those that reach the plant before and after the
+    /// arrival within the interval that follows.
+    fn commands_of(&self, k: i64) -> [S; 3] {
+        let lag = self.lag();
+        [k, k - lag - 1, k - lag].map(|number| self.commands.at(number))
+    }
+
+    /// Advance from sample `k` at time `now` to the next one.
     fn interval(&mut self, k: i64, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
-        let (before, after) = (
-            self.commands.at(k - self.lag() - 1),
-            self.commands.at(k - self.lag()),
-        );
-        let u = self.commands.at(k);
+        let [u, before, after] = self.commands_of(k);
         self.requested
             .inputs_before((now + early + late).value() - tolerance, |_| u);
-        // An instant that grows with the parameter counts as well.
+        // A length that is zero but has a slope counts as well.
         if !early.is_nothing() {
             self.measure(before, now, |windows| &windows.early);
             self.serve(before, now, (now + early).value() - tolerance);
@@ -164,7 +167,7 @@ impl<S: Scalar> Walk<'_, S> {
         Ok(())
     }
 
-    /// Move the states that move at samples.
+    /// Change the states that change at samples.
     fn update(&mut self, update: &Update, arrived: S) {
         let rows = update.states.chunks_exact(self.x.len().max(1));
         let inputs = update.command.iter().zip(&update.reference);
@@ -177,15 +180,11 @@ impl<S: Scalar> Walk<'_, S> {
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 
-    /// From `into` seconds after sample `k` (at time `now`) to the next one.
+    /// Advance from `into` seconds after sample `k` (at time `now`) to the next sample.
     fn partial(&mut self, k: i64, into: S, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
-        let (before, after) = (
-            self.commands.at(k - self.lag() - 1),
-            self.commands.at(k - self.lag()),
-        );
-        let u = self.commands.at(k);
+        let [u, before, after] = self.commands_of(k);
         let end = now + (early + late - into);
         self.requested.inputs_before(end.value() - tolerance, |_| u);
         let mut at = now;
@@ -201,7 +200,7 @@ impl<S: Scalar> Walk<'_, S> {
         Ok(())
     }
 
-    /// x over a step of any length under constant w.
+    /// Advance x by a step of any length under constant w.
     fn jump(&mut self, h: S, w: S) {
         let equations = self.plant.equations();
         Propagator::new(&equations.a, &[&equations.b, &equations.e], h).apply(
@@ -212,7 +211,7 @@ impl<S: Scalar> Walk<'_, S> {
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 
-    /// Have the output measured over one part of a sample, under constant w.
+    /// Measure the output over one part of a sample, under constant w.
     fn measure(&mut self, w: S, from: S, part: impl Fn(&Windows) -> &Window) {
         if let Some(windows) = &self.windows {
             let inputs = [w.value(), self.held.value()];
@@ -227,7 +226,7 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Outputs from `from`, where the state is x, to `end` under constant w.
+    /// Store the outputs from `from`, where the state is x, to `end` under constant w.
     fn serve(&mut self, w: S, from: S, end: f64) {
         let equations = self.plant.equations();
         let (x, scratch, held) = (&self.x, &mut self.scratch, self.held);

@@ -1,8 +1,8 @@
-//! How a delay lies on the sample grid.
+//! The delay in terms of samples.
 
 use crate::dde::scalar::Scalar;
 
-/// How a delay lies on the sample grid.
+/// The delay in terms of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timing<S = f64> {
     /// m, the whole samples in the delay.
@@ -14,7 +14,7 @@ pub struct Timing<S = f64> {
 }
 
 impl<S: Scalar> Timing<S> {
-    /// Of `delay` seconds at `sample_time` seconds.
+    /// The parts of `delay` seconds at `sample_time` seconds.
     pub fn new(delay: S, sample_time: S) -> Self {
         let ratio = delay.value() / sample_time.value();
         let nearest = ratio.round();
@@ -27,7 +27,7 @@ impl<S: Scalar> Timing<S> {
             };
         }
         let whole = ratio.floor();
-        // One rounding: the product of whole and Ts is not rounded on its own.
+        // With one rounding: the product of the whole number and Ts is not rounded separately.
         let early = S::from(-whole).mul_add(sample_time, delay);
         let early = early.pinned(early.value().clamp(0.0, sample_time.value()));
         Self {

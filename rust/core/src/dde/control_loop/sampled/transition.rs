@@ -3,11 +3,11 @@
 //!   x_{k+1} = Φ x_k + Γ₁ u_{k−m−1} + Γ₀ u_{k−m},   u_k = K x_k + L u_{k−m−1},
 //!
 //! Γ₀ = Γ(Ts − δ), Γ₁ = Φ(Ts − δ) Γ(δ); the state is (x_k, u_{k−1}, …, u_{k−m−1}), m + 1 commands
-//! behind x. Where a sample moves states, x_k is J x_k + G u_{k−m−1} in the first equation, with u_k
-//! computed before. Reference: Åström & Wittenmark, Computer-Controlled Systems (3rd ed. 1997), section
-//! 2.3, with the feedback closed. Eigenvalues by the QR algorithm (backward stable), of the matrix
-//! with states and commands in units of powers of two that make its norm small: the error is that
-//! of the norm, and a gain in one unit is not a hard problem because of its unit.
+//! behind x. Where a sample changes states, x_k is J x_k + G u_{k−m−1} in the first equation, with
+//! u_k computed before. Reference: Åström & Wittenmark, Computer-Controlled Systems (3rd ed. 1997),
+//! section 2.3, with the feedback closed. Eigenvalues by the QR algorithm (backward stable), of the
+//! matrix with states and commands in units of powers of two that make its norm small: the error is
+//! relative to that norm and does not depend on the units of the gains.
 
 use faer::MatRef;
 use num_complex::Complex64;
@@ -18,7 +18,7 @@ use crate::dde::propagator::{Propagator, balanced, multiply_add};
 
 use super::timing::Timing;
 
-/// A dense eigenvalue problem beyond this size is refused.
+/// Upper limit on the size of the dense eigenvalue problem (bounds the time).
 const MOST_STATES: usize = 2000;
 
 /// The open-loop pieces Φ, Γ₀, Γ₁ of one sample.
@@ -46,7 +46,7 @@ impl Sample {
         }
     }
 
-    /// The same sample, which begins with an update of the states.
+    /// The same sample, preceded by an update of the states.
     fn updated(mut self, update: &Update) -> Self {
         let n = self.now.len();
         multiply_add(&self.phi, &update.command, &mut self.past);
@@ -61,7 +61,7 @@ impl Sample {
         self.states() + self.lag + 1
     }
 
-    /// Number of states, the commands under way left out.
+    /// Number of states without the commands in the delay.
     pub(super) fn states(&self) -> usize {
         self.now.len()
     }
@@ -77,7 +77,7 @@ impl Sample {
             line[..n].copy_from_slice(&self.phi[row * n..(row + 1) * n]);
             line[oldest] += gain * self.past[row];
             if self.lag == 0 {
-                // u_{k−m} is the command of this very sample.
+                // u_{k−m} is the command of this sample itself.
                 for (entry, k) in line.iter_mut().zip(k) {
                     *entry += gain * self.now[row] * k;
                 }
@@ -116,7 +116,7 @@ pub fn balanced_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error> {
     Ok((matrix, sample.size()))
 }
 
-/// The transition matrix, the sample it is of and the sample time.
+/// The transition matrix, its sample and the sample time.
 fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
     let Some(sample_time) = plant.sample_time() else {
         return Err(Error::argument(
@@ -149,7 +149,7 @@ pub fn poles(plant: &LinearLoop) -> Result<Vec<Complex64>, Error> {
 
 /// Choose units of the states and one unit of all commands; `matrix` is row-major.
 fn balance(matrix: &mut [f64], states: usize, size: usize) {
-    // With the commands as one: each of them but the newest is the one before it.
+    // With the commands as one group: each of them except the newest equals the one before it.
     let side = states + 1;
     let mut small = vec![0.0; side * side];
     for i in 0..states {
@@ -170,7 +170,7 @@ fn balance(matrix: &mut [f64], states: usize, size: usize) {
     }
 }
 
-/// Refuse what a dense eigenvalue problem is no tool for.
+/// Refuse a dense eigenvalue problem that is too large.
 pub(super) fn check_size(n: usize, delay: f64, sample_time: f64) -> Result<(), Error> {
     if delay / sample_time + n as f64 > MOST_STATES as f64 {
         return Err(Error::TooMuch {

@@ -4,8 +4,8 @@
 //!
 //!   c_0 = C x + D w,   c_{j+1} = ρ_j (A x + B w + E r) h/(j + 1),   ρ_0 = C, ρ_{j+1} = ρ_j A h/(j + 1),
 //!
-//! so that the coefficients are fixed rows times (x, w, r). A part is cut into equal steps on
-//! which the series ends below rounding well before its last term.
+//! so that the coefficients are fixed rows times (x, w, r). A part is divided into equal steps on
+//! which the series falls below rounding errors well before its last term.
 
 use crate::dde::control_loop::linear_loop::{Equations, dot};
 use crate::dde::control_loop::requested_output::RequestedOutput;
@@ -13,16 +13,19 @@ use crate::dde::control_loop::series::{DEGREE, Series};
 use crate::dde::propagator::{Propagator, balanced_norm};
 use crate::dde::scalar::Scalar;
 
-/// Largest ‖A‖ h of a step: 1/19! is below rounding.
+/// Largest ‖A‖ h of a step: 1/19! is below rounding errors.
 const REACH: f64 = 1.0;
 
-/// Rows this small beside the largest so far end the series.
+/// The series ends at rows this small relative to the largest one so far.
 const NEGLIGIBLE: f64 = 1e-18;
+
+/// Upper limit on the steps of one part.
+const MOST_STEPS: f64 = 1e6;
 
 /// The rows of one part.
 #[derive(Debug)]
 pub(super) struct Window {
-    /// Length of a step, s, and how many there are.
+    /// Length of a step, s, and the number of steps.
     step: f64,
     steps: usize,
     /// Row j, of n + 2 numbers, gives c_{j+1}.
@@ -35,7 +38,7 @@ impl Window {
     pub(super) fn new(equations: &Equations, length: f64) -> Self {
         let n = equations.states();
         let cuts = (balanced_norm(&equations.a, n) * length / REACH).ceil();
-        let steps = cuts.clamp(1.0, 1e6) as usize;
+        let steps = cuts.clamp(1.0, MOST_STEPS) as usize;
         let step = length / steps as f64;
         let mut rows = Vec::new();
         let mut rho = equations.c.clone();
@@ -67,7 +70,7 @@ impl Window {
         }
     }
 
-    /// Have the output measured from `start` on, where the state is `x`.
+    /// Measure the output from `start` on, where the state is `x`.
     pub(super) fn measure<S: Scalar>(
         &self,
         equations: &Equations,
@@ -97,7 +100,7 @@ impl Window {
     }
 }
 
-/// What is measured of a run, part by part.
+/// The polynomials of a run, part by part.
 #[derive(Debug)]
 pub(super) struct Windows {
     equations: Equations,

@@ -1,4 +1,4 @@
-"""Equations unstable at a glance: one root proved to lie right of the axis settles it."""
+"""One root that is proved to lie in the right half plane proves that an equation is unstable."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ UNSTABLE = [
 
 @pytest.mark.parametrize("h", UNSTABLE)
 @pytest.mark.parametrize("strong", [True, False])
-def test_one_root_on_the_right_settles_stability(h, strong):
+def test_one_root_in_the_right_half_plane_proves_instability(h, strong):
     # The axis was walked for seconds up to |Im s| = 1e8, or the answer refused.
     assert not h.is_stable(strong)
     assert h.roots(re=(1e-3, 40.0), im=(0, 10.0), edge="inside").counted > 0
 
 
-def test_systems_of_matrices_unstable_at_a_glance():
+def test_one_unstable_root_of_a_system_of_matrices_proves_instability():
     rng = np.random.default_rng(0)
     n = 12
     late = -1e6 * np.eye(n) + rng.normal(size=(n, n))
