@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from types import ModuleType
 
 import deadtime as dtm
 import numpy as np
@@ -58,7 +59,9 @@ DRAWN = {
 
 def drawing_methods():
     """Every method of a public type that takes axes or is named for a drawing."""
-    for kind in (getattr(dtm, name) for name in dtm.__all__):
+    rooms = [getattr(dtm, name) for name in dir(dtm) if isinstance(getattr(dtm, name), ModuleType)]
+    kinds = [getattr(room, name) for room in rooms for name in room.__all__]
+    for kind in kinds:
         if isinstance(kind, type):
             for name in ("plot", "bode", "nyquist"):
                 if callable(getattr(kind, name, None)):
