@@ -91,6 +91,9 @@ _ROOMS = {
     "internet": "",
     "paper": "",
 }
+#: Version of the installed package.
+__version__: str
+
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names.split()}
 
 __all__ = [
@@ -155,6 +158,8 @@ if not TYPE_CHECKING:  # A type checker reads the imports above.
         """Load the room of a name when the name is first used."""
         if name in _ROOM_OF:
             value = getattr(importlib.import_module(f"deadtime.{_ROOM_OF[name]}"), name)
+        elif name == "__version__":
+            value = importlib.import_module("importlib.metadata").version("deadtime")
         elif name in _ROOMS and not name.startswith("_"):
             value = importlib.import_module(f"deadtime.{name}")
         else:

@@ -97,10 +97,10 @@ def _bar() -> Progress:
 
 
 @contextmanager
-def counted(what: str, total: int, quiet: bool) -> Iterator[Callable[[int], object] | None]:
+def counted(what: str, total: int, quiet: bool) -> Iterator[bool | Callable[[int], object]]:
     """A progress bar over `total` items; call it with the number that is done."""
     if quiet or not ERRORS.is_terminal:
-        yield None
+        yield False
         return
     with _bar() as progress:
         task = progress.add_task(what, total=total)

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops._model import LoopModel
+from deadtime.loops._model import LoopModel, LoopRun
 
 __all__ = ["Fundamental", "states_at"]
 
@@ -31,8 +31,6 @@ _MOST_CELLS = 512
 
 #: Upper limit on the number of grid points (bounds memory).
 _MOST_POINTS = 400_000
-
-_NONE = np.empty(0)
 
 
 class Fundamental:
@@ -147,11 +145,9 @@ def states_at(
     limit: float | None,
 ) -> Vector:
     """Every state of a continuous loop after a step, nothing under way at time 0."""
-    step = np.zeros(1), np.array([amplitude]), _NONE, 0.0
+    run = LoopRun(start, command=0.0, reference=amplitude)
     found = [
-        replace(model, C=row, D=0.0)
-        .native(delay, None, limit)
-        .simulate(times, _NONE, start, 0.0, 0.0, *step)[0]
+        replace(model, C=row, D=0.0).native(delay, None, limit).outputs(times, run)
         for row in np.eye(len(model.B))
     ]
     return np.array(found)
