@@ -99,7 +99,7 @@ fn poles(criterion: &mut Criterion) {
         b: &[1.0],
         k: &k,
         l: &[0.0],
-        scale: &[1.0],
+        gain: &[1.0],
         delay: &[DELAY],
         sample_time: &[SAMPLE_TIME],
     };

@@ -10,9 +10,9 @@ import typer
 
 from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
+from deadtime._cli.comparisons import estimates_table
 from deadtime._cli.show import (
     console,
-    estimates_table,
     print_json,
     print_table,
     save_figure,

@@ -172,7 +172,7 @@ class LoopGain:
         return self.open_loop().phase(omega)
 
     def bode(
-        self, omega: ArrayLike | None = None, *, axes: Sequence[Axes] | None = None
+        self, omega: ArrayLike | None = None, *, ax: Sequence[Axes] | None = None
     ) -> Sequence[Axes]:
         """Draw gain and phase of the loop gain over frequency, and mark the margins.
 
@@ -182,7 +182,7 @@ class LoopGain:
             Frequencies in rad/s, above zero and increasing; by default from two decades below
             the gain crossover to where the delay has turned the phase a few times, of a sampled
             loop to pi/sample_time.
-        axes : sequence of two matplotlib.axes.Axes, optional
+        ax : sequence of two matplotlib.axes.Axes, optional
             Where to draw gain and phase; a new figure by default.
 
         Returns
@@ -205,7 +205,7 @@ class LoopGain:
                 high = np.pi / loop.sample_time
                 low = min(low, 0.01 * high)
             omega = np.geomspace(low, high, 1001)
-        drawn = shown_rows(axes, 2)
+        drawn = shown_rows(ax, 2)
         plot_bode(drawn, self, real_array("omega", omega), found)
         return drawn
 

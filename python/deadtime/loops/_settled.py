@@ -33,7 +33,7 @@ def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None
     count = max(np.size(value) for value in numbers.values())
     moving = {name: value for name, value in numbers.items() if name != "limit"}
     if loop.is_sampled:
-        return sampled_grid(loop.plant, loop.controller, moving, threads=threads)[0]
+        return sampled_grid(loop.plant, loop.controller, moving, threads=threads).abscissa
     columns = {name: np.broadcast_to(value, count).tolist() for name, value in moving.items()}
     found = np.full(count, np.nan)
     for i in range(count):

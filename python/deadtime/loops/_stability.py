@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eig, matrix_balance
 
+from deadtime import _deadtime
 from deadtime._deadtime import sampled_abscissa_grid
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._continuous_ranges import (
@@ -90,6 +90,8 @@ def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> boo
 
 def _balanced(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix in units that make its norm small, each command in its own."""
+    from scipy.linalg import matrix_balance
+
     with np.errstate(invalid="ignore"):  # units beyond integers, read as places as well
         return np.asarray(matrix_balance(matrix, permute=False)[0], dtype=np.float64)
 
@@ -103,6 +105,8 @@ def _eigenvalues(
     matrix: NDArray[np.float64],
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
     """Eigenvalues and first-order bounds on their errors."""
+    from scipy.linalg import eig
+
     z, left, right = cast(Any, eig)(matrix, left=True, right=True)
     # |dz| <= ||error|| / |y* x|.
     overlap = np.abs(np.sum(left.conj() * right, axis=0))
@@ -203,6 +207,29 @@ def _bounds(name: str, value: float) -> tuple[float, float]:
     return (0.0 if name in _NON_NEGATIVE or name in _KEEPS_SIGN else -math.inf), math.inf
 
 
+class SampledLoops(NamedTuple):
+    """Loops of one structure: every array holds one entry for all of them, or one a loop."""
+
+    cells: int
+    states: int
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
+    K: NDArray[np.float64]
+    L: NDArray[np.float64]
+    #: Factor on B.
+    gain: NDArray[np.float64]
+    delay: NDArray[np.float64]
+    sample_time: NDArray[np.float64]
+
+
+class SampledCells(NamedTuple):
+    """What is known of the poles of each of many loops."""
+
+    abscissa: NDArray[np.float64]
+    unstable: NDArray[np.int32]
+    status: NDArray[np.uint8]
+
+
 def sampled_grid(
     plant: Plant,
     controller: Controller,
@@ -210,7 +237,7 @@ def sampled_grid(
     decay: float = 0.0,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+) -> SampledCells:
     """Abscissa, number of poles outside exp(-decay Ts) and status of loops of one structure.
 
     `values` names every number of the loop; each is one for all cells or an array with one entry
@@ -238,11 +265,11 @@ def sampled_grid(
         part = {name: a if len(a) == 1 else a[group] for name, a in arrays.items()}
         size = cells if isinstance(group, slice) else len(group)
         report = None if progress is None else lambda n, done=done: progress(done + n)
-        abscissa[group], unstable[group], status[group] = _grid_of_gains(
-            plant, controller, part, size, decay, threads, report
-        )
+        found = _grid_of_gains(plant, controller, part, size, decay, threads, report)
+        abscissa[group], unstable[group] = found.abscissa, found.unstable
+        status[group] = found.status
         done += size
-    return abscissa, unstable, status
+    return SampledCells(abscissa, unstable, status)
 
 
 def _grid_of_gains(
@@ -253,7 +280,7 @@ def _grid_of_gains(
     decay: float,
     threads: int | None,
     progress: Callable[[int], object] | None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+) -> _deadtime.SampledCells:
     """Like `sampled_grid`, where only gains, delay and sample time vary."""
     fixed = {name: float(array[0]) for name, array in arrays.items()} | {"gain": 1.0}
     gains = controller._gains()
@@ -264,18 +291,16 @@ def _grid_of_gains(
         model = LoopModel.build(plant, controller, alone)
         feedback = feedback + arrays[name][:, None] * model.K
         direct = direct + arrays[name] * model.L
-    scale = arrays["gain"] if "gain" in arrays else np.ones(1)
-    return sampled_abscissa_grid(
-        cells,
-        len(model.B),
-        np.ascontiguousarray(model.A),
-        model.B,
-        feedback,
-        direct * scale,
-        scale,
-        arrays["delay"],
-        arrays["sample_time"],
-        decay,
-        threads,
-        progress,
+    gain = arrays["gain"] if "gain" in arrays else np.ones(1)
+    loops = SampledLoops(
+        cells=cells,
+        states=len(model.B),
+        A=model.A,
+        B=model.B,
+        K=feedback,
+        L=direct * gain,
+        gain=gain,
+        delay=arrays["delay"],
+        sample_time=arrays["sample_time"],
     )
+    return sampled_abscissa_grid(loops, decay=decay, threads=threads, progress=progress)

@@ -16,9 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
-from deadtime.loops._model import LoopModel
+from deadtime.loops._model import LoopModel, LoopRun
 
 __all__ = ["Fundamental", "states_at"]
 
@@ -32,13 +31,13 @@ _MOST_CELLS = 512
 #: Grid points that are held at once.
 _MOST_POINTS = 400_000
 
-_NONE = np.empty(0)
-
 
 class Fundamental:
     """The unit responses of one loop, simulated as far as they are asked for."""
 
     def __init__(self, model: LoopModel, delay: float) -> None:
+        from scipy.linalg import expm
+
         self.model, self.delay = model, delay
         n = len(model.B)
         undelayed = model.A + np.outer(model.B, model.K)
@@ -145,11 +144,9 @@ def states_at(
     limit: float | None,
 ) -> Vector:
     """Every state of a continuous loop after a step, nothing under way at time 0."""
-    step = np.zeros(1), np.array([amplitude]), _NONE, 0.0
+    run = LoopRun(start, command=0.0, reference=amplitude)
     found = [
-        replace(model, C=row, D=0.0)
-        .native(delay, None, limit)
-        .simulate(times, _NONE, start, 0.0, 0.0, *step)[0]
+        replace(model, C=row, D=0.0).native(delay, None, limit).outputs(times, run)
         for row in np.eye(len(model.B))
     ]
     return np.array(found)

@@ -18,7 +18,7 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Literal, TypeAlias, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -26,10 +26,9 @@ from deadtime.loops import ControlLoop, sweep
 from deadtime.loops._model import rest_of
 from deadtime.tuning._problem import Problem, Scenario, Vector
 from deadtime.tuning._settling import BAND, proved_step
+from deadtime.tuning._specification import ObjectiveName
 
-__all__ = ["NEVER", "Objective", "ObjectiveName", "dominant_damping", "objective_named"]
-
-ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
+__all__ = ["NEVER", "Objective", "dominant_damping", "objective_named"]
 
 #: What a loop costs that is unstable or does not settle, so that the search turns away from it.
 NEVER = 1e6

@@ -14,9 +14,9 @@ more       grids around the best point, each narrower than the one before (a map
 What is simulated is searched for the gains alone first, and in the last grids with gains half a
 percent beside them. There a gain whose axis begins at zero stays a quarter of a cell off it.
 
-Margins are demands, not costs: a shortfall costs many times as much as any gain in the objective,
-and becomes zero where the demands can be met. None of this proves a global minimum: the map sees
-to it, as far as its cells are close enough.
+Margins are requirements, not costs: a shortfall costs many times as much as any gain in the
+objective, and becomes zero where the requirements can be met. None of this proves a global minimum:
+the map finds it as far as its cells are close enough.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize, minimize_scalar
 
-from deadtime.tuning._demands import Demands, MarginEstimate
+from deadtime.tuning._margin_estimate import MarginEstimate
 from deadtime.tuning._objectives import NEVER, Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._required_margins import RequiredMargins
 from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
 
 __all__ = ["Search"]
@@ -99,52 +99,58 @@ class Search:
     survey: Survey
     estimate: MarginEstimate
 
-    def globally(self, scenarios: Sequence[Scenario], demands: Demands) -> Vector:
+    def globally(self, scenarios: Sequence[Scenario], required: RequiredMargins) -> Vector:
         """The best gains, from the map."""
         points, stable = self.survey.points, np.flatnonzero(self.survey.stable)
         costs = np.full(len(points), np.inf)
         short = np.zeros(len(stable))
-        if demands.asked:
-            short = demands.shortfall(self.estimate.of(points[stable], scenarios, _COARSE))
+        if required.named:
+            short = required.shortfall(self.estimate.of(points[stable], scenarios, _COARSE))
         met = stable[short <= _MET]
         if met.size:
             costs[met] = self._map_costs(met, scenarios)
             if self.objective.simulated:
-                return self._firmest(points, costs, scenarios, demands)
+                return self._firmest(points, costs, scenarios, required)
             starts = self.survey.chosen(points, costs, _STARTS)
         else:
-            # Perhaps the demands are met between the cells.
+            # Perhaps the requirements are met between the cells.
             costs[stable] = short
             starts = self.survey.chosen(points, costs, 1)
-        found = [self._by_grids(start, scenarios, demands) for start in starts]
-        best = min(found, key=lambda one: self._total(one[0], scenarios, demands))
-        return self._polished(*best, scenarios, demands)
+        found = [self._by_grids(start, scenarios, required) for start in starts]
+        best = min(found, key=lambda one: self._total(one[0], scenarios, required))
+        return self._polished(*best, scenarios, required)
 
     def _firmest(
-        self, points: Vector, costs: Vector, scenarios: Sequence[Scenario], demands: Demands
+        self,
+        points: Vector,
+        costs: Vector,
+        scenarios: Sequence[Scenario],
+        required: RequiredMargins,
     ) -> Vector:
         """The best gains with their neighbours, from more starts where those lose much by them."""
         for axes in self.survey.fringes:
             points = np.vstack([points, grid_points(axes)])
-            found = self._totals(axes, scenarios, demands, self.objective.coarse)
+            found = self._totals(axes, scenarios, required, self.objective.coarse)
             costs = np.append(costs, found)
         starts = self.survey.chosen(points, costs, _MOST_STARTS)
         best, least = starts[0], np.inf
         for i, start in enumerate(starts):
             if i >= _STARTS_SIMULATED and least <= _MUCH * costs.min():
                 break
-            gains = self._by_grids(start, scenarios, demands)[0]
-            cost = self._total(gains, scenarios, demands)
+            gains = self._by_grids(start, scenarios, required)[0]
+            cost = self._total(gains, scenarios, required)
             if cost < least:
                 best, least = gains, cost
         return np.asarray(best, dtype=np.float64)
 
-    def locally(self, start: Vector, scenarios: Sequence[Scenario], demands: Demands) -> Vector:
+    def locally(
+        self, start: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
+    ) -> Vector:
         """The best gains around some."""
-        return self._polished(*self._by_grids(start, scenarios, demands), scenarios, demands)
+        return self._polished(*self._by_grids(start, scenarios, required), scenarios, required)
 
     def _by_grids(
-        self, start: Vector, scenarios: Sequence[Scenario], demands: Demands
+        self, start: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
     ) -> tuple[Vector, Vector]:
         """A better point, and how far around it a better one may still be."""
         reach = _REACH * self.survey.spacing
@@ -152,7 +158,7 @@ class Search:
 
         def narrowed(judge: Judge, around: Vector, reach: Vector, grids: int) -> Pair:
             def costs(axes: list[Vector]) -> Vector:
-                return self._totals(axes, scenarios, demands, judge)
+                return self._totals(axes, scenarios, required, judge)
 
             return _by_grids(costs, around, reach, low, high, grids)
 
@@ -169,13 +175,13 @@ class Search:
         return narrowed(self.objective.costs, start, reach, _GRIDS)
 
     def _polished(
-        self, start: Vector, reach: Vector, scenarios: Sequence[Scenario], demands: Demands
+        self, start: Vector, reach: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
     ) -> Vector:
         """The best point within reach, where costs are continuous."""
         low, high = np.array(self.survey.bounds).T
 
         def cost(gains: Vector) -> float:
-            return self._total(gains, scenarios, demands)
+            return self._total(gains, scenarios, required)
 
         if self.objective.simulated:
             return start
@@ -183,25 +189,29 @@ class Search:
             return _between_neighbours(cost, start, reach, low, high)
         return _by_simplices(cost, start, 0.5 * reach, low, high)
 
-    def short(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:
-        """By how much gains fall short of the demands, by the estimate."""
-        return float(demands.shortfall(self.estimate.of(gains[None, :], scenarios))[0])
+    def short(
+        self, gains: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
+    ) -> float:
+        """By how much gains fall short of the required margins, by the estimate."""
+        return float(required.shortfall(self.estimate.of(gains[None, :], scenarios))[0])
 
-    def _total(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:
+    def _total(
+        self, gains: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
+    ) -> float:
         """Cost of gains, shortfalls of margins included."""
         cost = self.objective.worst(self.problem, gains, scenarios)
-        if not demands.asked:
+        if not required.named:
             return cost
         # An unstable loop has crossings, which are no margins.
         stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
-        short = self.short(gains, scenarios, demands) if stable else _UNSTABLE
+        short = self.short(gains, scenarios, required) if stable else _UNSTABLE
         return cost + _PENALTY * self._scale * short
 
     def _totals(
         self,
         axes: list[Vector],
         scenarios: Sequence[Scenario],
-        demands: Demands,
+        required: RequiredMargins,
         judge: Judge,
     ) -> Vector:
         """The same of every point of a grid."""
@@ -209,9 +219,9 @@ class Search:
         late = worst_abscissa(self.problem, axes, scenarios).ravel()
         stable = np.isfinite(late)
         short = np.where(stable, 0.0, _UNSTABLE)
-        if demands.asked and stable.any():
+        if required.named and stable.any():
             estimated = self.estimate.of(points[stable], scenarios, _COARSE)
-            short[stable] = demands.shortfall(estimated)
+            short[stable] = required.shortfall(estimated)
         if self.objective.name == "abscissa":
             costs = np.where(stable, late, 0.0)
             return np.asarray(costs + _PENALTY * self._scale * short)
@@ -249,6 +259,8 @@ class Search:
 def _between_neighbours(
     cost: Callable[[Vector], float], start: Vector, reach: Vector, low: Vector, high: Vector
 ) -> Vector:
+    from scipy.optimize import minimize_scalar
+
     ends = (float(max(start[0] - reach[0], low[0])), float(min(start[0] + reach[0], high[0])))
     found = minimize_scalar(
         lambda gain: cost(np.array([gain])),
@@ -289,6 +301,8 @@ def _by_grids(
 def _by_simplices(
     cost: Callable[[Vector], float], start: Vector, size: Vector, low: Vector, high: Vector
 ) -> Vector:
+    from scipy.optimize import minimize
+
     best, least, turn, idle = start, cost(start), 1.0, 0
     for _ in range(_SIMPLICES):
         corners = best + np.vstack([np.zeros(len(best)), turn * np.diag(size)])

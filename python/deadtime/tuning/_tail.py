@@ -19,7 +19,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from deadtime.loops import ControlLoop
 from deadtime.loops._model import LoopModel
@@ -105,6 +104,8 @@ def _sampled(
     loop: ControlLoop, rest: Vector, limit: float, end: float
 ) -> tuple[float, float] | None:
     """Of a sampled loop: z are states, the command that is held, and those under way."""
+    from scipy.linalg import expm
+
     model, period = loop.specification.model, cast(float, loop.sample_time)
     delay = loop.specification.known_delay
     whole = math.floor(delay / period + _ON_SAMPLE)
@@ -154,6 +155,8 @@ def _sampled(
 
 def _without_delay(model: LoopModel, away: Vector) -> tuple[float, float] | None:
     """Of a continuous loop without delay: z are the states, at the ends of short steps."""
+    from scipy.linalg import expm
+
     feedback = model.K / (1.0 - model.L)
     closed = model.A + np.outer(model.B, feedback)
     step = _STEP / max(float(np.abs(np.linalg.eigvals(closed)).max()), 1e-300)

@@ -12,13 +12,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from deadtime.loops import ControlLoop
 from deadtime.stability import proved_boxes
-from deadtime.tuning._demands import Demands
 from deadtime.tuning._objectives import Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._required_margins import RequiredMargins
 
 __all__ = ["fine", "proved", "worst_scenario"]
 
@@ -40,6 +39,8 @@ def worst_scenario(
     problem: Problem, objective: Objective, gains: Vector, scenarios: Sequence[Scenario]
 ) -> tuple[float, Scenario]:
     """Cost of gains in the worst scenario, which may lie between those given, and that scenario."""
+    from scipy.optimize import minimize_scalar
+
     costs = objective.costs(problem, gains[None, :], scenarios)[0]
     place = int(np.argmax(costs))
     worst, least = scenarios[place], float(costs[place])
@@ -58,28 +59,30 @@ def worst_scenario(
     return least, worst
 
 
-def proved(problem: Problem, gains: Vector, demands: Demands) -> tuple[str, ...]:
-    """What of ``stable``, ``gain margin``, ``delay margin`` is proved for all of the intervals."""
+def proved(problem: Problem, gains: Vector, required: RequiredMargins) -> tuple[str, ...]:
+    """What of ``stable``, ``gain_margin``, ``delay_margin`` is proved for all of the intervals."""
     if problem.loop.is_sampled:
         return ()
     loop = problem.at(gains)
     found = []
-    late, strong = problem.intervals["delay"], problem.intervals.get("gain")
-    if _stable_throughout(loop, late, strong):
+    delay, strong = problem.intervals["delay"], problem.intervals.get("gain")
+    if _stable_throughout(loop, delay, strong):
         found.append("stable")
-    if demands.gain:
+    if required.gain_margin:
         weak, most = strong or (loop.parameters["gain"],) * 2
-        if weak > 0.0 and _stable_throughout(loop, late, (weak, demands.gain * most)):
-            found.append("gain margin")
-    if demands.delay and _stable_throughout(loop, (late[0], late[1] + demands.delay), strong):
-        found.append("delay margin")
+        if weak > 0.0 and _stable_throughout(loop, delay, (weak, required.gain_margin * most)):
+            found.append("gain_margin")
+    if required.delay_margin and _stable_throughout(
+        loop, (delay[0], delay[1] + required.delay_margin), strong
+    ):
+        found.append("delay_margin")
     return tuple(found)
 
 
 def _stable_throughout(
-    loop: ControlLoop, late: tuple[float, float], strong: tuple[float, float] | None
+    loop: ControlLoop, delay: tuple[float, float], strong: tuple[float, float] | None
 ) -> bool:
-    ranges = {"delay": late} | ({} if strong is None else {"gain": strong})
+    ranges = {"delay": delay} | ({} if strong is None else {"gain": strong})
     moving = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     loop = loop.replace(**{name: ends[0] for name, ends in ranges.items()})
     if not moving:
