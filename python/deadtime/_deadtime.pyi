@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "AtCommand",
     "Certificate",
     "CharacteristicMatrix",
     "Contour",
@@ -19,11 +20,15 @@ __all__ = [
     "LinearLoop",
     "LinearSystem",
     "LinearSystemResponse",
+    "LoopPacket",
     "LoopResponse",
     "LoopSensitivities",
     "MapBoundary",
     "MapCells",
     "Monotone",
+    "Navdata",
+    "NavdataLayout",
+    "NavdataOption",
     "ProvedBoxes",
     "QuasiPolynomial",
     "RootSet",
@@ -58,7 +63,6 @@ __all__ = [
     "loop_packet_read",
     "loop_packet_write",
     "loop_sensitivities",
-    "nap",
     "navdata_full",
     "navdata_layouts",
     "navdata_read",
@@ -68,11 +72,9 @@ __all__ = [
     "robust_map",
     "sampled_abscissa_grid",
     "solve_dde",
-    "spin",
     "stability_radius",
     "sweep_metrics",
     "sweep_responses",
-    "thread_count",
     "wrightomega",
 ]
 
@@ -222,10 +224,6 @@ class QuasiPolynomial:
     def expansion(self, s: complex, order: int) -> Expansion: ...
     def logarithmic_derivatives(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
 
-def thread_count(threads: int | None = None) -> int: ...
-def spin(
-    seconds: float, threads: int | None = None, progress: Callable[[int], object] | None = None
-) -> int: ...
 def limit_threads(threads: int | None) -> int | None: ...
 
 lambertw: np.ufunc
@@ -236,7 +234,6 @@ wrightomega: np.ufunc
 lambertw_derivative: np.ufunc
 lambertw_offset: np.ufunc
 dde_roots: np.ufunc
-nap: np.ufunc
 __pyx_capi__: dict[str, object]
 
 def lambertw_number(z: object, k: object) -> np.complex128 | None: ...
@@ -774,22 +771,97 @@ class DelayRun:
 
 def solve_dde(problem: _DelayProblem) -> DelayRun: ...
 
-_Words: TypeAlias = tuple[int, int, int, int]
-_LoopFields: TypeAlias = tuple[int, float, int, float, float, float, float, int]
+@final
+class AtCommand:
+    @property
+    def sequence(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def arguments(self) -> tuple[Any, ...]: ...
 
 def at_write(commands: Sequence[tuple[str, tuple[Any, ...]]], first: int) -> bytes: ...
-def at_read(datagram: bytes) -> list[tuple[int, str, tuple[Any, ...]]]: ...
-def navdata_read(
-    packet: bytes, verify: bool
-) -> tuple[_Words, list[tuple[int, bytes, tuple[float, ...] | None]], bool]: ...
+def at_read(datagram: bytes) -> list[AtCommand]: ...
+
+@final
+class NavdataOption:
+    @property
+    def tag(self) -> int: ...
+    @property
+    def body(self) -> bytes: ...
+    @property
+    def values(self) -> tuple[float, ...] | None: ...
+
+@final
+class Navdata:
+    @property
+    def header(self) -> int: ...
+    @property
+    def state(self) -> int: ...
+    @property
+    def sequence(self) -> int: ...
+    @property
+    def vision(self) -> int: ...
+    @property
+    def options(self) -> list[NavdataOption]: ...
+    @property
+    def checksum_matches(self) -> bool: ...
+
+@final
+class NavdataLayout:
+    @property
+    def tag(self) -> int: ...
+    @property
+    def length(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def fields(self) -> list[str]: ...
+
+def navdata_read(packet: bytes, verify: bool) -> Navdata: ...
 def navdata_write(
-    head: _Words, options: Sequence[tuple[int, bytes, tuple[float, ...] | None]]
+    options: Sequence[tuple[int, bytes, tuple[float, ...] | None]],
+    *,
+    header: int,
+    state: int,
+    sequence: int,
+    vision: int,
 ) -> bytes: ...
-def navdata_layouts() -> list[tuple[int, int, str, list[str]]]: ...
+def navdata_layouts() -> list[NavdataLayout]: ...
 def navdata_full() -> list[tuple[int, int]]: ...
 def configuration_read(dump: bytes) -> list[tuple[str, str]]: ...
 def configuration_write(settings: Sequence[tuple[str, str]]) -> bytes: ...
-def loop_packet_read(packet: bytes) -> _LoopFields: ...
-def loop_packet_write(fields: _LoopFields) -> bytes: ...
+
+@final
+class LoopPacket:
+    @property
+    def sequence(self) -> int: ...
+    @property
+    def sent(self) -> float: ...
+    @property
+    def echo_sequence(self) -> int: ...
+    @property
+    def echo_sent(self) -> float: ...
+    @property
+    def held(self) -> float: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def reference(self) -> float: ...
+    @property
+    def flags(self) -> int: ...
+
+def loop_packet_read(packet: bytes) -> LoopPacket: ...
+def loop_packet_write(
+    *,
+    sequence: int,
+    sent: float,
+    echo_sequence: int,
+    echo_sent: float,
+    held: float,
+    value: float,
+    reference: float,
+    flags: int,
+) -> bytes: ...
 def doubles_read(packet: bytes, count: int) -> list[float]: ...
 def doubles_write(values: Sequence[float]) -> bytes: ...

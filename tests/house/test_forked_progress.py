@@ -15,9 +15,10 @@ import warnings
 
 warnings.simplefilter("ignore", DeprecationWarning)  # the test forks a process with threads
 import deadtime as dtm
-from deadtime import _deadtime
 
 child = None
+Kp, T = dtm.parameters("Kp T")
+family, ranges = dtm.s + Kp * dtm.delay(T), {{"Kp": (0.1, 3.0), "T": (0.1, 0.5)}}
 
 
 def progress(done):
@@ -29,14 +30,14 @@ def progress(done):
 
 
 try:
-    _deadtime.spin(0.3, 2, progress)
+    # Longer than it takes for progress to be reported.
+    shape = (150, 150)
+    dtm.stability_map(family, ranges, shape, proof="cells", threads=2, progress=progress)
 except BaseException as error:
     if child == 0:
         assert {expected}, repr(error)
         abs(dtm.lambertw([1.0, 2.0], threads=2))  # new threads of its own
-        Kp, T = dtm.parameters("Kp T")
-        ranges = {{"Kp": (0.1, 3.0), "T": (0.1, 0.5)}}
-        dtm.stability_map(dtm.s + Kp * dtm.delay(T), ranges, shape=(9, 9))
+        dtm.stability_map(family, ranges, shape=(9, 9))
         os._exit(7)
     raise
 assert child > 0

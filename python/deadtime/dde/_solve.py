@@ -337,7 +337,7 @@ def _events(events: Any) -> list[DelayEvent]:
             raise TypeError(f"events: {event!r} is no function")
         direction = int(np.sign(finite("direction", getattr(event, "direction", 0))))
         terminal = finite("terminal", getattr(event, "terminal", None) or 0)
-        if terminal < 0 or terminal != int(terminal):
+        if not 0 <= terminal < 2**31 or terminal != int(terminal):
             raise ValueError(f"terminal={terminal}: give True, or the number of a crossing")
         found.append(DelayEvent(event, direction, int(terminal)))
     return found

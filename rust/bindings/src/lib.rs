@@ -42,8 +42,6 @@ mod _deadtime {
     #[pymodule_export]
     use super::roots::{Certificate, Contour, Monotone, RootSet, Segment, Sensitivity};
     #[pymodule_export]
-    use super::runtime::{spin, thread_count};
-    #[pymodule_export]
     use super::sampled::{SampledCells, sampled_abscissa_grid};
     #[pymodule_export]
     use super::solver::{DelayPieces, DelayRun, solve_dde};
@@ -64,9 +62,9 @@ mod _deadtime {
     use super::ufunc::limit_threads;
     #[pymodule_export]
     use super::wire::{
-        at_read, at_write, configuration_read, configuration_write, doubles_read, doubles_write,
-        loop_packet_read, loop_packet_write, navdata_full, navdata_layouts, navdata_read,
-        navdata_write,
+        AtCommand, Navdata, NavdataLayout, NavdataOption, PyLoopPacket, at_read, at_write,
+        configuration_read, configuration_write, doubles_read, doubles_write, loop_packet_read,
+        loop_packet_write, navdata_full, navdata_layouts, navdata_read, navdata_write,
     };
     use pyo3::prelude::*;
 

@@ -225,7 +225,7 @@ def decode(datagram: bytes) -> list[tuple[int, Command]]:
     >>> decode(b"AT*REF=1,512\rAT*PCMD=2,1,0,0,nonsense,0\r")
     [(1, Ref(take_off=True, emergency=False))]
     """
-    return [(number, _command(name, arguments)) for number, name, arguments in at_read(datagram)]
+    return [(read.sequence, _command(read.name, read.arguments)) for read in at_read(datagram)]
 
 
 def _command(name: str, arguments: tuple[Any, ...]) -> Command:

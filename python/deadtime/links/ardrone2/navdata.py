@@ -227,7 +227,7 @@ _KINDS: dict[str, Any] = {
 _FIELDS: dict[int, tuple[str, Any]] = {1: ("clock", float)} | {
     kind.tag: (name, kind) for name, kind in _KINDS.items()
 }
-_LENGTHS = {tag: length for tag, length, _, _ in navdata_layouts()}
+_LENGTHS = {layout.tag: layout.length for layout in navdata_layouts()}
 
 
 def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
@@ -259,20 +259,22 @@ def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
     Traceback (most recent call last):
     deadtime._base.errors.PacketError: navdata: the last option is no checksum, at byte 164
     """
-    (header, state, sequence, vision), read, matches = navdata_read(packet, checksum)
+    read = navdata_read(packet, checksum)
     known: dict[str, Any] = {}
-    for tag, _, values in read:
+    options = []
+    for option in read.options:
+        tag, values = option.tag, option.values
+        options.append((tag, option.body))
         if tag in _FIELDS and _FIELDS[tag][0] not in known:
             name, kind = _FIELDS[tag]
             known[name] = None if values is None else kind(*values)
-    options = tuple((tag, body) for tag, body, _ in read)
     return Navdata(
-        state,
-        sequence,
-        vision,
-        options=options,
-        header=header,
-        checksum_matches=matches,
+        state=read.state,
+        sequence=read.sequence,
+        vision=read.vision,
+        options=tuple(options),
+        header=read.header,
+        checksum_matches=read.checksum_matches,
         **known,
     )
 
@@ -298,8 +300,8 @@ def build_navdata(navdata: Navdata) -> bytes:
         (tag, body, fields.pop(tag, None)) for tag, body in navdata.options
     ]
     options += [(tag, bytes(_LENGTHS[tag]), fields[tag]) for tag in sorted(fields)]
-    head = (navdata.header, navdata.state, navdata.sequence, navdata.vision)
+    head = {name: getattr(navdata, name) for name in ("header", "state", "sequence", "vision")}
     try:
-        return navdata_write(head, options)
+        return navdata_write(options, **head)
     except OverflowError as error:
         raise ValueError(f"a word of the head {head}, or a tag: {error}") from None

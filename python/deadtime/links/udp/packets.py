@@ -59,7 +59,7 @@ class LoopPacket:
             If a number is not finite, `held` is negative, or an integer has more than 32 bits.
         """
         try:
-            return loop_packet_write(tuple(vars(self).values()))
+            return loop_packet_write(**vars(self))
         except OverflowError as error:
             raise ValueError(f"{self}: {error}") from None
 
@@ -72,7 +72,17 @@ class LoopPacket:
         PacketError
             If it has another length or header, or a number in it is not finite.
         """
-        return cls(*loop_packet_read(packet))
+        found = loop_packet_read(packet)
+        return cls(
+            sequence=found.sequence,
+            sent=found.sent,
+            echo_sequence=found.echo_sequence,
+            echo_sent=found.echo_sent,
+            held=found.held,
+            value=found.value,
+            reference=found.reference,
+            flags=found.flags,
+        )
 
 
 def encode_doubles(values: Iterable[float]) -> bytes:
