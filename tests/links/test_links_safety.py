@@ -43,6 +43,11 @@ def test_a_command_of_another_kind_is_refused(wrong):
         UnitCommand(wrong)
 
 
+def test_a_command_of_which_nothing_is_said_is_none():
+    # Full climb as the default failed no test.
+    assert UnitCommand() == 0.0
+
+
 def test_a_command_survives_copies():
     command = UnitCommand(-0.25)
     assert pickle.loads(pickle.dumps(command)) == copy.deepcopy(command) == command
