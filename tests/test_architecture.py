@@ -23,6 +23,7 @@ CORE_ARROWS = {
     "roots": {"elementary", "lambertw", "quasipoly"},
     "stability": {"elementary", "lambertw", "quasipoly", "roots"},
     "dde": {"elementary", "quasipoly"},
+    "frequency": {"elementary", "quasipoly", "roots", "stability"},
 }
 
 # Floors of the Python package, lowest first: a module uses its own floor and those below.
@@ -67,8 +68,6 @@ FLOORS = [
         "_sweep",
         "_map_axes",
         "_boundaries",
-        "_axis_crossings",
-        "_multiples",
         "_crossings",
         "_stability",
         "_families",
@@ -78,16 +77,12 @@ FLOORS = [
         "_stability_radius",
         "_determinant",
         "_matrix_roots",
-        "_frequency",
-        "_phase",
         "_interchange",
         "_margins",
         "_sampled_gain",
         "_sampled_margins",
         "_sampled_march",
         "_sampled_ranges",
-        "_continuous_ranges",
-        "_ratio",
         "_transfer",
         "_systems",
         "_signals",

@@ -1,4 +1,7 @@
-"""Where roots cross the imaginary axis as one number varies, and the delay margin."""
+"""Where roots cross the imaginary axis as one number varies, and the delay margin.
+
+The crossings are found by the native core.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,13 @@ from typing import Any, SupportsFloat, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._axis_crossings import alone, is_factor, leading, of_delay, of_gain, periods, rows_of
+from deadtime import _deadtime
 from deadtime._errors import DeadtimeError
 from deadtime._families import family_of
 from deadtime._frozen import ReadOnlyArrays, read_only
 from deadtime._loop import ControlLoop
 from deadtime._margins import Margins
-from deadtime._parametric import ParametricQuasiPolynomial, parameters
+from deadtime._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime._quasipolynomial import delay, s
 from deadtime._systems import DelaySystem
 from deadtime._transfer import TransferFunction
@@ -193,16 +196,16 @@ def crossings(
     (name, ends), fixed = _one_range(ranges), dict(at or {})
     equation = _alone(family, name, fixed)
     equation.at(**{name: ends[0]}), equation.at(**{name: ends[1]})
-    unlisted: tuple[tuple[float, float], ...] = ()
-    if is_factor(equation, name):
-        (values, omega, direction), unlisted = of_gain(equation, name, ends)
-    else:
-        values, omega, direction = of_delay(equation, name, ends)
-    order = np.lexsort((omega, values))
-    arrays = (values[order] + 0.0, omega[order], direction[order].astype(np.int32))
-    for array in arrays:
-        read_only(array)
-    return Crossings(name, ends, *arrays, equation, unlisted)
+    found = _deadtime.crossings(equation._family, ends)
+    return Crossings(
+        parameter=name,
+        range=ends,
+        values=found.values,
+        omega=found.omega,
+        direction=found.direction,
+        family=equation,
+        unlisted=tuple(found.unlisted),
+    )
 
 
 def delay_margin(
@@ -276,7 +279,7 @@ def _told(margins: Margins) -> float:
 
 
 def _margin_of_family(family: ParametricQuasiPolynomial, at: dict[str, SupportsFloat]) -> float:
-    member = family.at(**at)
+    family.at(**at)
     delays = {name for _, _, (_, slopes) in family._terms for name, _ in slopes}
     if len(delays) != 1:
         raise ValueError(
@@ -285,21 +288,7 @@ def _margin_of_family(family: ParametricQuasiPolynomial, at: dict[str, SupportsF
         )
     (name,) = delays
     start = finite(name, at.pop(name))
-    rows = rows_of(_alone(family, name, at), name)
-    if any(slope < 0.0 for _, slope in rows):
-        raise ValueError(f"a delay of {family!r} falls as {name} grows: it has no delay margin")
-    if not member.is_stable():
-        raise ValueError(f"not stable at {name}={start}: it has no delay margin")
-    far = 2.0 * start + 2.0 * max(constant for constant, _ in rows) + 1.0
-    lead, rest = leading(rows, name, start, far)
-    if lead <= rest:
-        return 0.0
-    omega, first, period, _ = periods(rows, name)
-    if not omega.size:
-        return math.inf
-    later = first + period * np.ceil((start - first) / period)
-    later = np.where(later <= start, later + period, later)
-    return float(later.min()) - start
+    return _deadtime.delay_margin(_alone(family, name, at)._family, start)
 
 
 def _one_range(ranges: Any) -> tuple[str, tuple[float, float]]:
@@ -332,7 +321,23 @@ def _alone(
         raise ValueError(f"{name}={values[name]}: what varies has no value of its own")
     if isinstance(family, DelaySystem):
         family = _scaled(family)
-    return alone(family_of(family, (name, *values)), name, values)
+    return _with_numbers(family_of(family, (name, *values)), name, values)
+
+
+def _with_numbers(
+    family: ParametricQuasiPolynomial, name: str, values: Mapping[str, float]
+) -> ParametricQuasiPolynomial:
+    """The equation in which `name` alone has no value."""
+    own = Parameter(name)
+    total: Any = 0.0 * own
+    for (powers, power, (constant, slopes)), number in family._terms.items():
+        exponents, rates = dict(powers), dict(slopes)
+        coefficient = math.prod((values[q] ** exponents.get(q, 0) for q in values), start=number)
+        time = constant + sum(values[q] * rates.get(q, 0.0) for q in values)
+        late = delay(own * rates[name] + time) if name in rates else delay(time)
+        total = total + coefficient * own ** exponents.get(name, 0) * s**power * late
+    found: ParametricQuasiPolynomial = total
+    return found
 
 
 def _scaled(system: DelaySystem) -> ParametricQuasiPolynomial:

@@ -1,28 +1,37 @@
 """Signatures of the native part."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, final
+from typing import Any, Final, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "CharacteristicMatrix",
+    "Crossings",
     "DelayPieces",
     "DelayRun",
     "Family",
     "LinearLoop",
     "LinearSystem",
+    "Margins",
     "QuasiPolynomial",
     "Signal",
     "at_read",
     "at_write",
     "configuration_read",
     "configuration_write",
+    "corner_range",
+    "crossings",
+    "damping_range",
     "dde_root_number",
     "dde_roots",
+    "delay_margin",
+    "delay_range",
     "doubles_read",
     "doubles_write",
+    "end_of_gain",
+    "gain_range",
     "lambertw",
     "lambertw0",
     "lambertw0_number",
@@ -35,6 +44,7 @@ __all__ = [
     "largest_stable_box",
     "legendre_tables",
     "limit_threads",
+    "loop_margins",
     "loop_packet_read",
     "loop_packet_write",
     "loop_sensitivities",
@@ -44,6 +54,7 @@ __all__ = [
     "navdata_read",
     "navdata_write",
     "proved_boxes",
+    "ratio",
     "robust_map",
     "sampled_abscissa_grid",
     "solve_delay_equation",
@@ -112,6 +123,10 @@ class QuasiPolynomial:
     def scale(self, factor: float) -> QuasiPolynomial: ...
     def pow(self, exponent: int) -> QuasiPolynomial: ...
     def derivative(self, order: int) -> QuasiPolynomial: ...
+    def powers_of_s(self) -> int: ...
+    def without_powers(self, k: int) -> QuasiPolynomial: ...
+    def first_term(self) -> tuple[float, int]: ...
+    def argument(self, omega: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def values(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
     def count(self, re: tuple[float, float], im: tuple[float, float], edge: str) -> int: ...
     def certify(self, re: tuple[float, float], im: tuple[float, float]) -> _Proof: ...
@@ -130,6 +145,45 @@ class QuasiPolynomial:
     ) -> tuple[NDArray[np.complex128], NDArray[np.float64], float]: ...
     def logarithmic_derivatives(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
 
+@final
+class Margins:
+    stable: Final[bool]
+    gain_margin: Final[float]
+    gain_reduction: Final[float]
+    phase_margin: Final[float]
+    delay_margin: Final[float]
+    gain_margin_omega: Final[float]
+    gain_reduction_omega: Final[float]
+    phase_margin_omega: Final[float]
+    delay_margin_omega: Final[float]
+    gain_crossovers: Final[NDArray[np.float64]]
+    phase_margins: Final[NDArray[np.float64]]
+    delay_margins: Final[NDArray[np.float64]]
+    phase_crossovers: Final[NDArray[np.float64]]
+    gain_margins: Final[NDArray[np.float64]]
+    searched: Final[tuple[float, float]]
+
+def loop_margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins: ...
+def end_of_gain(n: QuasiPolynomial, d: QuasiPolynomial, level: float) -> float: ...
+def ratio(
+    n: QuasiPolynomial, d: QuasiPolynomial, points: NDArray[np.complex128]
+) -> NDArray[np.complex128]: ...
+
+@final
+class Crossings:
+    values: Final[NDArray[np.float64]]
+    omega: Final[NDArray[np.float64]]
+    direction: Final[NDArray[np.int32]]
+    unlisted: Final[list[tuple[float, float]]]
+
+def crossings(family: Family, ends: tuple[float, float]) -> Crossings: ...
+def delay_margin(family: Family, start: float) -> float: ...
+def delay_range(family: Family, value: float) -> tuple[float, float]: ...
+def gain_range(
+    family: Family, value: float, bounds: tuple[float, float]
+) -> tuple[float, float]: ...
+def damping_range(family: Family, value: float, highest: float) -> tuple[float, float]: ...
+def corner_range(family: Family, value: float, highest: float) -> tuple[float, float]: ...
 def thread_count(threads: int | None = None) -> int: ...
 def spin(
     seconds: float, threads: int | None = None, progress: Callable[[int], object] | None = None
@@ -198,9 +252,6 @@ class Family:
         ]
         | None
     ): ...
-    def crossings(
-        self, values: list[float], parameter: int, ends: tuple[float, float]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]: ...
 
 def proved_boxes(
     family: Family,

@@ -14,16 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, matrix_balance
 
-from deadtime._continuous_ranges import (
-    range_of_corner,
-    range_of_damping,
-    range_of_delay,
-    range_of_gain,
-)
+from deadtime import _deadtime
 from deadtime._controllers import Controller
-from deadtime._deadtime import sampled_abscissa_grid
 from deadtime._loop_model import LoopModel, refuse_discretised
-from deadtime._margins import end_of_gain
 from deadtime._parametric import Parameter
 from deadtime._plants import Plant
 from deadtime._quasipolynomial import QuasiPolynomial, delay, s
@@ -184,17 +177,15 @@ def continuous_range(
     value = values[name]
     family = characteristic(plant, controller, {**values, name: Parameter(name)})
     if name == "delay":
-        return range_of_delay(family, value)
+        return _deadtime.delay_range(family._family, value)
     if name in _OF_FILTER:
-        seek = range_of_damping if name == "damping" else range_of_corner
-        return seek(family, value, _highest_crossing(plant, controller, values))
-    return range_of_gain(family, name, value, _bounds(name, value))
+        seek = _deadtime.damping_range if name == "damping" else _deadtime.corner_range
+        return seek(family._family, value, _highest_crossing(plant, controller, values))
+    return _deadtime.gain_range(family._family, value, _bounds(name, value))
 
 
-def _highest_crossing(
-    plant: Plant, controller: Controller, values: Mapping[str, float]
-) -> float | None:
-    """A frequency beyond which the loop gain is below one; None where there is none.
+def _highest_crossing(plant: Plant, controller: Controller, values: Mapping[str, float]) -> float:
+    """A frequency beyond which the loop gain is below one; infinite where there is none.
 
     Whatever the corner of its filter is, and for all dampings from the present one on.
     """
@@ -205,7 +196,9 @@ def _highest_crossing(
     feedback = [abs(terms.derivative) / least, abs(terms.proportional), abs(terms.integral)]
     gain = np.polymul(np.abs(b), feedback)[::-1]
     rest = np.append(0.0, np.asarray(a, dtype=np.float64)[::-1])
-    return end_of_gain(QuasiPolynomial([gain], [0.0]), QuasiPolynomial([rest], [0.0]), 1.0)
+    return _deadtime.end_of_gain(
+        QuasiPolynomial([gain], [0.0])._native, QuasiPolynomial([rest], [0.0])._native, 1.0
+    )
 
 
 def sampled_range(
@@ -308,7 +301,7 @@ def _grid_of_gains(
         feedback = feedback + arrays[name][:, None] * model.K
         direct = direct + arrays[name] * model.L
     scale = arrays["gain"] if "gain" in arrays else np.ones(1)
-    return sampled_abscissa_grid(
+    return _deadtime.sampled_abscissa_grid(
         cells,
         len(model.B),
         np.ascontiguousarray(model.A),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._frequency import powers_of_s, without_powers
+from deadtime._deadtime import ratio
 from deadtime._interchange import (
     control_package,
     polynomials_of_control,
@@ -21,9 +21,7 @@ from deadtime._interchange import (
     rational,
 )
 from deadtime._margins import Margins, margins
-from deadtime._phase import argument
 from deadtime._quasipolynomial import QuasiPolynomial, delay, is_number
-from deadtime._ratio import first_term, ratio
 from deadtime._realisation import Realisation, of_transfer_function
 from deadtime._rootset import Range, RootSet
 from deadtime._system_response import SystemResponse
@@ -208,7 +206,7 @@ class TransferFunction:
         if points.dtype.kind not in "biufc":
             raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
         flat = points.astype(np.complex128).ravel()
-        values = ratio(self._num, self._den, flat)
+        values = ratio(self._num._native, self._den._native, flat)
         return values.reshape(points.shape) if points.ndim else complex(values[0])
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
@@ -269,11 +267,12 @@ class TransferFunction:
         if not self._num.coefficients.any():
             raise ValueError("the zero transfer function has no phase")
         size = np.abs(frequencies).ravel()
-        (a, p), (b, q) = first_term(self._num), first_term(self._den)
+        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
         start = np.pi * (int(a < 0.0) - int(b < 0.0) + 0.5 * (p - q))
         phase = np.full(size.shape, start)
         above = size > 0.0
-        phase[above] = argument(self._num, size[above]) - argument(self._den, size[above])
+        phase[above] = self._num._native.argument(size[above])
+        phase[above] -= self._den._native.argument(size[above])
         mirrored = np.where(frequencies.ravel() < 0.0, -phase, phase)
         return np.asarray(mirrored.reshape(frequencies.shape))
 
@@ -293,7 +292,7 @@ class TransferFunction:
         """
         if not self._num.coefficients.any():
             return 0.0
-        (a, p), (b, q) = first_term(self._num), first_term(self._den)
+        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
         if p > q:
             return 0.0
         return a / b if p == q else math.copysign(math.inf, a * b)
@@ -401,8 +400,7 @@ class TransferFunction:
         """
         if not self._num.coefficients.any():
             return TransferFunction(0.0)
-        k = min(powers_of_s(self._num), powers_of_s(self._den))
-        return TransferFunction(without_powers(self._num, k), without_powers(self._den, k))
+        return TransferFunction(*_without_common_powers(self._num, self._den))
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost poles, as `QuasiPolynomial.rightmost` does for the denominator.
@@ -799,9 +797,17 @@ def _sum(first: TransferFunction, second: TransferFunction) -> TransferFunction:
     """Over the common denominator as far as it is seen exactly: all of it, or its powers of s."""
     if first._den == second._den:
         return TransferFunction(first._num + second._num, first._den)
-    k = min(powers_of_s(first._den), powers_of_s(second._den))
-    d, q = without_powers(first._den, k), without_powers(second._den, k)
+    d, q = _without_common_powers(first._den, second._den)
     return TransferFunction(first._num * q + second._num * d, first._den * q)
+
+
+def _without_common_powers(
+    one: QuasiPolynomial, other: QuasiPolynomial
+) -> tuple[QuasiPolynomial, QuasiPolynomial]:
+    """Both divided by the highest power of s that divides every row of both exactly."""
+    k = min(one._native.powers_of_s(), other._native.powers_of_s())
+    one, other = (QuasiPolynomial._wrap(h._native.without_powers(k)) for h in (one, other))
+    return one, other
 
 
 def _quasi_polynomial(name: str, given: Polynomial) -> QuasiPolynomial:

@@ -5,6 +5,7 @@ mod boxes;
 mod dde;
 mod errors;
 mod fixed_step;
+mod frequency;
 mod matrix;
 mod pointers;
 mod quasipoly;
@@ -28,6 +29,11 @@ mod _deadtime {
     use super::dde::{PyLinearLoop, on_samples, sampled_abscissa_grid};
     #[pymodule_export]
     use super::fixed_step::fixed_step_run;
+    #[pymodule_export]
+    use super::frequency::{
+        PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
+        end_of_gain, gain_range, loop_margins, ratio,
+    };
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{column, in_order};
 use crate::errors::to_python;
-use crate::runtime::{run, run_here};
+use crate::runtime::run;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Table<'py, T> = Bound<'py, PyArray2<T>>;
@@ -21,13 +21,6 @@ type Curve<'py> = (
 
 /// Counts, abscissas and statuses of a map.
 type Charted<'py> = (Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>);
-
-/// Gains, frequencies and jumps (0 where unknown) of crossings.
-type Crossings<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i32>>,
-);
 
 /// coefficient, exponents, power of s, constant part of the delay, its slopes.
 type Row = (f64, Vec<u32>, u32, f64, Vec<f64>);
@@ -172,28 +165,6 @@ impl PyFamily {
             });
             (found.along, curves.collect())
         }))
-    }
-
-    /// Crossings of the imaginary axis as one gain grows within a range; `values` holds the others.
-    fn crossings<'py>(
-        &self,
-        py: Python<'py>,
-        values: Vec<f64>,
-        parameter: usize,
-        ends: (f64, f64),
-    ) -> PyResult<Crossings<'py>> {
-        let family = &self.inner;
-        let found = run_here(py, |task| {
-            stability::crossings_along(family, &values, parameter, ends, task)
-        })?;
-        let gains: Vec<f64> = found.iter().map(|place| place.gain).collect();
-        let omegas: Vec<f64> = found.iter().map(|place| place.omega).collect();
-        let jumps: Vec<i32> = found.iter().map(|place| place.jump.unwrap_or(0)).collect();
-        Ok((
-            gains.into_pyarray(py),
-            omegas.into_pyarray(py),
-            jumps.into_pyarray(py),
-        ))
     }
 }
 

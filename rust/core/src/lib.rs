@@ -3,11 +3,12 @@
 //!
 //! Everything numerical of the `deadtime` Python package is here, and nothing of Python.
 //! Dependencies run one way: error, lanes ← lambertw; error ← elementary ← quasipoly ← roots ←
-//! stability; quasipoly ← dde.
+//! stability ← frequency; quasipoly ← dde.
 
 pub mod dde;
 pub mod elementary;
 pub mod error;
+pub mod frequency;
 pub mod lambertw;
 mod lanes;
 pub mod memory;

@@ -43,6 +43,7 @@ mod tail;
 mod transect;
 mod value_set;
 
+pub(crate) use along::radius_of_members;
 pub use along::{Place, crossings_along};
 pub use boxes::{Boxes, Limits, Node, proved_boxes};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
