@@ -146,7 +146,7 @@ fn sweeps(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(count as u64));
         group.bench_function(name, |bencher| {
             let task = Task::new();
-            bencher.iter(|| ensemble::figures(black_box(&sets), &steady, 10.0, &criteria, &task));
+            bencher.iter(|| ensemble::metrics(black_box(&sets), &steady, 10.0, &criteria, &task));
         });
     }
     group.finish();

@@ -24,14 +24,14 @@ import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
-from dataclasses import dataclass, field
-from inspect import signature
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from typing import Any, NamedTuple
 
 import deadtime as dtm
 import numpy as np
-from deadtime._estimation.estimate import METHODS
+from deadtime.estimation import ARXScan, Method, OutputError, Overshoot, Waveform
+from deadtime.estimation._estimate import METHODS
 
 SAMPLE = 0.065
 REST = 16 * SAMPLE
@@ -55,7 +55,7 @@ class Case:
     sensor: bool = True
 
     @property
-    def circulates(self) -> bool:
+    def noise_in_loop(self) -> bool:
         """Whether the controller sees the noise: that of a sensor, in sampled loops."""
         return self.sensor and self.loop.is_sampled
 
@@ -69,12 +69,9 @@ class Column:
     """A method with its options."""
 
     name: str
-    method: str
-    options: Mapping[str, Any] = field(default_factory=dict)
+    method: Method
     continuous: bool = False
-
-    def missing(self) -> bool:
-        return self.method not in METHODS
+    start_known: bool = True
 
 
 class Tally(NamedTuple):
@@ -86,21 +83,21 @@ class Tally(NamedTuple):
 
 
 COLUMNS = [
-    Column("output_error", "output_error"),
-    Column("waveform", "waveform"),
-    Column("wave, no hold", "waveform", continuous=True),
-    Column("frequency", "frequency"),
-    Column("arx_scan", "arx_scan", {"fractional": True}),
-    Column("gcc", "gcc"),
-    Column("Mo exact", "overshoot", {"map": "exact"}),
-    Column("Mo paper", "overshoot", {"map": "dominant"}),
-    Column("Mo saturated", "overshoot", {"map": "saturated"}),
-    Column("decrement", "decrement"),
-    Column("decay", "decay"),
-    Column("grid", "grid"),
-    Column("cta", "cta"),
-    Column("graphical", "graphical"),
-    Column("relay", "relay"),
+    Column("output_error", OutputError()),
+    Column("waveform", Waveform()),
+    Column("wave, no hold", Waveform(), continuous=True),
+    Column("frequency", METHODS["frequency"]()),
+    Column("arx_scan", ARXScan(fractional=True)),
+    Column("gcc", METHODS["gcc"]()),
+    Column("Mo exact", Overshoot(map="exact")),
+    Column("Mo paper", Overshoot(map="dominant")),
+    Column("Mo saturated", Overshoot(map="saturated")),
+    Column("decrement", METHODS["decrement"]()),
+    Column("decay", METHODS["decay"]()),
+    Column("grid", METHODS["grid"]()),
+    Column("cta", METHODS["cta"]()),
+    Column("graphical", METHODS["graphical"]()),
+    Column("relay", METHODS["relay"]()),
 ]
 NOTED = ["bound", *(column.name for column in COLUMNS[:8])]
 
@@ -238,20 +235,19 @@ def tally(
     truth = dict(case.loop.parameters)
     truth["delay+lag"] = truth["delay"] + truth["lag"]
     given = case.given()
-    options = dict(column.options)
-    if "initial_output" in signature(METHODS[column.method]).parameters and "delay" in case.free:
-        options.setdefault("initial_output", 0.0)
+    method = column.method
+    if column.start_known and "delay" in case.free and hasattr(method, "initial_output"):
+        method = replace(method, initial_output=0.0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of feedback, in every flight
         for seed in seeds:
-            flight = case.experiment.fly(case.loop, case.noise, seed, case.circulates)
+            flight = case.experiment.run(case.loop, case.noise, seed, case.noise_in_loop)
             try:
                 fit = dtm.estimate_delay(
                     flight,
                     given.continuous() if column.continuous else given,
-                    method=column.method,
+                    method=method,
                     free=case.free,
-                    **options,
                 )
             except (dtm.DeadtimeError, ValueError):
                 refused += 1
@@ -339,12 +335,12 @@ def error_of_the_map() -> None:
     )
     for x, expected in zip(gains, known, strict=True):
         flown = loop(Kp=x, delay=1.0, sample_time=None, limit=None)
-        flight = dtm.Experiment.step(31.0, sample_time=0.005, rest=1.0).fly(flown)
+        flight = dtm.Experiment.step(31.0, sample_time=0.005, rest=1.0).run(flown)
         row = f"{x:8.4f}{100.0 * (flight.output.max() - 1.0):12.2f}"
         for way, wide in (("dominant", 22), ("exact", 19)):
             try:
                 fit = dtm.estimate_delay(
-                    flight, flown.replace(delay=None), method="overshoot", map=way, free=("delay",)
+                    flight, flown.replace(delay=None), method=Overshoot(map=way), free=("delay",)
                 )
                 row += f"{100.0 * (fit.delay - 1.0):>+{wide}.3f}"
             except dtm.NotIdentifiableError:
@@ -359,27 +355,27 @@ def coverage(pool: Executor, runs: int, text: str) -> None:
     """How many intervals hold the truth."""
     plain = step()
     rows = [
-        ("delay", Case("", loop(), plain, 0.01), Column("", "output_error")),
+        ("delay", Case("", loop(), plain, 0.01), Column("", OutputError())),
         (
             "delay, gain",
             Case("", loop(), plain, 0.01, free=("delay", "gain")),
-            Column("", "output_error", {"initial_output": None}),
+            Column("", OutputError(), start_known=False),
         ),
         (
             "delay, gain, lag of 60 ms",
             Case("", loop(delay=0.3, lag=0.06), plain, 0.01, free=("delay", "gain", "lag")),
-            Column("", "output_error", {"initial_output": None}),
+            Column("", OutputError(), start_known=False),
         ),
         (
             "delay, gain, lag of zero",
             Case("", loop(), plain, 0.01, free=("delay", "gain", "lag")),
-            Column("", "output_error", {"initial_output": None}),
+            Column("", OutputError(), start_known=False),
         ),
         *(
             (
                 f"noise in the {where}, told {told}",
                 Case("", loop(Kp), plain, 0.01, free=("delay", "gain"), sensor=where == "loop"),
-                Column("", "waveform", {"noise": told}),
+                Column("", Waveform(noise=told)),
             )
             for where, Kp, told in (
                 ("log", 1.31, "recording"),
@@ -391,13 +387,12 @@ def coverage(pool: Executor, runs: int, text: str) -> None:
     ]
     print(f"\n{'coverage of 95 % intervals':44}{'runs':>6}{'refused':>9}")
     for label, case, column in rows:
-        known = signature(METHODS[column.method]).parameters
-        if text not in column.method or any(option not in known for option in column.options):
+        if text not in column.method.name:
             continue
         found = next(shared(pool, [(case, column)], runs, intervals=True))
         told = runs - found.refused
         shares = "  ".join(f"{n} {100 * held / told:.1f} %" for n, held in found.held.items())
-        print(f"{column.method + ', ' + label:44}{runs:6d}{found.refused:9d}  {shares}")
+        print(f"{column.method.name + ', ' + label:44}{runs:6d}{found.refused:9d}  {shares}")
 
 
 def times(columns: list[Column], repetitions: int, most: int) -> None:
@@ -406,7 +401,7 @@ def times(columns: list[Column], repetitions: int, most: int) -> None:
     experiment = dtm.Experiment.prbs(20.0, 0.4, 0.4)
     for free in (("delay",), ("delay", "gain"), ("delay", "gain", "lag"))[:most]:
         flown = loop(lag=0.06 if "lag" in free else 0.0)
-        flight = experiment.fly(flown, 0.01, seed=1)
+        flight = experiment.run(flown, 0.01, seed=1)
         for column in columns:
             try:
                 durations = [timed(flight, flown, column, free) for _ in range(repetitions)]
@@ -423,9 +418,7 @@ def timed(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         begin = time.perf_counter()
-        fit = dtm.estimate_delay(
-            flight, flown.replace(delay=None), method=column.method, free=free, **column.options
-        )
+        fit = dtm.estimate_delay(flight, flown.replace(delay=None), method=column.method, free=free)
         if fit.calibrated:
             for name in fit.stderr:
                 fit.ci(LEVEL, name)
@@ -451,7 +444,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a flight of some cases")
     given = parser.parse_args()
     chosen = [case for case in cases() if given.case in case.name]
-    columns = [c for c in COLUMNS if given.method in f"{c.method} {c.name}" and not c.missing()]
+    columns = [c for c in COLUMNS if given.method in f"{c.method.name} {c.name}"]
     runs, covering, repetitions = given.runs, given.coverage_runs, 11
     if given.quick:
         runs, covering, repetitions, chosen = 1, 2, 1, chosen[4:5] + chosen[-3:]

@@ -9,13 +9,16 @@ extensions = [
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
 ]
 myst_enable_extensions = ["dollarmath", "amsmath"]
-autosummary_generate = True
+autodoc_default_options = {
+    "inherited-members": "object,tuple,int,Exception",
+    "special-members": "__call__",
+}
+autodoc_member_order = "groupwise"
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
-exclude_patterns = ["_build", "reproduction-numbers.md"]
+exclude_patterns = ["_build", "paper/reproduction-numbers.md"]
 html_theme = "alabaster"
 html_title = "deadtime"

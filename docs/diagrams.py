@@ -1,6 +1,6 @@
 """Draw the block diagrams of the page on the reproduced paper: ``python docs/diagrams.py``.
 
-A diagram is blocks and circles in places, and arrows along corners.
+A diagram consists of blocks and circles at given points, and of arrows through given points.
 """
 
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Rectangl
 IMAGES = Path(__file__).parent / "images"
 
 LINE = "#0b6fb8"
-Place = tuple[float, float]
+Point = tuple[float, float]
 
 
 def canvas(width: float, height: float) -> tuple[Figure, Axes]:
-    """A figure whose axes count in tenths of an inch or so, without a frame."""
+    """A figure without a frame, whose axes are in tenths of an inch (approximately)."""
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots()
     axes.set(xlim=(0, 10 * width), ylim=(0, 10 * height), aspect="equal")
@@ -26,33 +26,33 @@ def canvas(width: float, height: float) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def block(axes: Axes, at: Place, words: str, width: float = 12.0, height: float = 7.0) -> None:
-    """A block with words in it, centred at a place."""
+def block(axes: Axes, at: Point, text: str, width: float = 12.0, height: float = 7.0) -> None:
+    """A block with a text in it, centred at a point."""
     corner = (at[0] - width / 2, at[1] - height / 2)
     axes.add_patch(
         FancyBboxPatch(
             corner, width, height, boxstyle="round,pad=0,rounding_size=0.8", fc="#eef4fa", ec=LINE
         )
     )
-    axes.text(*at, words, ha="center", va="center", fontsize=10)
+    axes.text(*at, text, ha="center", va="center", fontsize=10)
 
 
-def difference(axes: Axes, at: Place) -> None:
-    """The place where what comes from below is subtracted."""
+def difference(axes: Axes, at: Point) -> None:
+    """A circle at which the signal from below is subtracted from that from the left."""
     axes.add_patch(Circle(at, 1.6, fc="white", ec=LINE))
     axes.text(at[0] - 3.0, at[1] + 1.4, "+", fontsize=10)
     axes.text(at[0] + 0.9, at[1] - 4.0, "−", fontsize=11)
 
 
-def arrow(axes: Axes, places: Sequence[Place], words: str = "", dashed: bool = False) -> None:
-    """An arrow along corners, its words above the middle of the first part."""
+def arrow(axes: Axes, points: Sequence[Point], text: str = "", dashed: bool = False) -> None:
+    """An arrow through points, with its text above the middle of the first line."""
     style = "--" if dashed else "-"
-    until = places[:-1]
+    until = points[:-1]
     axes.plot([x for x, _ in until], [y for _, y in until], color="0.25", lw=1.1, ls=style)
     axes.add_patch(
         FancyArrowPatch(
-            places[-2],
-            places[-1],
+            points[-2],
+            points[-1],
             arrowstyle="-|>",
             mutation_scale=11,
             color="0.25",
@@ -62,15 +62,15 @@ def arrow(axes: Axes, places: Sequence[Place], words: str = "", dashed: bool = F
             shrinkB=0,
         )
     )
-    if words:
-        (x0, y0), (x1, y1) = places[0], places[1]
-        axes.text((x0 + x1) / 2, (y0 + y1) / 2 + 1.0, words, ha="center", fontsize=9)
+    if text:
+        (x0, y0), (x1, y1) = points[0], points[1]
+        axes.text((x0 + x1) / 2, (y0 + y1) / 2 + 1.0, text, ha="center", fontsize=9)
 
 
-def frame(axes: Axes, corner: Place, width: float, height: float, words: str) -> None:
-    """A dashed frame around what runs in one place."""
+def frame(axes: Axes, corner: Point, width: float, height: float, text: str) -> None:
+    """A dotted frame around the parts that run on one computer."""
     axes.add_patch(Rectangle(corner, width, height, fill=False, ec="0.6", ls=":"))
-    axes.text(corner[0] + 1.0, corner[1] + height - 2.6, words, fontsize=9, color="0.4")
+    axes.text(corner[0] + 1.0, corner[1] + height - 2.6, text, fontsize=9, color="0.4")
 
 
 def internet_loop() -> Figure:

@@ -1,6 +1,6 @@
 """Make the pictures of these pages: ``python docs/pictures.py``.
 
-They are kept beside the pages, so that building the pages needs no run of the package.
+The pictures are stored beside the pages, so that building the pages does not run the package.
 """
 
 import tempfile
@@ -10,19 +10,20 @@ import deadtime as dtm
 import matplotlib.pyplot as plt
 import numpy as np
 from deadtime import paper
+from deadtime._base.drawing import new_figure
 from deadtime._cli.fly import emulated_drone
-from deadtime._experiment import FlightPlan, fly_experiment
-from deadtime._experiment.flights import read_telemetry
-from deadtime._flight_plots import plot_checked, plot_learned, plot_told
-from deadtime._internet_loop import run_internet_loop
-from deadtime._internet_plots import plot_internet_loop
-from deadtime._plots import new_figure
+from deadtime.estimation import Waveform
+from deadtime.flights import FlightPlan, fly_experiment
+from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
+from deadtime.flights._runs import read_telemetry
+from deadtime.internet._loop import run_internet_loop
+from deadtime.internet._plots import plot_internet_loop
 from deadtime.links import udp, virtual_time
 from deadtime.links.ardrone2.emulator import Thruster, ThrustMotion
 from scipy.optimize import least_squares
 
 IMAGES = Path(__file__).parent / "images"
-NUMBERS = Path(__file__).parent / "reproduction-numbers.md"
+NUMBERS = Path(__file__).parent / "paper/reproduction-numbers.md"
 
 
 def fixed_steps() -> None:
@@ -77,7 +78,7 @@ def reproduction() -> None:
             ]
             lines += ["|---|---|---|---|---|"]
             lines += [
-                f"| {one.where} | {one.quantity} | {one.printed} | {one.shown} | {one.told} |"
+                f"| {one.where} | {one.quantity} | {one.printed} | {one.shown} | {one.outcome} |"
                 for one in part.comparisons
             ]
             lines += [""]
@@ -91,9 +92,9 @@ def guess(Kp: float = 1.31) -> dtm.ControlLoop:
 
 
 def planned_step() -> None:
-    """What a step will tell of the guessed loop."""
+    """The smallest standard errors that a step on the guessed loop can give."""
     plan = dtm.identifiability(guess(), dtm.Experiment.step(5.0), noise=0.01, initial_output=0.0)
-    plan.plot().savefig(IMAGES / "planned-step.png", dpi=90)
+    plan.plot()[0].figure.savefig(IMAGES / "planned-step.png", dpi=90)
 
 
 def hold() -> None:
@@ -125,7 +126,7 @@ def hold() -> None:
 
 
 def designing() -> None:
-    """A design for an interval of the delay, what the middle alone would do, and a filter."""
+    """A design for an interval of the delay, one for its middle alone, and a filter."""
     vehicle = dtm.ControlLoop(
         dtm.Integrator(0.85, 0.1), dtm.P(1.0), delay=0.25, sample_time=0.065, limit=1.0
     )
@@ -158,21 +159,23 @@ def designing() -> None:
 
 
 def estimating() -> None:
-    """Fits with a lag, without, and of three flights, and a design for what was found."""
+    """Fits with a lag, without a lag, and of three recordings, and a design for the fitted loop."""
     vehicle = dtm.ControlLoop(
         dtm.Integrator(gain=0.9, lag=0.1), dtm.P(1.6), delay=0.3, sample_time=0.065, limit=1.0
     )
     known = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), sample_time=0.065, limit=1.0)
     step, free = dtm.Experiment.step(8.0, rest=1.04), ("delay", "gain", "lag")
-    flight = step.fly(vehicle, noise=0.002, seed=2)
+    flight = step.run(vehicle, noise=0.002, seed=2)
     fit = dtm.estimate_delay(flight, known, free=free)
-    fit.plot().savefig(IMAGES / "estimate-lag.png", dpi=80)
-    dtm.estimate_delay(flight, known).plot().savefig(IMAGES / "estimate-lagless.png", dpi=80)
+    fit.plot()[0].figure.savefig(IMAGES / "estimate-lag.png", dpi=80)
+    dtm.estimate_delay(flight, known).plot()[0].figure.savefig(
+        IMAGES / "estimate-lagless.png", dpi=80
+    )
 
     gains = (0.8, 1.6, 2.4)
-    flights = [step.fly(vehicle.replace(Kp=Kp), 0.002, seed) for seed, Kp in enumerate(gains)]
+    flights = [step.run(vehicle.replace(Kp=Kp), 0.002, seed) for seed, Kp in enumerate(gains)]
     joint = dtm.estimate_delay(flights, [known.replace(Kp=Kp) for Kp in gains], free=free)
-    joint.plot().savefig(IMAGES / "estimate-joint.png", dpi=65)
+    joint.plot()[0].figure.savefig(IMAGES / "estimate-joint.png", dpi=65)
 
     smooth = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0))
     best = dtm.design(
@@ -185,10 +188,10 @@ def estimating() -> None:
     figure, axes = plt.subplots(figsize=(7.0, 3.8), layout="constrained")
     time = np.linspace(0.0, 6.0, 601)
     before = vehicle.simulate(time)
-    axes.plot(time, before.outputs, color="0.5", label="as it was flown: Kp 1.6")
+    axes.plot(time, before.outputs, color="0.5", label="with the recorded gain: Kp 1.6")
     after = vehicle.replace(controller=best.loop.controller).simulate(time)
-    told = ", ".join(f"{name} {value:.3g}" for name, value in best.gains.items())
-    axes.plot(time, after.outputs, "C0", label=f"the vehicle under the design: {told}")
+    labels = ", ".join(f"{name} {value:.3g}" for name, value in best.gains.items())
+    axes.plot(time, after.outputs, "C0", label=f"with the designed gains: {labels}")
     axes.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--")
     axes.set(xlabel="time (s)", ylabel="height (m)")
     axes.legend(frameon=False)
@@ -208,21 +211,23 @@ def flying() -> None:
         figure.savefig(IMAGES / "flying-learned.png", dpi=90)
         told = read_telemetry(found.before.telemetry, found.before.recording)
         figure, axes = new_figure(7.5, 4.2, rows=2)
-        plot_told(axes, told, found.before)
-        figure.savefig(IMAGES / "flying-told.png", dpi=90)
+        plot_telemetry(axes, told, found.before)
+        figure.savefig(IMAGES / "flying-telemetry.png", dpi=90)
     print(found.verdict())
 
 
 def internet_loop() -> None:
-    """The Internet loop on a network that jitters and loses, and what policies make of a burst."""
+    """The Internet loop on a network with jitter and losses, and the effect of the policies."""
     bad = udp.Network(delay=udp.Normal(0.05, 0.01), loss=udp.Bursts.of(0.05, 4.0))
     jitters = udp.Network(delay=udp.Normal(0.05, 0.01), loss=0.05)
-    found = run_internet_loop(udp.Trial(gain=8.0, there=jitters, back=jitters))
+    found = run_internet_loop(udp.Trial(gain=8.0, forward_path=jitters, return_path=jitters))
     printed = {
         float(gain): paper.delay_by_dominant_root(gain, percent / 100.0)
         for gain, percent in paper.PRINTED_OVERSHOOTS.items()
     }
-    plot_internet_loop(found, printed).savefig(IMAGES / "internet-loop.png", dpi=90)
+    figure, axes = new_figure(10.0, 4.2, columns=2)
+    plot_internet_loop(found, printed, axes)
+    figure.savefig(IMAGES / "internet-loop.png", dpi=90)
 
     policies = {
         "newest wins": udp.NewestWins(),
@@ -234,7 +239,9 @@ def internet_loop() -> None:
     )
     for ax, (name, policy) in zip(axes, policies.items(), strict=True):
         for seed in range(40):
-            trial = udp.Trial(gain=6.0, there=bad, back=bad, seed=seed, policy=policy, duration=4.0)
+            trial = udp.Trial(
+                gain=6.0, forward_path=bad, return_path=bad, seed=seed, policy=policy, duration=4.0
+            )
             recording = virtual_time.run(udp.run_trial(trial)).plant.recording
             ax.plot(recording.time - 1.0, recording.output, "C0", alpha=0.25, linewidth=0.8)
         ax.plot(recording.time - 1.0, recording.reference, "k--", linewidth=0.8)
@@ -247,30 +254,30 @@ def internet_loop() -> None:
 TS = 0.065
 
 
-def thrust_flight(gain: float, step: float, noise: float = 0.0) -> dtm.Recording:
-    """A step of the height under P control, flown by rotors: four samples of transport delay."""
+def thrust_step(gain: float, step: float, noise: float = 0.0) -> dtm.Recording:
+    """A step of the height of the rotor model under P control, with a delay of four samples."""
     motion, random = ThrustMotion(Thruster()), np.random.default_rng(1)
     motion.settle(0, 0.0)
     heights, commands = [], []
     reference = np.where(np.arange(160) >= 16, step, 0.0)
-    for k, wanted in enumerate(reference):
+    for k, height in enumerate(reference):
         now = k * 65_000
         if k >= 4:
-            motion.demand(now, commands[k - 4])
+            motion.follow(now, commands[k - 4])
         heights.append(motion.at(now)[0] + noise * random.standard_normal())
-        commands.append(float(np.clip(gain * (wanted - heights[-1]), -2.0, 2.0)))
+        commands.append(float(np.clip(gain * (height - heights[-1]), -2.0, 2.0)))
     return dtm.Recording(np.arange(160) * TS, reference, heights, commands)
 
 
 def first_order_climb(amplitude: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The climb after a step of its demand, over the step, and lag and delay fitted to it."""
+    """The climb after a step of its setpoint, divided by the step, and the fitted lag and delay."""
     motion = ThrustMotion(Thruster())
     motion.settle(0, 0.0)
-    motion.demand(0, amplitude)
+    motion.follow(0, amplitude)
     climb = np.array([motion.at(round(1e6 * t))[1] for t in time]) / amplitude
 
-    def error(numbers: np.ndarray) -> np.ndarray:
-        lag, delay = numbers
+    def error(parameters: np.ndarray) -> np.ndarray:
+        lag, delay = parameters
         return -np.expm1(-np.maximum(time - delay, 0.0) / lag) - climb
 
     return climb, least_squares(error, [0.12, 0.04]).x
@@ -280,15 +287,15 @@ def thrust() -> None:
     """Climb and height of the thrust model, beside first-order fits to them."""
     figure, axes = plt.subplots(1, 3, figsize=(12.5, 3.8), layout="constrained")
     time = np.arange(0.0, 0.8, 0.002)
-    print("demand (m/s)  lag (s)  delay (s)  lag + delay (s)")
+    print("setpoint (m/s)  lag (s)  delay (s)  lag + delay (s)")
     for amplitude in (0.1, 1.0, -1.0, 2.0, -2.0):
         climb, (lag, delay) = first_order_climb(amplitude, time)
         print(f"{amplitude:4.1f}  {lag:.3f}  {delay:.3f}  {lag + delay:.3f}")
-        axes[0].plot(time, climb, linewidth=1.2, label=f"demand {amplitude:+.1f} m/s")
+        axes[0].plot(time, climb, linewidth=1.2, label=f"setpoint {amplitude:+.1f} m/s")
         if amplitude == 0.1:
             first = -np.expm1(-np.maximum(time - delay, 0.0) / lag)
-    axes[0].plot(time, first, "k--", linewidth=1.0, label="first order behind a delay")
-    axes[0].set(xlabel="time (s)", ylabel="climb / demand", title="A step of the demanded climb")
+    axes[0].plot(time, first, "k--", linewidth=1.0, label="delay and first-order lag")
+    axes[0].set(xlabel="time (s)", ylabel="climb / setpoint", title="A step of the commanded climb")
     axes[0].legend(frameon=False)
 
     thruster, gain = Thruster(), 2.0
@@ -312,26 +319,26 @@ def thrust() -> None:
         f"linear: {overshoot:.1f} %, margins {margin.gain_margin:.3f}, {margin.delay_margin:.3f} s"
     )
     for number, step in enumerate((0.1, 0.4, 0.8, 1.6)):
-        flown, noisy = (thrust_flight(gain, step, noise) for noise in (0.0, 0.002))
+        clean, noisy = (thrust_step(gain, step, noise) for noise in (0.0, 0.002))
         fit = dtm.estimate_delay(
-            noisy, known, free=("delay", "gain", "lag"), method="waveform", initial_output=0.0
+            noisy, known, free=("delay", "gain", "lag"), method=Waveform(initial_output=0.0)
         )
         margin = fit.loop.replace(limit=None).margin()
         fitted = fit.loop.simulate(np.arange(144) * TS, step).outputs
         print(
-            f"{step}  {100 * (np.max(flown.output) / step - 1):.1f}  "
+            f"{step}  {100 * (np.max(clean.output) / step - 1):.1f}  "
             f"{100 * (np.max(fitted) / step - 1):.1f}  {fit.delay:.3f}  {fit.lag:.3f}  "
             f"{fit.delay + fit.lag:.3f}  {fit.gain:.3f}  {margin.gain_margin:.3f}  "
             f"{margin.delay_margin:.3f}  {fit.adequate}"
         )
-        late = flown.time[16:] - flown.time[16]
-        color, height = f"C{number}", flown.output[16:]
+        late = clean.time[16:] - clean.time[16]
+        color, height = f"C{number}", clean.output[16:]
         axes[1].plot(late, height / step, color, linewidth=1.4, label=f"step {step} m")
         axes[2].plot(late, 100 * (fitted - height) / step, color, linewidth=1.2)
     axes[1].set(xlabel="time (s)", ylabel="height / step", title="Height: Kp 2, limit 2 m/s")
     axes[1].legend(frameon=False)
     axes[2].set(
-        xlabel="time (s)", ylabel="percent of the step", title="First-order fit less height"
+        xlabel="time (s)", ylabel="percent of the step", title="First-order fit minus height"
     )
     figure.savefig(IMAGES / "thrust.png", dpi=90)
 

@@ -24,7 +24,8 @@ from typing import Any
 import deadtime as dtm
 import numpy as np
 import scipy.special
-from deadtime import ParametricQuasiPolynomial, delay, s
+from deadtime import delay, s
+from deadtime.roots import ParametricQuasiPolynomial
 
 Ranges = dict[str, tuple[float, float]]
 Region = tuple[float, float, float, float]
@@ -117,7 +118,7 @@ def unstable_region(members: list[dtm.QuasiPolynomial]) -> Region:
 
 
 def cell_by_cell(
-    chart: dtm.StabilityMap, count: Count, cells: list[tuple[int, int]], limit: float
+    chart: dtm.stability.StabilityMap, count: Count, cells: list[tuple[int, int]], limit: float
 ) -> tuple[float, int, int]:
     """Mean seconds a cell, cells asked, and cells that disagree."""
     (first, x), (second, y) = chart.axes.items()
@@ -171,7 +172,7 @@ def main() -> None:
             family: ParametricQuasiPolynomial = family,
             ranges: Ranges = ranges,
             **more: Any,
-        ) -> dtm.StabilityMap:
+        ) -> dtm.stability.StabilityMap:
             shapes = (shape, shape)
             return dtm.stability_map(
                 family, ranges, shapes, **{"abscissa": False, "threads": 1} | more

@@ -1,139 +1,126 @@
-"""Control loops with a delay in them.
+"""Control loops with a delay.
 
 The delay of a recorded loop with its uncertainty, the characteristic roots of time-delay systems,
 maps of the gains that are stable, and exact simulation with hold and limit.
+
+This is the table of contents: what people call and construct. Each name belongs to a room, a
+package that is loaded when it is first used; results and further functions are in the rooms.
 """
 
-from deadtime import gallery
-from deadtime._boxes import ProvedBoxes, largest_stable_box, proved_boxes
-from deadtime._certificate import Certificate
-from deadtime._chains import Chain
-from deadtime._controllers import PD, PI, PID, PV, Controller, P
-from deadtime._crossings import Crossings, crossings, delay_margin
-from deadtime._delay_solution import DelayResult, DelaySolution
-from deadtime._derivative_filter import DerivativeFilter
-from deadtime._design import Design, FilterChoice, LeastMargins, Trade, design, design_filter
-from deadtime._errors import (
-    CertificateError,
-    ContourError,
-    ConvergenceError,
-    CountMismatchError,
-    DeadtimeError,
-    FlightAbortedError,
-    LinkError,
-    MissingExtraError,
-    NotIdentifiableError,
-    PacketError,
-    RecordingError,
-    WorkerError,
-)
-from deadtime._estimation import (
-    CramerRaoBound,
-    DelayEstimate,
-    Flight,
-    Identifiability,
-    MonteCarlo,
-    PlannedBound,
-    Whiteness,
-    damping_ratio,
-    estimate_delay,
-    identifiability,
-)
-from deadtime._excitation import Experiment
-from deadtime._expansion import Expansion
-from deadtime._fixed_step import simulate_fixed_step
-from deadtime._loop import ControlLoop
-from deadtime._low_level import low_level_callable
-from deadtime._margins import Margins
-from deadtime._parametric import Parameter, ParametricQuasiPolynomial, parameters
-from deadtime._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
-from deadtime._quasipolynomial import QuasiPolynomial, delay, s
-from deadtime._readers import read_recording
-from deadtime._recording import Recording, Step
-from deadtime._response import Response
-from deadtime._robust import RobustMap, robust_map
-from deadtime._rootset import RootSet
-from deadtime._scalar_delay import dde_roots, rightmost_branches
-from deadtime._sensitivity import Sensitivity
-from deadtime._simulation import simulate
-from deadtime._solve_dde import solve_dde
-from deadtime._special import lambertw, lambertw0, lambertwm1
-from deadtime._special_forms import (
-    OffsetW,
-    lambertw_derivative,
-    lambertw_log,
-    lambertw_offset,
-    wrightomega,
-)
-from deadtime._stability import MapStatus, StabilityMap, stability_map
-from deadtime._stability_radius import StabilityRadius, stability_radius
-from deadtime._sweep import Sweep, SweepStatus, sweep
-from deadtime._system_response import SystemResponse
-from deadtime._systems import DelaySystem
-from deadtime._transfer import TransferFunction, feedback
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from deadtime._base.errors import (
+        CertificateError,
+        ContourError,
+        ConvergenceError,
+        CountMismatchError,
+        DeadtimeError,
+        FlightAbortedError,
+        LinkError,
+        MissingExtraError,
+        NotIdentifiableError,
+        PacketError,
+        RecordingError,
+        WorkerError,
+    )
+    from deadtime.dde import solve_dde
+    from deadtime.estimation import damping_ratio, estimate_delay, identifiability
+    from deadtime.experiments import Experiment
+    from deadtime.loops import (
+        PD,
+        PI,
+        PID,
+        PV,
+        ControlLoop,
+        DerivativeFilter,
+        FirstOrder,
+        Integrator,
+        P,
+        RationalPlant,
+        kit_plant,
+        simulate,
+        simulate_fixed_step,
+        sweep,
+    )
+    from deadtime.recordings import Recording, read_recording
+    from deadtime.roots import (
+        QuasiPolynomial,
+        crossings,
+        dde_roots,
+        delay,
+        delay_margin,
+        parameters,
+        s,
+    )
+    from deadtime.special import lambertw, lambertw0, lambertwm1, wrightomega
+    from deadtime.stability import (
+        largest_stable_box,
+        proved_boxes,
+        robust_map,
+        stability_map,
+        stability_radius,
+    )
+    from deadtime.systems import DelaySystem, TransferFunction, feedback
+    from deadtime.tuning import design, design_filter
+
+#: The names of each room that are here too.
+_ROOMS = {
+    "_base.errors": (
+        "CertificateError ContourError ConvergenceError CountMismatchError DeadtimeError "
+        "FlightAbortedError LinkError MissingExtraError NotIdentifiableError PacketError "
+        "RecordingError WorkerError"
+    ),
+    "special": "lambertw lambertw0 lambertwm1 wrightomega",
+    "dde": "solve_dde",
+    "roots": "QuasiPolynomial crossings dde_roots delay delay_margin parameters s",
+    "systems": "DelaySystem TransferFunction feedback",
+    "loops": (
+        "ControlLoop DerivativeFilter FirstOrder Integrator P PD PI PID PV RationalPlant kit_plant "
+        "simulate simulate_fixed_step sweep"
+    ),
+    "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
+    "recordings": "Recording read_recording",
+    "experiments": "Experiment",
+    "gallery": "",
+    "links": "",
+    "estimation": "damping_ratio estimate_delay identifiability",
+    "tuning": "design design_filter",
+    "reports": "",
+    "flights": "",
+    "internet": "",
+    "paper": "",
+}
+_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names.split()}
 
 __all__ = [
     "PD",
     "PI",
     "PID",
     "PV",
-    "Certificate",
     "CertificateError",
-    "Chain",
     "ContourError",
     "ControlLoop",
-    "Controller",
     "ConvergenceError",
     "CountMismatchError",
-    "CramerRaoBound",
-    "Crossings",
     "DeadtimeError",
-    "DelayEstimate",
-    "DelayResult",
-    "DelaySolution",
     "DelaySystem",
     "DerivativeFilter",
-    "Design",
-    "Expansion",
     "Experiment",
-    "FilterChoice",
     "FirstOrder",
-    "Flight",
     "FlightAbortedError",
-    "Identifiability",
     "Integrator",
-    "LeastMargins",
     "LinkError",
-    "MapStatus",
-    "Margins",
     "MissingExtraError",
-    "MonteCarlo",
     "NotIdentifiableError",
-    "OffsetW",
     "P",
     "PacketError",
-    "Parameter",
-    "ParametricQuasiPolynomial",
-    "PlannedBound",
-    "Plant",
-    "ProvedBoxes",
     "QuasiPolynomial",
     "RationalPlant",
     "Recording",
     "RecordingError",
-    "Response",
-    "RobustMap",
-    "RootSet",
-    "Sensitivity",
-    "StabilityMap",
-    "StabilityRadius",
-    "Step",
-    "Sweep",
-    "SweepStatus",
-    "SystemResponse",
-    "Trade",
     "TransferFunction",
-    "Whiteness",
     "WorkerError",
     "crossings",
     "damping_ratio",
@@ -144,21 +131,15 @@ __all__ = [
     "design_filter",
     "estimate_delay",
     "feedback",
-    "gallery",
     "identifiability",
     "kit_plant",
     "lambertw",
     "lambertw0",
-    "lambertw_derivative",
-    "lambertw_log",
-    "lambertw_offset",
     "lambertwm1",
     "largest_stable_box",
-    "low_level_callable",
     "parameters",
     "proved_boxes",
     "read_recording",
-    "rightmost_branches",
     "robust_map",
     "s",
     "simulate",
@@ -169,3 +150,19 @@ __all__ = [
     "sweep",
     "wrightomega",
 ]
+
+if not TYPE_CHECKING:  # A type checker reads the imports above.
+
+    def __getattr__(name: str) -> Any:
+        """Load the room of a name when the name is first used."""
+        if name in _ROOM_OF:
+            value = getattr(importlib.import_module(f"deadtime.{_ROOM_OF[name]}"), name)
+        elif name in _ROOMS and not name.startswith("_"):
+            value = importlib.import_module(f"deadtime.{name}")
+        else:
+            raise AttributeError(f"module 'deadtime' has no attribute {name!r}")
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return [*__all__, *(room for room in _ROOMS if not room.startswith("_"))]

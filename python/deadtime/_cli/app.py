@@ -1,64 +1,19 @@
-"""The commands: each reads its options, calls the library once, and shows what came out."""
+"""The commands by name: each is imported when it is called, so that help comes at once."""
 
 from __future__ import annotations
 
-import csv
+import importlib
 import os
-import shlex
 import sys
-import traceback
-from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
-import numpy as np
 import typer
-from rich import box
-from rich.table import Table
+from typer.core import TyperGroup
+from typer.main import get_command
 
-from deadtime._cli import options as opt
-from deadtime._cli.designs import design_gains
-from deadtime._cli.emulate import emulators
-from deadtime._cli.estimates import estimate_delays
-from deadtime._cli.fly import fly_drone
-from deadtime._cli.internet_loop import run_loop
-from deadtime._cli.maps import map_gains
-from deadtime._cli.reproduce import reproduce_paper
-from deadtime._cli.show import (
-    console,
-    estimates_table,
-    print_json,
-    print_table,
-    save_figure,
-    stages,
-)
-from deadtime._cli.verdicts import listed, verdict
-from deadtime._errors import DeadtimeError
-from deadtime._experiment import demo_flight, study
-from deadtime._loop import ControlLoop
-from deadtime._plots import (
-    check_matplotlib,
-    new_figure,
-    plot_certificate,
-    plot_responses,
-    plot_root_set,
-)
-from deadtime._readers import read_recording
-from deadtime._recording import Recording
-from deadtime._report import write_report
-from deadtime._rootset import RootSet
+from deadtime._base.errors import DeadtimeError
 
-__all__ = ["app", "run"]
-
-app = typer.Typer(
-    name="deadtime",
-    help="Control loops with a delay in them: estimate it, map the gains, design for it.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-
-Ends = tuple[float, float]
+__all__ = ["COMMANDS", "app", "run"]
 
 #: What ends a command with one line; anything else is a defect and shows where it is.
 FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
@@ -68,6 +23,129 @@ DEFECT = 70
 
 #: Exit code after Ctrl-C.
 INTERRUPTED = 130
+
+
+class Command(NamedTuple):
+    """Where a command is, and the first line of its help."""
+
+    file: str
+    function: str
+    help: str
+
+
+COMMANDS = {
+    "estimate": Command(
+        "estimates",
+        "estimate_delays",
+        "Estimate the delay of a loop from a recording of it, or from several together.",
+    ),
+    "roots": Command(
+        "roots",
+        "list_roots",
+        "Characteristic roots of a loop: the rightmost ones, or all in a region.",
+    ),
+    "map": Command(
+        "maps",
+        "map_gains",
+        "Map which gains of a PV controller are stable, with the boundary and the best of them.",
+    ),
+    "design": Command(
+        "designs",
+        "design_gains",
+        "Find the gains that are best in the worst case, within margins.",
+    ),
+    "reproduce": Command(
+        "reproduce",
+        "reproduce_paper",
+        "Reproduce the paper on delays in quadrotor control: each printed number beside ours.",
+    ),
+    "fly": Command(
+        "fly",
+        "fly_drone",
+        "Fly steps under P control, learn the delay, design PV for it, fly that; land.",
+    ),
+    "internet-loop": Command(
+        "internet_loop",
+        "run_loop",
+        "Control an integrator over UDP, estimate the loop's delay, and measure it.",
+    ),
+    "simulate": Command(
+        "simulate", "simulate_step", "Simulate the step response of a loop, exactly."
+    ),
+    "report": Command(
+        "report",
+        "report_recording",
+        "Write one page about a recording: delay, map of gains, a controller to try.",
+    ),
+    "demo": Command(
+        "demo",
+        "show_demo",
+        "Fly a simulated loop with known truth and find its delay and its gains; no hardware.",
+    ),
+    "emulate": Command(
+        "emulate",
+        "emulators",
+        "Stand in for a vehicle, on its own ports and in its own protocol.",
+    ),
+}
+
+
+class _Commands(TyperGroup):
+    """Commands that hold their help alone until one is called."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and args[0] in COMMANDS:
+            self.commands[args[0]] = _loaded(args[0])
+        return super().resolve_command(ctx, args)
+
+
+def _loaded(name: str) -> Any:
+    """Import a command."""
+    place = COMMANDS[name]
+    found = getattr(importlib.import_module(f"deadtime._cli.{place.file}"), place.function)
+    if isinstance(found, typer.Typer):
+        return get_command(found)
+    alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+    alone.command(name)(found)
+    return get_command(alone)
+
+
+app = typer.Typer(
+    name="deadtime",
+    cls=_Commands,
+    help="Control loops with a delay in them: estimate it, map the gains, design for it.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"deadtime {version('deadtime')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version.", callback=_print_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Control loops with a delay in them: estimate it, map the gains, design for it."""
+
+
+def _not_loaded() -> None:
+    """Stands for a command that was not called."""
+
+
+for _name, _command in COMMANDS.items():
+    app.command(_name, help=_command.help)(_not_loaded)
 
 
 def run() -> None:
@@ -95,6 +173,8 @@ def run() -> None:
         print(f"deadtime: {' '.join(told.split())}", file=sys.stderr)
         raise SystemExit(1) from None
     except Exception as error:
+        import traceback
+
         traceback.print_exc()
         print(
             f"deadtime: the command has failed internally ({type(error).__name__}); this is a "
@@ -102,263 +182,3 @@ def run() -> None:
             file=sys.stderr,
         )
         raise SystemExit(DEFECT) from None
-
-
-app.command("estimate")(estimate_delays)
-
-
-@app.command()
-def roots(
-    kp: opt.Kp,
-    delay: opt.Delay,
-    kv: opt.Kv = 0.0,
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    sample_time: opt.Sample_time = None,
-    filter: opt.Filter = None,  # noqa: A002
-    re: Annotated[Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
-    im: Annotated[Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
-    rightmost: Annotated[
-        int, typer.Option(min=1, help="At most how many of those with Im s >= 0, without a region.")
-    ] = 3,
-    plot: opt.Plot = None,
-    certificate: Annotated[
-        Path | None,
-        typer.Option(help="File the proof of their number as JSON; with --plot, draw it, too."),
-    ] = None,
-    as_json: opt.As_json = False,
-) -> None:
-    """Characteristic roots of a loop: the rightmost ones, or all in a region."""
-    loop = opt.described_loop(
-        kp, kv, delay=delay, gain=gain, lag=lag, sample_time=sample_time, corner=filter
-    )
-    if (re is None) != (im is None):
-        raise ValueError("a region needs both --re and --im")
-    if re is None or im is None:
-        found = loop.rightmost(rightmost)
-    else:
-        found = loop.characteristic().roots(re=re, im=im)
-    chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
-    proof = None
-    if certificate is not None:
-        # Of a sampled loop there is no contour: `characteristic` says so.
-        reals, heights = found.region
-        proof = loop.characteristic().certify(reals, heights)
-        certificate.write_text(proof.to_json(indent=1), encoding="utf-8")
-    if plot is not None:
-        figure, axes = new_figure(6.0, 4.5)
-        if proof is not None:
-            plot_certificate(axes, proof)
-        chains = () if loop.is_sampled else loop.characteristic().chains()
-        plot_root_set(axes, found, chains)
-        save_figure(figure, plot)
-    if as_json:
-        print_json(
-            {
-                "roots": [complex(root) for root in found.roots],
-                "multiplicities": found.multiplicities,
-                "radii": found.radii,
-                "counted": found.counted,
-                "region": {"re": found.region[0], "im": found.region[1]},
-                "chain_abscissa": chain,
-                "spectral_abscissa": loop.spectral_abscissa(),
-                "stable": loop.is_stable(),
-            }
-        )
-        return
-    print_table(_roots_table(found))
-    console.print(listed(found, rightmost if re is None else None, chain), highlight=False)
-    if np.isfinite(chain):
-        console.print(f"neutral: a chain of roots approaches Re s = {chain:.6g}", highlight=False)
-    console.print(verdict(loop), highlight=False)
-
-
-def _roots_table(found: RootSet) -> Table:
-    table = Table(box=box.SIMPLE_HEAD)
-    for head in ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius"):
-        table.add_column(head, justify="right")
-    for root, multiplicity, radius in zip(
-        found.roots, found.multiplicities, found.radii, strict=True
-    ):
-        table.add_row(f"{root.real:.10g}", f"{root.imag:.10g}", str(multiplicity), f"{radius:.1e}")
-    return table
-
-
-app.command("map")(map_gains)
-app.command("design")(design_gains)
-app.command("reproduce")(reproduce_paper)
-app.command("fly")(fly_drone)
-app.command("internet-loop")(run_loop)
-app.add_typer(emulators, name="emulate")
-
-
-#: What a step response has also where it comes to no steady state.
-PEAK = ("peak", "peak_time")
-
-
-@app.command()
-def simulate(
-    kp: opt.Kp,
-    delay: opt.Delay,
-    kv: opt.Kv = 0.0,
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    sample_time: opt.Sample_time = None,
-    limit: opt.Limit = None,
-    filter: opt.Filter = None,  # noqa: A002
-    duration: Annotated[float, typer.Option(min=1e-6, help="How long, s.")] = 10.0,
-    amplitude: Annotated[float, typer.Option(help="Size of the step.")] = 1.0,
-    points: Annotated[int, typer.Option(min=2, max=10_000_000, help="Output times.")] = 501,
-    out: Annotated[
-        Path | None, typer.Option(help="Write time, reference, output, command.")
-    ] = None,
-    plot: opt.Plot = None,
-    as_json: opt.As_json = False,
-) -> None:
-    """Simulate the step response of a loop, exactly."""
-    loop = opt.described_loop(
-        kp,
-        kv,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        limit=limit,
-        corner=filter,
-    )
-    opt.check_duration(loop, duration)
-    time = np.linspace(0.0, duration, points)
-    response = loop.simulate(time, amplitude)
-    if out is not None:
-        with out.open("w", newline="", encoding="utf-8") as stream:
-            rows = csv.writer(stream)
-            rows.writerow(["time_s", "reference", "output", "command"])
-            rows.writerows(
-                zip(
-                    time.tolist(),
-                    [amplitude] * points,
-                    response.outputs.tolist(),
-                    response.inputs.tolist(),
-                    strict=True,
-                )
-            )
-    if plot is not None:
-        figure, axes = new_figure(7.0, 3.8)
-        plot_responses(axes, {"response": response})
-        save_figure(figure, plot)
-    stable = loop.is_stable()
-    figures = response.info()
-    if not stable:
-        # Measured against a steady state, to which this loop does not come.
-        figures = {name: figures[name] if name in PEAK else np.nan for name in figures}
-    if as_json:
-        print_json(
-            {
-                "time": response.time,
-                "output": response.outputs,
-                "command": response.inputs,
-                "stable": stable,
-                "info": figures,
-            }
-        )
-        return
-    limited = " (without the limit on its command)" if limit is not None else ""
-    console.print(f"the loop{limited} is {verdict(loop)}", highlight=False)
-    for name, value in figures.items():
-        if stable or name in PEAK:
-            shown = f"{value:.6g}" if np.isfinite(value) else "not within the time simulated"
-            console.print(f"{name.replace('_', ' '):<20}{shown}", highlight=False)
-
-
-@app.command()
-def report(
-    file: opt.File,
-    kp: opt.Kp,
-    time: opt.Time = "time",
-    reference: opt.Reference = "reference",
-    output: opt.Output = "output",
-    command: opt.Command = None,
-    sample_time: opt.Sample_time = None,
-    limit: opt.Limit = None,
-    gain: opt.Gain = 1.0,
-    window: opt.Window = None,
-    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("report.html"),
-    as_json: opt.As_json = False,
-) -> None:
-    """Write one page about a recording: delay, map of gains, a controller to try."""
-    check_matplotlib()
-    recording = read_recording(file, time=time, reference=reference, output=output, command=command)
-    loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit)
-    with stages(5, quiet=as_json) as begin:
-        found = study(recording, loop, window=window, progress=begin)
-    write_report(found, out)
-    if as_json:
-        print_json({"verdict": found.verdict(), "report": out, "gains": found.designed.gains})
-        return
-    console.print(found.verdict(), highlight=False, markup=False)
-    console.print(f"report: {out}", highlight=False, markup=False)
-
-
-@app.command()
-def demo(
-    folder: Annotated[Path, typer.Option(help="Where to write.")] = Path("demo"),
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")] = 1,
-    as_json: opt.As_json = False,
-) -> None:
-    """Fly a simulated loop with known truth and find its delay and its gains; no hardware."""
-    check_matplotlib()
-    with stages(6, quiet=as_json) as begin:
-        begin("flying the simulated loop")
-        flight = demo_flight(seed)
-        folder.mkdir(parents=True, exist_ok=True)
-        file = folder / "flight.csv"
-        _write_flight(flight.recording, file)
-        found = study(
-            flight.recording, flight.known, window=flight.window, truth=flight, progress=begin
-        )
-    page = write_report(found, folder / "report.html")
-    if as_json:
-        print_json(
-            {
-                "truth": flight.numbers,
-                "estimates": {
-                    name: fit.to_dict() for name, fit in found.comparison.estimates.items()
-                },
-                "gains": found.designed.gains,
-                "verdict": found.verdict(),
-                "flight": file,
-                "report": page,
-            }
-        )
-        return
-    print_table(estimates_table(found.comparison, flight.numbers))
-    for sentence in found.comparison.explanation():
-        console.print(f"• {sentence}", highlight=False, markup=False)
-    console.print()
-    console.print(found.verdict(), highlight=False, markup=False, style="bold")
-    console.print(f"\nThe flight is in {file}, the report in {page}. To go on:", highlight=False)
-    for line in _next_commands(found.known, flight.window, file, found.fit):
-        print(f"  {line}")
-
-
-def _write_flight(recording: Recording, path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        rows = csv.writer(stream)
-        rows.writerow(["t_s", "ref_m", "height_m"])
-        for time, reference, output in zip(
-            recording.time, recording.reference, recording.output, strict=True
-        ):
-            rows.writerow([f"{time:.3f}", f"{reference:.3f}", f"{output:.5f}"])
-
-
-def _next_commands(loop: ControlLoop, window: Ends, file: Path, fit: object) -> list[str]:
-    columns = (
-        f"{shlex.quote(str(file))} --time t_s --reference ref_m --output height_m "
-        f"--kp {loop.controller.gains['Kp']:g} --sample-time {loop.sample_time:g} "
-        f"--limit {loop.limit:g} --window {window[0]:g} {window[1]:g}"
-    )
-    return [
-        f"deadtime estimate {columns} --method waveform --free delay,gain,lag",
-        f"deadtime estimate {columns} --method overshoot --map exact",
-        f"deadtime report {columns} --out {shlex.quote(str(file.with_name('again.html')))}",
-    ]

@@ -6,13 +6,12 @@ from typing import Annotated, Literal
 
 import typer
 
+from deadtime._base.validation import finite
 from deadtime._cli import options as opt
 from deadtime._cli.show import console, print_json, save_figure, stages
-from deadtime._controllers import PD, PI, PID, PV, Controller, P
-from deadtime._derivative_filter import DerivativeFilter
-from deadtime._design import Design
-from deadtime._design import design as find_design
-from deadtime._validation import finite
+from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
+from deadtime.tuning import Design
+from deadtime.tuning import design as find_design
 
 __all__ = ["design_gains"]
 
@@ -36,6 +35,7 @@ def design_gains(
     fix: Annotated[
         list[str] | None, typer.Option(help="A gain that is given, such as Kp=2; repeatable.")
     ] = None,
+    plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     gain_to: Annotated[
         float | None, typer.Option(help="Upper end of the plant's gain, if it is an interval.")
@@ -58,8 +58,11 @@ def design_gains(
     """Find the gains that are best in the worst case, within margins."""
     if choose_filter and filter is not None:
         raise ValueError("--filter gives the corner and --choose-filter asks for it: take one")
-    loop = opt.pv_loop(delay, gain, lag, sample_time, limit, filter)
-    opt.check_duration(loop if delay_to is None else loop.replace(delay=delay_to))
+    loop = opt.pv_loop(delay, gain, lag, sample_time, limit, filter, plant)
+    low = loop.specification.known_delay
+    in_plant = low - delay
+    high = low if delay_to is None else delay_to + in_plant
+    opt.check_duration(loop.replace(delay=high))
     given = {"Kp": kp, "Kv": kv, "Ki": ki, "Kd": kd}
     ranges = {name: ends for name, ends in given.items() if ends is not None}
     smooth: DerivativeFilter | Literal["auto"] | None = None
@@ -70,7 +73,7 @@ def design_gains(
         found = find_design(
             loop,
             controller=CONTROLLERS[controller],
-            delay=delay if delay_to is None else (delay, delay_to),
+            delay=low if delay_to is None else (low, high),
             gain=None if gain_to is None else (gain, gain_to),
             objective=objective,
             fixed=dict(map(_gain, fix)) if fix else None,

@@ -14,14 +14,14 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from deadtime._base.validation import positive
 from deadtime._cli import options as opt
 from deadtime._cli.show import console
-from deadtime._validation import positive
 from deadtime.links import Journal
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase, Truth
 from deadtime.links.ardrone2.emulator.motion import PlantName
 from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
-from deadtime.links.lifeline import input_ends
+from deadtime.links.parent_watch import parent_ended
 
 __all__ = ["emulators", "tell"]
 
@@ -34,7 +34,7 @@ emulators = typer.Typer(
 #: Between two looks at the drone, s: for the status line, and for the record.
 SHOWN_EVERY, RECORDED_EVERY = 0.2, 0.02
 
-COLUMNS = ("time_s", "height_m", "climb_m_s", "demand_m_s", "battery_percent", "landed")
+COLUMNS = ("time_s", "height_m", "climb_m_s", "setpoint_m_s", "battery_percent", "landed")
 
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="This port; 0: a free one.")]
 
@@ -47,7 +47,7 @@ def _group() -> None:
 @emulators.command()
 def ardrone2(
     plant: Annotated[
-        PlantName, typer.Option(help="How height answers the demanded climb.")
+        PlantName, typer.Option(help="How height answers the commanded climb.")
     ] = "kit",
     delay: Annotated[
         float | None, typer.Option(min=0.0, help="Transport delay, s. Without: the plant's.")
@@ -139,7 +139,7 @@ async def _emulate(
             live = None
             if not as_json and console.is_terminal:
                 live = stack.enter_context(Live(console=console, auto_refresh=False))
-            ended = input_ends() if until_input_ends else asyncio.Event()
+            ended = parent_ended() if until_input_ends else asyncio.Event()
             tasks: list[asyncio.Task[object]] = [asyncio.create_task(ended.wait())]
             if journal is not None:
                 tasks.append(asyncio.create_task(_keep(emulator, journal)))
@@ -201,7 +201,7 @@ def _line(truth: Truth) -> Text:
         f"{truth.time:6.1f} s",
         f"{truth.phase.value:<10}",
         f"{truth.height:6.3f} m",
-        f"{truth.climb:+6.3f} m/s of {truth.demand:+6.3f}",
+        f"{truth.climb:+6.3f} m/s of {truth.setpoint:+6.3f}",
         f"battery {truth.battery:.0f} %",
     ]
     if truth.emergency:
@@ -217,6 +217,6 @@ async def _keep(emulator: Emulator, journal: Journal) -> None:
     while True:
         truth = emulator.truth()
         landed = float(truth.phase is Phase.LANDED)
-        row = (truth.time, truth.height, truth.climb, truth.demand, truth.battery, landed)
+        row = (truth.time, truth.height, truth.climb, truth.setpoint, truth.battery, landed)
         journal.write(row)
         await asyncio.sleep(RECORDED_EVERY)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
+from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -15,16 +17,14 @@ from deadtime._cli.show import (
     print_table,
     save_figure,
 )
-from deadtime._estimation import estimate_delay
-from deadtime._estimation.compare import Comparison, compare_methods
-from deadtime._estimation.estimate import JOINT, METHODS
-from deadtime._plots import new_figure, plot_estimate, plot_fits
-from deadtime._readers import read_recording
+from deadtime.estimation import Comparison, Method, compare_methods, estimate_delay
+from deadtime.estimation._estimate import JOINT, METHODS, automatic_method
+from deadtime.estimation._plots import estimate_axes, plot_estimate, plot_fits
+from deadtime.estimation.methods._overshoot import OvershootMap
+from deadtime.estimation.methods._waveform import NoisePath
+from deadtime.recordings import read_recording
 
 __all__ = ["estimate_delays"]
-
-Map = Literal["dominant", "exact", "saturated"]
-Noise = Literal["auto", "recording", "loop"]
 
 CHOICES = ("all", "auto", *METHODS)
 
@@ -41,6 +41,7 @@ def estimate_delays(
     command: opt.Command = None,
     sample_time: opt.Sample_time = None,
     limit: opt.Limit = None,
+    plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     window: opt.Window = None,
     method: Annotated[
@@ -54,10 +55,10 @@ def estimate_delays(
         str, typer.Option(help="What is fitted, where the method can: of delay, gain, lag.")
     ] = "delay,gain",
     map: Annotated[  # noqa: A002
-        Map | None, typer.Option(help="From overshoot to delay, for overshoot.")
+        OvershootMap | None, typer.Option(help="From overshoot to delay, for overshoot.")
     ] = None,
     noise: Annotated[
-        Noise | None,
+        NoisePath | None,
         typer.Option(help="Where sensor noise goes, for waveform: round the loop or not."),
     ] = None,
     initial_output: Annotated[
@@ -72,8 +73,11 @@ def estimate_delays(
     """Estimate the delay of a loop from a recording of it, or from several together."""
     given = {"map": map, "noise": noise, "initial_output": initial_output}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    method = _chosen(method, len(files), options)
-    loops = [opt.described_loop(one, gain=gain, sample_time=sample_time, limit=limit) for one in kp]
+    name = _chosen(method, len(files), options)
+    loops = [
+        opt.described_loop(one, gain=gain, sample_time=sample_time, limit=limit, plant=plant)
+        for one in kp
+    ]
     if len(loops) not in (1, len(files)):
         raise ValueError(
             f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(loops)} of --kp: give "
@@ -83,19 +87,20 @@ def estimate_delays(
         read_recording(file, time=time, reference=reference, output=output, command=command)
         for file in files
     ]
-    if method == "all":
+    if name == "all":
         _show_all(compare_methods(flights[0], loops[0], window), plot, as_json)
         return
     fit = estimate_delay(
         flights,
         loops[0] if len(loops) == 1 else loops,
-        method=method,
+        method=_with_options(automatic_method(flights) if name == "auto" else name, options),
         free=[name.strip() for name in free.split(",") if name.strip()],
         window=window,
-        **options,
     )
     if plot is not None:
-        save_figure(plot_estimate(fit), plot)
+        figure = empty_figure(7.0 + 3.5 * len(fit.runs), 4.6)
+        plot_estimate(fit, estimate_axes(fit, figure))
+        save_figure(figure, plot)
     if as_json:
         print_json(fit.to_dict())
     else:
@@ -117,6 +122,15 @@ def _chosen(method: str | None, number: int, options: dict[str, Any]) -> str:
         option = next(iter(options)).replace("_", "-")
         raise ValueError(f"--{option} is for one method: name it by --method")
     return method
+
+
+def _with_options(name: str, options: dict[str, Any]) -> Method:
+    """The method with the options of the command line, refused where it does not have them."""
+    known = [field.name for field in fields(METHODS[name])]
+    for option in options:
+        if option not in known:
+            raise ValueError(f"--{option.replace('_', '-')} is not an option of --method {name}")
+    return METHODS[name](**options)
 
 
 def _show_all(comparison: Comparison, plot: Path | None, as_json: bool) -> None:

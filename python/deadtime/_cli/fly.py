@@ -14,16 +14,15 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
 from deadtime._cli.show import ERRORS, console, plain, print_json, print_table, stages
-from deadtime._experiment import FlightPlan, FlightStudy, fly_experiment
-from deadtime._experiment.flights import FlownSteps
-from deadtime._experiment.fly import Connect
-from deadtime._experiment.learn import COLUMNS
-from deadtime._flight_page import PARTS, write_flight_page
-from deadtime._plots import check_matplotlib
+from deadtime.flights import FlightPlan, FlightStudy, FlownSteps, fly_experiment
+from deadtime.flights._fly import Connect
+from deadtime.flights._learn import COLUMNS
+from deadtime.flights._page import PARTS, write_flight_page
 from deadtime.links import Limits, Vehicle
 from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2

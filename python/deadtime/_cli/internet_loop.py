@@ -10,6 +10,7 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -18,9 +19,9 @@ from deadtime._cli.show import (
     save_figure,
     stages,
 )
-from deadtime._internet_loop import GAINS, run_internet_loop
-from deadtime._internet_plots import plot_internet_loop
-from deadtime._internet_result import InternetLoop, InternetRun, Spread
+from deadtime.internet._loop import GAINS, run_internet_loop
+from deadtime.internet._plots import plot_internet_loop
+from deadtime.internet._result import InternetLoop, InternetRun, Spread
 from deadtime.links.udp import Trial, network_of, policy_of
 from deadtime.paper import PRINTED_OVERSHOOTS, delay_by_dominant_root
 
@@ -96,8 +97,8 @@ def run_loop(
     gains = tuple(gain) if gain else GAINS
     trial = Trial(
         gain=gains[0],
-        there=way,
-        back=way,
+        forward_path=way,
+        return_path=way,
         seed=seed,
         sample_time=sample_time,
         duration=duration,
@@ -124,7 +125,9 @@ def run_loop(
         for one, percent in PRINTED_OVERSHOOTS.items()
     }
     if plot is not None:
-        save_figure(plot_internet_loop(found, printed), plot)
+        figure, axes = new_figure(10.0, 4.2, columns=2)
+        plot_internet_loop(found, printed, axes)
+        save_figure(figure, plot)
     if as_json:
         print_json({**found.to_dict(), "table_1": printed})
         return

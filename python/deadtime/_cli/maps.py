@@ -10,6 +10,7 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     console,
@@ -18,10 +19,9 @@ from deadtime._cli.show import (
     print_table,
     save_figure,
 )
-from deadtime._crossings import Crossings, crossings, delay_margin
-from deadtime._loop import ControlLoop
-from deadtime._plots import new_figure
-from deadtime._stability import stability_map
+from deadtime.loops import ControlLoop
+from deadtime.roots import Crossings, crossings, delay_margin
+from deadtime.stability import stability_map
 
 __all__ = ["map_gains"]
 
@@ -37,6 +37,7 @@ def map_gains(
     delay: opt.Delay,
     kp: Annotated[Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
     kv: Annotated[Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
+    plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     lag: opt.Lag = 0.0,
     sample_time: opt.Sample_time = None,
@@ -65,7 +66,7 @@ def map_gains(
     as_json: opt.As_json = False,
 ) -> None:
     """Map which gains of a PV controller are stable, with the boundary and the best of them."""
-    loop = opt.pv_loop(delay, gain, lag, sample_time, None, filter)
+    loop = opt.pv_loop(delay, gain, lag, sample_time, None, filter, plant)
     with counted("mapping", shape[0] * shape[1], quiet=as_json) as progress:
         chart = stability_map(
             loop,

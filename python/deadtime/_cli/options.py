@@ -6,14 +6,21 @@ import math
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
+from deadtime._base.validation import finite
+from deadtime._cli.plants import plant_from
 from deadtime._cli.show import check_picture
-from deadtime._controllers import PV, Controller, P
-from deadtime._derivative_filter import DerivativeFilter
-from deadtime._loop import ControlLoop
-from deadtime._plants import Integrator
-from deadtime._validation import finite
+from deadtime.loops import (
+    PV,
+    Controller,
+    ControlLoop,
+    DerivativeFilter,
+    Integrator,
+    P,
+    RationalPlant,
+)
 
 __all__ = [
     "As_json",
@@ -28,6 +35,7 @@ __all__ = [
     "Lag",
     "Limit",
     "Output",
+    "Plant",
     "Plot",
     "Reference",
     "Sample_time",
@@ -61,7 +69,14 @@ Window = Annotated[
 Kp = Annotated[float, typer.Option(help="Proportional gain.", show_default=False)]
 Kv = Annotated[float, typer.Option(help="Velocity gain.")]
 Delay = Annotated[float, typer.Option(help="Delay of the loop, s.", show_default=False)]
-Gain = Annotated[float, typer.Option(help="Gain of the integrating plant.")]
+Gain = Annotated[float, typer.Option(help="Gain of the integrating plant, a factor on --plant.")]
+Plant = Annotated[
+    str | None,
+    typer.Option(
+        help="Plant in place of the integrator, such as '0.9/(s*(0.1*s+1))'; delay(T) in it is a "
+        "delay of T s, added to that of the loop."
+    ),
+]
 Lag = Annotated[float, typer.Option(help="Lag of the plant, s.")]
 Sample_time = Annotated[
     float | None, typer.Option(help="Time between commands, s; each is held. Without: continuous.")
@@ -94,20 +109,24 @@ def described_loop(
     sample_time: float | None = None,
     limit: float | None = None,
     corner: float | None = None,
+    plant: str | None = None,
 ) -> ControlLoop:
-    """The loop that the options describe: an integrator under P or PV control."""
+    """The loop that the options describe: an integrator or `plant` under P or PV control."""
     for name, value in {"kp": kp, "kv": kv, "gain": gain, "lag": lag}.items():
         if not math.isfinite(value):
             raise ValueError(f"--{name} is {value}: give a finite number")
     smoothing = None if corner is None else DerivativeFilter(omega=corner)
     controller: Controller = P(Kp=kp) if kv == 0.0 else PV(Kp=kp, Kv=kv, filter=smoothing)
-    return ControlLoop(
-        Integrator(gain=gain, lag=lag),
+    if plant is not None and lag != 0.0:
+        raise ValueError("--lag is that of the integrating plant: write it into --plant")
+    loop = ControlLoop(
+        Integrator(gain=gain, lag=lag) if plant is None else plant_from(plant),
         controller,
         delay=delay,
         sample_time=sample_time,
         limit=limit,
     )
+    return loop if plant is None else loop.replace(gain=gain)
 
 
 def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
@@ -119,6 +138,9 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
     times = {f"--{name.replace('_', '-')}": numbers.get(name, 0.0) for name in SHORT_TIMES}
     if "omega" in numbers:
         times["one over --filter"] = 1.0 / numbers["omega"]
+    if isinstance(loop.plant, RationalPlant):
+        fastest = float(np.abs(np.roots(loop.plant.den)).max(initial=0.0))
+        times["one over the fastest pole of --plant"] = 1.0 / fastest if fastest else 0.0
     if duration is None:
         duration = 10.0 * max(times.values())
     finite("--duration", duration)
@@ -137,6 +159,7 @@ def pv_loop(
     sample_time: float | None,
     limit: float | None,
     corner: float | None,
+    plant: str | None = None,
 ) -> ControlLoop:
     """The loop of a PV controller with any gains: they are to be varied."""
     return described_loop(
@@ -148,4 +171,5 @@ def pv_loop(
         sample_time=sample_time,
         limit=limit,
         corner=corner,
+        plant=plant,
     )

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Timer
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 
 __all__ = ["own_emulator"]
 

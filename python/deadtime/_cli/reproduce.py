@@ -9,11 +9,11 @@ import typer
 from rich import box
 from rich.table import Table
 
+from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
 from deadtime._cli.show import console, print_json, print_table, save_figure, stages
-from deadtime._paper_page import write_reproduction
-from deadtime._plots import check_matplotlib
 from deadtime.paper import PARTS, TITLES, Grid, Part, Verdict, reproduce
+from deadtime.paper._page import write_reproduction
 
 __all__ = ["reproduce_paper"]
 
@@ -74,7 +74,7 @@ def _show(title: str, part: Part) -> None:
         for head in ("where", "what", "printed", "ours", "verdict"):
             table.add_column(head, justify="right" if head in ("printed", "ours") else "left")
         for one in part.comparisons:
-            verdict = f"[{STYLES[one.verdict]}]{one.told}[/]"
+            verdict = f"[{STYLES[one.verdict]}]{one.outcome}[/]"
             table.add_row(one.where, one.quantity, one.printed, one.shown, verdict)
         print_table(table)
     for grid in part.grids():

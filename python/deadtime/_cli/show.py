@@ -14,9 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from deadtime._base.drawing import check_matplotlib
 from deadtime._cli.readable import shows
-from deadtime._estimation.compare import COLUMNS, Comparison, truth_row
-from deadtime._plots import check_matplotlib
+from deadtime.estimation import Comparison
+from deadtime.estimation._compare import COLUMNS, truth_row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from deadtime._loop import ControlLoop
-from deadtime._rootset import RootSet
+from deadtime.loops import ControlLoop
+from deadtime.roots import RootSet
 
 __all__ = ["listed", "verdict"]
 

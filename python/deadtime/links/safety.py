@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import Self, SupportsFloat
 
-from deadtime._errors import FlightAbortedError
-from deadtime._validation import finite, positive
+from deadtime._base.errors import FlightAbortedError
+from deadtime._base.validation import finite, positive
 from deadtime.links.vehicle import VehicleState
 
 __all__ = ["Limits", "UnitCommand", "Watch", "largest_gain"]
@@ -145,6 +145,25 @@ def largest_gain(delay: float, gain: float = 1.0) -> float:
     return math.pi / (4.0 * positive("delay", delay) * positive("gain", gain))
 
 
+#: Change of the height that is accepted at any speed, m: noise of the sensor, a bump on the ground.
+BUMP = 0.1
+
+
+def jumps(before: float, height: float, passed: float, max_jump: float) -> bool:
+    """Whether a measured height changes faster than a vehicle can; NaN does.
+
+    Parameters
+    ----------
+    before, height : float
+        The last two measured heights, m.
+    passed : float
+        Time between them, s, not negative.
+    max_jump : float
+        Fastest change that is accepted, m/s.
+    """
+    return not abs(height - before) <= max_jump * passed + BUMP
+
+
 #: Distance from the reference at which a height that does not change at all is no rest, m.
 AWAY = 0.05
 
@@ -162,7 +181,7 @@ class Watch:
     >>> state = VehicleState(time=0.0, height=1.0, flying=True, landed=False, sequence=1, battery=9)
     >>> watch.check(state, now=0.0)
     Traceback (most recent call last):
-    deadtime._errors.FlightAbortedError: the battery is at 9 %, below 20 %
+    deadtime._base.errors.FlightAbortedError: the battery is at 9 %, below 20 %
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -252,8 +271,8 @@ class Watch:
         passed = state.time - last.time
         if state.vehicle_time is not None and last.vehicle_time is not None:
             passed = max(passed, state.vehicle_time - last.vehicle_time)
-        # A millimetre is the resolution of the height; messages may arrive in one burst.
-        if abs(state.height - last.height) > self.limits.max_jump * max(passed, 0.0) + 0.1:
+        passed = max(passed, 0.0)  # messages may arrive in one burst
+        if jumps(last.height, state.height, passed, self.limits.max_jump):
             return (
                 f"the height jumps from {last.height:.2f} to {state.height:.2f} m within "
                 f"{1e3 * passed:.0f} ms, faster than {self.limits.max_jump:g} m/s"

@@ -29,7 +29,7 @@ class VehicleState:
         The vehicle's own clock at the message, s.
     climb : float, optional
         Vertical speed, m/s, up positive.
-    climb_demand : float, optional
+    climb_setpoint : float, optional
         The vertical speed that the vehicle is following, m/s, up positive: its echo of the
         commands that have reached it.
     roll, pitch : float
@@ -51,7 +51,7 @@ class VehicleState:
     sequence: int
     vehicle_time: float | None = None
     climb: float | None = None
-    climb_demand: float | None = None
+    climb_setpoint: float | None = None
     roll: float = 0.0
     pitch: float = 0.0
     battery: float | None = None

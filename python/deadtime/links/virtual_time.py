@@ -16,7 +16,7 @@ from collections.abc import Callable, Coroutine
 from contextvars import Context
 from typing import Any, TypeVar, cast
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 
 __all__ = ["VirtualTimeLoop", "run"]
 

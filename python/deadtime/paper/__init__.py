@@ -8,10 +8,11 @@ data; `reproduce` runs them all, and ``deadtime reproduce`` prints them and writ
 This namespace is imported on demand: ``from deadtime import paper``.
 """
 
+from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison, Verdict, agreeing_digits, printed_digits
 from deadtime.paper.figure2 import Figure2, Scenario, Trial, figure2
 from deadtime.paper.figure3 import Figure3, coarse_limit, figure3
-from deadtime.paper.figure10 import PAPER_FILTER, Curve, Figure10, figure10, velocity_loop
+from deadtime.paper.figure10 import Curve, Figure10, figure10, velocity_loop
 from deadtime.paper.figure11 import Figure11, SettlingTimes, figure11
 from deadtime.paper.figures6and7 import Figure6, Figure7, Flight, figure6, figure7
 from deadtime.paper.figures8and9 import Figure8, Figure9, figure8, figure9

@@ -128,7 +128,7 @@ class Comparison:
     --------
     >>> from deadtime.paper import Comparison
     >>> found = Comparison.of_number("Fig 10", "rightmost root", "-3.323", -3.31678, "Lambert W")
-    >>> found.told
+    >>> found.outcome
     'to 3 of 4 digits'
     """
 
@@ -144,7 +144,7 @@ class Comparison:
     details: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def told(self) -> str:
+    def outcome(self) -> str:
         """The verdict in words."""
         if self.digits is None:
             return self.verdict.value
@@ -218,11 +218,11 @@ class Comparison:
         parts = list(zip(printed, (root.real, root.imag), strict=True))
         digits = min((agreeing_digits(*part), printed_digits(part[0])) for part in parts)
         shown = " ± ".join(_shown(*part) for part in parts)
-        told = " ± ".join(printed)
+        shown_printed = " ± ".join(printed)
         return cls(
             where,
             quantity,
-            f"{told}i",
+            f"{shown_printed}i",
             root,
             f"{shown}i",
             model,

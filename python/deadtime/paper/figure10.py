@@ -13,20 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 import deadtime as dtm
+from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid
 
-__all__ = ["PAPER_FILTER", "Curve", "Figure10", "figure10", "velocity_loop"]
+__all__ = ["Curve", "Figure10", "figure10", "velocity_loop"]
 
 #: Proportional gain of the design, 1/s.
 GAIN = 2.0
-
-#: The filter of the paper's velocity.
-PAPER_FILTER = dtm.DerivativeFilter(omega=38.0, damping=1.0)
 
 #: Velocity gains of the figure, and those of a curve.
 GRID, FINE = np.round(np.arange(0.1, 1.0, 0.1), 1), np.linspace(0.005, 1.0, 200)
@@ -161,6 +158,8 @@ def figure10() -> Figure10:
 
 
 def _curve(loop: dtm.ControlLoop) -> Curve:
+    from scipy.optimize import minimize_scalar
+
     def abscissa(gain: float) -> float:
         return loop.replace(Kv=float(gain)).spectral_abscissa()
 
@@ -182,6 +181,7 @@ def _rightmost(loop: dtm.ControlLoop) -> complex:
 
 def _turns_complex() -> float:
     """Gain at which the rightmost real root and the rightmost pair lie equally far right."""
+    from scipy.optimize import brentq
 
     def lead(gain: float) -> float:
         found = (
@@ -273,6 +273,7 @@ def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comp
 
 def _delay_of_marker() -> float:
     """The delay at which the rightmost root is that of the figure's marker, s."""
+    from scipy.optimize import brentq
 
     def off(delay: float) -> float:
         loop = velocity_loop(0.3, filtered=False).replace(delay=delay)

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import deadtime as dtm
+from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
-from deadtime.paper.figure10 import PAPER_FILTER, velocity_loop
+from deadtime.paper.figure10 import velocity_loop
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid
+from deadtime.systems import Response
 
 __all__ = ["Figure11", "SettlingTimes", "figure11"]
 
@@ -76,9 +77,9 @@ class Figure11:
         The printed numbers beside ours.
     """
 
-    responses: dict[float, dtm.Response]
+    responses: dict[float, Response]
     settling: tuple[SettlingTimes, ...]
-    unlimited: dtm.Response
+    unlimited: Response
     cutoffs: dict[str, float]
     comparisons: tuple[Comparison, ...]
 
@@ -141,7 +142,7 @@ def figure11() -> Figure11:
     )
 
 
-def _settling(gain: float, response: dtm.Response) -> SettlingTimes:
+def _settling(gain: float, response: Response) -> SettlingTimes:
     info = response.info(settling=BAND)
     wider = response.info(settling=WIDER)["settling_time"]
     return SettlingTimes(
@@ -169,7 +170,7 @@ def _cutoffs() -> dict[str, float]:
 
 
 def _compared(
-    settling: tuple[SettlingTimes, ...], unlimited: dtm.Response, cutoffs: dict[str, float]
+    settling: tuple[SettlingTimes, ...], unlimited: Response, cutoffs: dict[str, float]
 ) -> tuple[Comparison, ...]:
     info = unlimited.info(settling=BAND)
     damping, corner = PAPER_FILTER.damping, PAPER_FILTER.omega

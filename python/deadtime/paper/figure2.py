@@ -18,6 +18,7 @@ from deadtime.paper.internet_loop import internet_loop
 from deadtime.paper.part import Grid
 from deadtime.paper.table1 import PRINTED_OVERSHOOTS
 from deadtime.paper.time_scales import Explanation, Stretch, explain, stretch, time_scale
+from deadtime.systems import Response
 
 __all__ = ["Figure2", "Scenario", "Trial", "figure2"]
 
@@ -98,7 +99,7 @@ class Figure2:
         None: the figure prints no numbers.
     """
 
-    simulated: dict[float, dtm.Response]
+    simulated: dict[float, Response]
     trials: tuple[Trial, ...]
     stretches: tuple[Stretch, ...]
     explanations: tuple[Explanation, ...]

@@ -15,6 +15,7 @@ import numpy as np
 import deadtime as dtm
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.part import Grid
+from deadtime.systems import Response
 
 __all__ = ["Figure3", "coarse_limit", "figure3"]
 
@@ -53,7 +54,7 @@ class Figure3:
         The printed numbers beside ours.
     """
 
-    responses: dict[float, dtm.Response]
+    responses: dict[float, Response]
     rightmost: dict[float, complex]
     limit: float
     held_limit: float

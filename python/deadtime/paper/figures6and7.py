@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import deadtime as dtm
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.inversion import delay_by_dominant_root, delay_by_simulation
 from deadtime.paper.part import Grid
 from deadtime.paper.table2 import PRINTED, SAMPLE_TIME, altitude_loop, simulink
+from deadtime.systems import Response
 
 __all__ = ["Figure6", "Figure7", "Flight", "figure6", "figure7"]
 
@@ -38,8 +38,8 @@ class Figure6:
         The printed numbers beside ours.
     """
 
-    exact: dict[float, dtm.Response]
-    coarse: dict[float, dtm.Response]
+    exact: dict[float, Response]
+    coarse: dict[float, Response]
     comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
@@ -120,7 +120,7 @@ class Figure7:
     """
 
     flights: tuple[Flight, ...]
-    response: dtm.Response
+    response: Response
     comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:

@@ -15,6 +15,7 @@ from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid
 from deadtime.paper.table2 import SAMPLE_TIME, altitude_loop
+from deadtime.systems import Response
 
 __all__ = ["Figure8", "Figure9", "figure8", "figure9"]
 
@@ -40,7 +41,7 @@ class Figure8:
         The printed limit beside ours.
     """
 
-    responses: dict[float, dtm.Response]
+    responses: dict[float, Response]
     limit: float
     held_limit: float
     comparisons: tuple[Comparison, ...]

@@ -67,10 +67,11 @@ def internet_loop(
 
     >>> import deadtime as dtm
     >>> from deadtime import paper
+    >>> from deadtime.estimation import Overshoot
     >>> trial = paper.internet_loop(8.0, delay=0.1, sample_time=0.02)
     >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=8.0), sample_time=0.02)
     >>> for name in ("dominant", "saturated"):
-    ...     print(round(dtm.estimate_delay(trial, loop, method="overshoot", map=name).delay, 4))
+    ...     print(round(dtm.estimate_delay(trial, loop, method=Overshoot(map=name)).delay, 4))
     0.1128
     0.1
     """

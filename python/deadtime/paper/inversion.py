@@ -7,8 +7,6 @@ overshoots by so much, here with exact simulations, so that nothing is left of a
 
 from __future__ import annotations
 
-from scipy.optimize import brentq
-
 import deadtime as dtm
 
 __all__ = ["damping_of", "delay_by_dominant_root", "delay_by_simulation", "overshoot"]
@@ -53,6 +51,8 @@ def delay_by_dominant_root(gain: float, part: float) -> float:
     >>> round(delay_by_dominant_root(1.31, 0.0230), 4)
     0.3598
     """
+    from scipy.optimize import brentq
+
     wanted = dtm.damping_ratio(part)
 
     def excess(delay: float) -> float:
@@ -100,6 +100,8 @@ def delay_by_simulation(loop: dtm.ControlLoop, part: float) -> float:
     >>> round(delay_by_simulation(free, 0.0230), 5), round(delay_by_simulation(limited, 0.0230), 5)
     (0.35874, 0.36864)
     """
+    from scipy.optimize import brentq
+
     gain = loop.parameters["gain"] * loop.parameters["Kp"]
 
     def excess(delay: float) -> float:

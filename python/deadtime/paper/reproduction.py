@@ -136,7 +136,7 @@ class Reproduction:
         ImportError
             If matplotlib is not installed.
         """
-        from deadtime._paper_plots import draw
+        from deadtime.paper._plots import draw
 
         return {name: figure for name, part in self.parts.items() if (figure := draw(part))}
 

@@ -14,6 +14,7 @@ import deadtime as dtm
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.inversion import overshoot
 from deadtime.paper.part import Grid
+from deadtime.systems import Response
 
 __all__ = ["SAMPLE_TIME", "Table2", "Table2Row", "altitude_loop", "simulink", "table2"]
 
@@ -57,7 +58,7 @@ def altitude_loop(delay: float, Kp: float = 1.31, limit: float | None = 1.0) -> 
     )
 
 
-def simulink(delay: float, end: float = 10.0) -> dtm.Response:
+def simulink(delay: float, end: float = 10.0) -> Response:
     """Run the coarse block diagram that gives the printed digits of Table 2.
 
     Fixed steps of one sample (0.065 s) of the third-order formula, a transport delay in the

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 import deadtime as dtm
 from deadtime.paper.table1 import PRINTED_OVERSHOOTS
@@ -151,6 +150,8 @@ def _with_overshoot(
     gain: float, overshoot: float, hold: float, lag: float
 ) -> dtm.ControlLoop | None:
     """The loop with a delay that gives it this overshoot, if there is one."""
+    from scipy.optimize import brentq
+
     loop = dtm.ControlLoop(
         dtm.Integrator(lag=lag), dtm.P(Kp=gain), delay=0.1, sample_time=hold or None
     )

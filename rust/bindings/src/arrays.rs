@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use deadtime::{Error, memory};
 use numpy::ndarray::ArrayViewD;
-use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{Element, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::errors::to_python;
@@ -29,6 +29,12 @@ pub(crate) fn owned<T: Element + Copy>(array: &PyReadonlyArrayDyn<'_, T>) -> PyR
         Cow::Borrowed(slice) => converted(memory::copied(COPY, slice)),
         Cow::Owned(copy) => Ok(copy),
     }
+}
+
+/// The rows of a matrix.
+pub(crate) fn rows(matrix: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
+    let rows = matrix.as_array();
+    rows.rows().into_iter().map(|row| row.to_vec()).collect()
 }
 
 /// One column of a list of results.

@@ -1,6 +1,6 @@
 //! The one table from the core's errors to Python's exceptions.
 //!
-//! The exception classes themselves are Python (`deadtime._errors`), so that they carry
+//! The exception classes themselves are Python (`deadtime._base.errors`), so that they carry
 //! docstrings and attributes like any other class of the package.
 
 use deadtime::Error;
@@ -41,13 +41,13 @@ pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
     }
 }
 
-/// An instance of a class of `deadtime._errors`.
+/// An instance of a class of `deadtime._base.errors`.
 pub(crate) fn own<'py, A>(py: Python<'py>, class: &str, arguments: A) -> PyErr
 where
     A: pyo3::call::PyCallArgs<'py>,
 {
     let instance = py
-        .import("deadtime._errors")
+        .import("deadtime._base.errors")
         .and_then(|module| module.getattr(class))
         .and_then(|class| class.call1(arguments));
     match instance {

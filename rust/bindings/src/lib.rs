@@ -2,6 +2,7 @@
 
 mod arrays;
 mod boxes;
+mod by_name;
 mod dde;
 mod errors;
 mod fixed_step;
@@ -9,6 +10,7 @@ mod frequency;
 mod matrix;
 mod pointers;
 mod quasipoly;
+mod roots;
 mod runtime;
 mod solver;
 mod special;
@@ -24,7 +26,10 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _deadtime {
     #[pymodule_export]
-    use super::boxes::{largest_stable_box, proved_boxes, robust_map, stability_radius};
+    use super::boxes::{
+        ProvedBoxes, StabilityRadius, largest_stable_box, proved_boxes, robust_map,
+        stability_radius,
+    };
     #[pymodule_export]
     use super::dde::{PyLinearLoop, on_samples, sampled_abscissa_grid};
     #[pymodule_export]
@@ -37,7 +42,9 @@ mod _deadtime {
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]
-    use super::quasipoly::QuasiPolynomial;
+    use super::quasipoly::{Expansion, QuasiPolynomial};
+    #[pymodule_export]
+    use super::roots::{Certificate, Contour, Monotone, RootSet, Segment, Sensitivity};
     #[pymodule_export]
     use super::runtime::{spin, thread_count};
     #[pymodule_export]
@@ -45,7 +52,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]
-    use super::stability::PyFamily;
+    use super::stability::{MapBoundary, MapCells, PyFamily};
     #[pymodule_export]
     use super::sweeps::{loop_sensitivities, sweep_figures, sweep_responses};
     #[pymodule_export]

@@ -6,8 +6,9 @@ use deadtime::roots::matrix::{self, CharacteristicMatrix as Core};
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 
+use crate::arrays::rows;
 use crate::errors::to_python;
-use crate::quasipoly::{Listed, listed};
+use crate::roots::RootSet;
 use crate::runtime::run;
 
 type ByDelay<'py> = Vec<(f64, PyReadonlyArray2<'py, f64>)>;
@@ -16,11 +17,6 @@ type ByDelay<'py> = Vec<(f64, PyReadonlyArray2<'py, f64>)>;
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct CharacteristicMatrix {
     core: Core,
-}
-
-fn rows(matrix: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
-    let rows = matrix.as_array();
-    rows.rows().into_iter().map(|row| row.to_vec()).collect()
 }
 
 fn by_delay(group: &ByDelay<'_>) -> Vec<(f64, Vec<Vec<f64>>)> {
@@ -54,18 +50,18 @@ impl CharacteristicMatrix {
         })
     }
 
-    fn roots<'py>(&self, py: Python<'py>, re: (f64, f64), im: (f64, f64)) -> PyResult<Listed<'py>> {
+    fn roots(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<RootSet> {
         let set = run(py, None, None, |task: &Task| {
             matrix::roots(&self.core, &Region { re, im }, task)
         })?;
-        Ok(listed(py, set))
+        RootSet::new(py, set)
     }
 
-    fn rightmost<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Listed<'py>> {
+    fn rightmost(&self, py: Python<'_>, n: usize) -> PyResult<RootSet> {
         let set = run(py, None, None, |task: &Task| {
             matrix::rightmost(&self.core, n, task)
         })?;
-        Ok(listed(py, set))
+        RootSet::new(py, set)
     }
 
     fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {

@@ -7,77 +7,24 @@ use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use crate::arrays::{in_order, owned};
+use crate::arrays::{in_order, owned, rows};
 use crate::errors::to_python;
+use crate::roots::{Certificate, RootSet, Sensitivity};
 use crate::runtime::{run, run_here};
 
 /// Fewer values than this are computed on the calling thread.
 const FEW_VALUES: usize = 2048;
 
-/// Roots, multiplicities, radii, resolved, counted, re, im.
-pub(crate) type Listed<'py> = (
-    Bound<'py, PyArray1<Complex64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<bool>>,
-    u64,
-    (f64, f64),
-    (f64, f64),
-);
-
 type Range = (f64, f64);
+type Points<'py> = PyReadonlyArrayDyn<'py, Complex64>;
+type Values<'py> = Bound<'py, PyArray1<Complex64>>;
 
-/// Start, end, middle, reference, value, error, slope.
-type Segment = (Complex64, Complex64, Complex64, usize, Complex64, f64, f64);
-
-/// Start, end, middle, reference, slope, error, bend.
-type Monotone = (f64, f64, f64, usize, f64, f64, f64);
-
-/// One of the two.
-type RealPart = (Option<Segment>, Option<Monotone>);
-
-/// Real parts, imaginary parts, symmetric, count, segments.
-type Contour = (Range, Range, bool, u64, Vec<Segment>);
-
-/// Count, scale, zeros, beyond, closed, contours, real.
-type Proof = (
-    u64,
-    i32,
-    u32,
-    Option<(usize, f64)>,
-    (Range, Range),
-    Vec<Contour>,
-    Vec<RealPart>,
-);
-
-fn segment(part: &roots::Segment) -> Segment {
-    (
-        part.start,
-        part.end,
-        part.middle,
-        part.reference,
-        part.value,
-        part.error,
-        part.slope,
-    )
-}
-
-fn real_part(part: &roots::RealPart) -> RealPart {
-    match *part {
-        roots::RealPart::Empty(ref empty) => (Some(segment(empty)), None),
-        roots::RealPart::Monotone {
-            start,
-            end,
-            middle,
-            reference,
-            slope,
-            error,
-            bend,
-        } => (
-            None,
-            Some((start, end, middle, reference, slope, error, bend)),
-        ),
-    }
+/// Taylor coefficients at a place, with bounds on their errors.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct Expansion {
+    coefficients: Py<PyArray1<Complex64>>,
+    errors: Py<PyArray1<f64>>,
+    delay: f64,
 }
 
 /// A quasi-polynomial of the core.
@@ -86,7 +33,7 @@ pub(crate) struct QuasiPolynomial {
     pub(crate) core: Core,
 }
 
-fn wrapped(py: Python<'_>, result: Result<Core, Error>) -> PyResult<QuasiPolynomial> {
+pub(crate) fn wrapped(py: Python<'_>, result: Result<Core, Error>) -> PyResult<QuasiPolynomial> {
     result
         .map(|core| QuasiPolynomial { core })
         .map_err(|error| to_python(py, error))
@@ -100,9 +47,7 @@ impl QuasiPolynomial {
         coefficients: PyReadonlyArray2<'_, f64>,
         delays: PyReadonlyArrayDyn<'_, f64>,
     ) -> PyResult<Self> {
-        let rows = coefficients.as_array();
-        let rows = rows.rows().into_iter().map(|row| row.to_vec()).collect();
-        wrapped(py, Core::new(rows, owned(&delays)?))
+        wrapped(py, Core::new(rows(&coefficients), owned(&delays)?))
     }
 
     /// Ascending coefficients, one row for each delay.
@@ -187,19 +132,19 @@ impl QuasiPolynomial {
     }
 
     /// Values at all points, in C order.
-    fn values<'py>(
+    fn values<'py>(&self, py: Python<'py>, points: Points<'py>) -> PyResult<Values<'py>> {
+        at_all(py, &points, |points, task| self.core.values(points, task))
+    }
+
+    /// h'/h at all points, in C order.
+    fn logarithmic_derivatives<'py>(
         &self,
         py: Python<'py>,
-        points: PyReadonlyArrayDyn<'py, Complex64>,
-    ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
-        let points = in_order(&points)?;
-        let work = |task: &Task| self.core.values(&points, task);
-        let values = if points.len() < FEW_VALUES {
-            run_here(py, work)?
-        } else {
-            run(py, None, None, work)?
-        };
-        Ok(values.into_pyarray(py))
+        points: Points<'py>,
+    ) -> PyResult<Values<'py>> {
+        at_all(py, &points, |points, task| {
+            self.core.logarithmic_derivatives(points, task)
+        })
     }
 
     fn count(&self, py: Python<'_>, re: Range, im: Range, edge: &str) -> PyResult<u64> {
@@ -209,52 +154,28 @@ impl QuasiPolynomial {
         })
     }
 
-    fn certify(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<Proof> {
+    fn certify(&self, py: Python<'_>, re: Range, im: Range) -> PyResult<Certificate> {
         let proof = run(py, None, None, |task| {
             roots::certify(&self.core, &Region { re, im }, task)
         })?;
-        let contours = proof.contours.into_iter().map(|contour| {
-            let segments = contour.segments.iter().map(segment).collect();
-            (
-                contour.re,
-                contour.im,
-                contour.symmetric,
-                contour.count,
-                segments,
-            )
-        });
-        Ok((
-            proof.count,
-            proof.scale,
-            proof.zeros,
-            proof.beyond,
-            (proof.closed.re, proof.closed.im),
-            contours.collect(),
-            proof.real.iter().map(real_part).collect(),
-        ))
+        Certificate::new(py, &proof)
     }
 
     fn is_stable(&self, py: Python<'_>, strong: bool) -> PyResult<bool> {
         run_here(py, |task| roots::is_stable(&self.core, strong, task))
     }
 
-    fn roots<'py>(
-        &self,
-        py: Python<'py>,
-        re: Range,
-        im: Range,
-        edge: &str,
-    ) -> PyResult<Listed<'py>> {
+    fn roots(&self, py: Python<'_>, re: Range, im: Range, edge: &str) -> PyResult<RootSet> {
         let edge = side(edge)?;
         let set = run_here(py, |task| {
             roots::roots_with_edge(&self.core, &Region { re, im }, edge, task)
         })?;
-        Ok(listed(py, set))
+        RootSet::new(py, set)
     }
 
-    fn rightmost<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Listed<'py>> {
+    fn rightmost(&self, py: Python<'_>, n: usize) -> PyResult<RootSet> {
         let set = run_here(py, |task| roots::rightmost(&self.core, n, task))?;
-        Ok(listed(py, set))
+        RootSet::new(py, set)
     }
 
     fn spectral_abscissa(&self, py: Python<'_>, strong: bool) -> PyResult<f64> {
@@ -264,18 +185,18 @@ impl QuasiPolynomial {
     }
 
     /// A root, and its derivatives by the coefficients of s^power e^(-s delay).
-    fn sensitivity<'py>(
+    fn sensitivity(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         root: Complex64,
         delays: Vec<f64>,
         powers: Vec<u32>,
-    ) -> PyResult<(Complex64, Bound<'py, PyArray1<Complex64>>)> {
+    ) -> PyResult<Sensitivity> {
         let terms: Vec<(f64, u32)> = delays.into_iter().zip(powers).collect();
         let (root, slopes) = run(py, None, None, |task| {
             roots::sensitivity(&self.core, root, &terms, task)
         })?;
-        Ok((root, slopes.into_pyarray(py)))
+        Ok(Sensitivity::new(py, root, slopes))
     }
 
     fn chain_abscissa(&self) -> f64 {
@@ -291,40 +212,31 @@ impl QuasiPolynomial {
         roots::base_delay(&self.core)
     }
 
-    /// Taylor coefficients of h e^(s delay) at `s`, bounds on their errors, and the delay.
-    fn expansion<'py>(
-        &self,
-        py: Python<'py>,
-        s: Complex64,
-        order: usize,
-    ) -> (
-        Bound<'py, PyArray1<Complex64>>,
-        Bound<'py, PyArray1<f64>>,
-        f64,
-    ) {
+    /// Taylor coefficients of h e^(s delay) at `s`.
+    fn expansion(&self, py: Python<'_>, s: Complex64, order: usize) -> Expansion {
         let found = self.core.expansion(s, order);
-        (
-            found.coefficients.into_pyarray(py),
-            found.errors.into_pyarray(py),
-            found.delay,
-        )
+        Expansion {
+            coefficients: found.coefficients.into_pyarray(py).unbind(),
+            errors: found.errors.into_pyarray(py).unbind(),
+            delay: found.delay,
+        }
     }
+}
 
-    /// h'/h at all points, in C order.
-    fn logarithmic_derivatives<'py>(
-        &self,
-        py: Python<'py>,
-        points: PyReadonlyArrayDyn<'py, Complex64>,
-    ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
-        let points = in_order(&points)?;
-        let work = |task: &Task| self.core.logarithmic_derivatives(&points, task);
-        let values = if points.len() < FEW_VALUES {
-            run_here(py, work)?
-        } else {
-            run(py, None, None, work)?
-        };
-        Ok(values.into_pyarray(py))
-    }
+/// What `work` makes of all points, in C order: a few of them on the calling thread.
+fn at_all<'py>(
+    py: Python<'py>,
+    points: &Points<'py>,
+    work: impl FnOnce(&[Complex64], &Task) -> Result<Vec<Complex64>, Error> + Send,
+) -> PyResult<Values<'py>> {
+    let points = in_order(points)?;
+    let work = |task: &Task| work(&points, task);
+    let values = if points.len() < FEW_VALUES {
+        run_here(py, work)?
+    } else {
+        run(py, None, None, work)?
+    };
+    Ok(values.into_pyarray(py))
 }
 
 /// To which side roots on an edge belong.
@@ -337,20 +249,4 @@ fn side(edge: &str) -> PyResult<Edge> {
             "edge={other:?}: choose \"error\", \"inside\" or \"outside\""
         ))),
     }
-}
-
-pub(crate) fn listed(py: Python<'_>, set: roots::RootSet) -> Listed<'_> {
-    (
-        set.roots.into_pyarray(py),
-        set.multiplicities
-            .into_iter()
-            .map(i64::from)
-            .collect::<Vec<_>>()
-            .into_pyarray(py),
-        set.radii.into_pyarray(py),
-        set.resolved.into_pyarray(py),
-        set.counted,
-        set.region.re,
-        set.region.im,
-    )
 }

@@ -1,29 +1,63 @@
-//! Bindings of `deadtime::stability`.
+//! Bindings of `deadtime::stability`: families and maps.
 
-use deadtime::stability::{self, Affine, Axis, Damping, Demand, Family, Proof, Question, Term};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use deadtime::stability::{
+    self, Affine, Axis, Boundaries, Damping, Family, Proof, Question, Specification, Term, Vertex,
+};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{column, in_order};
+use crate::by_name::ByName;
 use crate::errors::to_python;
+use crate::quasipoly::{QuasiPolynomial, wrapped};
 use crate::runtime::run;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Table<'py, T> = Bound<'py, PyArray2<T>>;
 
-/// Gains, rows, frequencies and jumps of a boundary.
-type Curve<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i32>>,
-);
+/// One summand of a family; parameters that it does not depend on are left out.
+#[derive(FromPyObject)]
+struct FamilyTerm {
+    coefficient: f64,
+    /// The power of each parameter.
+    exponents: Vec<(String, u32)>,
+    /// The power of s.
+    power: u32,
+    /// The delay where all parameters are zero.
+    constant: f64,
+    /// The slope of the delay by each parameter.
+    slopes: Vec<(String, f64)>,
+}
 
-/// Counts, abscissas and statuses of a map.
-type Charted<'py> = (Table<'py, i32>, Option<Table<'py, f64>>, Table<'py, u8>);
+/// What is asked of each cell of a map.
+#[derive(FromPyObject)]
+struct MapQuestion {
+    decay: f64,
+    damping: Option<(f64, f64)>,
+    abscissa: bool,
+    proof: String,
+}
 
-/// coefficient, exponents, power of s, constant part of the delay, its slopes.
-type Row = (f64, Vec<u32>, u32, f64, Vec<f64>);
+/// The cells of a map.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct MapCells {
+    unstable: Py<PyArray2<i32>>,
+    abscissa: Option<Py<PyArray2<f64>>>,
+    status: Py<PyArray2<u8>>,
+}
+
+/// One curve on which roots lie on the edge of stability.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct MapBoundary {
+    /// Values of the parameter that varies along the rows.
+    gain: Py<PyArray1<f64>>,
+    /// Indices of the rows.
+    row: Py<PyArray1<i64>>,
+    omega: Py<PyArray1<f64>>,
+    crossing: Py<PyArray1<i32>>,
+    /// Name of the parameter that varies along the rows.
+    along: String,
+}
 
 /// A quasi-polynomial with named parameters.
 #[pyclass(frozen, module = "deadtime._deadtime", name = "Family")]
@@ -34,148 +68,165 @@ pub(crate) struct PyFamily {
 #[pymethods]
 impl PyFamily {
     #[new]
-    fn new(py: Python<'_>, names: Vec<String>, terms: Vec<Row>) -> PyResult<Self> {
-        let term = |(coefficient, exponents, power, constant, slopes)| Term {
-            coefficient,
-            exponents,
-            power,
-            delay: Affine { constant, slopes },
+    fn new(py: Python<'_>, names: Vec<String>, terms: Vec<FamilyTerm>) -> PyResult<Self> {
+        let term = |term: FamilyTerm| Term {
+            coefficient: term.coefficient,
+            exponents: one_each(&names, &term.exponents),
+            power: term.power,
+            delay: Affine {
+                constant: term.constant,
+                slopes: one_each(&names, &term.slopes),
+            },
         };
-        Family::new(names, terms.into_iter().map(term).collect())
+        let terms = terms.into_iter().map(term).collect();
+        Family::new(names, terms)
             .map(|inner| Self { inner })
             .map_err(|error| to_python(py, error))
     }
 
-    /// Coefficients (rows padded with zeros) and delays of the member at `values`.
-    fn at<'py>(
-        &self,
-        py: Python<'py>,
-        values: Vec<f64>,
-    ) -> PyResult<(Table<'py, f64>, Bound<'py, PyArray1<f64>>)> {
-        let h = self
-            .inner
-            .at(&values)
-            .map_err(|error| to_python(py, error))?;
-        let width = h.degree() + 1;
-        let mut padded = Vec::with_capacity(width * h.delays().len());
-        for row in h.coefficients() {
-            padded.extend_from_slice(row);
-            padded.resize(padded.len() + width - row.len(), 0.0);
-        }
-        let coefficients = padded.to_pyarray(py).reshape([h.delays().len(), width])?;
-        Ok((coefficients, h.delays().to_pyarray(py)))
+    /// The member at `values`, which are in the order of the parameters.
+    fn at(&self, py: Python<'_>, values: Vec<f64>) -> PyResult<QuasiPolynomial> {
+        wrapped(py, self.inner.at(&values))
     }
 
-    /// Counts, abscissas (if asked for) and statuses over two parameters; `values` holds the others.
-    #[pyo3(signature = (values, parameters, first, second, decay, damping, abscissa, cells, threads=None, progress=None))]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "two axes, what is asked and how to run"
-    )]
+    /// Counts, abscissas (if asked for) and statuses over the two parameters of `axes`.
+    #[pyo3(signature = (axes, question, *, threads=None, progress=None))]
     fn map<'py>(
         &self,
         py: Python<'py>,
-        values: Vec<f64>,
-        parameters: (usize, usize),
-        first: Floats<'py>,
-        second: Floats<'py>,
-        decay: f64,
-        damping: Option<(f64, f64)>,
-        abscissa: bool,
-        cells: bool,
+        axes: ByName<Floats<'py>>,
+        question: MapQuestion,
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Charted<'py>> {
-        let (first, second) = (in_order(&first)?, in_order(&second)?);
-        let axes = axes(parameters, &first, &second);
+    ) -> PyResult<MapCells> {
         let question = Question {
-            demand: demand(decay, damping),
-            abscissa,
-            proof: if cells { Proof::Cells } else { Proof::Curves },
+            specification: specification(question.decay, question.damping),
+            abscissa: question.abscissa,
+            proof: match question.proof.as_str() {
+                "cells" => Proof::Cells,
+                _ => Proof::Curves,
+            },
         };
-        let family = &self.inner;
-        let chart = run(py, threads, progress.as_ref(), |task| {
-            stability::map(family, &values, axes, question, task)
-        })?;
-        let shape = [first.len(), second.len()];
-        let status = column(&chart.status, |status| *status as u8)?;
-        let asked = abscissa.then_some(chart.abscissa);
-        Ok((
-            chart.unstable.into_pyarray(py).reshape(shape)?,
-            asked
-                .map(|values| values.into_pyarray(py).reshape(shape))
-                .transpose()?,
-            status.into_pyarray(py).reshape(shape)?,
-        ))
+        with_axes(&self.inner, &axes, |axes| {
+            let values = vec![0.0; self.inner.names().len()];
+            let cells = run(py, threads, progress.as_ref(), |task| {
+                stability::map(&self.inner, &values, axes, question, task)
+            })?;
+            let shape = axes.map(|axis| axis.points.len());
+            let status = column(&cells.status, |status| *status as u8)?;
+            let abscissa = question.abscissa.then_some(cells.abscissa);
+            Ok(MapCells {
+                unstable: cells.unstable.into_pyarray(py).reshape(shape)?.unbind(),
+                abscissa: abscissa
+                    .map(|values| values.into_pyarray(py).reshape(shape))
+                    .transpose()?
+                    .map(Bound::unbind),
+                status: status.into_pyarray(py).reshape(shape)?.unbind(),
+            })
+        })
     }
 
-    /// The abscissas of the chains over two parameters; `values` holds the others.
+    /// The abscissas of the chains of roots over the two parameters of `axes`.
     fn chains<'py>(
         &self,
         py: Python<'py>,
-        values: Vec<f64>,
-        parameters: (usize, usize),
-        first: Floats<'py>,
-        second: Floats<'py>,
-    ) -> PyResult<Table<'py, f64>> {
-        let (first, second) = (in_order(&first)?, in_order(&second)?);
-        let axes = axes(parameters, &first, &second);
-        let family = &self.inner;
-        let found = run(py, None, None, |task| {
-            stability::chains(family, &values, axes, task)
-        })?;
-        found.into_pyarray(py).reshape([first.len(), second.len()])
+        axes: ByName<Floats<'py>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        with_axes(&self.inner, &axes, |axes| {
+            let values = vec![0.0; self.inner.names().len()];
+            let found = run(py, None, None, |task| {
+                stability::chains(&self.inner, &values, axes, task)
+            })?;
+            let shape = axes.map(|axis| axis.points.len());
+            found.into_pyarray(py).reshape(shape)
+        })
     }
 
-    /// The axis along the rows, and the curves: positions on it, rows, frequencies and jumps.
-    #[pyo3(signature = (values, parameters, first, second, decay, damping, threads=None))]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "two axes, what is asked and how to run"
-    )]
+    /// The curves on which roots lie on the edge of stability; None where they cannot be followed.
+    #[pyo3(signature = (axes, *, decay, damping))]
     fn boundaries<'py>(
         &self,
         py: Python<'py>,
-        values: Vec<f64>,
-        parameters: (usize, usize),
-        first: Floats<'py>,
-        second: Floats<'py>,
+        axes: ByName<Floats<'py>>,
         decay: f64,
         damping: Option<(f64, f64)>,
-        threads: Option<usize>,
-    ) -> PyResult<Option<(usize, Vec<Curve<'py>>)>> {
-        let (first, second) = (in_order(&first)?, in_order(&second)?);
-        let axes = axes(parameters, &first, &second);
-        let family = &self.inner;
-        let found = run(py, threads, None, |task| {
-            stability::boundaries(family, &values, axes, demand(decay, damping), task)
-        })?;
-        Ok(found.map(|found| {
-            let curves = found.curves.into_iter().map(|curve| {
-                let gains: Vec<f64> = curve.iter().map(|vertex| vertex.gain).collect();
-                let rows: Vec<i64> = curve.iter().map(|vertex| vertex.row as i64).collect();
-                let omegas: Vec<f64> = curve.iter().map(|vertex| vertex.omega).collect();
-                let jumps: Vec<i32> = curve.iter().map(|vertex| vertex.jump).collect();
-                (
-                    gains.into_pyarray(py),
-                    rows.into_pyarray(py),
-                    omegas.into_pyarray(py),
-                    jumps.into_pyarray(py),
+    ) -> PyResult<Option<Vec<MapBoundary>>> {
+        with_axes(&self.inner, &axes, |axes| {
+            let values = vec![0.0; self.inner.names().len()];
+            let found = run(py, None, None, |task| {
+                stability::boundaries(
+                    &self.inner,
+                    &values,
+                    axes,
+                    specification(decay, damping),
+                    task,
                 )
-            });
-            (found.along, curves.collect())
-        }))
+            })?;
+            found
+                .map(|found| map_boundaries(py, &self.inner, axes, &found))
+                .transpose()
+        })
     }
 }
 
-fn axes<'a>(parameters: (usize, usize), first: &'a [f64], second: &'a [f64]) -> [Axis<'a>; 2] {
+/// A number for each name, zero for those that are not in the list.
+fn one_each<T: Copy + Default>(names: &[String], listed: &[(String, T)]) -> Vec<T> {
+    let number = |name: &String| {
+        let found = listed.iter().find(|(known, _)| known == name);
+        found.map_or_else(T::default, |(_, value)| *value)
+    };
+    names.iter().map(number).collect()
+}
+
+/// Hand the axes of a map to `work`, with their parameters as `family` numbers them.
+pub(crate) fn with_axes<T>(
+    family: &Family,
+    axes: &ByName<Floats<'_>>,
+    work: impl FnOnce([Axis<'_>; 2]) -> PyResult<T>,
+) -> PyResult<T> {
+    let places = axes.places(family)?;
+    let points: Vec<_> = axes.values().map(in_order).collect::<PyResult<_>>()?;
+    let ([first, second], [x, y]) = (&places[..], &points[..]) else {
+        return Err(PyValueError::new_err(format!(
+            "{} axes: a map has two",
+            places.len()
+        )));
+    };
     let axis = |parameter, points| Axis { parameter, points };
-    [axis(parameters.0, first), axis(parameters.1, second)]
+    work([axis(*first, x), axis(*second, y)])
+}
+
+fn map_boundaries(
+    py: Python<'_>,
+    family: &Family,
+    axes: [Axis<'_>; 2],
+    found: &Boundaries,
+) -> PyResult<Vec<MapBoundary>> {
+    let along = axes.get(found.along).map_or(0, |axis| axis.parameter);
+    let along = family.names().get(along).cloned().unwrap_or_default();
+    let boundary = |curve: &Vec<Vertex>| {
+        Ok(MapBoundary {
+            gain: column(curve, |vertex| vertex.gain)?
+                .into_pyarray(py)
+                .unbind(),
+            row: column(curve, |vertex| vertex.row as i64)?
+                .into_pyarray(py)
+                .unbind(),
+            omega: column(curve, |vertex| vertex.omega)?
+                .into_pyarray(py)
+                .unbind(),
+            crossing: column(curve, |vertex| vertex.jump)?
+                .into_pyarray(py)
+                .unbind(),
+            along: along.clone(),
+        })
+    };
+    found.curves.iter().map(boundary).collect()
 }
 
 /// Decay, and (damping ratio, horizon).
-fn demand(decay: f64, damping: Option<(f64, f64)>) -> Demand {
-    Demand {
+fn specification(decay: f64, damping: Option<(f64, f64)>) -> Specification {
+    Specification {
         decay,
         damping: damping.map(|(ratio, horizon)| Damping { ratio, horizon }),
     }

@@ -41,7 +41,7 @@ pub(crate) fn sweep_figures<'py>(
     };
     let criteria = Criteria { rise, settling };
     let found = run(py, threads, progress.as_ref(), |task| {
-        ensemble::figures(&sets, &steady, span, &criteria, task)
+        ensemble::metrics(&sets, &steady, span, &criteria, task)
     })?;
     let figures = column(&found, |(figures, _)| figures.to_array())?;
     let outcomes = column(&found, |(_, outcome)| *outcome as u8)?;

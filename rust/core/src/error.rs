@@ -1,23 +1,23 @@
-//! What can go wrong, with the numbers in it.
+//! Errors, with the numbers that caused them.
 
 use num_complex::Complex64;
 
 use crate::memory::in_words;
 
-/// Every failure a kernel can report. The message says what was wrong and what to do.
+/// Every error of the kernel. The message states what was wrong and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// An argument outside what the function is defined for.
     #[error("{0}")]
     Argument(String),
 
-    /// A response has grown out of bounds.
+    /// A response exceeded the limit for diverging runs.
     #[error(
         "the response exceeds {bound:e} at t = {time} s after the start: the loop is unstable, end \
          the simulation earlier, lower the gain or give it a limit"
     )]
     Diverges {
-        /// What it exceeds.
+        /// The limit that it exceeded.
         bound: f64,
         /// When, s.
         time: f64,
@@ -27,24 +27,24 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
 
-    /// Memory that was not to be had.
+    /// Memory that could not be allocated.
     #[error(
         "{what} needs {} of memory, which the system does not give: ask for less at once, or raise \
          the limit",
         in_words(*bytes)
     )]
     Memory {
-        /// What it is for.
+        /// Purpose of the memory.
         what: &'static str,
-        /// How much.
+        /// Its size in bytes.
         bytes: u64,
     },
 
-    /// A function of the caller failed; what it said is the caller's to tell.
+    /// A function of the caller failed; the caller knows its error.
     #[error("a function given by the caller failed")]
     Caller,
 
-    /// An iteration used up its budget; `best` is the last iterate.
+    /// An iteration reached its limit; `best` is the last iterate.
     #[error("{what} did not converge from {best}: {advice}")]
     Convergence {
         /// What was being computed.
@@ -55,7 +55,7 @@ pub enum Error {
         advice: String,
     },
 
-    /// A zero lies on the contour, or too close to it to tell.
+    /// A root lies on the contour, or too close to it to decide its side.
     #[error(
         "a root lies on the contour near {:?}{:+?}i, or closer to it than double precision can \
          tell: move the edge of the region by more than {distance:.1e}",
@@ -64,45 +64,45 @@ pub enum Error {
     Contour {
         /// Where the contour meets the root.
         place: Complex64,
-        /// Size of the segment on which the winding could not be proved.
+        /// Size of the segment on which the winding number could not be proved.
         distance: f64,
     },
 
-    /// Roots lie on the edge of a region, or closer to it than the discs that hold them tell.
+    /// Roots lie on the edge of a region, or closer to it than the radii of their discs.
     #[error(
         "the edge of the region meets {}; {inside} roots are clearly inside: move the edge, or say \
          to which side roots on it belong (edge=\"inside\" or \"outside\")",
         described(roots)
     )]
     OnEdge {
-        /// The number of roots clear of the edge and inside.
+        /// The number of roots inside that do not touch the edge.
         inside: u64,
         /// Centre, radius and number of roots of each disc that meets the edge.
         roots: Vec<(Complex64, f64, u32)>,
     },
 
-    /// Roots found and roots counted disagree; both are given.
+    /// The number of roots found and the number counted disagree; the error contains both.
     #[error(
         "{counted} roots were counted in the region but {} could be located: {advice}",
         found.iter().map(|(_, m)| m).sum::<u32>()
     )]
     CountMismatch {
-        /// What the argument principle says.
+        /// The number by the argument principle.
         counted: u64,
-        /// What was located: root and multiplicity.
+        /// The located roots and their multiplicities.
         found: Vec<(Complex64, u32)>,
         /// What to change.
         advice: String,
     },
 
-    /// More work than the caller can have meant.
+    /// The work exceeds a limit.
     #[error("{what} needs more than {limit} {unit}: {advice}")]
     TooMuch {
         /// What was being computed.
         what: &'static str,
-        /// The limit that was hit.
+        /// The limit that was reached.
         limit: u64,
-        /// What is being counted.
+        /// The unit of the limit.
         unit: &'static str,
         /// What to change.
         advice: String,
@@ -115,14 +115,14 @@ impl Error {
         Self::Argument(message.into())
     }
 
-    /// Whether the whole computation ends with it: the caller has asked to stop, or memory is
-    /// gone. No part of the work may take it for a finding.
+    /// Does the error end the whole computation? True when the caller asked to stop, or memory is
+    /// exhausted; no part of the work may then interpret the error as a result.
     pub const fn ends_all(&self) -> bool {
         matches!(self, Self::Interrupted | Self::Memory { .. })
     }
 }
 
-/// The places of roots on an edge, as a message names them.
+/// The locations of roots on an edge, for a message.
 fn described(roots: &[(Complex64, f64, u32)]) -> String {
     const FEW: usize = 3;
     let place = |(root, radius, multiplicity): &(Complex64, f64, u32)| {

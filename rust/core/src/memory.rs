@@ -1,10 +1,11 @@
-//! Memory whose size the caller chose: asked for before it is used, and refused as an error.
+//! Allocation of memory whose size depends on the request: failures become errors.
 //!
-//! Rust ends the process when an allocation fails. So every array that grows with the request is
-//! made here, where a failure is [`Error::Memory`] with the size, and only if [`HEADROOM`] is left
-//! beside it for what is small: queues, series, matrices of one loop. Those grow while a kernel
-//! runs, so whoever waits for it looks now and then whether [`is_scarce`], and stops it in time.
-//! Not guaranteed: anything where the system promises more than it has and kills processes later.
+//! Rust ends the process when an allocation fails. Every array whose size depends on the request is
+//! therefore allocated here, where a failure is [`Error::Memory`] with the size, and only if
+//! [`HEADROOM`] remains for small things: queues, series, matrices of one loop. These grow while a
+//! kernel runs, so that the waiting thread checks [`is_scarce`] regularly and stops the kernel in
+//! time. Nothing is guaranteed where the operating system promises more memory than it has and
+//! kills processes later.
 
 use std::collections::VecDeque;
 
@@ -12,14 +13,15 @@ use rayon::prelude::*;
 
 use crate::Error;
 
-/// Room that has to be left, in bytes: more than kernels take for small things between two looks.
-/// Above 32 MiB, so that giving it back does not change how glibc serves other requests.
+/// Memory that has to remain free, in bytes: more than kernels allocate for small things between
+/// two checks. It is above 32 MiB, so that freeing it does not change how glibc handles other
+/// requests.
 pub const HEADROOM: usize = 48 << 20;
 
 /// Requests below this size are served from the headroom.
 const SMALL: usize = 1 << 20;
 
-/// Whether the headroom is gone.
+/// Is less than the headroom available?
 pub fn is_scarce() -> bool {
     !there_is(HEADROOM)
 }
@@ -28,7 +30,7 @@ fn there_is(bytes: usize) -> bool {
     Vec::<u8>::new().try_reserve_exact(bytes).is_ok()
 }
 
-/// Refuse what needs `count` items of type `T` in all, if they are not to be had.
+/// Return an error if memory for `count` items of type `T` is not available.
 pub fn room<T>(what: &'static str, count: usize) -> Result<(), Error> {
     let bytes = count.saturating_mul(size_of::<T>());
     if bytes < SMALL || there_is(bytes.saturating_add(HEADROOM)) {
@@ -65,7 +67,7 @@ pub fn copied<T: Copy>(what: &'static str, values: &[T]) -> Result<Vec<T>, Error
     collected(what, values.iter().copied())
 }
 
-/// The items of an iterator that knows how many they are.
+/// The items of an iterator of known length.
 pub fn collected<T>(
     what: &'static str,
     items: impl ExactSizeIterator<Item = T>,
@@ -75,7 +77,7 @@ pub fn collected<T>(
     Ok(made)
 }
 
-/// Append a value to what grows with the length of a run.
+/// Append a value to a vector that grows with the length of a run.
 pub fn push<T>(what: &'static str, to: &mut Vec<T>, value: T) -> Result<(), Error> {
     if to.len() == to.capacity() {
         grow(what, to, 1)?;
@@ -84,7 +86,7 @@ pub fn push<T>(what: &'static str, to: &mut Vec<T>, value: T) -> Result<(), Erro
     Ok(())
 }
 
-/// Append values to what grows with the length of a run.
+/// Append values to a vector that grows with the length of a run.
 pub fn append<T: Copy>(what: &'static str, to: &mut Vec<T>, values: &[T]) -> Result<(), Error> {
     if to.capacity() - to.len() < values.len() {
         grow(what, to, values.len())?;
@@ -112,8 +114,8 @@ fn grow<T>(what: &'static str, to: &mut Vec<T>, more: usize) -> Result<(), Error
         .map_err(|_| refused(what, most.saturating_mul(size_of::<T>())))
 }
 
-/// What `work` gives for 0, 1, … `count`, in that order, on all threads; `start` makes what each
-/// of them works with.
+/// The results of `work` for 0, 1, … `count`, in that order, computed on all threads; `start`
+/// creates the state of each thread.
 pub fn in_parallel<T, W>(
     what: &'static str,
     count: usize,
@@ -135,7 +137,7 @@ where
     Ok(found)
 }
 
-/// A size as people write it.
+/// A size in readable units.
 pub(crate) fn in_words(bytes: u64) -> String {
     const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
     let mut size = bytes as f64 / 1024.0;

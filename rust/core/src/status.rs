@@ -1,10 +1,10 @@
 //! Outcome of one item of a batch.
 
-/// What is known of one cell of a stability map.
+/// Status of one cell of a stability map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum CellStatus {
-    /// Count (and abscissa, where asked for) hold.
+    /// Count (and abscissa, where requested) are proved.
     Ok = 0,
     /// A root lies on the boundary line, to working precision.
     Boundary = 1,

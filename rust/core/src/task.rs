@@ -1,5 +1,5 @@
-//! What a long kernel shares with whoever waits for it: a request to stop and a count of
-//! finished items.
+//! State shared by a long computation and the thread that waits for it: a request to stop and a
+//! count of finished items.
 //!
 //! A kernel calls [`Task::check`] at least every few milliseconds of work and
 //! [`Task::advance`] as it finishes items; both are a relaxed atomic access.
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use crate::Error;
 use crate::memory::{HEADROOM, is_scarce};
 
-/// Checks between two looks at the clock: reading it costs more than a check.
+/// Checks between two readings of the clock, which cost more than a check.
 const CHECKS: u64 = 32;
 
 /// Stop flag and progress counter of one running computation.
@@ -23,7 +23,7 @@ pub struct Task {
     lookout: Option<Lookout>,
 }
 
-/// Somebody to ask now and then, on the computing thread, whether to go on.
+/// A function to call regularly, on the computing thread, that decides whether to continue.
 struct Lookout {
     start: Instant,
     every: Duration,
@@ -42,7 +42,7 @@ impl fmt::Debug for Lookout {
 }
 
 impl Lookout {
-    /// Whether it is time to ask.
+    /// Is it time to call it?
     fn is_due(&self) -> bool {
         if !self
             .checks
@@ -58,7 +58,7 @@ impl Lookout {
 }
 
 impl Task {
-    /// A task nobody has asked to stop, with nothing done.
+    /// A task without a request to stop and with no items finished.
     pub const fn new() -> Self {
         Self {
             stop: AtomicBool::new(false),
@@ -68,7 +68,8 @@ impl Task {
         }
     }
 
-    /// A task that asks `go_on` by itself, about so often, when it is checked; `false` stops it.
+    /// A task that calls `go_on` itself at about this interval when it is checked; `false` stops
+    /// it.
     pub fn asking(every: Duration, go_on: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self {
             lookout: Some(Lookout {
@@ -95,8 +96,8 @@ impl Task {
         }
     }
 
-    /// `Err(Error::Interrupted)` once somebody has asked to stop, [`Error::Memory`] once memory
-    /// was scarce.
+    /// `Err(Error::Interrupted)` after a request to stop, [`Error::Memory`] after memory was
+    /// scarce.
     pub fn check(&self) -> Result<(), Error> {
         if let Some(lookout) = self.lookout.as_ref().filter(|lookout| lookout.is_due()) {
             self.look_at_memory();
@@ -121,7 +122,7 @@ impl Task {
         self.done.fetch_add(items, Ordering::Relaxed);
     }
 
-    /// How many items are finished.
+    /// Number of finished items.
     pub fn done(&self) -> u64 {
         self.done.load(Ordering::Relaxed)
     }

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
-from deadtime._errors import FlightAbortedError, LinkError
-from deadtime._validation import finite
+from deadtime._base.errors import FlightAbortedError, LinkError
+from deadtime._base.validation import finite
 from deadtime.links.ardrone2.commands import FlatTrim
 from deadtime.links.ardrone2.connection import LOST, Connection
 from deadtime.links.ardrone2.limit_settings import LimitSettings
@@ -64,7 +64,7 @@ class ARDrone2:
         What it is kept within. Largest climb and height are set in the drone, too, as far as it
         takes them, and put back to what they were when the link is closed.
     full : bool
-        All of navdata, 200 times a second, with vertical speed and the demand that is followed;
+        All of navdata, 200 times a second, with vertical speed and the setpoint that is followed;
         otherwise the 15 small ones.
     navdata_port, command_port, control_port : int
         5554, 5556 and 5559 on a drone.
@@ -79,7 +79,7 @@ class ARDrone2:
     >>> drone = ARDrone2("192.168.1.1")
     >>> drone.command(0.3)
     Traceback (most recent call last):
-    deadtime._errors.LinkError: 192.168.1.1 is not in the air: take off before commanding it
+    deadtime._base.errors.LinkError: 192.168.1.1 is not in the air: take off before commanding it
     """
 
     def __init__(
@@ -344,8 +344,8 @@ class ARDrone2:
 
     def _is_down(self, navdata: Navdata) -> bool:
         """Whether a drone is down, by news that would show that it has begun to take off."""
-        told = self._link.told
-        return on_ground(navdata) and told is not None and told >= self._asked_up + ANSWERED
+        sent = self._link.news_sent
+        return on_ground(navdata) and sent is not None and sent >= self._asked_up + ANSWERED
 
     async def close(self) -> None:
         """Land if in the air, put the drone's settings back, and end the link; may be called twice.
@@ -421,7 +421,7 @@ class ARDrone2:
                     return False
                 # What waited in the socket during a pause of this program is no news, either.
                 since = max(toggled, self._sender.resumed)
-                if link.told is not None and link.told >= since + ANSWERED:
+                if link.news_sent is not None and link.news_sent >= since + ANSWERED:
                     break
         return True
 

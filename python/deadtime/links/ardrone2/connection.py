@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.ardrone2.commands import Command
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import NavdataReader
@@ -94,8 +94,8 @@ class Connection:
         )
 
     @property
-    def told(self) -> float | None:
-        """When the newest news were sent, s; when they arrived, where the drone tells no clock."""
+    def news_sent(self) -> float | None:
+        """When the newest navdata were sent, s; when they arrived, if the drone sends no clock."""
         return self.reader.heard if self.reader.sent is None else self.reader.sent
 
     @property
@@ -187,7 +187,7 @@ class Connection:
         if reader.restarts > restarts:
             self.sender.give_up(self.forgotten)
         if reader.navdata is not None and reader.navdata is not before:
-            self.sender.told(reader.navdata, reader.sent)
+            self.sender.received(reader.navdata, reader.sent)
         self._arrived.set()
         if state is None or self.listener is None:
             return

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.ardrone2.commands import Command, Config, Control
 from deadtime.links.ardrone2.configuration import parse_configuration
 from deadtime.links.ardrone2.navdata import Navdata

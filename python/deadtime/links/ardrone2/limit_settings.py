@@ -6,7 +6,7 @@ import asyncio
 import math
 from contextlib import suppress
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.ardrone2.connection import LOST, Connection
 from deadtime.links.ardrone2.handshake import Handshake, check_configuration
 from deadtime.links.ardrone2.reader import on_ground

@@ -178,7 +178,7 @@ video_stream, pressure, kalman_pressure, wifi
         return None if self.altitude is None else _finite(-self.altitude.altitude_vz)
 
     @property
-    def climb_demand(self) -> float | None:
+    def climb_setpoint(self) -> float | None:
         """The vertical speed that the drone follows, m/s, up positive, where it says a finite one.
 
         The echo of the commands that have reached it.
@@ -256,7 +256,7 @@ def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
     1.25
     >>> parse_navdata(packet[:-8])
     Traceback (most recent call last):
-    deadtime._errors.PacketError: navdata: the last option is no checksum, at byte 164
+    deadtime._base.errors.PacketError: navdata: the last option is no checksum, at byte 164
     """
     (header, state, sequence, vision), read, matches = navdata_read(packet, checksum)
     known: dict[str, Any] = {}

@@ -13,8 +13,9 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
-from deadtime._errors import PacketError
+from deadtime._base.errors import PacketError
 from deadtime.links.ardrone2.navdata import Navdata, State, parse_navdata
+from deadtime.links.safety import jumps
 from deadtime.links.vehicle import VehicleState
 
 __all__ = [
@@ -38,9 +39,6 @@ SILENCE = 0.5
 
 #: How long a state tells of messages that were lost, s.
 RECENT = 1.0
-
-#: Change of the height that is believed at any speed, m: bump and noise of the ultrasound.
-BUMP = 0.1
 
 #: Control states, the upper half of the word that navdata has for them.
 FLYING, HOVERING = 3, 4
@@ -229,7 +227,7 @@ class NavdataReader:
         height = navdata.height
         if height is None:
             return True
-        return not abs(height - self.newest.height) <= self.max_jump * passed + BUMP
+        return jumps(self.newest.height, height, passed, self.max_jump)
 
     def _taken(self, navdata: Navdata, clock: float | None, now: float) -> VehicleState | None:
         while self._lost and self._lost[0][0] < now - RECENT:
@@ -303,7 +301,7 @@ def _state_of(navdata: Navdata, clock: float | None, now: float, missing: int) -
         sequence=navdata.sequence,
         vehicle_time=clock,
         climb=navdata.climb,
-        climb_demand=navdata.climb_demand,
+        climb_setpoint=navdata.climb_setpoint,
         # NaN is no angle that a watch would let pass.
         roll=math.nan if navdata.roll is None else navdata.roll,
         pitch=math.nan if navdata.pitch is None else navdata.pitch,

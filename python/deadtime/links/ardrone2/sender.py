@@ -165,15 +165,15 @@ class CommandSender:
         else:
             self._in_doubt = self.in_air
 
-    def told(self, navdata: Navdata, sent: float | None) -> None:
-        """Hold the wish to fly against what the drone says.
+    def received(self, navdata: Navdata, sent: float | None) -> None:
+        """Compare the request to fly with what the drone reports.
 
         Parameters
         ----------
         navdata : Navdata
             The newest.
         sent : float or None
-            When they were sent, s; None if that cannot be told.
+            When they were sent, s; None if that is not known.
         """
         self._look_for_others(navdata)
         self._left_ground = self._left_ground or not on_ground(navdata)

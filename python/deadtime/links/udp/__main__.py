@@ -18,9 +18,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from deadtime._errors import DeadtimeError
+from deadtime._base.errors import DeadtimeError
 from deadtime.links.addresses import Address
-from deadtime.links.lifeline import input_ends
+from deadtime.links.parent_watch import parent_ended
 from deadtime.links.udp.controller import Controller, ControllerOptions
 from deadtime.links.udp.described import (
     DELAYS,
@@ -42,20 +42,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one part of the loop; the exit code is 0 on success only."""
     given = _parser().parse_args(arguments)
     try:
-        asyncio.run(_until_told(given.run(given), given.until_input_ends))
+        asyncio.run(_until_stopped(given.run(given), given.until_input_ends))
     except (DeadtimeError, OSError, ValueError) as error:
         print(f"deadtime.links.udp: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
     return 0
 
 
-async def _until_told(work: Coroutine[Any, Any, None], until_input_ends: bool) -> None:
-    """Run, and end in an orderly way when told to."""
+async def _until_stopped(work: Coroutine[Any, Any, None], until_input_ends: bool) -> None:
+    """Run, and end in an orderly way on a signal or at the end of standard input."""
     task = asyncio.ensure_future(work)
     loop = asyncio.get_running_loop()
     if until_input_ends:
-        lifeline = asyncio.ensure_future(input_ends().wait())
-        lifeline.add_done_callback(lambda _: task.cancel())
+        parent_watch = asyncio.ensure_future(parent_ended().wait())
+        parent_watch.add_done_callback(lambda _: task.cancel())
     for number in (signal.SIGINT, signal.SIGTERM):
         with suppress(NotImplementedError, RuntimeError):  # Windows has no such handlers
             loop.add_signal_handler(number, task.cancel)
@@ -92,7 +92,7 @@ async def _run_controller(given: argparse.Namespace) -> None:
 
 
 async def _run_relay(given: argparse.Namespace) -> None:
-    words = {name: getattr(given, name) for name in WAYS}
+    words = {name: getattr(given, name) for name in PATHS}
     both = network_of(
         given.delays,
         given.delay,
@@ -109,7 +109,7 @@ async def _run_relay(given: argparse.Namespace) -> None:
         try:
             await asyncio.sleep(given.duration)
         finally:
-            paths = {name: getattr(relay, name) for name in WAYS}
+            paths = {name: getattr(relay, name) for name in PATHS}
             counts = {name: path.counts() for name, path in paths.items()}
             _say(report={**counts, "overflowed": relay.overflowed})
 
@@ -141,7 +141,7 @@ async def _run_plant(given: argparse.Namespace) -> None:
 
 
 #: From the plant to the controller, and back.
-WAYS = ("there", "back")
+PATHS = ("forward_path", "return_path")
 
 LOOPBACK = ("127.0.0.1", 0)
 
@@ -184,9 +184,11 @@ def _parser() -> argparse.ArgumentParser:
     relay.add_argument("--burst", type=float, default=1.0, help="mean length of a burst of losses")
     relay.add_argument("--duplication", type=float, default=0.0, help="part that comes twice")
     relay.add_argument("--ordered", action="store_true", help="no packet overtakes another")
-    for way, which in zip(WAYS, ("to the controller", "to the plant"), strict=True):
+    for path, which in zip(PATHS, ("to the controller", "to the plant"), strict=True):
         relay.add_argument(
-            f"--{way}", metavar="JSON", help=f"the network {which}, in place of the options above"
+            f"--{path.replace('_', '-')}",
+            metavar="JSON",
+            help=f"the network {which}, in place of the options above",
         )
     relay.add_argument("--seed", type=int, default=0, help="of delays and losses")
 

@@ -16,14 +16,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from deadtime._recording import MINIMUM_SAMPLES, Recording
-from deadtime._validation import finite, positive
+from deadtime._base.validation import finite, positive
 from deadtime.links.addresses import Address
 from deadtime.links.journal import Journal
 from deadtime.links.udp.endpoint import Endpoint
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.statistics import KEPT, LinkReport, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
+from deadtime.recordings import Recording
+from deadtime.recordings._recording import MINIMUM_SAMPLES
 
 __all__ = ["Controller", "ControllerOptions", "ControllerReport"]
 

@@ -7,7 +7,7 @@ import random
 from dataclasses import dataclass
 from typing import Protocol
 
-from deadtime._validation import non_negative, positive
+from deadtime._base.validation import non_negative, positive
 
 __all__ = ["Constant", "Delays", "LogNormal", "Normal", "ShiftedGamma"]
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, cast
 
-from deadtime._errors import LinkError, PacketError
+from deadtime._base.errors import LinkError, PacketError
 from deadtime.links.addresses import Address, canonical, for_socket, is_loopback
 from deadtime.links.udp.judgement import REMEMBERED, Judgement, Verdict
 from deadtime.links.udp.packets import LoopPacket
@@ -206,7 +206,7 @@ class Endpoint:
             return
         now = self._loop.time()
         if self.peer is not None and address != self.peer:
-            self.statistics.strangers += 1
+            self.statistics.foreign += 1
             return
         try:
             packet = self._wire.decode(data)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from deadtime._validation import finite, non_negative
+from deadtime._base.validation import finite, non_negative
 
 __all__ = ["HeldIntegrator"]
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections import deque
 from enum import Enum
 
-from deadtime._recording import LARGEST
 from deadtime.links.udp.packets import LoopPacket
+from deadtime.recordings._recording import LARGEST
 
 __all__ = ["REMEMBERED", "Judgement", "Verdict"]
 

@@ -12,7 +12,7 @@ import math
 import random
 from dataclasses import dataclass, field
 
-from deadtime._validation import finite, non_negative, positive, whole_number
+from deadtime._base.validation import finite, non_negative, positive, whole_number
 from deadtime.links.udp.delays import Constant, Delays
 
 __all__ = ["Bursts", "Network", "Path"]

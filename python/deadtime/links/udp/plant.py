@@ -13,7 +13,6 @@ import math
 from collections import deque
 from contextlib import ExitStack
 
-from deadtime._recording import MINIMUM_SAMPLES, Recording
 from deadtime.links.addresses import Address
 from deadtime.links.journal import Journal
 from deadtime.links.udp.endpoint import Endpoint
@@ -23,6 +22,8 @@ from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.statistics import KEPT, Percentiles
 from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
+from deadtime.recordings import Recording
+from deadtime.recordings._recording import MINIMUM_SAMPLES
 
 __all__ = ["Plant", "run_plant"]
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from deadtime._recording import Recording
-from deadtime._validation import finite, non_negative, positive
+from deadtime._base.validation import finite, non_negative, positive
 from deadtime.links.addresses import Address
 from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.statistics import LinkReport, Percentiles
+from deadtime.recordings import Recording
 
 __all__ = ["PlantOptions", "PlantReport"]
 

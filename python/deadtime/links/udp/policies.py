@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from deadtime._validation import positive, whole_number
+from deadtime._base.validation import positive, whole_number
 
 __all__ = ["DropLate", "HoldThenZero", "JitterBuffer", "NewestWins", "Policy"]
 

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.addresses import Address
 from deadtime.links.udp.described import arguments_of
 from deadtime.links.udp.trial import ENDS, Trial
@@ -29,7 +29,7 @@ class Part:
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
         self.name = name
         # Not a pipe of Popen's, whose `communicate` closes it at once.
-        its_end, self._lifeline = os.pipe()
+        its_end, self._parent_watch = os.pipe()
         self.process = subprocess.Popen(
             [sys.executable, "-m", "deadtime.links.udp", name, "--until-input-ends", *arguments],
             stdin=its_end,
@@ -74,7 +74,7 @@ class Part:
         """End it, if it has not ended yet."""
         self.process.kill()
         self.process.communicate()
-        os.close(self._lifeline)
+        os.close(self._parent_watch)
 
 
 def _last_line(said: str) -> str:

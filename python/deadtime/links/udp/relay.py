@@ -33,7 +33,7 @@ class RelayOptions:
     ----------
     controller : (str, int)
         Where the controller listens.
-    there, back : Network
+    forward_path, return_path : Network
         From the plant to the controller, and back.
     seed : int
         What all delays and losses follow from.
@@ -42,8 +42,8 @@ class RelayOptions:
     """
 
     controller: Address
-    there: Network = field(default_factory=Network)
-    back: Network = field(default_factory=Network)
+    forward_path: Network = field(default_factory=Network)
+    return_path: Network = field(default_factory=Network)
     seed: int = 0
     listen: Address = ("127.0.0.1", 0)
 
@@ -53,7 +53,7 @@ class Relay:
 
     Attributes
     ----------
-    there, back : Path
+    forward_path, return_path : Path
         What became of the packets.
     overflowed : int
         Packets that were dropped because 10 000 were under way.
@@ -61,8 +61,8 @@ class Relay:
 
     def __init__(self, options: RelayOptions) -> None:
         self.options = options
-        self.there: Path = options.there.path(f"{options.seed} there")
-        self.back: Path = options.back.path(f"{options.seed} back")
+        self.forward_path: Path = options.forward_path.path(f"{options.seed} there")
+        self.return_path: Path = options.return_path.path(f"{options.seed} back")
         self.overflowed = 0
         self._under_way: list[tuple[float, int, bytes, bool]] = []
         self._number = itertools.count()
@@ -100,18 +100,18 @@ class Relay:
                 return
             self._plant = address
         self._heard = now
-        self._pass_on(self.there, now, data, True)
+        self._pass_on(self.forward_path, now, data, True)
 
     def _from_controller(self, data: bytes, address: Address) -> None:
         if address == self._controller:
-            self._pass_on(self.back, self._loop.time(), data, False)
+            self._pass_on(self.return_path, self._loop.time(), data, False)
 
-    def _pass_on(self, path: Path, now: float, data: bytes, there: bool) -> None:
+    def _pass_on(self, path: Path, now: float, data: bytes, forward: bool) -> None:
         for arrival, packet in path.send(now - self._started, data):
             if len(self._under_way) >= MOST_UNDER_WAY:
                 self.overflowed += 1
                 continue
-            entry = (self._started + arrival, next(self._number), packet, there)
+            entry = (self._started + arrival, next(self._number), packet, forward)
             heapq.heappush(self._under_way, entry)
         self._wait()
 
@@ -125,8 +125,8 @@ class Relay:
     def _deliver(self) -> None:
         due = max(self._loop.time(), self._under_way[0][0])  # a timer may fire a rounding early
         while self._under_way and self._under_way[0][0] <= due:
-            _, _, packet, there = heapq.heappop(self._under_way)
-            if there:
+            _, _, packet, forward = heapq.heappop(self._under_way)
+            if forward:
                 self._rear.send(packet, self._controller)
             elif self._plant is not None:
                 self._front.send(packet, self._plant)

@@ -131,7 +131,7 @@ class LinkReport:
         Packets that came again; packets that came after one sent later.
     late : int
         Packets that came too late to be used: overtaken, or refused by the policy.
-    strangers, invalid : int
+    foreign, invalid : int
         Datagrams from another address; datagrams that are no packets, or say what cannot be.
     round_trip : Percentiles
         Round trips, without the time an answer was held, s.
@@ -141,7 +141,7 @@ class LinkReport:
         How much older than the newest one in use late packets were, or than the policy bears, s.
     jitter : float
         Running mean of the change of the way here from packet to packet (RFC 3550), s.
-    there, back : (float, float)
+    forward_delay, return_delay : (float, float)
         Bounds of the mean one-way delay to the other end and from it, s.
     offset, offset_uncertainty : float
         Of the other end's clock against this one, s.
@@ -154,14 +154,14 @@ class LinkReport:
     duplicates: int
     reordered: int
     late: int
-    strangers: int
+    foreign: int
     invalid: int
     round_trip: Percentiles
     held: Percentiles
     lateness: Percentiles
     jitter: float
-    there: tuple[float, float]
-    back: tuple[float, float]
+    forward_delay: tuple[float, float]
+    return_delay: tuple[float, float]
     offset: float
     offset_uncertainty: float
     round_trip_histogram: tuple[list[float], list[int]]
@@ -189,15 +189,15 @@ class LinkStatistics:
     received: int = 0
     duplicates: int = 0
     reordered: int = 0
-    strangers: int = 0
+    foreign: int = 0
     invalid: int = 0
     round_trips: deque[float] = field(default_factory=_newest)
     held: deque[float] = field(default_factory=_newest)
     lateness: deque[float] = field(default_factory=_newest)
     late: int = 0
     clock: ClockOffset = field(default_factory=ClockOffset)
-    _there: deque[float] = field(default_factory=_newest)
-    _back: deque[float] = field(default_factory=_newest)
+    _forward: deque[float] = field(default_factory=_newest)
+    _return: deque[float] = field(default_factory=_newest)
     _jitter: float = 0.0
     _first: int | None = None
     _highest: int = -1
@@ -251,12 +251,12 @@ class LinkStatistics:
     def exchanged(self, packet: LoopPacket, now: float) -> None:
         """Take in the times of a packet that was judged to answer one of this end."""
         received_there = packet.sent - packet.held
-        there, back = received_there - packet.echo_sent, now - packet.sent
-        if self._back:
-            change = abs(back - self._back[-1])
+        forward, returning = received_there - packet.echo_sent, now - packet.sent
+        if self._return:
+            change = abs(returning - self._return[-1])
             self._jitter += JITTER_PART * (change - self._jitter)
-        self._there.append(there)
-        self._back.append(back)
+        self._forward.append(forward)
+        self._return.append(returning)
         self.held.append(packet.held)
         # Not the sum of both ways, in which a far-off clock would leave its rounding.
         self.round_trips.append((now - packet.echo_sent) - packet.held)
@@ -271,25 +271,25 @@ class LinkStatistics:
         """All of it."""
         nothing = (math.nan, math.nan)
         most, least = self.clock.most, self.clock.least
-        there = float(np.mean(self._there)) if self._there else math.nan
-        back = float(np.mean(self._back)) if self._back else math.nan
+        forward = float(np.mean(self._forward)) if self._forward else math.nan
+        returning = float(np.mean(self._return)) if self._return else math.nan
         return LinkReport(
             received=self.received,
             lost=self._lost(),
             duplicates=self.duplicates,
             reordered=self.reordered,
             late=self.late,
-            strangers=self.strangers,
+            foreign=self.foreign,
             invalid=self.invalid,
             round_trip=Percentiles.of(self.round_trips),
             held=Percentiles.of(self.held),
             lateness=Percentiles.of(self.lateness),
             jitter=self._jitter,
             # The way there is what the clocks show less the offset, which is between two bounds.
-            there=(there - most, there - least) if self._there else nothing,
-            back=(back + least, back + most) if self._back else nothing,
+            forward_delay=(forward - most, forward - least) if self._forward else nothing,
+            return_delay=(returning + least, returning + most) if self._return else nothing,
             offset=self.clock.offset,
-            offset_uncertainty=self.clock.uncertainty if self._there else math.nan,
+            offset_uncertainty=self.clock.uncertainty if self._forward else math.nan,
             round_trip_histogram=histogram(self.round_trips),
             lateness_histogram=histogram(self.lateness),
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from deadtime._validation import positive
+from deadtime._base.validation import positive
 from deadtime.links.udp.controller import Controller, ControllerOptions, ControllerReport
 from deadtime.links.udp.network import Network
 from deadtime.links.udp.plant import run_plant
@@ -28,7 +28,7 @@ class Trial:
     ----------
     gain : float
         Of the controller, 1/s.
-    there, back : Network
+    forward_path, return_path : Network
         From the plant to the controller, and back.
     seed : int
         What all delays and losses follow from.
@@ -51,8 +51,8 @@ class Trial:
     """
 
     gain: float
-    there: Network = field(default_factory=Network)
-    back: Network = field(default_factory=Network)
+    forward_path: Network = field(default_factory=Network)
+    return_path: Network = field(default_factory=Network)
     seed: int = 0
     sample_time: float = 0.01
     duration: float = 6.0
@@ -83,7 +83,7 @@ class Trial:
 
     def relay_options(self, controller: tuple[str, int]) -> RelayOptions:
         """The network's part, on a free port of this computer."""
-        return RelayOptions(controller, self.there, self.back, self.seed)
+        return RelayOptions(controller, self.forward_path, self.return_path, self.seed)
 
     def plant_options(
         self, controller: tuple[str, int], recording: Path | None = None
@@ -155,7 +155,7 @@ async def run_trial(
     >>> from deadtime.links import virtual_time
     >>> from deadtime.links.udp import Network, Trial, run_trial
     >>> way = Network(delay=0.05)
-    >>> report = virtual_time.run(run_trial(Trial(gain=8.0, there=way, back=way)))
+    >>> report = virtual_time.run(run_trial(Trial(gain=8.0, forward_path=way, return_path=way)))
     >>> round(report.plant.link.round_trip.p50, 6), round(report.plant.age, 6)
     (0.1, 0.105)
     """

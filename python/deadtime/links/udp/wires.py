@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
-from deadtime._validation import whole_number
+from deadtime._base.validation import whole_number
 from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_doubles
 
 __all__ = ["SAFE", "Doubles", "Stamped", "Wire"]

@@ -1,43 +1,24 @@
 //! Delay differential equations.
 //!
-//! * [`linear`]: the loop x′ = A x + B w + E r, u = K x + L w + M r, w(t) = sat(u(t − Td)),
-//!   its start and its reference;
-//! * [`sampled`]: the same loop with the command held between samples: exact response, transition
-//!   matrix, poles, grids of poles;
-//! * [`continuous`]: the loop in continuous time, exact to rounding by the method of steps;
-//! * [`fixed_step`]: the loop in fixed steps, with the errors of block-diagram tools;
-//! * [`propagator`]: the response of x′ = A x + g to constant g (matrix exponential);
-//! * [`ensemble`]: many loops at once, their responses or figures of merit;
-//! * [`sensitivity`]: derivatives of a response with respect to numbers of the loop;
-//! * [`scalar`]: the numbers all of these compute with, plain or with a slope;
-//! * [`spectral`]: any equation with constant delays, by collocation on elements that end on
-//!   breaking points, with its [`history`] and its [`breaks`];
+//! * [`control_loop`]: the loop x′ = A x + B w + E r, u = K x + L w + M r, w(t) = sat(u(t − Td)):
+//!   sampled or in continuous time, exact to rounding; in fixed steps; many at once; derivatives.
 //! * [`system`]: linear systems of any order with any number of delays, retarded or neutral.
+//! * [`spectral`]: any equation with constant delays, by collocation on elements that end on
+//!   breaking points.
+//! * `propagator` is the response of x′ = A x + g to constant g (matrix exponential), `scalar` the
+//!   numbers to compute with, plain or with a derivative, `limits` when a run is given up.
 
-pub mod breaks;
-mod chebyshev;
-pub mod continuous;
-pub mod ensemble;
-mod figures;
-pub mod fixed_step;
-mod gauge;
-pub mod history;
-pub mod linear;
-pub mod propagator;
-mod response;
-mod row;
-pub mod sampled;
-pub mod scalar;
-pub mod sensitivity;
+pub mod control_loop;
+mod limits;
+mod propagator;
+mod scalar;
 pub mod spectral;
 pub mod system;
-mod wanted;
 
-#[cfg(test)]
-mod tests;
-
-pub use figures::{Criteria, Figures};
-pub use linear::{Equations, LinearLoop, Reference, Start, Trajectory, Update};
-pub use response::{Request, Response, on_sample};
+pub use control_loop::{
+    Criteria, Equations, LinearLoop, Metrics, Reference, Request, Response, Start, Trajectory,
+    Update, ensemble, fixed_step, on_sample, sampled, sensitivity,
+};
 pub use scalar::{Dual, Scalar};
+pub use spectral::{breaks, history};
 pub use system::{LinearSystem, Past, Signal, SystemEquations, SystemResponse};

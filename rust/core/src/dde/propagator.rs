@@ -2,21 +2,21 @@
 //!
 //!   x(h) = Φ x(0) + Σ Γ_i v_i,   Φ = e^{A h},   Γ_i = ∫₀ʰ e^{A s} ds g_i.
 //!
-//! Φ − I and Γ are summed by Taylor for h / 2^q with ‖A‖₁ h / 2^q ≤ 1/2 and doubled q times:
-//! F(2h) = 2 F + F² for F = Φ − I, Γ(2h) = 2 Γ + F Γ. Working with Φ − I keeps slow modes beside
-//! fast ones, and keeping Γ apart from Φ keeps a large input gain from forcing more doublings
-//! than A needs. Sastre et al. and Higham (Functions of Matrices, 2008, section 10.3) treat
-//! scaling and squaring in general; this is its plain form for a handful of states. The norm is
-//! that of A balanced: with states scaled by powers of two every operation here gives the same
-//! bits, so badly chosen units of the states must not cost doublings.
-//! Guaranteed: the truncated series is below rounding. Not guaranteed: full relative accuracy of
-//! entries far below ‖Φ‖ for strongly non-normal A.
+//! Φ − I and Γ are summed by Taylor for h / 2^q with ‖A‖₁ h / 2^q ≤ 1/2 and doubled q times: F(2h)
+//! = 2 F + F² for F = Φ − I, Γ(2h) = 2 Γ + F Γ. Working with Φ − I keeps slow modes beside fast
+//! ones, and keeping Γ apart from Φ keeps a large input gain from forcing more doublings than A
+//! needs. Sastre et al. and Higham (Functions of Matrices, 2008, section 10.3) treat scaling and
+//! squaring in general; this is its plain form for a few states. The norm is that of A balanced:
+//! with states scaled by powers of two every operation here gives the same bits, so that badly
+//! chosen units of the states do not cost doublings. Guaranteed: the truncated series is below
+//! rounding. Not guaranteed: full relative accuracy of entries far below ‖Φ‖ for strongly
+//! non-normal A.
 
 use super::scalar::Scalar;
 
 /// Φ and the Γ_i of one step length.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Propagator<S = f64> {
+pub(crate) struct Propagator<S = f64> {
     n: usize,
     /// Φ − I, row-major.
     growth: Vec<S>,
@@ -26,7 +26,7 @@ pub struct Propagator<S = f64> {
 
 impl<S: Scalar> Propagator<S> {
     /// For A (n × n row-major), input columns g_i (n each) and step length `h` ≥ 0.
-    pub fn new(a: &[S], inputs: &[&[S]], h: S) -> Self {
+    pub(crate) fn new(a: &[S], inputs: &[&[S]], h: S) -> Self {
         let n = inputs.first().map_or_else(|| side(a), |g| g.len());
         let doublings = doublings(balanced_norm(a, n) * h.value());
         let step = h * S::from(0.5_f64.powi(doublings));
@@ -61,7 +61,7 @@ impl<S: Scalar> Propagator<S> {
     }
 
     /// Φ, row-major.
-    pub fn phi(&self) -> Vec<S> {
+    pub(crate) fn phi(&self) -> Vec<S> {
         let mut phi = self.growth.clone();
         for i in 0..self.n {
             phi[i * self.n + i] += S::from(1.0);
@@ -75,12 +75,12 @@ impl<S: Scalar> Propagator<S> {
     }
 
     /// Γ of input `i`.
-    pub fn gamma(&self, i: usize) -> &[S] {
+    pub(crate) fn gamma(&self, i: usize) -> &[S] {
         &self.gamma[i * self.n..(i + 1) * self.n]
     }
 
     /// `out` = Φ x + Σ Γ_i v_i.
-    pub fn apply(&self, x: &[S], inputs: &[S], out: &mut [S]) {
+    pub(crate) fn apply(&self, x: &[S], inputs: &[S], out: &mut [S]) {
         for (row, out) in out.iter_mut().enumerate() {
             let mut change = S::default();
             for (&f, &x) in self.growth[row * self.n..(row + 1) * self.n].iter().zip(x) {
@@ -115,13 +115,13 @@ impl<S: Scalar> Propagator<S> {
     }
 }
 
-/// Largest ‖A‖₁ h that the series is summed for without doubling.
+/// Largest ‖A‖₁ h for which the series is summed without doubling.
 const REACH: f64 = 0.5;
 
-/// 0.5^17/17! is below 1e-19: the series has ended by then.
+/// Number of terms: 0.5^17/17! is below 1e-19.
 const TERMS: u32 = 17;
 
-/// Halvings that bring `size` within reach.
+/// Number of halvings that bring `size` below [`REACH`].
 fn doublings(size: f64) -> i32 {
     let mut count = 0;
     let mut size = size;
@@ -159,7 +159,7 @@ pub(crate) fn multiply_add<S: Scalar>(a: &[S], x: &[S], out: &mut [S]) {
     }
 }
 
-/// Rounds of balancing; few are needed, since states are few.
+/// Upper limit on the rounds of balancing; few are needed for few states.
 const ROUNDS: usize = 100;
 
 /// ‖D⁻¹ A D‖₁, the largest column sum, with D of `balanced`.
@@ -170,8 +170,8 @@ pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
 /// D⁻¹ A D and the exponents k of D = diag(2^k), chosen to make its norm small.
 ///
 /// Osborne 1960, in powers of two: each state in turn is scaled until its row and its column,
-/// diagonal left out, are of one size. A state that only drives or is only driven can be scaled
-/// at will, and is, until that no longer matters beside the diagonal.
+/// diagonal left out, are of one size. A state with an empty row or column can be scaled by any
+/// factor. It is scaled until the other entry is negligible beside the diagonal.
 pub(crate) fn balanced<S: Scalar>(a: &[S], n: usize) -> (Vec<f64>, Vec<i32>) {
     let mut a: Vec<f64> = a.iter().map(|a| a.value()).collect();
     let mut exponents = vec![0; n];
@@ -186,7 +186,7 @@ pub(crate) fn balanced<S: Scalar>(a: &[S], n: usize) -> (Vec<f64>, Vec<i32>) {
             if column.max(row) <= floor {
                 continue;
             }
-            // A chain of integrators alone has no rate to stop at.
+            // A chain of integrators alone has no rate at which to stop.
             if (column == 0.0 || row == 0.0) && diagonal == 0.0 {
                 continue;
             }
@@ -278,7 +278,8 @@ mod tests {
             -0.748_505_561_166_607_5,
             0.364_865_734_044_597_43,
         ];
-        // Eight doublings each lose about one unit of the largest entry.
+        // Eight doublings each have an error of about one unit in the last place of the largest
+        // entry.
         close(&found.phi(), &phi, 1e-14);
         close(
             found.gamma(0),
@@ -302,7 +303,7 @@ mod tests {
             balanced_norm(&slow, 3),
             balanced_norm(&a, 3) * 2f64.powi(-30)
         );
-        // A lag before an integrator: the integrator's unit is anyone's choice.
+        // A lag before an integrator: the unit of the integrator is arbitrary.
         assert!(balanced_norm(&[-1e-6, 1.0, 0.0, 0.0], 2) < 2e-6);
         assert_eq!(balanced_norm(&[0.0, 3.0, 0.0, 0.0], 2), 3.0);
         assert_eq!(balanced_norm::<f64>(&[], 0), 0.0);

@@ -1,23 +1,23 @@
-//! The numbers a loop is simulated with: plain ones, or ones that carry a slope.
+//! The numbers with which a loop is simulated: plain numbers, or numbers with a derivative.
 //!
 //! A [`Dual`] is a value v and its derivative v̇ with respect to one parameter,
 //!
 //!   (u, u̇)(v, v̇) = (u v, u̇ v + u v̇),   (u, u̇)/(v, v̇) = (u/v, (u̇ − (u/v) v̇)/v).
 //!
-//! Run in duals, an engine differentiates itself (forward mode; Wengert 1964). Times are duals as
-//! well: element ends, breaking points and arrivals move with the parameter, and the local
-//! coordinate (time − start)/length with them, so a jump that moves is differentiated as one.
-//! Decisions (which element, which mode, which event comes first) look at values alone; tests
-//! that something is negligible look at both. Events at one value of time that move at different
-//! speeds stay apart: between them lies a stretch of no length whose length has a slope.
+//! A simulation in duals computes its own derivative (forward mode; Wengert 1964). Times are duals
+//! as well: element ends, breaking points and arrivals move with the parameter, and the local
+//! coordinate (time − start)/length with them, so that a moving jump is differentiated correctly.
+//! Decisions (which element, which mode, which event comes first) depend on values alone; tests
+//! that something is negligible depend on both. Events at one value of time that move at different
+//! speeds stay separate: between them lies an element of length zero whose length has a derivative.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub};
 
-/// Slopes of two times that differ by less than this part of their sizes are one.
+/// Relative difference of the slopes of two times below which they move together.
 const SAME_SPEED: f64 = 1e-10;
 
-/// What the engines compute with.
+/// A number with which a simulation computes.
 pub trait Scalar:
     Copy
     + Debug
@@ -49,7 +49,7 @@ pub trait Scalar:
     /// `self` · `factor` + `summand`, the value rounded once.
     fn mul_add(self, factor: Self, summand: Self) -> Self;
 
-    /// No value and no slope?
+    /// Are value and slope both zero?
     fn is_nothing(self) -> bool {
         self == Self::default()
     }
@@ -59,7 +59,7 @@ pub trait Scalar:
         self.value().is_finite() && self.slope().is_finite()
     }
 
-    /// The one of smaller value.
+    /// The one with the smaller value.
     fn earlier(self, other: Self) -> Self {
         if other.value() < self.value() {
             other
@@ -103,7 +103,7 @@ pub struct Dual {
 }
 
 impl Dual {
-    /// From both parts.
+    /// From value and slope.
     pub const fn new(value: f64, slope: f64) -> Self {
         Self { value, slope }
     }
@@ -191,13 +191,13 @@ impl MulAssign for Dual {
     }
 }
 
-/// Do two times, alike in value, move at different speeds?
+/// Do two times of equal value move at different speeds?
 pub(crate) fn part_ways<S: Scalar>(s: S, t: S) -> bool {
     let size = s.slope().abs() + t.slope().abs();
     S::MOVES && (s.slope() - t.slope()).abs() > SAME_SPEED * size
 }
 
-/// Is the time of `event` no later than `t`, or within `slack` of it and moving along?
+/// Is the time of `event` at most `t`, or within `slack` after it and moving with it?
 pub(crate) fn is_reached<S: Scalar>(event: S, t: S, slack: f64) -> bool {
     event.value() <= t.value() + slack && !part_ways(event, t)
 }

@@ -1,16 +1,17 @@
 //! The angle of a vector within 8 u, u = 2⁻⁵³, by a table of 17 arctangents.
 //!
-//! Let b ≤ a be the moduli of the coordinates, c = j/16 next to b/a, so that
-//! atan(b/a) = atan c + atan z, z = (b − c a)/(a + c b), |z| ≤ 0.0313 (the quotient b/a only chooses j).
-//! c a loses u a, the difference u |b − c a|, the denominator 2.01 u, the quotient u: z is within
-//! u + 4.1 u |z| < 1.13 u. The series to z⁹ is cut by |z|¹¹/11 < 0.03 u and rounded within 0.04 u.
-//! The sum with the table, at most 0.79, loses 0.5 u. In the other octants π/2 or π, wrong by at
-//! most 1.11 u as doubles, is added: at most 2 u for rounding a sum below 4. In all 4.9 u.
-//! Holds as long as no product underflows or overflows: coordinates between 1e-290 and 1e300 or 0.
+//! Let b ≤ a be the moduli of the coordinates, c = j/16 next to b/a, so that atan(b/a) = atan c +
+//! atan z, z = (b − c a)/(a + c b), |z| ≤ 0.0313 (the quotient b/a only chooses j). The errors are
+//! u a of c a, u |b − c a| of the difference, 2.01 u (relative) of the denominator and u of the
+//! quotient: z is within u + 4.1 u |z| < 1.13 u. The series to z⁹ has the truncation error |z|¹¹/11
+//! < 0.03 u and the rounding error 0.04 u. The sum with the table, at most 0.79, has the error 0.5
+//! u. In the other octants π/2 or π, whose doubles have an error of at most 1.11 u, is added: at
+//! most 2 u for rounding a sum below 4. The total is 4.9 u. Holds as long as no product underflows
+//! or overflows: coordinates between 1e-290 and 1e300 or 0.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::ANGLES;
 
 /// The angle of (x, y) in (−π, π] within 2⁻⁵⁰; 0 for the zero vector.

@@ -15,7 +15,7 @@
 //! *Result.* The two inner sums, below 0.06, lose 0.06 u together; the last sum, below 1 but for
 //! rounding, u/2. In all 0.16 + 0.045 + 0.001 + 0.101 + 0.005 + 0.06 + 0.5 < 0.9 u.
 
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::{INVERSE_TURN, SINES};
 
 pub(super) const STEPS_PER_UNIT: f64 = 10.185_916_357_881_302;
@@ -25,7 +25,7 @@ pub(super) const STEP: [f64; 3] = [
     6.200_584_880_614_035e-11,
     -7.610_657_361_233_729e-20,
 ];
-/// Below this the reduction in three pieces holds.
+/// Largest argument for the reduction in three pieces.
 pub(super) const LARGE: f64 = 1_048_576.0;
 /// 2π/2⁶⁴: from units of 2⁻⁶⁴ turns to radians.
 const UNIT: f64 = std::f64::consts::TAU / 18_446_744_073_709_551_616.0;
@@ -87,7 +87,7 @@ fn reduce(y: f64) -> (i64, f64) {
         let pair = (u128::from(word(index)) << 64) | u128::from(word(index + 1));
         (pair >> (64 - shift)) as u64
     };
-    // M times the fraction, modulo 1; of the lowest product only the carry is wanted.
+    // M times the fraction, modulo 1; of the lowest product only the carry is used.
     let products = [0, 1, 2].map(|i| mantissa * u128::from(window(i)));
     let middle = products[1].wrapping_add(products[2] >> 64);
     let fraction = (products[0] as u64).wrapping_add((middle >> 64) as u64);

@@ -1,23 +1,24 @@
-//! Sums of two doubles as one number of 106 bits.
+//! Double-double arithmetic: sums of two doubles as one number of 106 bits.
 //!
 //! A number is `high + low`, high being the double nearest to the sum. With u = 2⁻⁵³ the bounds of
 //! Joldes, Muller & Popescu (2017, ACM Trans. Math. Softw. 44) hold, relative to the exact result:
 //! sum of two numbers 3.1 u² (their algorithm 6), with a double 2 u² (algorithm 4), product 7 u²
-//! (algorithm 10), with a double 2 u² (algorithm 7). They assume that nothing overflows; where a low word
-//! underflows, 2⁻¹⁰⁷⁴ is lost besides. Products are made exact by splitting (Dekker 1971), not
-//! by fused operations, so that the bits are the same on every machine.
+//! (algorithm 10), with a double 2 u² (algorithm 7). They assume that nothing overflows; where a
+//! low word underflows, there is a further error of 2⁻¹⁰⁷⁴. Products are made exact by splitting
+//! (Dekker 1971) and not by fused operations. The double-doubles of `simd`, for kernels, use fused
+//! operations and normalise less often.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// 2²⁷ + 1 splits a double into halves of 26 bits.
 const SPLITTER: f64 = 134_217_729.0;
 
-/// A number of two words.
+/// A double-double.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DoubleDouble {
     /// The double nearest to the number.
     pub high: f64,
-    /// The rest.
+    /// The remainder.
     pub low: f64,
 }
 

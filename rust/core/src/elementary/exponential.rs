@@ -13,7 +13,7 @@
 //! Together less than 1.1 u, of T: 1.12 u of e^r T. The power of two is exact down to 2⁻¹⁰²²,
 //! below it costs one rounding, 2⁻¹⁰⁷⁵.
 
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::POWERS;
 
 pub(super) const STEPS_PER_UNIT: f64 = 46.166_241_308_446_83;
@@ -34,7 +34,7 @@ pub fn exp(x: f64) -> f64 {
         return f64::INFINITY;
     }
     if x < -745.2 {
-        // Less than 2⁻¹⁰⁷⁵.
+        // The result is less than 2⁻¹⁰⁷⁵.
         return 0.0;
     }
     let k = nearest(x * STEPS_PER_UNIT);
@@ -57,7 +57,7 @@ pub fn exp(x: f64) -> f64 {
 /// An upper bound of e^x, larger by less than 1e-15 of it.
 #[inline]
 pub fn exp_above(x: f64) -> f64 {
-    // 1.25 u + u for this product < 4 u; then 2^-1074 covers what is lost near underflow.
+    // 1.25 u + u for this product < 4 u; the last 2^-1074 covers underflow.
     exp(x) * (1.0 + 2.0 * f64::EPSILON) + f64::from_bits(1)
 }
 

@@ -50,7 +50,7 @@ pub fn log(x: f64) -> f64 {
     let z = (f - 1.0) / (f + 1.0);
     let square = z * z;
     let fourth = square * square;
-    // In pairs, which halves the chain of operations.
+    // Summed in pairs, which halves the chain of dependent operations.
     let tail = PAIRS
         .iter()
         .rev()

@@ -1,8 +1,9 @@
 //! Exponential, sine and cosine, logarithm and angle with proved error bounds.
 //!
-//! Proofs by winding numbers lean on these functions, so what they lose is derived, not trusted.
-//! Each file carries its derivation. u = 2⁻⁵³ is half an ulp of 1; every sum and product of the
-//! derivations is one IEEE operation, rounded to nearest, relative error at most u.
+//! Proofs by winding numbers depend on the errors of these functions, which are therefore derived.
+//! Each file contains its derivation; "loses" states a rounding error there. u = 2⁻⁵³ is half an
+//! ulp of 1; every sum and product of the derivations is one IEEE operation, rounded to nearest,
+//! relative error at most u.
 //!
 //! | function | bound |
 //! |---|---|
@@ -13,15 +14,16 @@
 //! | [`precise::exp`], [`precise::sin_cos`] of a [`DoubleDouble`] | 8 u² |
 //!
 //! No library function and no fused operation is used: the bits are the same on every machine.
-//! `in_lanes` has the same bits of several elements at once.
+//! `simd` computes several elements at once with the same bits.
 
 mod angle;
 mod circular;
 mod double_double;
 mod exponential;
-pub(crate) mod in_lanes;
 mod logarithm;
+mod nearest;
 pub mod precise;
+pub(crate) mod simd;
 mod tables;
 
 pub use angle::angle;
@@ -29,14 +31,6 @@ pub use circular::sin_cos;
 pub use double_double::DoubleDouble;
 pub use exponential::{exp, exp_above};
 pub use logarithm::log;
-
-/// Adding and subtracting 1.5 · 2⁵² rounds to the nearest integer, for |x| < 2⁵¹.
-const ROUNDER: f64 = 6_755_399_441_055_744.0;
-
-#[inline(always)]
-fn nearest(x: f64) -> f64 {
-    (x + ROUNDER) - ROUNDER
-}
 
 #[cfg(test)]
 mod tests;

@@ -1,41 +1,43 @@
-//! e^x, sin y and cos y of two-word arguments, within 8 u² (u = 2⁻⁵³).
+//! e^x, sin y and cos y of double-double arguments, within 8 u² (u = 2⁻⁵³).
 //!
-//! As in `exponential` and `circular`, with the same tables, whose entries are within u² (Tang 1989),
-//! and the step (ln 2/32, π/32) in three words. The multiples of the first two words are exact
-//! products; each of the three differences loses 3.1 u² of what it leaves (below 0.05), the third
-//! word and what follows it less than 2⁻¹²⁰ for |k| < 2¹⁶, |n| < 2⁴⁴: the reduced r is within 0.5 u².
-//! *Exponential.* |r| ≤ 0.01084. The series ends at r¹²/12!, cut by 2⁻¹¹⁷; its part from r⁷ on is
-//! computed in doubles, 10 u r⁷/5040 < 0.4 u². Products and sums of the rest lose 10 u² of r²/2 and 3.1 u²
-//! of r: together with r, p = e^r − 1 is within 1 u². T + T p: 1 u² (table), 1 u² (p), 0.1 u² (product),
-//! 3.2 u² (sum): below 6 u² of the result. Powers of two are exact unless words underflow.
-//! *Circular.* |r| ≤ 0.0492. sin r to r¹⁵ (cut by 2⁻¹²²), from r⁹ in doubles (0.4 u²); cos r − 1 to r¹⁴
-//! (2⁻¹¹³), from r¹⁰ in doubles (0.1 u²). S + (C sin r + S (cos r − 1)): 1 u² (table), 0.5 + 0.4 + 0.1 u²
-//! (r and series), 0.5 u² (products), 3.1 u² (sum) and 0.2 u² (inner sum): below 6 u².
+//! As in `exponential` and `circular`, with the same tables, whose entries are within u² (Tang
+//! 1989), and the step (ln 2/32, π/32) as the sum of three doubles. The multiples of the first two
+//! words are exact products; each of the three differences loses 3.1 u² of what it leaves (below
+//! 0.05), the third word and what follows it less than 2⁻¹²⁰ for |k| < 2¹⁶, |n| < 2⁴⁴: the reduced
+//! r is within 0.5 u². *Exponential.* |r| ≤ 0.01084. The series ends at r¹²/12!, cut by 2⁻¹¹⁷; its
+//! part from r⁷ on is computed in doubles, 10 u r⁷/5040 < 0.4 u². Products and sums of the rest
+//! lose 10 u² of r²/2 and 3.1 u² of r: together with r, p = e^r − 1 is within 1 u². T + T p: 1 u²
+//! (table), 1 u² (p), 0.1 u² (product), 3.2 u² (sum): below 6 u² of the result. Powers of two are
+//! exact unless words underflow. *Circular.* |r| ≤ 0.0492. sin r to r¹⁵ (cut by 2⁻¹²²), from r⁹ in
+//! doubles (0.4 u²); cos r − 1 to r¹⁴ (2⁻¹¹³), from r¹⁰ in doubles (0.1 u²). S + (C sin r + S (cos
+//! r − 1)): 1 u² (table), 0.5 + 0.4 + 0.1 u² (r and series), 0.5 u² (products), 3.1 u² (sum) and
+//! 0.2 u² (inner sum): below 6 u².
 
 use super::double_double::DoubleDouble;
-use super::nearest;
+use super::nearest::nearest;
 use super::tables::{POWERS, SINES};
 
 const EXP_STEPS_PER_UNIT: f64 = 46.166_241_308_446_83;
-/// ln 2/32 in three words.
+/// ln 2/32 as the sum of three doubles.
 const EXP_STEP: [f64; 3] = [
     0.021_660_849_392_498_29,
     7.247_021_293_269_686e-19,
     1.783_658_887_005_066_3e-35,
 ];
 const ANGLE_STEPS_PER_UNIT: f64 = 10.185_916_357_881_302;
-/// π/32 in three words.
+/// π/32 as the sum of three doubles.
 const ANGLE_STEP: [f64; 3] = [
     0.098_174_770_424_681_03,
     3.827_021_247_335_479e-18,
     -9.358_655_655_369_811e-35,
 ];
-/// Arguments of sine and cosine up to here.
+/// Largest argument of sine and cosine.
 const LARGEST_ANGLE: f64 = 1_099_511_627_776.0;
-/// e^x is computed for |x| up to here, where neither it nor its low word leaves the normal numbers.
+/// Largest |x| for which e^x is computed; up to it neither the result nor its low word leaves the
+/// normal numbers.
 pub const LARGEST_EXPONENT: f64 = 600.0;
 
-/// 1/2, −1/6 and so on in two words are taken from here: 1/2!, 1/3!, …, 1/8!.
+/// 1/2, −1/6 and so on as double-doubles are taken from here: 1/2!, 1/3!, …, 1/8!.
 const INVERSE_FACTORIALS: [DoubleDouble; 7] = [
     DoubleDouble::new(0.5, 0.0),
     DoubleDouble::new(0.166_666_666_666_666_66, 9.251_858_538_542_97e-18),

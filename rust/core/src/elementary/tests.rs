@@ -55,7 +55,7 @@ fn errors_stay_within_the_proved_bounds() {
         count += 1;
     }
     assert!(count > 1400, "{count} rows");
-    // A bound far from what is reached would be a slip in its derivation.
+    // A bound far above the errors found would indicate a mistake in its derivation.
     assert!(worst.iter().all(|share| *share > 0.2), "{worst:?}");
 }
 
@@ -94,7 +94,7 @@ proptest! {
 
     #[test]
     fn both_reductions_agree_where_they_meet(y in 1_048_000.0..1_049_000.0f64) {
-        // The double angle is reduced the other way.
+        // The double angle is reduced in another way.
         let (s, c) = sin_cos(y);
         let (far_s, far_c) = sin_cos(y * 2.0);
         prop_assert!((far_s - 2.0 * s * c).abs() <= 8.0 * U);

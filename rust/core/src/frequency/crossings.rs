@@ -8,24 +8,13 @@
 use super::chains::{Lead, ROOM};
 use super::delays::crossings_of_delay;
 use super::equation::Equation;
+use super::passage::Crossing;
 use crate::stability::{Family, crossings_along};
 use crate::{Error, Task};
 
 /// Crossings are not listed within this part of the range of where chains reach the axis: the
 /// frequencies at which they may lie grow without bound there.
 const NEAR_CHAINS: f64 = 1e-3;
-
-/// A value of a parameter at which roots lie on the imaginary axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Crossing {
-    /// The value.
-    pub value: f64,
-    /// Imaginary part of the root, zero or positive, 1/s.
-    pub omega: f64,
-    /// Roots that go to the right as the parameter grows, less those that go to the left; zero where
-    /// that is not known.
-    pub direction: i32,
-}
 
 /// Crossings over a range of a parameter.
 #[derive(Debug, Clone, PartialEq, Default)]

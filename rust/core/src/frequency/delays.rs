@@ -7,15 +7,13 @@
 //! enters as several multiples of one, see `multiples`. No frequency is missed (`zeros`); frequencies
 //! and delays carry rounding only, which is not bounded.
 
-use std::f64::consts::TAU;
-
 use num_complex::Complex64;
 
 use super::bounds::moduli;
-use super::crossings::Crossing;
 use super::equation::Equation;
 use super::margins::{gain_crossovers, over};
 use super::multiples::crossings_of_multiples;
+use super::passage::{Crossing, Passage};
 use super::squares::DifferenceOfSquares;
 use super::waves::polynomial;
 use super::zeros::RealFunction;
@@ -30,42 +28,6 @@ const MOST: f64 = 1e6;
 /// A zero that both parts share is a multiple one of the difference of their squares, and so met to
 /// the square or the third root of the rounding only; their quotient means nothing there.
 const COMMON: f64 = 1e-4;
-
-/// A frequency at which roots cross for T = `first` + n `period`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Passage {
-    pub(super) omega: f64,
-    pub(super) first: f64,
-    pub(super) period: f64,
-    pub(super) direction: i32,
-}
-
-impl Passage {
-    /// From e^(−jωT·`unit`) = e^(j·`turn`).
-    pub(super) fn new(omega: f64, turn: f64, unit: f64, direction: i32) -> Self {
-        let scale = unit * omega;
-        Self {
-            omega,
-            first: turn.rem_euclid(TAU) / scale,
-            period: TAU / scale,
-            direction,
-        }
-    }
-
-    /// The last delay before `value` and the first one after it.
-    fn around(&self, value: f64) -> (f64, f64) {
-        let turns = (value - self.first) / self.period;
-        let at = |turns: f64| self.first + self.period * turns;
-        let (mut low, mut high) = (at(turns.ceil() - 1.0), at(turns.floor() + 1.0));
-        if low >= value {
-            low -= self.period;
-        }
-        if high <= value {
-            high += self.period;
-        }
-        (low, high)
-    }
-}
 
 /// All crossings as the delay varies from `low` to `high`.
 ///

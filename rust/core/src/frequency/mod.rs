@@ -15,6 +15,7 @@ mod delays;
 mod equation;
 mod margins;
 mod multiples;
+mod passage;
 mod polynomial;
 mod ranges;
 mod ratio;
@@ -25,9 +26,10 @@ mod zeros;
 
 pub use argument::argument;
 pub use bounds::end_of_gain;
-pub use crossings::{Crossing, Crossings, crossings};
+pub use crossings::{Crossings, crossings};
 pub use delays::{delay_margin, delay_range};
 pub use margins::{Margins, margins};
+pub use passage::Crossing;
 pub use ranges::{corner_range, damping_range, gain_range};
 pub use ratio::{first_term, ratio};
 

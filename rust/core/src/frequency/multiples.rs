@@ -13,7 +13,7 @@
 use num_complex::Complex64;
 
 use super::bounds::{fujiwara, moduli};
-use super::delays::Passage;
+use super::passage::Passage;
 use super::polynomial::roots;
 use super::two_sided::TwoSided;
 use super::waves::{Waves, polynomial};

@@ -1,20 +1,20 @@
-//! Blocks of elements on the calling thread: what every array call comes down to.
+//! Blocks of elements on the calling thread: the implementation of every array call.
 //!
-//! Inputs and outputs of one call have equal lengths; where they have not, the shortest counts.
-//! An element's bits depend on nothing but its arguments.
+//! Inputs and outputs of one call have equal lengths; where they have not, the shortest counts. The
+//! bits of an element depend only on its arguments.
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
+use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
-use super::kernel::{self, Point};
-use super::route::Order;
-use super::{delay, huge_branch, log_form, real, special_values};
+use super::branch_sort::Order;
+use super::kernel::Point;
+use super::{delay, huge_branch, kernel, log_form, real, special_values};
 
 /// Elements in a block.
 const BLOCK: usize = 256;
 
-/// 1 in lanes where it is true.
+/// 1 in the lanes where the mask is true, 0 elsewhere.
 #[inline(always)]
 fn marked<S: Simd>(mask: Mask<S>, like: Real<S>) -> Real<S> {
     mask.select(1.0, like.constant(0.0))
@@ -74,7 +74,7 @@ fn lambertw_by<const W: usize>(z: &[Complex64], k: &[i64], w: &mut [Complex64]) 
     }
 }
 
-/// W where the kernel in lanes does not reach.
+/// W for arguments that the vectorised code does not handle.
 fn far(z: Complex64, k: i64) -> Complex64 {
     if !(z.re.is_finite() && z.im.is_finite()) || (z.re == 0.0 && z.im == 0.0) {
         return special_values::lambertw(z, k);
@@ -181,7 +181,7 @@ pub fn lambertw_derivative(z: &[Complex64], k: &[i64], slope: &mut [Complex64]) 
     by_branch(&Derivative, z, k, slope, far_derivative);
 }
 
-/// The derivative where the kernel in lanes does not reach.
+/// The derivative for arguments that the vectorised code does not handle.
 fn far_derivative(z: Complex64, k: i64) -> Complex64 {
     if z.re.is_nan() || z.im.is_nan() {
         return Complex64::new(f64::NAN, f64::NAN);
@@ -196,7 +196,8 @@ fn far_derivative(z: Complex64, k: i64) -> Complex64 {
     if !(z.re.is_finite() && z.im.is_finite()) {
         return Complex64::new(0.0_f64.copysign(z.re), 0.0_f64.copysign(-z.im));
     }
-    // W is in the millions there: W/(1 + W) is 1 - 1/W but for 1e-13 of it, and divided with it.
+    // W is in the millions there: W/(1 + W) is 1 - 1/W up to a relative error of 1e-13, which the
+    // division takes into account.
     let w = far(z, k);
     let scale = z.re.abs().max(z.im.abs());
     (w / (w + 1.0)) / (z / scale) / scale
@@ -208,7 +209,8 @@ impl Kernel<3, 5> for Offset {
     #[inline(always)]
     fn lanes<S: Simd>(&self, [re, im, k]: [Real<S>; 3]) -> [Real<S>; 5] {
         let point = Point::from_offset(Complex::new(re, im));
-        // -1/e is not a double, so only what is infinite, NaN or far out is beyond reach.
+        // -1/e is not a double, so that only infinite, NaN and very large arguments are not
+        // handled.
         let unit = Complex::new(re.constant(1.0) + re.abs(), im);
         let beyond = marked(kernel::out_of_reach(unit, k), re);
         let answer = kernel::lambertw(point, k);
@@ -280,7 +282,8 @@ pub fn dde_root(a0: &[f64], a1: &[f64], delay: &[f64], k: &[i64], s: &mut [Compl
     });
 }
 
-/// `out[i] = kernel(z[i], k[i])`, by `far` where the kernel marks that it does not reach.
+/// `out[i] = kernel(z[i], k[i])`, or `far` where the kernel marks that it does not handle the
+/// argument.
 fn by_branch<K: Kernel<3, 3>>(
     kernel: &K,
     z: &[Complex64],

@@ -1,12 +1,12 @@
 //! Next to -1/e: the series of W in the square root of the distance.
 //!
-//! With h = 1 + e z and p = ±sqrt(2 h), w = -1 + p - p^2/3 + 11 p^3/72 - … (Corless, Gonnet,
-//! Hare, Jeffrey & Knuth 1996, eq. 4.22; coefficients by the recurrence 4.23), + for W_0 and
-//! minus for the branch behind the cut. What is summed is 1 + w, whose relative accuracy survives,
-//! from h = e (z + 1/e) with 1/e in two words: -1/e itself is not a double.
-//! Guaranteed: relative error of 1 + w of a few 2^-53 for |p| < 0.02, and 1e-8 for |p| < 0.52.
+//! With h = 1 + e z and p = ±sqrt(2 h), w = -1 + p - p^2/3 + 11 p^3/72 - … (Corless, Gonnet, Hare,
+//! Jeffrey & Knuth 1996, eq. 4.22; coefficients by the recurrence 4.23), + for W_0 and minus for
+//! the branch behind the cut. The sum is 1 + w, which keeps its relative accuracy, from h = e (z +
+//! 1/e) with 1/e in double-double arithmetic, because -1/e itself is not a double. Guaranteed:
+//! relative error of 1 + w of a few 2^-53 for |p| < 0.02, and 1e-8 for |p| < 0.52.
 
-use crate::lanes::{Complex, Simd};
+use crate::simd::{Complex, Simd};
 
 /// 1/e = INVERSE_E + INVERSE_E_LOW to 106 bits.
 pub(super) const INVERSE_E: f64 = 0.367_879_441_171_442_33;
@@ -60,7 +60,7 @@ pub(super) fn one_plus_w<S: Simd>(p: Complex<S>) -> Complex<S> {
     for &coefficient in SERIES.iter().rev() {
         tail = tail.mul_add(p, coefficient);
     }
-    // The first term is p itself, and by far the largest: it is added last.
+    // The first term is p itself and by far the largest; it is added last.
     let tail = tail * p;
     Complex::new(
         tail.re.mul_add(p.re, tail.im.negated_mul_add(p.im, p.re)),

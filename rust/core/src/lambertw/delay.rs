@@ -1,18 +1,18 @@
 //! Characteristic roots of the scalar equation with one delay.
 //!
-//! The roots of s = a0 + a1 e^(-s T), belonging to x'(t) = a0 x(t) + a1 x(t - T), are
-//! s_k = W_k(T a1 e^(-a0 T))/T + a0 for every integer k: Armah & Yi, eq. (3), after Asl & Ulsoy
-//! (2003) and Yi, Nelson & Ulsoy (2010). Taken literally the formula overflows or cancels for
-//! large |a0 T|. Here sigma = s T solves (sigma - alpha) e^sigma = beta, alpha = a0 T,
-//! beta = a1 T: the starting value comes from W, or from sigma = log beta + 2 pi i k - log W
-//! where W is large, and the steps that follow act on sigma itself with the residual
-//! beta e^-sigma - (sigma - alpha) in two words. A sigma near zero (stability boundary) is solved
-//! for from alpha + beta, so that its sign is right. Error: a few 2^-53 |s|, more only where
-//! two roots meet (1 + W small), where the inputs do not determine the root better either.
+//! The roots of s = a0 + a1 e^(-s T), belonging to x'(t) = a0 x(t) + a1 x(t - T), are s_k = W_k(T
+//! a1 e^(-a0 T))/T + a0 for every integer k: Armah & Yi, eq. (3), after Asl & Ulsoy (2003) and Yi,
+//! Nelson & Ulsoy (2010). Taken literally the formula overflows or cancels for large |a0 T|. Here
+//! sigma = s T solves (sigma - alpha) e^sigma = beta, alpha = a0 T, beta = a1 T: the starting value
+//! comes from W, or from sigma = log beta + 2 pi i k - log W where W is large, and the steps that
+//! follow act on sigma itself with the residual beta e^-sigma - (sigma - alpha) in double-double
+//! arithmetic. A sigma near zero (stability boundary) is solved for from alpha + beta, so that its
+//! sign is right. Error: a few 2^-53 |s|, more only where two roots meet (1 + W small), where the
+//! inputs do not determine the root better either.
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Mask, Real, Simd};
+use crate::simd::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{INVERSE_E, one_plus_w};
 use super::elementary::{Reduced, cos_sin, exp, rough_log};
@@ -22,21 +22,21 @@ use super::guess::{
 use super::huge_branch::{HUGE_BRANCH, fixed_point};
 use super::refine::{Scaled, correction};
 use super::special_values;
-use super::two_word::{TwoWord, product};
+use crate::simd::double_double::{DoubleDouble, product};
 
-/// Products a0 T and a1 T up to here are treated; beyond, the answer is NaN.
+/// Largest products a0 T and a1 T; beyond, the result is NaN.
 const LARGEST: f64 = 1e300;
-/// log |z| below which W_0 is its own Taylor polynomial.
+/// log |z| below which W_0 equals its Taylor polynomial of low order.
 const SMALL: f64 = -20.0;
-/// log |z| from which on two roots can no longer be near each other.
+/// log |z| from which on two roots cannot be close to each other.
 const APART: f64 = 3.0;
-/// |log z| above which w is real but for rounding, and its powers might overflow.
+/// |log z| above which w is real up to rounding errors, and its powers might overflow.
 const LARGE: f64 = 1e40;
-/// |1 + e z| below which two roots (nearly) meet and the series is the answer.
+/// |1 + e z| below which two roots (nearly) meet and the series is the result.
 const MEETING: f64 = 1.0 / 8_192.0;
 /// |1 + e z| below which the series is the starting value.
 const NEARLY_MEETING: f64 = 0.125;
-/// |sigma| below which the difference of 1 and e^-sigma is summed as such.
+/// |sigma| below which the difference of 1 and e^-sigma is summed by its series.
 const NEAR_ZERO: f64 = 1.0 / 256.0;
 /// -1/7!, 1/6!, …, 1/2!: what follows 1/8! in (e^-s - 1 + s)/s^2, highest power first.
 const EXP_TAIL: [f64; 6] = [
@@ -48,8 +48,7 @@ const EXP_TAIL: [f64; 6] = [
     0.5,
 ];
 
-/// Where the kernel does not reach: arguments that are not sound, no delayed term, branches far
-/// out.
+/// Arguments that the kernel does not handle: not finite, no delayed term, or large branches.
 #[inline(always)]
 pub(super) fn out_of_reach<S: Simd>([a0, a1, delay, k]: [Real<S>; 4]) -> Mask<S> {
     let sound = a0.abs().lt(f64::INFINITY)
@@ -60,7 +59,7 @@ pub(super) fn out_of_reach<S: Simd>([a0, a1, delay, k]: [Real<S>; 4]) -> Mask<S>
     !(sound & moderate) | a1.eq(0.0) | k.abs().ge(HUGE_BRANCH as f64)
 }
 
-/// The root where the kernel in lanes does not reach.
+/// The root for arguments that the vectorised code does not handle.
 pub(super) fn far_root(a0: f64, a1: f64, delay: f64, k: i64) -> Complex64 {
     let (alpha, beta) = (a0 * delay, a1 * delay);
     let sound = a0.is_finite() && a1.is_finite() && delay.is_finite() && delay >= 0.0;
@@ -93,15 +92,15 @@ fn without_delay(a0: f64, a1: f64, k: i64) -> Complex64 {
     Complex64::new(f64::NEG_INFINITY, im)
 }
 
-/// (sigma - alpha) e^sigma = beta on branch k >= 0, below the cut where mirrored.
+/// (sigma - alpha) e^sigma = beta on branch k >= 0, below the cut where `mirrored`.
 struct Problem<S: Simd> {
-    alpha: TwoWord<S>,
+    alpha: DoubleDouble<S>,
     /// beta = factor 2^exponent.
-    factor: TwoWord<S>,
+    factor: DoubleDouble<S>,
     exponent: Real<S>,
 }
 
-/// The root within reach.
+/// The root for arguments that the kernel handles.
 #[inline(always)]
 pub(super) fn root<S: Simd>([a0, a1, delay, k]: [Real<S>; 4]) -> Complex<S> {
     let zero = k.constant(0.0);
@@ -136,7 +135,7 @@ impl<S: Simd> Problem<S> {
         let principal_branch = k.eq(0.0);
         let joined = principal_branch | (k.eq(1.0) & mirrored & negative);
         let small = principal_branch & log_modulus.lt(SMALL);
-        // Where the sheets that meet at -1/e can be near.
+        // Arguments for which the sheets that meet at -1/e can be close.
         let close = joined & log_modulus.gt(SMALL) & log_modulus.lt(APART);
         let large = log_modulus.abs().gt(LARGE);
 
@@ -206,8 +205,8 @@ impl<S: Simd> Problem<S> {
             sigma = near.choose(self.near_zero(sigma), sigma);
         }
         sigma = meeting.choose(met, sigma);
-        // With beta = -alpha one root is zero, and W = -alpha: of the upper sheet up to alpha = 1,
-        // of the lower one from there on. The steps leave something like 1e-87 of it.
+        // With beta = -alpha one root is zero, and W = -alpha: on the upper sheet up to alpha = 1,
+        // on the lower one from there on. The steps leave an error of about 1e-87.
         let balanced = self.alpha.hi.eq(-self.factor.hi * self.beta_power())
             & self.alpha.lo.eq(-self.factor.lo * self.beta_power());
         let upper_sheet = principal_branch & alpha.le(1.0);
@@ -234,7 +233,7 @@ impl<S: Simd> Problem<S> {
         let alpha = reached.select(self.alpha.hi, zero);
         let (factor, exponent) = exp(-alpha, reached.select(-self.alpha.lo, zero));
         let exponent = exponent + self.exponent;
-        // Beyond the normal numbers nothing is left beside alpha.
+        // Beyond the normal numbers the term is negligible beside alpha.
         let seen = reached & exponent.gt(-1_000.0);
         let power = seen.select(exponent, zero).power_of_two();
         seen.select(self.factor.hi * factor.hi * power, zero)
@@ -245,15 +244,17 @@ impl<S: Simd> Problem<S> {
     fn one_plus_ez(&self, wanted: Mask<S>) -> Real<S> {
         let zero = self.alpha.hi.constant(0.0);
         let one = zero.constant(1.0);
-        let alpha = TwoWord::new(
+        let alpha = DoubleDouble::new(
             wanted.select(self.alpha.hi, zero),
             wanted.select(self.alpha.lo, zero),
         );
-        let argument = TwoWord::from_word(one).plus(alpha.negated()).normalised();
+        let argument = DoubleDouble::from_word(one)
+            .plus(alpha.negated())
+            .normalised();
         let (factor, power) = exp(argument.hi, argument.lo);
         let power = wanted.select(power + self.exponent, zero).power_of_two();
         let ez = factor.times(self.factor).scaled(power);
-        TwoWord::from_word(one).plus(ez).rounded()
+        DoubleDouble::from_word(one).plus(ez).rounded()
     }
 
     #[inline(always)]
@@ -264,7 +265,7 @@ impl<S: Simd> Problem<S> {
             sine,
             quarters,
         } = cos_sin(sigma.im, sigma.im.constant(0.0));
-        // The quarter turns exchange cosine and sine; their signs follow.
+        // The quarter turns exchange cosine and sine and determine their signs.
         let odd = quarters.abs().eq(1.0);
         let half = quarters.abs().eq(2.0);
         let zero = quarters.constant(0.0);
@@ -272,7 +273,7 @@ impl<S: Simd> Problem<S> {
         let flip_im = (half | quarters.eq(-1.0)).select(0.0, zero.constant(-0.0));
         let power = (power + self.exponent).power_of_two();
         let modulus = modulus.times(self.factor).scaled(power);
-        let w_re = TwoWord::from_word(sigma.re)
+        let w_re = DoubleDouble::from_word(sigma.re)
             .plus(self.alpha.negated())
             .normalised();
         let t_re = modulus.times(chosen(odd, sine, cosine)).flipped(flip_re);
@@ -301,7 +302,7 @@ impl<S: Simd> Problem<S> {
         let beta = self.factor.scaled(self.beta_power());
         let sum = self.alpha.plus(beta).rounded();
         let one = zero.constant(1.0);
-        let one_plus_beta = TwoWord::from_word(one).plus(beta).rounded();
+        let one_plus_beta = DoubleDouble::from_word(one).plus(beta).rounded();
         // A common factor keeps the squares of the division in range.
         let unit = one / (beta.hi.abs() + 1.0);
         let mut s = sigma;
@@ -328,8 +329,8 @@ fn folded<S: Simd>(sigma: Complex<S>, real: Mask<S>) -> Complex<S> {
     Complex::new(sigma.re, real.select(0.0, sigma.im.abs()))
 }
 
-/// Lane by lane: `yes` where true, `no` elsewhere.
+/// In each lane `yes` where the mask is true, `no` elsewhere.
 #[inline(always)]
-fn chosen<S: Simd>(mask: Mask<S>, yes: TwoWord<S>, no: TwoWord<S>) -> TwoWord<S> {
-    TwoWord::new(mask.select(yes.hi, no.hi), mask.select(yes.lo, no.lo))
+fn chosen<S: Simd>(mask: Mask<S>, yes: DoubleDouble<S>, no: DoubleDouble<S>) -> DoubleDouble<S> {
+    DoubleDouble::new(mask.select(yes.hi, no.hi), mask.select(yes.lo, no.lo))
 }

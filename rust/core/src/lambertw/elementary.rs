@@ -1,14 +1,14 @@
-//! Exponential, sine and cosine to 2^-61, as sums of two words; rough logarithms.
+//! Exponential, sine and cosine to 2^-61 as double-doubles; logarithms of low accuracy.
 //!
-//! Reduction by multiples of ln 2 and pi/2 in pieces short enough that each product is exact
-//! (Cody & Waite 1980), then the Taylor series: its first terms in two words, the tail, at most
-//! 2^-10 of the sum, in one. What is lost is the rounding of that tail.
-//! Valid for |a| < 5000 (exponential) and |b| < 2^23 (sine and cosine). Errors are meant beside 1:
-//! a sine next to a multiple of pi (other than 0) is good to 2^-61, not to 2^-61 of itself.
+//! Reduction by multiples of ln 2 and pi/2 in pieces short enough that each product is exact (Cody
+//! & Waite 1980), then the Taylor series: its first terms in double-double arithmetic, the tail, at
+//! most 2^-10 of the sum, in double precision. The error is the rounding error of that tail. Valid
+//! for |a| < 5000 (exponential) and |b| < 2^23 (sine and cosine). Errors are absolute: a sine next
+//! to a multiple of pi (other than 0) has the error 2^-61, not the relative error 2^-61.
 
-use crate::lanes::{Complex, Real, Simd};
+use crate::simd::{Complex, Real, Simd};
 
-use super::two_word::{Constant, TwoWord, ordered_sum, product, sum};
+use crate::simd::double_double::{Constant, DoubleDouble, ordered_sum, product, sum};
 
 const LOG2_E: f64 = std::f64::consts::LOG2_E;
 /// ln 2 in pieces of 40 and 53 bits.
@@ -81,17 +81,17 @@ fn polynomial<S: Simd, const PAIRS: usize>(
 
 /// `e^(a + low)` as a factor in [0.7, 1.42] and a power of two; `low` is at most an ulp of `a`.
 #[inline(always)]
-pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (TwoWord<S>, Real<S>) {
+pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (DoubleDouble<S>, Real<S>) {
     let n = (a * LOG2_E).nearest();
     let [first, second] = LN_2;
-    // The first difference is exact. If the second piece is the larger one, both are so small
-    // that the rounding of this sum is out of sight.
+    // The first difference is exact. If the second piece is the larger one, both are so small that
+    // the rounding error of this sum is negligible.
     let piece = product(n, n.constant(second));
     let near = ordered_sum(n.negated_mul_add(first, a), -piece.hi);
-    let r = TwoWord::new(near.hi, (near.lo - piece.lo) + low);
+    let r = DoubleDouble::new(near.hi, (near.lo - piece.lo) + low);
 
     let square = product(r.hi, r.hi);
-    let square = TwoWord::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
+    let square = DoubleDouble::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
     let cube = square.times(r);
     let third = product(cube.hi, r.hi.constant(SIXTH.0));
     let third_low = cube.lo.mul_add(SIXTH.0, cube.hi.mul_add(SIXTH.1, third.lo));
@@ -99,27 +99,28 @@ pub(super) fn exp<S: Simd>(a: Real<S>, low: Real<S>) -> (TwoWord<S>, Real<S>) {
     let fifth = fourth * r.hi * polynomial(&EXP_TAIL, r.hi);
     let tail = fourth.mul_add(TWENTY_FOURTH.0, fifth);
 
-    // 1 + (r + (r^2/2 + r^3/6)); the rest comes last to the second words, being the largest there.
+    // 1 + (r + (r^2/2 + r^3/6)); the rest, which is the largest there, is added last to the low
+    // words.
     let curved = ordered_sum(square.hi * 0.5, third.hi);
     let change = ordered_sum(r.hi, curved.hi);
     let whole = ordered_sum(change.hi.constant(1.0), change.hi);
     let low = square.lo.mul_add(0.5, curved.lo + third_low) + (change.lo + r.lo) + whole.lo;
-    // r^4/24 was taken from the first word alone; the second moves it by r^3/6 of itself.
+    // r^4/24 was computed from the high word alone; the low word changes it by r^3/6 times itself.
     let low = r.lo.mul_add(third.hi, low);
     (ordered_sum(whole.hi, tail + low), n)
 }
 
-/// Cosine and sine of an angle less whole quarter turns.
+/// Cosine and sine of an angle reduced by whole quarter turns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reduced<S: Simd> {
-    pub(super) cosine: TwoWord<S>,
-    pub(super) sine: TwoWord<S>,
-    /// The quarter turns taken off, modulo 4: -2 or 2, -1, 0 or 1.
+    pub(super) cosine: DoubleDouble<S>,
+    pub(super) sine: DoubleDouble<S>,
+    /// The quarter turns removed, modulo 4: -2 or 2, -1, 0 or 1.
     pub(super) quarters: Real<S>,
 }
 
-/// Cosine and sine of `b + low` less quarter turns, so that what is left is at most pi/4; `low` is
-/// at most an ulp of `b`.
+/// Cosine and sine of `b + low` reduced by quarter turns to at most pi/4; `low` is at most an ulp
+/// of `b`.
 #[inline(always)]
 pub(super) fn cos_sin<S: Simd>(b: Real<S>, low: Real<S>) -> Reduced<S> {
     let n = (b * TWO_OVER_PI).nearest();
@@ -129,17 +130,17 @@ pub(super) fn cos_sin<S: Simd>(b: Real<S>, low: Real<S>) -> Reduced<S> {
     let r = ordered_sum(near.hi, n.negated_mul_add(third, near.lo + low));
 
     let square = product(r.hi, r.hi);
-    let square = TwoWord::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
+    let square = DoubleDouble::new(square.hi, (r.hi + r.hi).mul_add(r.lo, square.lo));
 
     let tail = polynomial(&SIN_TAIL, square.hi) * square.hi;
-    let series = TwoWord::from_word(tail).added_to(ONE_OVER_120);
+    let series = DoubleDouble::from_word(tail).added_to(ONE_OVER_120);
     let series = series.times(square).negated().added_to(SIXTH).negated();
     let bend = series.times(square).times(r);
     let sine = ordered_sum(r.hi, bend.hi);
-    let sine = TwoWord::new(sine.hi, sine.lo + (bend.lo + r.lo));
+    let sine = DoubleDouble::new(sine.hi, sine.lo + (bend.lo + r.lo));
 
     let tail = polynomial(&COS_TAIL, square.hi) * square.hi;
-    let series = TwoWord::from_word(tail).added_to(TWENTY_FOURTH);
+    let series = DoubleDouble::from_word(tail).added_to(TWENTY_FOURTH);
     let series = series.times(square).negated().added_to(HALF).negated();
     let cosine = series.times(square).added_to(ONE);
 
@@ -204,8 +205,8 @@ mod tests {
         lanes[0]
     }
 
-    /// What is left of a two-word sum that ought to be 1.
-    fn beside_one(value: TwoWord<Scalar128b>) -> f64 {
+    /// The difference between a double-double that should be 1 and 1.
+    fn beside_one(value: DoubleDouble<Scalar128b>) -> f64 {
         ((first(value.hi) - 1.0) + first(value.lo)).abs()
     }
 

@@ -1,11 +1,11 @@
 //! Starting values, good to 8e-4 in log(z/w) - w and better where 1 + w is small.
 //!
-//! Around the branch point a rational function of sqrt(2 (e z + 1)); elsewhere w = log z +
-//! 2 pi i k and one or two steps of Fritsch, Shafer & Crowley (1973) on w + log w = log z +
-//! 2 pi i k. The half plane Im w >= 0 belongs to k >= 0 (for k = 0 with Im z >= 0): a step that
-//! leaves it by rounding is folded back, so no step can land on another branch.
+//! Around the branch point a rational function of sqrt(2 (e z + 1)); elsewhere w = log z + 2 pi i k
+//! and one or two steps of Fritsch, Shafer & Crowley (1973) on w + log w = log z + 2 pi i k. The
+//! half plane Im w >= 0 belongs to k >= 0 (for k = 0 with Im z >= 0): a step that leaves it by
+//! rounding errors is reflected back, so that no step can lead to another branch.
 
-use crate::lanes::{Complex, Simd};
+use crate::simd::{Complex, Simd};
 
 use super::coefficients::{
     BEHIND_DENOMINATOR, BEHIND_NUMERATOR, PRINCIPAL_DENOMINATOR, PRINCIPAL_NUMERATOR,

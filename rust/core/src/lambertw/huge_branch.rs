@@ -1,19 +1,20 @@
-//! Branches so far out that |w| exceeds millions: iterate on the logarithm.
+//! Branches with |w| above several millions: fixed-point iteration on the logarithm.
 //!
-//! w <- log z + 2 pi i k - log w contracts by 1/|w| < 2e-7, and w is so large that its logarithm
-//! in one word is exact enough; 2 pi k needs two. One element at a time: nobody asks for many.
+//! w <- log z + 2 pi i k - log w contracts by 1/|w| < 2e-7, and w is so large that its logarithm in
+//! double precision is accurate enough; 2 pi k needs double-double precision. One element at a
+//! time, because such branches are rare.
 
 use num_complex::Complex64;
 
-/// The first branch treated here; below it the reduction of Im w by pi/2 is exact.
+/// The first branch handled here; below it the reduction of Im w by pi/2 is exact.
 pub(super) const HUGE_BRANCH: u64 = 1 << 20;
 
 /// 2 pi to 106 bits.
 const TURN: [f64; 2] = [std::f64::consts::TAU, 2.449_293_598_294_706_4e-16];
-/// 2^64 lifts a subnormal number among the normal ones.
+/// 2^64 makes a subnormal number normal.
 const LIFT: f64 = 18_446_744_073_709_551_616.0;
 
-/// `2 pi k` in two words.
+/// `2 pi k` as a double-double.
 pub(super) fn turns(k: u64) -> [f64; 2] {
     let high = k as f64;
     let low = (i128::from(k) - high as i128) as f64;
@@ -25,7 +26,7 @@ pub(super) fn turns(k: u64) -> [f64; 2] {
 
 /// W_k(z) for k >= [`HUGE_BRANCH`] and finite z other than zero.
 pub(super) fn lambertw(z: Complex64, k: u64) -> Complex64 {
-    // Neither tiny nor huge components may meet in the hypotenuse.
+    // The hypotenuse must not be formed from very small or very large components.
     let factor = if z.re.abs().max(z.im.abs()) < 1.0 {
         LIFT
     } else {

@@ -1,6 +1,6 @@
-//! The element: which starting value, which last step.
+//! The vectorised code for one element: choice of the starting value and of the last step.
 
-use crate::lanes::{Complex, Mask, Real, Simd};
+use crate::simd::{Complex, Mask, Real, Simd};
 
 use super::branch_point::{
     INVERSE_E, INVERSE_E_LOW, branch_root, deep_branch_root, offset,
@@ -10,15 +10,15 @@ use super::elementary::{rough_angle, rough_log};
 use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS, behind, logarithmic_step, principal};
 use super::huge_branch::HUGE_BRANCH;
 use super::refine::{Scaled, correction, product_with_exp};
-use super::two_word::{ordered_sum, sum};
+use crate::simd::double_double::{ordered_sum, sum};
 
-/// Distance from -1/e below which the series is the answer.
+/// Distance from -1/e below which the series is the result. A larger one would need more terms.
 pub(super) const SERIES_ANSWERS: f64 = 1.0 / 16_384.0;
-/// Distance from -1/e below which the series knows 1 + W better than a step does.
+/// Distance from -1/e below which the series gives 1 + W more accurately than a step does.
 const SERIES_TRUSTED: f64 = 1.0 / 2_048.0;
 /// Distance from -1/e below which the series is the starting value.
 pub(super) const SERIES_STARTS: f64 = 0.046;
-/// Angle between z and the real axis up to which dw/dz there is taken for the starting value.
+/// Angle between z and the real axis up to which the derivative dw/dz corrects the starting value.
 const NARROW: f64 = 1e-9;
 /// Modulus below which W_0(z) = z - z^2 to working precision.
 pub(super) const SMALL: f64 = 1e-9;
@@ -29,10 +29,10 @@ pub(super) struct Answer<S: Simd> {
     pub(super) one_plus_w: Complex<S>,
 }
 
-/// Where the kernel does not reach: zero, infinities, NaN, and branches far out.
+/// Arguments that the kernel does not handle: zero, infinities, NaN, and large branches.
 #[inline(always)]
 pub(super) fn out_of_reach<S: Simd>(z: Complex<S>, k: Real<S>) -> Mask<S> {
-    // Whatever is compared with NaN is false.
+    // Every comparison with NaN is false.
     let finite = z.re.abs().lt(f64::INFINITY) & z.im.abs().lt(f64::INFINITY);
     let zero = z.re.eq(0.0) & z.im.eq(0.0);
     !finite | zero | k.abs().ge(HUGE_BRANCH as f64)
@@ -41,7 +41,7 @@ pub(super) fn out_of_reach<S: Simd>(z: Complex<S>, k: Real<S>) -> Mask<S> {
 /// An argument, and what belongs to it.
 pub(super) struct Point<S: Simd> {
     z: Complex<S>,
-    /// The second word of Re z, where there is one.
+    /// The low word of Re z, where there is one.
     low: Option<Real<S>>,
     /// z + 1/e.
     offset: Complex<S>,
@@ -70,7 +70,7 @@ impl<S: Simd> Point<S> {
     }
 }
 
-/// W_k for lanes within reach; `k` holds whole numbers.
+/// W_k for arguments that the kernel handles; `k` holds whole numbers.
 #[inline(always)]
 pub(super) fn lambertw<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
     // W_k(conj z) = conj W_-k(z) brings every case to k >= 0 and, for k = 0, to Im z >= 0;
@@ -106,9 +106,9 @@ fn upper<S: Simd>(point: Point<S>, k: Real<S>) -> Answer<S> {
     let largest = z.re.abs().larger(z.im.abs());
     let small = principal_branch & largest.lt(SMALL);
 
-    // Only these two sheets are joined at -1/e.
+    // Only these two sheets meet at -1/e.
     let joined = principal_branch | (first & z.im.is_negative());
-    // An overflow here is as far away as anything else.
+    // An overflow here stands for a large distance.
     let square = offset.square_modulus();
     let by_series = joined & square.lt(SERIES_STARTS * SERIES_STARTS);
     let answered = joined & square.lt(SERIES_ANSWERS * SERIES_ANSWERS);
@@ -178,8 +178,8 @@ fn by_log<S: Simd>(z: Complex<S>, scaled: Scaled<S>, k: Real<S>, joined: Mask<S>
     if first.any() {
         w = first.choose(logarithmic_step(w, log), w);
     }
-    // Along the segment on which W_1 is real from below, log z + 2 pi i - log w leaves an
-    // imaginary part of rounding errors; the true one is Im z dw/dz, zero where Im z is.
+    // On the segment on which W_1 is real from below, log z + 2 pi i - log w has an imaginary part
+    // of rounding errors. The true one is Im z dw/dz, which is zero where Im z is.
     let flat = z.im.abs().le(z.re.abs() * NARROW);
     let narrow = joined & flat & z.re.lt(0.0) & z.re.gt(-INVERSE_E);
     if narrow.any() {
@@ -189,13 +189,13 @@ fn by_log<S: Simd>(z: Complex<S>, scaled: Scaled<S>, k: Real<S>, joined: Mask<S>
     w
 }
 
-/// dW/dz = W/(z (1 + W)) for lanes within reach.
+/// dW/dz = W/(z (1 + W)) for arguments that the kernel handles.
 #[inline(always)]
 pub(super) fn derivative<S: Simd>(z: Complex<S>, k: Real<S>) -> Complex<S> {
     let Answer { w, one_plus_w } = lambertw(Point::new(z), k);
     let (z, w) = (Scaled::new(z), Scaled::new(w));
     let exponent = w.exponent - z.exponent;
-    // In two halves: the quotient of extreme numbers is out of the range of one factor.
+    // In two factors, because the quotient of extreme numbers exceeds the range of one.
     let half = (exponent * 0.5).nearest();
     w.value
         .over(z.value)

@@ -1,37 +1,37 @@
 //! W of an argument given by its logarithm: w + log w = log z + 2 pi i k.
 //!
-//! No z is too large or too small then, and Im log z may have any value: with Im log z beyond
-//! ±pi the equation goes on analytically, which makes the Wright omega function of it (Corless &
+//! No z is too large or too small then, and Im log z may have any value: with Im log z beyond ±pi
+//! the equation goes on analytically, which makes the Wright omega function of it (Corless &
 //! Jeffrey 2002) for k = 0. In the last step t = z e^-w = exp(log z - w) needs no z either; the
-//! difference is taken in two words, and so is the angle theta = Im log z + 2 pi k. Beside the
-//! branch point, at log z = -1 ± i pi, 1 + e z = -expm1(log z + 1 ∓ i pi) keeps its digits.
-//! Error: as for W itself, 0.51 * 2^-52 of |w|.
+//! difference is formed in double-double arithmetic, and so is the angle theta = Im log z + 2 pi k.
+//! Beside the branch point, at log z = -1 ± i pi, 1 + e z = -expm1(log z + 1 ∓ i pi) keeps its
+//! digits. Error: as for W itself, 0.51 * 2^-52 of |w|.
 
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use crate::lanes::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
+use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
 
 use super::branch_point::one_plus_w as near_branch_point;
 use super::guess::{behind, logarithmic_step, principal};
 use super::huge_branch::{HUGE_BRANCH, turns};
 use super::kernel::{SERIES_ANSWERS, SERIES_STARTS, reflected};
 use super::refine::{Scaled, correction, product_with_exp};
-use super::two_word::{TwoWord, ordered_sum, product, sum};
+use crate::simd::double_double::{DoubleDouble, ordered_sum, product, sum};
 
-/// What 2 pi and pi lack as doubles.
+/// Low words of 2 pi and pi.
 const TURN_LOW: f64 = 2.449_293_598_294_706_4e-16;
 const HALF_TURN_LOW: f64 = 1.224_646_799_147_353_2e-16;
-/// |Im log z| from which on one element at a time is treated.
+/// |Im log z| from which on elements are handled one at a time.
 const FAR_ANGLE: f64 = 4_194_304.0;
-/// |Re log z| from which on w is its own logarithm's fixed point.
+/// |Re log z| from which on w is found by fixed-point iteration on its logarithm.
 const FAR_MODULUS: f64 = 1e7;
-/// log 1024, up to which the rational starting value serves.
+/// log 1024, up to which the rational starting value is used.
 const PRINCIPAL_LOG: f64 = 6.931_471_805_599_453;
 /// log |z| below which W_0(z) = z - z^2 to working precision.
 const SMALL: f64 = -20.8;
-/// log z is so near to -1 ± i pi where the rational function for the sheet behind serves.
+/// Distance of log z from -1 ± i pi up to which the rational function for the sheet behind is used.
 const BEHIND: f64 = 0.5;
 /// 1/11!, …, 1/2!, 1: expm1(x)/x, highest power first.
 const EXPM1: [f64; 11] = [
@@ -48,7 +48,7 @@ const EXPM1: [f64; 11] = [
     1.0,
 ];
 
-/// Where the kernel in lanes does not reach.
+/// Arguments that the vectorised code does not handle.
 #[inline(always)]
 pub(super) fn out_of_reach<S: Simd>(log: Complex<S>, k: Real<S>) -> Mask<S> {
     let reached =
@@ -56,7 +56,7 @@ pub(super) fn out_of_reach<S: Simd>(log: Complex<S>, k: Real<S>) -> Mask<S> {
     !reached
 }
 
-/// W for lanes within reach.
+/// W for arguments that the vectorised code handles.
 #[inline(always)]
 pub(super) fn lambertw<S: Simd>(log: Complex<S>, k: Real<S>) -> Complex<S> {
     let turn = product(k, k.constant(TAU));
@@ -69,7 +69,7 @@ pub(super) fn lambertw<S: Simd>(log: Complex<S>, k: Real<S>) -> Complex<S> {
 
 /// `angle` is not negative.
 #[inline(always)]
-fn upper<S: Simd>(modulus: Real<S>, angle: TwoWord<S>) -> Complex<S> {
+fn upper<S: Simd>(modulus: Real<S>, angle: DoubleDouble<S>) -> Complex<S> {
     let zero = modulus.constant(0.0);
     let one = modulus.constant(1.0);
     let unit = Complex::new(one, one);
@@ -89,7 +89,7 @@ fn upper<S: Simd>(modulus: Real<S>, angle: TwoWord<S>) -> Complex<S> {
     let mut w = unit;
     let near = by_principal | by_behind;
     if near.any() {
-        // Below 2^-1022 z is carried as z 2^600; at e^-800 nothing of it is left.
+        // Below 2^-1022 z is scaled by 2^600; at e^-800 it is zero.
         let deep = small & modulus.lt(-200.0);
         let lift = deep.select(600.0, zero);
         let exponent = Complex::new(
@@ -149,20 +149,20 @@ fn upper<S: Simd>(modulus: Real<S>, angle: TwoWord<S>) -> Complex<S> {
     w.folded()
 }
 
-/// W at an angle of two words.
+/// W at an angle given as a double-double.
 struct AtAngle;
 
 impl Kernel<3, 2> for AtAngle {
     #[inline(always)]
     fn lanes<S: Simd>(&self, [modulus, angle, low]: [Real<S>; 3]) -> [Real<S>; 2] {
         let side = angle.sign();
-        let w = upper(modulus, TwoWord::new(angle, low).flipped(side));
+        let w = upper(modulus, DoubleDouble::new(angle, low).flipped(side));
         let w = reflected(w, side);
         [w.re, w.im]
     }
 }
 
-/// W within reach of the kernel, as one element of it.
+/// W of an argument that the kernel handles, as a single element.
 fn at_angle(modulus: f64, angle: f64, low: f64) -> Complex64 {
     let arguments = [modulus, angle, low].map(|argument| [argument; SHORT]);
     let mut values = [[0.0; SHORT]; 2];
@@ -171,9 +171,9 @@ fn at_angle(modulus: f64, angle: f64, low: f64) -> Complex64 {
     Complex64::new(re, im)
 }
 
-/// W where the kernel in lanes does not reach.
+/// W for arguments that the vectorised code does not handle.
 pub(super) fn far(log: Complex64, k: i64) -> Complex64 {
-    // The angle in two words.
+    // The angle as a double-double.
     let [turn, turn_low] = turns(k.unsigned_abs());
     let (turn, turn_low) = if k < 0 {
         (-turn, -turn_low)
@@ -183,7 +183,7 @@ pub(super) fn far(log: Complex64, k: i64) -> Complex64 {
     let rounded = log.im + turn;
     let from_turn = rounded - log.im;
     let rest = (log.im - (rounded - from_turn)) + (turn - from_turn) + turn_low;
-    // Where turns cancel, the rest may be as large as what they leave.
+    // Where turns cancel, the low words may be as large as the difference.
     let angle = rounded + rest;
     let low = rest - (angle - rounded);
     if log.re.is_nan() || !angle.is_finite() {
@@ -202,7 +202,7 @@ pub(super) fn far(log: Complex64, k: i64) -> Complex64 {
         return Complex64::new(log.re, angle - side);
     }
     if log.re.abs() < FAR_MODULUS && angle.abs() < FAR_ANGLE {
-        // Turns that cancel: what is left is within reach.
+        // Turns that cancel: the difference is in the range of the kernel.
         return at_angle(log.re, angle, low);
     }
     (0..4).fold(Complex64::new(log.re, angle), |w, _| {

@@ -2,10 +2,10 @@
 //!
 //! The same starting values and the same last step as for complex arguments, with half the
 //! operations and no angle. W_0 lives on [-1/e, inf), W_-1 on [-1/e, 0). The double next to -1/e
-//! lies 1.2e-17 below it; it is taken for -1/e, where both are -1, and NaN begins one ulp further.
-//! Error: 0.54 ulp.
+//! lies 1.2e-17 below it; it counts as -1/e, where both are -1; the results are NaN from the next
+//! double on. Error: 0.54 ulp.
 
-use crate::lanes::{Real, Simd};
+use crate::simd::{Real, Simd};
 
 use super::branch_point::{INVERSE_E, INVERSE_E_LOW, SERIES};
 use super::coefficients::{
@@ -15,9 +15,9 @@ use super::elementary::{exp, rough_log};
 use super::guess::PRINCIPAL_RADIUS;
 use super::kernel::{SERIES_ANSWERS, SERIES_STARTS, SMALL};
 use super::refine::SCALE_LIFT;
-use super::two_word::TwoWord;
+use crate::simd::double_double::DoubleDouble;
 
-/// Up to here W_-1 has a rational starting value.
+/// Largest argument for which W_-1 has a rational starting value.
 const LOWER_END: f64 = -1.0 / 256.0;
 
 /// W_0(x), NaN outside its domain.
@@ -43,7 +43,7 @@ pub(super) fn lambertw0<S: Simd>(x: Real<S>) -> Real<S> {
     let done = small | answered;
     let mut w = start;
     if (!done).any() {
-        // Down to 2^-1013, where w is 702, the second word keeps eleven bits: enough here.
+        // Down to 2^-1013, where w is 702, the low word keeps eleven bits, which is sufficient.
         let (modulus, exponent) = exp(-start, start.constant(0.0));
         let t = modulus.scaled(exponent.power_of_two()).times_word(x);
         w = done.select(start, stepped(start, t));
@@ -126,7 +126,7 @@ impl<S: Simd> Scaled<S> {
         }
     }
 
-    /// `log |x|`, roughly.
+    /// `log |x|` with low accuracy.
     #[inline(always)]
     fn log(self) -> Real<S> {
         self.exponent
@@ -147,9 +147,9 @@ fn by_log<S: Simd>(log: Real<S>) -> Real<S> {
 
 /// The last step, as in `refine`, with t = x e^-w.
 #[inline(always)]
-fn stepped<S: Simd>(w: Real<S>, t: TwoWord<S>) -> Real<S> {
-    // One division for 1/w and 1/(1 + w); like all that follows from them, it is at hand before
-    // d is.
+fn stepped<S: Simd>(w: Real<S>, t: DoubleDouble<S>) -> Real<S> {
+    // One division for 1/w and 1/(1 + w). This and everything that follows from it is computed
+    // before d is known.
     let u = w + 1.0;
     let both = w.constant(1.0) / (w * u);
     let (inverse, v) = (both * u, both * w);

@@ -1,16 +1,16 @@
-//! The last step: a residual in two words and one step of fourth order.
+//! The last step: a residual in double-double arithmetic and one step of fourth order.
 //!
-//! With t = z e^-w the residual d = t - w is formed from t in two words, so its error is 2^-61 |w|
-//! rather than 2^-53 |w|, and the Taylor series of the solution in d carries it to w. Cut after
-//! the fourth power it leaves less than 1e-17 |w| for the starting values of `guess`; what remains
-//! is the rounding of the result and 2^-61 / |1 + w|.
+//! With t = z e^-w the residual d = t - w is formed from t as a double-double, so that its error is
+//! 2^-61 |w| rather than 2^-53 |w|. The Taylor series of the solution in d gives the correction of
+//! w. Truncated after the fourth power it has an error below 1e-17 |w| for the starting values of
+//! `guess`; the remaining errors are the rounding of the result and 2^-61 / |1 + w|.
 
-use crate::lanes::{Complex, Real, Simd};
+use crate::simd::{Complex, Real, Simd};
 
 use super::elementary::{Reduced, cos_sin, exp, turned_back};
-use super::two_word::TwoWord;
+use crate::simd::double_double::DoubleDouble;
 
-/// 2^64 lifts a subnormal number among the normal ones.
+/// 2^64 makes a subnormal number normal.
 pub(super) const SCALE_LIFT: f64 = 18_446_744_073_709_551_616.0;
 
 /// A complex number as (re + i im) 2^exponent, its larger component in [1, 2).
@@ -18,7 +18,7 @@ pub(super) const SCALE_LIFT: f64 = 18_446_744_073_709_551_616.0;
 pub(super) struct Scaled<S: Simd> {
     pub(super) value: Complex<S>,
     pub(super) exponent: Real<S>,
-    /// The second word of the real part, where there is one.
+    /// The low word of the real part, where there is one.
     pub(super) low: Option<Real<S>>,
 }
 
@@ -27,7 +27,7 @@ impl<S: Simd> Scaled<S> {
     #[inline(always)]
     pub(super) fn new(z: Complex<S>) -> Self {
         let largest = z.re.abs().larger(z.im.abs());
-        // A subnormal number has no exponent of its own: bring it among the normal ones first.
+        // The exponent of a subnormal number is read after the number was scaled to a normal one.
         let subnormal = largest.lt(f64::MIN_POSITIVE);
         let one = largest.constant(1.0);
         let lifted = subnormal.select(SCALE_LIFT, one);
@@ -53,7 +53,8 @@ impl<S: Simd> Scaled<S> {
         }
     }
 
-    /// With a second word of the real part, in units of the number itself (which is not subnormal).
+    /// The same with a low word of the real part, in units of the number itself (which is not
+    /// subnormal).
     #[inline(always)]
     pub(super) fn with_low(self, low: Option<Real<S>>) -> Self {
         match low {
@@ -66,14 +67,14 @@ impl<S: Simd> Scaled<S> {
     }
 }
 
-/// A complex number whose components have two words.
+/// A complex number whose components are double-doubles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TwoWordComplex<S: Simd> {
-    pub(super) re: TwoWord<S>,
-    pub(super) im: TwoWord<S>,
+    pub(super) re: DoubleDouble<S>,
+    pub(super) im: DoubleDouble<S>,
 }
 
-/// `z e^-w`, to 2^-61 of its modulus; `low` holds second words of w, where there are any.
+/// `z e^-w`, to 2^-61 of its modulus; `low` holds low words of w, where there are any.
 #[inline(always)]
 pub(super) fn product_with_exp<S: Simd>(
     z: Scaled<S>,
@@ -108,7 +109,7 @@ pub(super) fn product_with_exp<S: Simd>(
 }
 
 impl<S: Simd> TwoWordComplex<S> {
-    /// `self - w`, for a `w` that is near.
+    /// `self - w`, for a `w` close to `self`.
     #[inline(always)]
     pub(super) fn less(self, w: Complex<S>) -> Complex<S> {
         Complex::new(
@@ -129,10 +130,10 @@ pub(super) fn fritsch_step<S: Simd>(w: Complex<S>, r: Complex<S>) -> Complex<S> 
 
 /// What to add to `w`, which may be small, given `d = z e^-w - w`.
 ///
-/// With eta = d/w, r = log(1 + eta) and u = 1 + w, the solution moves by
-/// w (r/u + r^2/(2 u^3) + (1 - 2 w) r^3/(6 u^5) + (6 w^2 - 8 w + 1) r^4/(24 u^7) + …), the Taylor
-/// series of dw/dr = w/u. In powers of eta this is d/u times a cubic whose coefficients are
-/// polynomials in v = 1/u. All of them, and both divisions, are at hand before d is.
+/// With eta = d/w, r = log(1 + eta) and u = 1 + w, the solution moves by w (r/u + r^2/(2 u^3) + (1
+/// - 2 w) r^3/(6 u^5) + (6 w^2 - 8 w + 1) r^4/(24 u^7) + …), the Taylor series of dw/dr = w/u. In
+/// powers of eta this is d/u times a cubic whose coefficients are polynomials in v = 1/u. All of
+/// them, and both divisions, are computed before d is known.
 #[inline(always)]
 pub(super) fn correction<S: Simd>(w: Complex<S>, d: Complex<S>) -> Complex<S> {
     let v = w.shifted(1.0).inverse();
@@ -149,7 +150,7 @@ pub(super) fn correction<S: Simd>(w: Complex<S>, d: Complex<S>) -> Complex<S> {
         .mul_add(v, 11.0 / 24.0)
         .mul_add(square, -0.25);
     let eta = d * w.inverse();
-    // Of the next coefficient its constant term is enough.
+    // Of the next coefficient the constant term is sufficient.
     let third = third + eta.scaled(0.2);
     let series = (third * eta + second) * eta + first;
     (d * v) * series.mul_add(eta, 1.0)

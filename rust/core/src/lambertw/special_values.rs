@@ -17,8 +17,8 @@ pub(super) fn lambertw(z: Complex64, k: i64) -> Complex64 {
     if z.re == 0.0 && z.im == 0.0 {
         return match k {
             0 => z,
-            // The two that are real on (-1/e, 0): the sum cancels exactly, to a zero of the
-            // sign of k.
+            // The two branches that are real on (-1/e, 0): the sum cancels exactly, to a zero with
+            // the sign of k.
             _ => {
                 let side = if k > 0 { PI } else { -PI };
                 let im = k as f64 * TAU + (argument - side);

@@ -1,4 +1,4 @@
-//! Properties of W and of the roots it gives, at numbers that aim at trouble.
+//! Properties of W and of the roots computed from it, at difficult arguments.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use super::guess::{BEHIND_RADIUS, PRINCIPAL_RADIUS};
 use super::kernel::{SERIES_ANSWERS, SERIES_STARTS};
 use super::{block, dde_root, lambertw, lambertw_log};
 
-/// Numbers where something happens: any exponent, next to -1/e, on the axes.
+/// Difficult numbers: any exponent, next to -1/e, on the axes.
 fn troublesome() -> impl Strategy<Value = Complex64> {
     let anywhere = (-1070.0..1020.0_f64, -4.0..4.0_f64)
         .prop_map(|(power, angle)| Complex64::from_polar(power.exp2(), angle));
@@ -56,14 +56,14 @@ proptest! {
         prop_assume!(w != Complex64::ZERO);
         let angle = |z: Complex64| libm::atan2(z.im, z.re);
         let turns = (w.im + angle(w) - angle(z)) / TAU;
-        // Rounding of w, and of the angle where 1 + w nearly vanishes.
+        // The rounding error of w, and of the angle where 1 + w nearly vanishes.
         prop_assert!((turns - k as f64).abs() <= 1e-7 + 1e-15 * turns.abs(), "{w} {turns}");
     }
 
     #[test]
     fn the_log_form_is_the_same_function(z in troublesome(), k in -1000..1000_i64) {
         if !(1e-300..1e300).contains(&z.norm()) || z.im.abs() < 1e-3 * z.re.abs() {
-            // The rounding of the logarithm may leave the side of the cut.
+            // Rounding errors of the logarithm may move it to the other side of the cut.
             return Ok(());
         }
         let (w, other) = (lambertw(z, k), lambertw_log(z.ln(), k));

@@ -1,31 +1,21 @@
 //! Sums, products and derivatives of quasi-polynomials.
 //!
-//! Everything is exact but for the rounding of coefficients and of the sums of delays that a
-//! product forms. Such sums depend on the order of their summands by an ulp or two, so a product
-//! takes delays that agree to 4 ulp for the same one; where one factor has no delays, nothing is
-//! rounded and nothing merged.
+//! Everything is exact except for the rounding of coefficients and of the sums of delays in a
+//! product. Such sums depend on the order of their summands by an ulp or two, so that a product
+//! merges delays that agree to 4 ulp. Where one factor has no delays, no delay is rounded or
+//! merged.
 
-use super::QuasiPolynomial;
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::Error;
 
-/// A product with more coefficients than this is a slip of the pen.
+/// Upper limit on the coefficients of a product (bounds memory and time).
 const MAX_COEFFICIENTS: usize = 1_000_000;
 
-/// A derivative of higher order, of anything but a polynomial, is a slip of the pen as well.
+/// Upper limit on the order of a derivative of anything other than a polynomial (bounds the time).
 const MAX_ORDER: u32 = 10_000;
 
-/// Delays of a product closer than this (relative) are the same sum in another order.
+/// Relative difference of delays of a product below which they are merged.
 const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
-
-/// `sum += row`.
-pub(super) fn accumulate(sum: &mut Vec<f64>, row: &[f64]) {
-    if sum.len() < row.len() {
-        sum.resize(row.len(), 0.0);
-    }
-    for (total, value) in sum.iter_mut().zip(row) {
-        *total += value;
-    }
-}
 
 fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
@@ -186,7 +176,8 @@ impl QuasiPolynomial {
     /// The `order`-th derivative by s: row p becomes p′ − τp, `order` times.
     ///
     /// # Errors
-    /// [`Error::Argument`] when a coefficient overflows, [`Error::TooMuch`] for an absurd order.
+    /// [`Error::Argument`] when a coefficient overflows, [`Error::TooMuch`] for an order above the
+    /// limit.
     pub fn derivative(&self, order: u32) -> Result<Self, Error> {
         let mut rows = self.rows();
         for taken in 0..order {

@@ -1,18 +1,21 @@
-//! Taylor coefficients of g(s) = h(s) e^(s τ_c) in two words, for roots that lie close together.
+//! Taylor coefficients of g(s) = h(s) e^(s τ_c) in double-double arithmetic, for roots that lie
+//! close together.
 //!
-//! With d = τ_j − τ_c and b_i = p_j⁽ⁱ⁾(s)/i!, the k-th coefficient of a term is
-//! e^(−s d) Σ_i b_i (−d)^(k−i)/(k−i)!. With the bounds of `sharp` (u = 2⁻⁵³): the b_i, by repeated
-//! synthetic division, lose (20n + 4) u² P_i, P_i being the same with moduli; powers of d over factorials
-//! 10 u² each, the sum of products 7 u² + 3.1 (k + 1) u², the exponential (27 + 3|d| (|x| + |y|)) u², the
-//! product with it 13.1 u², the sum of m terms 4m u². Together, for C_k = Σ P_i |d|^(k−i)/(k−i)!,
+//! With d = τ_j − τ_c and b_i = p_j⁽ⁱ⁾(s)/i!, the k-th coefficient of a term is e^(−s d) Σ_i b_i
+//! (−d)^(k−i)/(k−i)!. With the bounds of `double_double` (u = 2⁻⁵³) the errors are: of the b_i, by
+//! repeated synthetic division, (20n + 4) u² P_i, where P_i is the same with moduli; powers of d
+//! over factorials 10 u² each, the sum of products 7 u² + 3.1 (k + 1) u², the exponential (27 +
+//! 3|d| (|x| + |y|)) u², the product with it 13.1 u², the sum of m terms 4m u². Together, for C_k =
+//! Σ P_i |d|^(k−i)/(k−i)!,
 //!     |error| ≤ u² Σ_j (20n + 14k + 60 + 4m + 3|d| (|x| + |y|)) C_k e^(−x d), and u for rounding.
 //! `remainder` bounds the coefficient after the last one in a disc.
 
 use num_complex::Complex64;
 
-use super::probe::{FLOOR, TINY, modulus};
-use super::sharp::{Complex, LAST_ROUNDING, ROUNDING, Turn, turn};
-use super::{Probe, QuasiPolynomial};
+use super::double_double::{Complex, LAST_ROUNDING, ROUNDING, Turn, turn};
+use super::jet::{FLOOR, TINY, modulus};
+use super::probe::Probe;
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{DoubleDouble, exp_above};
 
 /// Taylor coefficients of g(s) = h(s) e^(s τ) at a point, lowest first.
@@ -27,7 +30,8 @@ pub struct Expansion {
 }
 
 impl QuasiPolynomial {
-    /// h around `s` without its largest exponential: h(s + t) = e^(−(s + t) τ) Σ a_k tᵏ, in two words.
+    /// h around `s` without its largest exponential: h(s + t) = e^(−(s + t) τ) Σ a_k tᵏ, in
+    /// double-double arithmetic.
     ///
     /// The error bounds are infinite or NaN where an exponential of the others leaves double precision.
     ///
@@ -149,7 +153,7 @@ pub(crate) fn remainder(
             sum += bounds.get(i).copied().unwrap_or(0.0) * power;
             power *= gap.abs() / (order - i + 1) as f64;
         }
-        // The exponent is below 1500 in modulus, or this is infinite or next to nothing.
+        // The exponent is below 1500 in modulus; otherwise the result is infinite or negligible.
         total += sum * exp_above(gap.abs() * radius - gap * s.re + 1e-12);
     }
     (total + FLOOR) * (1.0 + 1e-9)

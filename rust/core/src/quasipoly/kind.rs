@@ -1,8 +1,8 @@
-//! What sort of equation a quasi-polynomial belongs to.
+//! The type of equation that a quasi-polynomial belongs to.
 
-use super::QuasiPolynomial;
+use super::quasi_polynomial::QuasiPolynomial;
 
-/// Told by the degrees of the rows once the smallest delay is factored out.
+/// The type, determined by the degrees of the rows after the smallest delay is factored out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// One row: a polynomial, or one times e^(−sτ). Finitely many roots.
@@ -14,12 +14,13 @@ pub enum Kind {
     Neutral,
     /// Every row is a constant: the equation has no derivative.
     Difference,
-    /// A delayed row has the highest degree alone. Roots run off to the right: no causal system.
+    /// Only a delayed row has the highest degree. Roots extend arbitrarily far to the right: no
+    /// causal system.
     Advanced,
 }
 
 impl Kind {
-    /// The word for it.
+    /// Its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Polynomial => "polynomial",

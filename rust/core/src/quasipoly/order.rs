@@ -1,13 +1,13 @@
 //! The order of a root at 0, without rounding.
 //!
-//! h⁽ⁱ⁾(0) = Σ_j Σ_k c_jk k! C(i, k) (−τ_j)^(i−k). Coefficients and delays are whole numbers times powers
-//! of two, and so is the sum: computed in integers it is zero or it is not.
+//! h⁽ⁱ⁾(0) = Σ_j Σ_k c_jk k! C(i, k) (−τ_j)^(i−k). Coefficients and delays are whole numbers times
+//! powers of two, and so is the sum: computed in integers, the test for zero is exact.
 
 use num_bigint::BigInt;
 
-use super::QuasiPolynomial;
+use super::quasi_polynomial::QuasiPolynomial;
 
-/// Sums of this many bits and more are not formed: numbers that far apart do not cancel by intent.
+/// Upper limit on the bits of a sum: numbers that differ so much in size are not meant to cancel.
 const MOST_BITS: u32 = 100_000;
 
 /// A whole number times a power of two.
@@ -40,7 +40,7 @@ impl Dyadic {
         }
     }
 
-    /// `None` where the sum would be too long.
+    /// The sum; `None` where it would be too long.
     fn plus(self, other: Self) -> Option<Self> {
         let (low, high) = if self.exponent <= other.exponent {
             (self, other)

@@ -1,69 +1,35 @@
-//! Evaluation of g(s) = h(s) e^(s τ_c) along a path: value, slope, and bounds on what is unknown.
+//! Evaluation of g(s) = h(s) e^(s τ_c) along a path: value, slope, and bounds on their errors.
 //!
 //! With d_j = τ_j − τ_c, g = Σ p_j(s) e^(−s d_j). Let P_j be p_j with the moduli of its
-//! coefficients and u = 2⁻⁵³. A complex product loses √5 u of its size (Brent, Percival and
-//! Zimmermann 2007), a sum u: Horner's rule for degree n loses 3.3 n u P_j, its derivative 7 n u P_j′.
-//! The rounding of d and of d x, d y changes the exponent by 2.1 u |d| (|x| + |y|), hence the
-//! exponential by less than 4 u |d| (|x| + |y|): its phase since |e^(ia) − e^(ib)| ≤ |a − b|, its
-//! modulus since |d x| < 746 where that is neither 0 nor infinite; never by more than 2.5 of it. exp loses 1.25 u, cos and sin together √2 u, their products with it u, the product
-//! with p_j 2.3 u, the factor d and the difference in g′ 2 u, the sum of m terms (m − 1) u. Hence
+//! coefficients and u = 2⁻⁵³. A complex product has the relative error √5 u (Brent, Percival and
+//! Zimmermann 2007), a sum u: Horner's rule for degree n has the error 3.3 n u P_j, its derivative
+//! 7 n u P_j′. The rounding of d and of d x, d y changes the exponent by 2.1 u |d| (|x| + |y|),
+//! hence the exponential by less than 4 u |d| (|x| + |y|): its phase since |e^(ia) − e^(ib)| ≤ |a −
+//! b|, its modulus since |d x| < 746 where that is neither 0 nor infinite; never by more than 2.5
+//! of it. The errors are 1.25 u of exp, √2 u of cos and sin together, u of their products with it,
+//! 2.3 u of the product with p_j, 2 u of the factor d and the difference in g′, and (m − 1) u of
+//! the sum of m terms. Hence
 //!     |error of g| ≤ u Σ (4n + m + 8 + 4|d| (|x| + |y|)) P_j(|s|) e^(−x d_j),
-//! with 8n and P_j′ + |d| P_j for g′. Underflow: each product loses 2⁻¹⁰⁷⁴ at most. TINY, added to
-//! every |coefficient| and weight, outweighs what Horner's rule makes of it, FLOOR the rest.
-//! `curvature` bounds |g″| ≤ Σ (P_j″ + 2|d| P_j′ + d² P_j)(|s| + r) max e^(−x d_j) nearby.
+//! with 8n and P_j′ + |d| P_j for g′. Underflow: each product has an error of at most 2⁻¹⁰⁷⁴. TINY,
+//! added to every |coefficient| and weight, exceeds its effect in Horner's rule, and FLOOR the
+//! rest. `curvature` bounds |g″| ≤ Σ (P_j″ + 2|d| P_j′ + d² P_j)(|s| + r) max e^(−x d_j) nearby.
 
 use num_complex::Complex64;
 
-use super::{QuasiPolynomial, sharp};
+use super::double_double;
+use super::jet::{FLOOR, Jet, TINY, modulus};
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, log, sin_cos};
 
-/// Half an ulp of 1, enlarged by what the bounds themselves lose in being computed.
+/// Half an ulp of 1, enlarged by the rounding errors of computing the bounds.
 const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
-/// 2⁻¹⁰¹⁰: u times this is still far above what an underflow loses.
-pub(super) const TINY: f64 = f64::MIN_POSITIVE * 4096.0;
-
-/// Above all that underflow can do to a sum of terms.
-pub(super) const FLOOR: f64 = 1e-290;
-
-/// No phase is wrong by more than a half turn: 2.5 of the exponential, in units of u.
+/// Largest relative error of an exponential, in units of u: its phase is wrong by at most half a
+/// turn.
 const OPPOSITE: f64 = 5.0 / f64::EPSILON;
 
-/// What an evaluation in two words counts for.
-const SHARP_COST: u64 = 20;
-
-/// |s| within 4u, wherever it is a normal number: two squares and their sum lose 2 u, of which the
-/// root, correctly rounded, keeps half. Where squares leave the range, of the quotient by the larger
-/// part.
-pub(crate) fn modulus(s: Complex64) -> f64 {
-    let square = s.norm_sqr();
-    if square > 1e-280 && square < 1e300 {
-        return square.sqrt();
-    }
-    let large = s.re.abs().max(s.im.abs());
-    if square.is_nan() {
-        f64::NAN
-    } else if large == 0.0 || large.is_infinite() {
-        large
-    } else {
-        (s / large).norm_sqr().sqrt() * large
-    }
-}
-
-/// Value and slope of g at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jet {
-    /// g(s).
-    pub value: Complex64,
-    /// g′(s).
-    pub slope: Complex64,
-    /// Bound on the error of `value`.
-    pub value_error: f64,
-    /// Bound on the error of `slope`.
-    pub slope_error: f64,
-    /// Index of the largest term, where it exceeds the reference term fourfold.
-    pub overtaken_by: Option<usize>,
-}
+/// Number of evaluations that one in double-double arithmetic counts for.
+const DOUBLE_DOUBLE_COST: u64 = 20;
 
 /// Evaluates one quasi-polynomial at many points, relative to a reference term c.
 #[derive(Debug, Clone)]
@@ -76,7 +42,7 @@ pub struct Probe<'a> {
     /// e^(−x d_j) at the last x.
     weights: Vec<f64>,
     x: f64,
-    /// What the terms are where the last jet was taken, if they are known there.
+    /// The terms at the point of the last jet, if they are known there.
     parts: Vec<Part>,
     parts_at: Option<Complex64>,
     evaluations: u64,
@@ -91,15 +57,16 @@ struct Part {
     size: f64,
 }
 
-/// How fast g can change from a point on, terms that are small and fast being counted by their size.
+/// How fast g can change from a point on, where terms that are small and fast are bounded by their
+/// size.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Calm {
+pub(crate) struct DominatedTerms {
     /// Slope of the other terms.
     pub(crate) slope: Complex64,
     /// Bound on their second derivative nearby.
     pub(crate) bend: f64,
-    /// What the small ones can change g by, at most.
-    pub(crate) ripple: f64,
+    /// Largest change of g by the small terms.
+    pub(crate) perturbation: f64,
 }
 
 impl<'a> Probe<'a> {
@@ -242,8 +209,8 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// [`jet`](Self::jet) on the real axis, where every operation loses less and the bounds of the
-    /// complex ones hold all the more; `weights` are those at `x`.
+    /// [`jet`](Self::jet) on the real axis, where every operation has a smaller error, so that the
+    /// bounds of the complex ones hold; `weights` are those at `x`.
     fn real_jet(&mut self, x: f64) -> Jet {
         let size = x.abs();
         let count = self.gaps.len() as f64;
@@ -293,13 +260,13 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// As [`jet`](Self::jet), in two words: some twenty times the work, for places where rounding
-    /// hides what double precision could say.
-    pub fn sharp_jet(&mut self, s: Complex64) -> Jet {
-        self.evaluations += SHARP_COST;
+    /// The same as [`jet`](Self::jet) in double-double arithmetic, at some twenty times the cost,
+    /// for points where rounding errors exceed the value.
+    pub fn double_double_jet(&mut self, s: Complex64) -> Jet {
+        self.evaluations += DOUBLE_DOUBLE_COST;
         self.weigh(s.re);
         self.parts_at = None;
-        sharp::jet(self.h, self.reference, s)
+        double_double::jet(self.h, self.reference, s)
     }
 
     /// Bound on |g″| at every s with |s| ≤ `modulus` whose real part lies between x and
@@ -325,8 +292,8 @@ impl<'a> Probe<'a> {
             let gap_size = gap.abs();
             total += (2.0 * ddp + gap_size * (2.0 * dp + gap_size * p)) * heaviest(gap, weight);
         }
-        // Exponents, below 746 in modulus or the weight is 0 or infinite, are wrong by 2e-13 at
-        // most; this, the rounding of the sums and of `modulus` together are far below 1e-9.
+        // Exponents are below 746 in modulus, or the weight is 0 or infinite; their error is at
+        // most 2e-13. This, the rounding of the sums and of `modulus` together are far below 1e-9.
         (total + FLOOR) * (1.0 + 1e-9)
     }
 
@@ -342,21 +309,21 @@ impl<'a> Probe<'a> {
             .fold(0.0, |most, part| part.size.max(most))
     }
 
-    /// What [`curvature`](Self::curvature) says, without the terms that together can change g by no more
-    /// than `most` on the way to Re s = x + `shift`; `None` where there are none or nothing else, or the
-    /// last jet was not taken at `s`.
-    pub(crate) fn calm(
+    /// The bounds of [`curvature`](Self::curvature) without the terms that together change g by at
+    /// most `most` on the way to Re s = x + `shift`. `None` where there are no such terms or no
+    /// others, or the last jet was not at `s`.
+    pub(crate) fn dominated_terms(
         &self,
         s: Complex64,
         (modulus, shift): (f64, f64),
         most: f64,
-    ) -> Option<Calm> {
+    ) -> Option<DominatedTerms> {
         if self.parts_at != Some(s) {
             return None;
         }
         let far = self.x + shift;
         let share = most / self.parts.len() as f64;
-        let (mut slope, mut bend, mut ripple) = (Complex64::ZERO, FLOOR, 0.0);
+        let (mut slope, mut bend, mut perturbation) = (Complex64::ZERO, FLOOR, 0.0);
         let (mut small, mut other) = (false, false);
         for (((row, &gap), &weight), part) in self.terms().zip(&self.parts) {
             let (p, dp, ddp) = sizes(row, modulus);
@@ -364,7 +331,7 @@ impl<'a> Probe<'a> {
             let change = part.size + p * heaviest;
             if gap != 0.0 && change < share {
                 small = true;
-                ripple += change;
+                perturbation += change;
             } else {
                 other = true;
                 let gap = gap.abs();
@@ -372,10 +339,10 @@ impl<'a> Probe<'a> {
                 bend += (2.0 * ddp + gap * (2.0 * dp + gap * p)) * heaviest;
             }
         }
-        (small && other).then_some(Calm {
+        (small && other).then_some(DominatedTerms {
             slope,
             bend: bend * (1.0 + 1e-9),
-            ripple: (ripple + FLOOR) * (1.0 + 1e-9),
+            perturbation: (perturbation + FLOOR) * (1.0 + 1e-9),
         })
     }
 }
@@ -396,7 +363,7 @@ fn sizes(row: &[f64], modulus: f64) -> (f64, f64, f64) {
 #[inline(always)]
 fn heavier(gap: f64, weight: f64, far: f64, shift: f64) -> f64 {
     if gap * shift < 0.0 {
-        // Not the product of the weight with what it grows by: either may be out of range.
+        // Not the product of the weight and its growth, because either may be out of range.
         exp(-gap * far).max(weight) + TINY
     } else {
         weight + TINY

@@ -21,7 +21,7 @@ fn point() -> impl Strategy<Value = Complex64> {
     (-2.0..2.0f64, -5.0..5.0f64).prop_map(|(x, y)| Complex64::new(x, y))
 }
 
-/// Size of all terms added up: what rounding is relative to.
+/// Sum of the moduli of all terms, to which rounding errors are relative.
 fn size(h: &QuasiPolynomial, s: Complex64) -> f64 {
     h.terms()
         .map(|(row, delay)| {

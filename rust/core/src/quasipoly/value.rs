@@ -3,15 +3,18 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::{Probe, QuasiPolynomial, beyond, modulus};
+use super::jet::modulus;
+use super::overflow;
+use super::probe::Probe;
+use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, sin_cos};
 use crate::memory::filled;
 use crate::{Error, Task};
 
-/// Points that one thread takes at a time.
+/// Points in one task of a thread.
 const CHUNK: usize = 1024;
 
-/// A value less than this many times its error bound is computed anew.
+/// A value less than this many times its error bound is computed again in double-double arithmetic.
 const DROWNED: f64 = 1e6;
 
 /// A value of h without its largest exponential: h(s) = `value` · e^(−s `delay`).
@@ -52,7 +55,7 @@ impl QuasiPolynomial {
     pub fn value(&self, s: Complex64) -> Complex64 {
         let Scaled { value, delay, .. } = self.scaled_value(s);
         if !value.is_finite() && s.is_finite() {
-            return beyond::value(self, s);
+            return overflow::value(self, s);
         }
         if delay == 0.0 {
             return value;
@@ -72,7 +75,7 @@ impl QuasiPolynomial {
     }
 
     /// h′(s)/h(s), the exponential of the dominating term cancelled: g′/g − τ. Where double
-    /// precision does not tell h from zero it is computed in two words.
+    /// precision does not separate h from zero, it is computed in double-double arithmetic.
     ///
     /// ```
     /// # use deadtime::quasipoly::QuasiPolynomial;
@@ -88,7 +91,7 @@ impl QuasiPolynomial {
         let mut jet = probe.jet(s);
         let drowned = |value, error| modulus(value) < DROWNED * error;
         if drowned(jet.value, jet.value_error) || drowned(jet.slope, jet.slope_error) {
-            jet = probe.sharp_jet(s);
+            jet = probe.double_double_jet(s);
         }
         let size = modulus(jet.value);
         (jet.slope / size) * (jet.value.conj() / size) - probe.delay()

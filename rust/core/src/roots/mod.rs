@@ -1,54 +1,34 @@
 //! Characteristic roots: counted, located, each with a proof.
 //!
-//! `winding` proves how arg h turns along a line, `dominated` the same in long steps where one row
-//! outweighs the others; `cell` builds rectangles with counts from it,
-//! `count` half planes; `newton` proves discs around single roots, `cluster` around several; `isolate` finds
-//! all roots of a region, `contour` sorts those on its edge; `rightmost` those that decide stability, along `lines`; `neutral` knows the chains, `commensurate`
-//! those of exact delays, `stable`
-//! decides, `unstable` sooner where one root shows it; `sensitivity` says how a root moves; `bounds` says where roots cannot be, `close_delays` where almost equal delays cancel;
-//! `tropical` guesses where roots far out are; `unit` chooses the unit of time; `certificate`
-//! writes the proof of a count down. `matrix` does the same for det M(s), not expanded. Elementary functions are those of `crate::elementary`, with
-//! proved bounds; each file says what its inequalities leave for rounding.
+//! * `region`, `disc` and `root_set` hold where roots are sought, where they are, and the evidence.
+//! * `chains` bounds the chains of roots of neutral equations.
+//! * `counting` proves how many roots a region holds; `locating` finds them, encloses each in a
+//!   disc, and decides about stability.
+//! * [`matrix`] answers the same questions for det M(s) without expanding the determinant.
+//!
+//! Elementary functions are those of [`crate::elementary`], whose error bounds are proved. Each
+//! file states how much of its inequalities is left for rounding errors.
 
-mod bounds;
-mod cell;
-mod certificate;
-mod close_delays;
-mod cluster;
-mod commensurate;
-mod contour;
-mod count;
-mod crowd;
-mod dominated;
-mod isolate;
-mod lines;
+mod chains;
+mod counting;
+mod disc;
+mod locating;
 pub mod matrix;
-mod neutral;
-mod newton;
-mod real;
 mod region;
-mod rightmost;
-mod sensitivity;
-mod set;
-mod stable;
-mod tropical;
-mod unit;
-mod unstable;
-mod winding;
+mod root_set;
 
-pub(crate) use bounds::radius_right_of;
-pub use certificate::{Certificate, Contour, Segment, certify};
-pub use commensurate::{base_delay, exact_chain_abscissa};
-pub use contour::{Edge, count_with_edge, roots_with_edge};
-pub use count::{count, count_right_of};
-pub(crate) use lines::chain_margin;
-pub use neutral::chain_abscissa;
-pub use real::RealPart;
+pub use chains::{base_delay, chain_abscissa};
+pub(crate) use counting::radius_right_of;
+pub use counting::{
+    Certificate, Contour, RealPart, Segment, certify, count, count_right_of, exact_chain_abscissa,
+};
+pub(crate) use locating::chain_margin;
+pub use locating::{
+    Edge, count_with_edge, is_stable, rightmost, roots, roots_with_edge, sensitivity,
+    spectral_abscissa, unstable_and_rightmost,
+};
 pub use region::Region;
-pub use rightmost::{rightmost, spectral_abscissa, unstable_and_rightmost};
-pub use sensitivity::sensitivity;
-pub use set::{RootSet, roots};
-pub use stable::is_stable;
+pub use root_set::RootSet;
 
 #[cfg(test)]
 mod tests;

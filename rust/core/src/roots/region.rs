@@ -2,7 +2,9 @@
 
 use crate::Error;
 
-/// The points whose real and imaginary parts lie in the two ranges; infinite ends are open sides.
+/// The points whose real and imaginary parts lie in the two ranges. An infinite end is an open
+/// side.
+///
 ///
 /// ```
 /// use deadtime::roots::Region;

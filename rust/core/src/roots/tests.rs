@@ -150,7 +150,7 @@ proptest! {
             part((re.0, x), (y, im.1)), part((x, re.1), (y, im.1)),
         ];
         let whole = part(re, im);
-        // Contour errors are honest, wrong numbers are not.
+        // An error is acceptable here, a wrong number is not.
         if let (Ok(whole), Ok(sum)) = (whole, parts.into_iter().sum::<Result<u64, Error>>()) {
             prop_assert_eq!(whole, sum);
         }

@@ -1,14 +1,14 @@
 //! One cell of a stability map: is this quasi-polynomial stable, and by how much?
 //!
 //! The number of roots with Re s > 0 is proved by [`count_right_of`]. Chains of a neutral equation
-//! decide first: right of the axis they make infinitely many roots unstable. "Right of the axis"
-//! is meant as in [`chain_abscissa`], hence robustly: under arbitrarily small changes of the
-//! delays. The abscissa is the larger of the rightmost root's real part and the abscissa of the
-//! chains. What double precision cannot tell is named, not guessed.
+//! decide first: right of the axis they make infinitely many roots unstable. "Right of the axis" is
+//! meant as in [`chain_abscissa`], hence robustly: under arbitrarily small changes of the delays.
+//! The abscissa is the larger of the rightmost root's real part and the abscissa of the chains.
+//! What double precision cannot decide is reported as such.
 
 use num_complex::Complex64;
 
-use super::demand::Demand;
+use super::specification::Specification;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{
     Region, chain_abscissa, count_right_of, rightmost, roots, unstable_and_rightmost,
@@ -16,24 +16,24 @@ use crate::roots::{
 use crate::status::CellStatus;
 use crate::{Error, Task};
 
-/// The count of a cell with infinitely many unstable roots.
+/// Count of a cell with infinitely many unstable roots.
 pub const ENDLESS: i32 = -1;
 
-/// The count of a cell where it is not known: a root on the axis, or undecided.
+/// Count of a cell where it is unknown: a root on the axis, or undecided.
 pub const UNKNOWN: i32 = -2;
 
-/// Chains closer to the line than this, in e-folds over the longest delay, lie on it: rounding of
-/// the coefficients alone moves them as far.
+/// Chains closer to the line than this, in units of one over the longest delay, count as lying on
+/// it: rounding errors of the coefficients move them as far.
 const ON_THE_LINE: f64 = 16.0 * f64::EPSILON;
 
-/// What is known of one cell.
+/// Result for one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
     /// Number of roots with Re s > 0, [`ENDLESS`] or [`UNKNOWN`].
     pub unstable: i32,
     /// Spectral abscissa, 1/s; NaN where it was not asked for or could not be computed.
     pub abscissa: f64,
-    /// How far count and abscissa hold.
+    /// What is proved of count and abscissa.
     pub status: CellStatus,
 }
 
@@ -46,32 +46,32 @@ impl Cell {
     };
 }
 
-/// Judge the stability of h: how many of its roots offend against `demand`? With `abscissa`, also how far
-/// they are from the axis.
+/// Judge the stability of h: how many of its roots violate `specification`? With `abscissa`, also
+/// the spectral abscissa.
 ///
 /// * `Ok`: count (and abscissa) hold.
 /// * `Boundary`: a root, or a chain of them, lies on the line to working precision.
 /// * `Chain`: the chains lie further right than every root right of them, so the abscissa is
-///   theirs; told only with `abscissa`.
+///   theirs. Reported only with `abscissa`.
 /// * `Infinite`: infinitely many unstable roots, or an advanced equation.
-/// * `Undecided`: the zero function, or more work or precision than there is. If only the
-///   abscissa is missing, the count holds all the same.
+/// * `Undecided`: the zero function, or the work or precision needed exceeds the limits. If only
+///   the abscissa is missing, the count is still proved.
 ///
-/// The abscissa is also NaN where it is beyond reach in a cell that is no longer `Ok`.
+/// The abscissa is also NaN where it could not be computed in a cell that is not `Ok`.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.
 ///
 /// ```
-/// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::{Demand, judge}, status::CellStatus};
+/// use deadtime::{Task, quasipoly::QuasiPolynomial, stability::{Specification, judge}, status::CellStatus};
 /// let h = QuasiPolynomial::new(vec![vec![0.0, 1.0], vec![5.0]], vec![0.0, 0.36])?;
-/// let cell = judge(&h, Demand::default(), true, &Task::new())?;
+/// let cell = judge(&h, Specification::default(), true, &Task::new())?;
 /// assert_eq!((cell.unstable, cell.status), (2, CellStatus::Ok));
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn judge(
     h: &QuasiPolynomial,
-    demand: Demand,
+    specification: Specification,
     abscissa: bool,
     task: &Task,
 ) -> Result<Cell, Error> {
@@ -87,9 +87,9 @@ pub fn judge(
     }
     let chain = chain_abscissa(h);
     if !abscissa {
-        let (unstable, status) = match by_chain(h, chain, demand.leftmost()) {
+        let (unstable, status) = match by_chain(h, chain, specification.leftmost()) {
             Some(known) => known,
-            None => by_count(offending(h, demand, task))?,
+            None => by_count(violating(h, specification, task))?,
         };
         return Ok(Cell {
             unstable,
@@ -97,13 +97,16 @@ pub fn judge(
             status,
         });
     }
-    let ((unstable, status), set) = match by_chain(h, chain, demand.leftmost()) {
+    let ((unstable, status), set) = match by_chain(h, chain, specification.leftmost()) {
         Some(known) => (known, rightmost(h, 1, task)),
-        None if demand == Demand::default() => {
+        None if specification == Specification::default() => {
             let (number, set) = unstable_and_rightmost(h, task);
             (by_count(number)?, set)
         }
-        None => (by_count(offending(h, demand, task))?, rightmost(h, 1, task)),
+        None => (
+            by_count(violating(h, specification, task))?,
+            rightmost(h, 1, task),
+        ),
     };
     // −∞ where no root lies right of the chains.
     let isolated = set.map(|set| set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re));
@@ -137,18 +140,19 @@ pub(super) fn with_abscissa(cell: Cell, isolated: f64, chain: f64) -> Cell {
     }
 }
 
-/// The number of offending roots: counted, or sorted one by one where the edge is not one line.
-fn offending(h: &QuasiPolynomial, demand: Demand, task: &Task) -> Result<u64, Error> {
-    let line = demand.leftmost();
-    if demand.damping.is_none() {
+/// The number of violating roots: counted, or sorted one by one where the edge is not a single
+/// line.
+fn violating(h: &QuasiPolynomial, specification: Specification, task: &Task) -> Result<u64, Error> {
+    let line = specification.leftmost();
+    if specification.damping.is_none() {
         return count_right_of(h, line, task);
     }
     let set = match roots(h, &Region::right_of(line), task) {
-        // A well damped root there offends no one: look from further left.
+        // A well damped root there violates nothing: use a line further left.
         Err(Error::Contour { .. }) => roots(h, &Region::right_of(1.01 * line), task)?,
         set => set?,
     };
-    demand.offending(&set).ok_or(Error::Contour {
+    specification.violating(&set).ok_or(Error::Contour {
         place: Complex64::new(line, 0.0),
         distance: 0.0,
     })
@@ -158,7 +162,7 @@ fn offending(h: &QuasiPolynomial, demand: Demand, task: &Task) -> Result<u64, Er
 pub(super) fn by_chain(h: &QuasiPolynomial, chain: f64, line: f64) -> Option<(i32, CellStatus)> {
     let longest = h.delays().last().zip(h.delays().first());
     let longest = longest.map_or(0.0, |(last, first)| last - first);
-    // Rounding of the coefficients moves chains by as much as that of log |b/a| = C_D d.
+    // Rounding errors of the coefficients move chains as much as an error of log |b/a| = C_D d.
     let off = (chain - line) * longest;
     if off.abs() <= ON_THE_LINE * (1.0 + (line * longest).abs()) {
         return Some((UNKNOWN, CellStatus::Boundary));

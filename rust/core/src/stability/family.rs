@@ -2,21 +2,21 @@
 //!
 //! A family is a sum of terms c · Π p_i^e_i · s^k · e^(−s τ(p)) with whole e_i and k and delays
 //! τ(p) = τ_0 + Σ σ_i p_i affine in the parameters p. It is what sums, differences and products of
-//! gains, s and e^(−s T) lead to. [`Family::at`] puts numbers in. Its coefficients and delays
-//! carry the rounding of that evaluation and no more; delays that agree to 4 ulp are the same
-//! sum in another order and are merged, as in products of quasi-polynomials, and a delay that is
-//! negative by no more than rounding is zero.
+//! gains, s and e^(−s T) lead to. [`Family::at`] puts numbers in. The coefficients and delays of a
+//! member have only the rounding errors of that evaluation. Delays that agree to 4 ulp are the same
+//! sum in another order and are merged, as in products of quasi-polynomials; a delay that is
+//! negative only by rounding errors is zero.
 
 use crate::Error;
 use crate::quasipoly::QuasiPolynomial;
 
-/// Delays closer than this (relative) are the same.
+/// Relative difference of delays below which they are merged.
 const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
 
-/// A power of s or of a parameter beyond this is a slip of the pen.
+/// Upper limit on a power of s or of a parameter. A larger one is most likely a typing error.
 const MAX_POWER: u32 = 1000;
 
-/// More terms than this are a slip of the pen, too.
+/// Upper limit on the number of terms (bounds memory and time).
 const MAX_TERMS: usize = 100_000;
 
 /// constant + Σ `slopes`[i] · p_i.
@@ -45,7 +45,7 @@ impl Affine {
 /// One summand of a family.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// The number in front.
+    /// The numerical factor.
     pub coefficient: f64,
     /// The power of each parameter.
     pub exponents: Vec<u32>,
@@ -83,12 +83,12 @@ pub struct Family {
 }
 
 impl Family {
-    /// Check the terms and gather them by delay.
+    /// Check the terms and group them by delay.
     ///
     /// # Errors
-    /// [`Error::Argument`] where a name occurs twice, a term has not one exponent and one slope a
-    /// parameter, a number is not finite, or a power is absurdly large; [`Error::TooMuch`] for
-    /// absurdly many terms.
+    /// [`Error::Argument`] where a name occurs twice, a term does not have one exponent and one
+    /// slope for each parameter, a number is not finite, or a power is above its limit;
+    /// [`Error::TooMuch`] for too many terms.
     pub fn new(names: Vec<String>, terms: Vec<Term>) -> Result<Self, Error> {
         if let Some(name) = repeated(&names) {
             return Err(Error::argument(format!(
@@ -223,7 +223,7 @@ impl Family {
         part(0).zip(part(1))
     }
 
-    /// The highest power of s, whatever the parameters are.
+    /// The highest power of s for any parameters.
     pub(super) fn degree(&self) -> u32 {
         let terms = self.terms.iter().flatten();
         terms.fold(0, |highest, term| highest.max(term.power))
@@ -316,7 +316,7 @@ fn repeated(names: &[String]) -> Option<&String> {
 fn value_of(term: &Term, values: &[f64]) -> f64 {
     let mut product = term.coefficient;
     for (value, exponent) in values.iter().zip(&term.exponents) {
-        // Repeated products, not powi: its bits differ from machine to machine.
+        // Repeated products instead of powi, whose bits differ between machines.
         for _ in 0..*exponent {
             product *= value;
         }

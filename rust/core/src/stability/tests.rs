@@ -3,7 +3,7 @@ use std::f64::consts::PI;
 use proptest::prelude::*;
 
 use super::{
-    Affine, Axis, Damping, Demand, ENDLESS, Family, Proof, Question, Term, UNKNOWN, Vertex,
+    Affine, Axis, Damping, ENDLESS, Family, Proof, Question, Specification, Term, UNKNOWN, Vertex,
     boundaries, judge, map,
 };
 use crate::quasipoly::QuasiPolynomial;
@@ -12,7 +12,7 @@ use crate::status::CellStatus;
 use crate::{Error, Task};
 
 const COUNTS: Question = Question {
-    demand: Demand {
+    specification: Specification {
         decay: 0.0,
         damping: None,
     },
@@ -155,7 +155,7 @@ fn cells_of_every_kind_are_told_apart() {
         QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec()).unwrap()
     };
     let told = |h: &QuasiPolynomial| {
-        let cell = judge(h, Demand::default(), true, &task).unwrap();
+        let cell = judge(h, Specification::default(), true, &task).unwrap();
         (cell.unstable, cell.status)
     };
     let s: &[f64] = &[0.0, 1.0];
@@ -168,7 +168,7 @@ fn cells_of_every_kind_are_told_apart() {
     // |s + 0.12| > |s|: every root of the chain lies left of its limit.
     let chain_leads = make(&[&[0.12, 1.0], &[0.0, 0.984]], &[0.0, 0.36]);
     assert_eq!(told(&chain_leads), (0, CellStatus::Chain));
-    let cell = judge(&chain_leads, Demand::default(), true, &task).unwrap();
+    let cell = judge(&chain_leads, Specification::default(), true, &task).unwrap();
     assert!((cell.abscissa - 0.984f64.ln() / 0.36).abs() < 1e-14);
     assert_eq!(
         told(&make(&[s, &[2.0, 1.0]], &[0.0, 0.36])),
@@ -353,7 +353,7 @@ proptest! {
             sum += value;
             size += value.norm() * (1.0 + delay * s.norm());
         }
-        // Each side rounds a handful of times.
+        // Each side has a few rounding errors.
         prop_assert!((h.value(s) - sum).norm() <= 1e-13 * size);
     }
 
@@ -368,7 +368,7 @@ proptest! {
         let h = velocity().at(&[kp, kv]).unwrap();
         prop_assert_eq!(chart.unstable[0] as u64, count_right_of(&h, 0.0, &task).unwrap());
         prop_assert_eq!(chart.abscissa[0], spectral_abscissa(&h, true, &task).unwrap());
-        // Both proved, hence never at odds.
+        // Both are proved, so that they never contradict each other.
         prop_assert_eq!(chart.unstable[0] > 0, chart.abscissa[0] > 0.0);
     }
 }
@@ -381,15 +381,15 @@ fn rows_say_what_single_cells_say() {
         ratio: 0.4,
         horizon: 1.0,
     });
-    let demands = [(0.0, None), (0.35, None), (0.0, damping), (0.2, damping)];
+    let specifications = [(0.0, None), (0.35, None), (0.0, damping), (0.2, damping)];
     for (first, second) in [(&gains, &others), (&others, &gains)] {
         let order = if first.len() == 40 { [0, 1] } else { [1, 0] };
         let axes = [(order[0], first), (order[1], second)]
             .map(|(parameter, points)| Axis { parameter, points });
-        for (decay, damping) in demands {
+        for (decay, damping) in specifications {
             let [curves, cells] = [Proof::Curves, Proof::Cells].map(|proof| {
                 let question = Question {
-                    demand: Demand { decay, damping },
+                    specification: Specification { decay, damping },
                     abscissa: false,
                     proof,
                 };
@@ -411,7 +411,7 @@ fn boundaries_are_closed_forms_in_order() {
         &velocity(),
         &[0.0, 0.0],
         axes,
-        Demand::default(),
+        Specification::default(),
         &Task::new(),
     );
     let found = found.unwrap().unwrap();
@@ -420,7 +420,7 @@ fn boundaries_are_closed_forms_in_order() {
     assert_eq!(curve.len(), others.len());
     for (vertex, kv) in curve.iter().zip(&others) {
         let omega = (-kv).acos() / 0.36;
-        // A crossing is known to some rounding errors of the bounds of F, not of F itself.
+        // A crossing is known to a few rounding errors of the bounds of F, not of F itself.
         assert!((vertex.omega - omega).abs() < 1e-10);
         assert!((vertex.gain - omega * (0.36 * omega).sin()).abs() < 1e-9);
         assert_eq!(vertex.jump, 2);
@@ -429,8 +429,9 @@ fn boundaries_are_closed_forms_in_order() {
 
 #[test]
 fn a_curve_that_turns_back_is_one() {
-    // The pendulum s² − 1 + (Kp + Kd s) e^(−0.3 s): Kp = (1 + w²) cos 0.3w, Kd = (w + 1/w) sin 0.3w, which grows up to
-    // 6.2 at w = 6.8 and comes back to 0, so that most rows meet the curve twice.
+    // The pendulum s² − 1 + (Kp + Kd s) e^(−0.3 s): Kp = (1 + w²) cos 0.3w, Kd = (w + 1/w) sin
+    // 0.3w, which grows up to 6.2 at w = 6.8 and returns to 0, so that most rows meet the curve
+    // twice.
     let none = [0.0, 0.0];
     let terms = vec![
         term(1.0, &[0, 0], 2, 0.0, &none),
@@ -442,9 +443,9 @@ fn a_curve_that_turns_back_is_one() {
     let (first, second) = (range(-130.0, 20.0, 31), range(0.02, 8.0, 400));
     let axes =
         [(0, &first[..]), (1, &second[..])].map(|(parameter, points)| Axis { parameter, points });
-    let found = boundaries(&family, &none, axes, Demand::default(), &Task::new());
+    let found = boundaries(&family, &none, axes, Specification::default(), &Task::new());
     let found = found.unwrap().unwrap();
-    // The real root crosses the other way where the pair comes down to it, at Kd = 0.3.
+    // The real root crosses in the opposite direction where the pair reaches it, at Kd = 0.3.
     assert_eq!((found.along, found.curves.len()), (0, 3));
     let curves = &found.curves;
     let (real, pairs): (Vec<_>, Vec<_>) = curves.iter().partition(|curve| curve[0].omega == 0.0);
@@ -460,7 +461,7 @@ fn a_curve_that_turns_back_is_one() {
         assert!((gain - (1.0 + omega * omega) * cosine).abs() < 1e-9);
         assert!((second[*row] - (omega + 1.0 / omega) * sine).abs() < 1e-9);
     }
-    // Once through all frequencies, rows and directions turning in one place.
+    // All frequencies once, with rows and directions turning at one point.
     let up = curve[0].omega < curve[1].omega;
     assert!(
         curve

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deadtime._plants import FirstOrder, Integrator, RationalPlant
 from deadtime.links.ardrone2.emulator.clock import Micros
 from deadtime.links.ardrone2.emulator.motion import (
     GRAVITY,
@@ -18,10 +17,11 @@ from deadtime.links.ardrone2.emulator.motion import (
     linear_plant,
 )
 from deadtime.links.ardrone2.emulator.thrust import Thruster, ThrustMotion
+from deadtime.loops import FirstOrder, Integrator, RationalPlant
 
 __all__ = ["Airframe", "Pose"]
 
-#: How roll, pitch and turning speed follow their demands, s.
+#: How roll, pitch and turning speed follow their setpoints, s.
 ATTITUDE_LAG = 0.15
 
 #: Rate at which the drag of the air takes up horizontal speed, 1/s.
@@ -36,7 +36,7 @@ class Pose:
     ----------
     height, climb : float
         m and m/s, up positive.
-    demand : float
+    setpoint : float
         The climb that is followed, m/s.
     roll, pitch, heading : float
         Right, backwards (nose up) and clockwise positive.
@@ -46,7 +46,7 @@ class Pose:
 
     height: float
     climb: float
-    demand: float
+    setpoint: float
     roll: float
     pitch: float
     heading: float
@@ -55,7 +55,7 @@ class Pose:
 
 
 class Airframe:
-    """Follows demands; knows nothing of links, states and limits.
+    """Follows setpoints; knows nothing of links, states and limits.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Airframe:
         )
         self._fall = FreeFall()
         self._vertical: Motion = self._hover
-        self.demand = 0.0
+        self.setpoint = 0.0
         self._roll, self._pitch = (LinearMotion(FirstOrder(1.0, ATTITUDE_LAG)) for _ in "rp")
         self._heading = LinearMotion(Integrator(1.0, ATTITUDE_LAG))
         sideways = RationalPlant((GRAVITY,), np.polymul((ATTITUDE_LAG, 1.0), (1.0, DRAG)).tolist())
@@ -82,7 +82,7 @@ class Airframe:
         """Stand on the ground, level, with the motors off."""
         self._vertical = self._hover
         self._hover.settle(time, 0.0)
-        self.demand = 0.0
+        self.setpoint = 0.0
         for motion in (self._roll, self._pitch, self._forward, self._right):
             motion.settle(time, 0.0)
         self._heading.settle(time, self._heading.at(time)[0])
@@ -90,20 +90,20 @@ class Airframe:
 
     def climb_at(self, time: Micros, climb: float) -> None:
         """Follow this climb from now on, m/s."""
-        if climb != self.demand:
-            self.demand = climb
-            self._vertical.demand(time, climb)
+        if climb != self.setpoint:
+            self.setpoint = climb
+            self._vertical.follow(time, climb)
 
     def lean(self, time: Micros, roll: float, pitch: float, turning: float) -> None:
         """Follow these angles (rad) and this turning speed (rad/s) from now on."""
         if (roll, pitch, turning) == self._angles:
             return
         self._angles, self._moved = (roll, pitch, turning), True
-        self._roll.demand(time, roll)
-        self._right.demand(time, roll)
-        self._pitch.demand(time, pitch)
-        self._forward.demand(time, -pitch)
-        self._heading.demand(time, turning)
+        self._roll.follow(time, roll)
+        self._right.follow(time, roll)
+        self._pitch.follow(time, pitch)
+        self._forward.follow(time, -pitch)
+        self._heading.follow(time, turning)
 
     def settle_tilt(self, time: Micros) -> None:
         """Tell the thrust how far the drone leans; the loop on board does not make up for it."""
@@ -115,7 +115,7 @@ class Airframe:
         """Cut the motors: fall."""
         height, climb = self._vertical.at(time)
         self._fall.drop(time, height, climb)
-        self._vertical, self.demand = self._fall, 0.0
+        self._vertical, self.setpoint = self._fall, 0.0
 
     def height_at(self, time: Micros) -> float:
         """Height, m."""
@@ -126,15 +126,15 @@ class Airframe:
         return self._vertical.at(time)
 
     def at(self, time: Micros) -> Pose:
-        """Everything about the body at a time not before the last demand."""
+        """Everything about the body at a time not before the last setpoint."""
         height, climb = self._vertical.at(time)
         if not self._moved:
             heading = self._heading.at(time)[0]
-            return Pose(height, climb, self.demand, 0.0, 0.0, heading, 0.0, 0.0)
+            return Pose(height, climb, self.setpoint, 0.0, 0.0, heading, 0.0, 0.0)
         return Pose(
             height,
             climb,
-            self.demand,
+            self.setpoint,
             self._roll.at(time)[0],
             self._pitch.at(time)[0],
             self._heading.at(time)[0],

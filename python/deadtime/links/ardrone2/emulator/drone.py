@@ -26,7 +26,7 @@ from deadtime.links.ardrone2.commands import (
 )
 from deadtime.links.ardrone2.configuration import write_configuration
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, micros, seconds
-from deadtime.links.ardrone2.emulator.flight import HOVER, TICK, Demand, Flight, Phase
+from deadtime.links.ardrone2.emulator.flight import HOVER, TICK, Flight, Phase, Setpoints
 from deadtime.links.ardrone2.emulator.link import Address, Listener, Order
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.sensors import Reading, Sensors
@@ -64,7 +64,7 @@ class Truth:
         m.
     climb : float
         m/s, up positive.
-    demand : float
+    setpoint : float
         The climb that is followed, m/s.
     battery : float
         Percent.
@@ -76,7 +76,7 @@ class Truth:
     phase: Phase
     height: float
     climb: float
-    demand: float
+    setpoint: float
     battery: float
     emergency: bool
     link_lost: bool
@@ -121,7 +121,7 @@ class Drone:
         self._sensors = Sensors(options)
         self._order, self._listener = Order(), Listener()
         self._jitter = np.random.default_rng((options.seed, 1))
-        self._under_way: deque[tuple[Micros, Demand]] = deque()
+        self._under_way: deque[tuple[Micros, Setpoints]] = deque()
         self._last_arrival: Micros = 0
         self._moved_at: Micros | None = None
         self._bootstrap, self._to_acknowledge = True, False
@@ -194,7 +194,7 @@ class Drone:
             self._flight.phase,
             pose.height,
             pose.climb,
-            pose.demand,
+            pose.setpoint,
             self._flight.charge(time),
             self._flight.emergency,
             self._order.lost,
@@ -244,7 +244,7 @@ class Drone:
         if len(self._under_way) < MOST_UNDER_WAY:
             self._under_way.append((self._last_arrival, self._asked_for(command)))
 
-    def _asked_for(self, command: Move | MoveFrom) -> Demand:
+    def _asked_for(self, command: Move | MoveFrom) -> Setpoints:
         """A motion in SI units, by what the drone is configured to do at most."""
         if not command.flag & 1:
             return HOVER
@@ -260,9 +260,9 @@ class Drone:
     def _configure(self, command: Config, ids: ConfigIds | None) -> None:
         """Take a setting, and say in navdata that one was received."""
         settings = self.settings
-        told = None if ids is None else (ids.session, ids.user, ids.application)
+        given = None if ids is None else (ids.session, ids.user, ids.application)
         entering = command.key.startswith("custom:")
-        if settings.asks_for_ids and not entering and told != settings.ids:
+        if settings.asks_for_ids and not entering and given != settings.ids:
             return
         if not settings.set(command.key, command.value):
             return
@@ -275,10 +275,10 @@ class Drone:
             self._to_acknowledge = False
         elif mode in (SEND_CONFIGURATION, SEND_IDS):
             values = self.settings.values
-            told = values if mode == SEND_CONFIGURATION else {key: values[key] for key in IDS}
+            shown = values if mode == SEND_CONFIGURATION else {key: values[key] for key in IDS}
             # One answer to a host at a time: more questions are no reason for more answers.
             if all(host != source[0] for host, _ in self._dumps):
-                self._dumps.append((source[0], write_configuration(told)))
+                self._dumps.append((source[0], write_configuration(shown)))
 
     # What happens by itself.
 
@@ -322,8 +322,8 @@ class Drone:
         return self._moved_at + HOVER_AFTER
 
     def _arrive(self, time: Micros) -> None:
-        _, demand = self._under_way.popleft()
-        self._flight.follow(time, demand)
+        _, setpoint = self._under_way.popleft()
+        self._flight.follow(time, setpoint)
 
     def _hover(self, time: Micros) -> None:
         """The last motion command is too old: forget it and those under way."""

@@ -1,6 +1,6 @@
 """The flight of the emulated drone: its phases and what its autopilot does in each.
 
-On the ground; taking off; flying, which follows the demands of the link and hovers without any;
+On the ground; taking off; flying, which follows the setpoints of the link and hovers without any;
 landing; falling with the motors cut. The autopilot acts at ticks of 200 Hz, and at once on what the
 link asks for.
 """
@@ -14,7 +14,7 @@ from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, seconds
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.settings import Settings
 
-__all__ = ["TICK", "Demand", "Flight", "Phase"]
+__all__ = ["TICK", "Flight", "Phase", "Setpoints"]
 
 #: Between two decisions of the autopilot.
 TICK: Micros = SECOND // 200
@@ -50,8 +50,8 @@ class Phase(Enum):
 
 
 #: Climb in m/s, roll and pitch in rad, turning speed in rad/s.
-Demand = tuple[float, float, float, float]
-HOVER: Demand = (0.0, 0.0, 0.0, 0.0)
+Setpoints = tuple[float, float, float, float]
+HOVER: Setpoints = (0.0, 0.0, 0.0, 0.0)
 
 
 class Flight:
@@ -119,10 +119,10 @@ class Flight:
             self.airframe.cut(time)
             self._enter(Phase.FALLING, time)
 
-    def follow(self, time: Micros, demand: Demand) -> None:
-        """Take a demand of the link; it counts in flight only."""
-        if self.phase is Phase.FLYING and demand != self._wanted:
-            self._wanted = demand
+    def follow(self, time: Micros, setpoint: Setpoints) -> None:
+        """Take a setpoint of the link; it counts in flight only."""
+        if self.phase is Phase.FLYING and setpoint != self._wanted:
+            self._wanted = setpoint
             self._follow(time)
 
     def tick(self, time: Micros) -> None:

@@ -16,8 +16,9 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from deadtime._plants import Integrator, Plant, kit_plant, rest
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
+from deadtime.loops import Integrator, Plant, kit_plant
+from deadtime.loops._plants import rest
 
 __all__ = [
     "DELAYS",
@@ -44,7 +45,7 @@ Row: TypeAlias = tuple[float, ...]
 
 
 class Motion(ABC):
-    """A quantity that follows a demand, which is constant between changes.
+    """A quantity that follows a setpoint, which is constant between changes.
 
     Looking at it changes nothing: what is read at a time is the same, however often and whenever
     it was read before.
@@ -52,11 +53,11 @@ class Motion(ABC):
 
     @abstractmethod
     def settle(self, time: Micros, value: float) -> None:
-        """Be at rest at a value, under the demand that keeps it there."""
+        """Be at rest at a value, under the setpoint that keeps it there."""
 
     @abstractmethod
-    def demand(self, time: Micros, value: float) -> None:
-        """Change the demand from this time on; times do not go back."""
+    def follow(self, time: Micros, value: float) -> None:
+        """Change the setpoint from this time on; times do not go back."""
 
     @abstractmethod
     def at(self, time: Micros) -> tuple[float, float]:
@@ -69,14 +70,14 @@ class LinearMotion(Motion):
     Parameters
     ----------
     plant : Plant
-        From the demand to the value.
+        From the setpoint to the value.
 
     Examples
     --------
     >>> import deadtime as dtm
     >>> height = LinearMotion(dtm.Integrator(gain=0.5))
     >>> height.settle(0, 1.0)
-    >>> height.demand(1_000_000, 0.4)
+    >>> height.follow(1_000_000, 0.4)
     >>> above, climb = height.at(6_000_000)
     >>> round(above, 12), round(climb, 12)
     (2.0, 0.2)
@@ -101,13 +102,13 @@ class LinearMotion(Motion):
         self._looked: tuple[Micros, Row] = (0, self._state)
 
     def settle(self, time: Micros, value: float) -> None:
-        """Be at rest at a value, under the demand that keeps it there."""
+        """Be at rest at a value, under the setpoint that keeps it there."""
         num, den = (part.tolist() for part in self._plant.polynomials())
-        state, demand = rest(num, den, value)
-        self._start(time, (*state.tolist(), float(demand)))
+        state, setpoint = rest(num, den, value)
+        self._start(time, (*state.tolist(), float(setpoint)))
 
-    def demand(self, time: Micros, value: float) -> None:
-        """Change the demand from this time on."""
+    def follow(self, time: Micros, value: float) -> None:
+        """Change the setpoint from this time on."""
         self._start(time, (*self._flown(time)[:-1], value))
 
     def at(self, time: Micros) -> tuple[float, float]:
@@ -138,7 +139,7 @@ class LinearMotion(Motion):
 
 
 class FreeFall(Motion):
-    """The height of what has no thrust any more; it follows no demand."""
+    """The height of what has no thrust any more; it follows no setpoint."""
 
     def __init__(self) -> None:
         self._start: tuple[Micros, float, float] = (0, 0.0, 0.0)
@@ -151,8 +152,8 @@ class FreeFall(Motion):
         """Begin to fall from a height with a vertical speed."""
         self._start = (time, height, climb)
 
-    def demand(self, time: Micros, value: float) -> None:
-        """Without thrust there is nothing to follow a demand."""
+    def follow(self, time: Micros, value: float) -> None:
+        """Without thrust there is nothing to follow a setpoint."""
 
     def at(self, time: Micros) -> tuple[float, float]:
         """Height and climb."""
@@ -162,7 +163,7 @@ class FreeFall(Motion):
 
 
 def linear_plant(name: PlantName) -> Plant:
-    """The linear plant of a name: from demanded climb to height, without the transport delay."""
+    """The linear plant of a name: from commanded climb to height, without the transport delay."""
     if name == "kit":
         return kit_plant()
     if name == "paper":

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import get_args
 
-from deadtime._validation import non_negative
+from deadtime._base.validation import non_negative
 from deadtime.links.addresses import canonical, is_loopback
 from deadtime.links.ardrone2.emulator.motion import DELAYS, PlantName
 
@@ -35,7 +35,7 @@ class EmulatorOptions:
     Parameters
     ----------
     plant : {"kit", "paper", "real", "thrust"}
-        How height answers the demanded climb.
+        How height answers the commanded climb.
     delay : float, optional
         Transport delay of motion commands, s; by default that of the plant.
     jitter : float

@@ -153,10 +153,10 @@ class Sensors:
 
     def packet(self, reading: Reading) -> bytes:
         """The navdata of one time."""
-        told = Navdata(self._state(reading), reading.sequence)
+        navdata = Navdata(self._state(reading), reading.sequence)
         if not reading.bootstrap:
-            told = self._measured(reading, told)
-        return build_navdata(told)
+            navdata = self._measured(reading, navdata)
+        return build_navdata(navdata)
 
     def _forces(self, reading: Reading) -> tuple[float, float, float]:
         """What accelerometers feel, forward, right and down, in units of the standard gravity.
@@ -208,7 +208,7 @@ class Sensors:
         turning = TURNING if reading.phase not in (Phase.LANDED, Phase.FALLING) else 0
         x, y, z = self._forces(reading)
         volts = EMPTY_VOLTAGE + (FULL_VOLTAGE - EMPTY_VOLTAGE) * reading.charge / 100.0
-        told: dict[str, Any] = {
+        parts: dict[str, Any] = {
             "demo": Demo(
                 major=_control_state(reading),
                 battery=round(reading.charge),
@@ -231,7 +231,7 @@ class Sensors:
             "physical_measures": PhysicalMeasures(
                 acceleration_x=x, acceleration_y=y, acceleration_z=z
             ),
-            "pwm": Pwm(turning, turning, turning, turning, vz_ref=pose.demand),
+            "pwm": Pwm(turning, turning, turning, turning, vz_ref=pose.setpoint),
             "altitude": AltitudeOption(
                 altitude_vision=height, altitude_vz=-climb, altitude_raw=echo
             ),
@@ -241,9 +241,9 @@ class Sensors:
         }
         bits = reading.options
         if bits is not None:
-            told = {name: part for name, part in told.items() if bits >> TAGS[name] & 1}
+            parts = {name: part for name, part in parts.items() if bits >> TAGS[name] & 1}
         options = FULL_OPTIONS if bits is None else _chosen(bits)
-        return replace(head, options=options, **told)
+        return replace(head, options=options, **parts)
 
 
 @lru_cache(maxsize=8)

@@ -16,7 +16,7 @@ from functools import partial
 from types import TracebackType
 from typing import Self
 
-from deadtime._errors import LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.addresses import canonical, for_socket
 from deadtime.links.ardrone2.emulator.connections import Connection, Door
 from deadtime.links.ardrone2.emulator.drone import Drone, Truth

@@ -42,10 +42,10 @@ class Settings:
         """Take a value if it is one; False if the drone has no such key."""
         if key not in ENTRIES:
             return False
-        told = _taken(ENTRIES[key], value)
-        if told is None:
+        accepted = _taken(ENTRIES[key], value)
+        if accepted is None:
             return True
-        self.values[key] = told
+        self.values[key] = accepted
         section, _, name = key.partition(":")
         if section == "control":
             self._keep_pairs(name)

@@ -5,14 +5,14 @@ their speed, T = 4 k Omega^2 with equal speeds Omega, and
 
     m z'' = T cos(roll) cos(pitch) - m g.
 
-Two parts are not in these equations and are in every vehicle: the speed of a rotor follows what is
-asked of it with a lag, Omega' = (Omega_asked - Omega) / lag, within a range; and a loop on board
-asks for the speed that gives the thrust m (g + c (climb_demanded - z')). Linearised at hover, with
-the rotor's lag, that is a climb of c / (lag s^2 + s + c) times the demand: two equal lags of 2 lag
-where c = 1 / (4 lag), their sum 1 / c.
+Two parts are not in these equations and are in every vehicle: the speed of a rotor follows its
+setpoint with a lag, Omega' = (Omega_set - Omega) / lag, within a range; and a loop on board sets
+the speed that gives the thrust m (g + c (climb_set - z')). Linearised at hover, with the rotor's
+lag, that is a climb of c / (lag s^2 + s + c) times its setpoint: two equal lags of 2 lag where
+c = 1 / (4 lag), their sum 1 / c.
 
 Integrated by the classical Runge-Kutta formula in steps that end at whole milliseconds of the
-drone's clock and where the demand changes.
+drone's clock and where the setpoint changes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from deadtime._validation import positive
+from deadtime._base.validation import positive
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
 from deadtime.links.ardrone2.emulator.motion import GRAVITY, Motion
 
@@ -100,7 +100,7 @@ class Thruster:
 
 
 class ThrustMotion(Motion):
-    """Height from the demanded climb by thrust.
+    """Height from the commanded climb by thrust.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class ThrustMotion(Motion):
     --------
     >>> height = ThrustMotion(Thruster())
     >>> height.settle(0, 1.0)
-    >>> height.demand(0, 0.5)
+    >>> height.follow(0, 0.5)
     >>> above, climb = height.at(2_000_000)
     >>> round(above, 3), round(climb, 3)             # 0.16 s of lag in all
     (1.919, 0.5)
@@ -120,18 +120,18 @@ class ThrustMotion(Motion):
         self.thruster = thruster
         self._time: Micros = 0
         self._state: State = (0.0, 0.0, thruster.hover_speed)
-        self._demand = 0.0
+        self._setpoint = 0.0
         self._upright = 1.0
 
     def settle(self, time: Micros, value: float) -> None:
         """Hover at a height."""
         self._time, self._state = time, (value, 0.0, self.thruster.hover_speed)
-        self._demand = 0.0
+        self._setpoint = 0.0
 
-    def demand(self, time: Micros, value: float) -> None:
-        """Change the demanded climb, m/s."""
+    def follow(self, time: Micros, value: float) -> None:
+        """Change the commanded climb, m/s."""
         self._go_to(time)
-        self._demand = value
+        self._setpoint = value
 
     def tilt(self, time: Micros, upright: float) -> None:
         """Change cos(roll) cos(pitch)."""
@@ -180,7 +180,7 @@ class ThrustMotion(Motion):
         model = self.thruster
         hover = model.hover_speed
         # Thrusts as accelerations, so that the mass cancels: T / m = g (Omega / Omega_hover)^2.
-        asked = max(0.0, GRAVITY + model.speed_gain * (self._demand - climb))
+        asked = max(0.0, GRAVITY + model.speed_gain * (self._setpoint - climb))
         wanted = hover * math.sqrt(asked / GRAVITY)
         wanted = min(max(wanted, model.slowest), model.fastest)
         thrust = GRAVITY * (speed / hover) ** 2

@@ -1,13 +1,14 @@
 //! LU factors with partial pivoting of a complex matrix whose entries lie near its diagonal.
 //!
-//! Row i holds the columns i − b … i + 2 b, as exchanges of rows widen U to 2 b; the multipliers
-//! are kept apart, and exchanges are done as the solution goes (as in LAPACK's `gbtrf`).
+//! Row i holds the columns i − b … i + 2 b, because exchanges of rows widen U to 2 b. The
+//! multipliers are stored separately, and exchanges are made during the solution (as in LAPACK's
+//! `gbtrf`).
 
 use num_complex::Complex64;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// A matrix to be filled, and its factors once made.
+/// A matrix to be filled, or its factors.
 #[derive(Debug)]
 pub(super) struct Banded {
     n: usize,
@@ -18,7 +19,7 @@ pub(super) struct Banded {
 }
 
 impl Banded {
-    /// Numbers that factors of this size hold.
+    /// Number of entries in factors of this size.
     pub(super) fn size(n: usize, band: usize) -> usize {
         n * (4 * band + 1)
     }
@@ -34,7 +35,7 @@ impl Banded {
         }
     }
 
-    /// An entry, no farther from the diagonal than the band is wide.
+    /// An entry within the band.
     pub(super) fn entry(&mut self, row: usize, column: usize) -> &mut Complex64 {
         let width = 3 * self.band + 1;
         &mut self.rows[row * width + (column + self.band - row)]

@@ -1,28 +1,28 @@
-//! Error estimate of an element, and what length and order come next.
+//! Error estimate of an element, and the length and order of the next one.
 //!
 //! The error of the polynomial is judged by its last coefficients and by its defect at the start,
-//! (h/2) |Y′ − f| times what the integral of the defect's shape can reach. Coefficients of smooth
-//! solutions fall like C ρ^(−k), where the last one bounds what follows; around a kink they fall
-//! like a power of k, and N of the size of the last quarter follow. The two cases are told by how
-//! much the last quarter is below the one before. As ρ is inversely proportional to the length,
-//! an element longer by a factor s has an error s^N times as large.
+//! (h/2) |Y′ − f| times the largest integral of the defect's shape. Coefficients of smooth
+//! solutions decrease like C ρ^(−k), and the last one bounds the rest. Around a kink they decrease
+//! like a power of k, and the rest is about N times the size of the last quarter. The ratio of the
+//! last quarter to the one before distinguishes the two cases. As ρ is inversely proportional to
+//! the length, an element longer by a factor s has an error s^N times as large.
 
 use super::element::Element;
 use super::nodes::{Nodes, ORDERS};
 
-/// Part of the tolerance that an element may use.
+/// Share of the tolerance that an element may use.
 const SHARE: f64 = 0.2;
-/// Last but one coefficient, as a part: in an even or odd function the last one vanishes.
+/// Weight of the last but one coefficient: in an even or odd function the last one is zero.
 const LAST_BUT_ONE: f64 = 0.2;
-/// Coefficients below this part of the tolerance are not missed.
+/// Coefficients below this share of the tolerance are negligible.
 const NEGLIGIBLE: f64 = 0.02;
 const LONGER: f64 = 2.0;
 const SHORTER: f64 = 0.1;
 
-/// What an element is worth.
+/// Verdict about an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Verdict {
-    /// Error over what is allowed.
+    /// Error relative to the allowed one.
     pub(super) error: f64,
     /// Coefficients that are not negligible.
     pub(super) terms: usize,
@@ -39,7 +39,8 @@ pub(super) fn judge(element: &Element, nodes: &Nodes) -> Verdict {
     for (d, c) in element.coefficients.chunks_exact(n).enumerate() {
         let scale = element.scale[d];
         let largest = largest_of(c);
-        // Rounding of values, spread over coefficients and multiplied by k² in the slope.
+        // Rounding errors of values, distributed over coefficients and multiplied by k² in the
+        // slope.
         let rounding = f64::EPSILON * largest;
         let last = c[n - 1].abs().max(LAST_BUT_ONE * c[n - 2].abs());
         let (third, fourth) = (
@@ -84,7 +85,7 @@ pub(super) fn order_for(wanted: usize, most: usize) -> usize {
     found.unwrap_or(most).min(most)
 }
 
-/// The largest order worth its nodes: where calls cost much, nodes are nearly free.
+/// The largest order that pays: where calls are costly, nodes are almost free.
 pub(super) fn preferred(rtol: f64, costly: bool) -> usize {
     let digits = -rtol.log10();
     let wanted = if costly {

@@ -1,17 +1,17 @@
 //! Delayed values at the nodes of an element.
 //!
-//! For each delay the shifted nodes are dealt out to the stored pieces they lie in, and each piece
-//! is summed at its nodes. The first and the last node belong to the pieces inside the shifted
-//! element, also where rounding puts them a hair outside: values at a breaking point are
-//! one-sided. Where a delay is shorter than the element, shifted nodes lie in the element itself;
-//! their values follow from the iterate and are renewed at each sweep.
+//! For each delay the shifted nodes are assigned to the stored pieces that contain them, and each
+//! piece is evaluated at its nodes. The first and the last node belong to the pieces inside the
+//! shifted element, even where rounding errors put them slightly outside, because values at a
+//! breaking point are one-sided. Where a delay is shorter than the element, shifted nodes lie in
+//! the element itself; their values follow from the iterate and are computed again in each sweep.
 
-use super::super::history::History;
+use super::chebyshev;
+use super::history::History;
 use super::nodes::Nodes;
 use crate::Error;
-use crate::dde::chebyshev;
 
-/// How far end nodes are moved inwards to find their piece, in gaps between nodes.
+/// Shift of end nodes towards the inside when their piece is searched for, in gaps between nodes.
 const INWARDS: f64 = 0.01;
 
 /// Nodes from `first` on whose delayed value lies in the element itself.
@@ -22,7 +22,7 @@ struct Inner {
     table: Vec<f64>,
 }
 
-/// Workspace of one run.
+/// Memory for one run.
 #[derive(Debug, Default)]
 pub(super) struct Delayed {
     inner: Vec<Inner>,
@@ -30,7 +30,7 @@ pub(super) struct Delayed {
     table: Vec<f64>,
 }
 
-/// An element as far as its place goes.
+/// The place of an element.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) start: f64,
@@ -40,12 +40,12 @@ pub(super) struct Place<'a> {
 }
 
 impl Delayed {
-    /// Whether delays shorter than the element make its delayed values depend on itself.
+    /// Do delays shorter than the element make its delayed values depend on itself?
     pub(super) fn overlaps(&self) -> bool {
         !self.inner.is_empty()
     }
 
-    /// Whether the last node reads its own element through this delay.
+    /// Does the last node read its own element through this delay?
     pub(super) fn reaches_itself(&self, delay: usize) -> bool {
         self.inner.iter().any(|inner| inner.delay == delay)
     }
@@ -109,7 +109,7 @@ impl Delayed {
         Ok(())
     }
 
-    /// Note that nodes from `first` on read the element itself.
+    /// Record that nodes from `first` on read the element itself.
     fn inside(&mut self, delay: usize, first: usize, shift: f64, place: Place<'_>) {
         let length = place.end - place.start;
         let shifted = place.t[first..]
@@ -126,7 +126,7 @@ impl Delayed {
         });
     }
 
-    /// Renew what depends on the iterate, given its coefficients.
+    /// Compute again what depends on the iterate, given its coefficients.
     pub(super) fn renew(&self, coefficients: &[f64], n: usize, z: &mut [f64]) {
         for inner in &self.inner {
             let dim = coefficients.len() / n;
@@ -139,7 +139,7 @@ impl Delayed {
     }
 }
 
-/// The time by which the piece of a node is found: end nodes a little inside.
+/// The time at which the piece of a node is searched for: end nodes slightly inside.
 fn inwards(t: &[f64], index: usize) -> f64 {
     let last = t.len() - 1;
     if index == 0 {
@@ -151,7 +151,7 @@ fn inwards(t: &[f64], index: usize) -> f64 {
     }
 }
 
-/// Whether shifted nodes are the nodes of the piece, to rounding.
+/// Are the shifted nodes equal to the nodes of the piece, up to rounding errors?
 fn same(points: &[f64], nodes: &[f64]) -> bool {
     const ROUNDING: f64 = 1e-13;
     let pairs = points.iter().zip(nodes);

@@ -65,7 +65,7 @@ impl Factors {
 }
 
 impl Factors {
-    /// The inverse, row-major: worth its making where many right-hand sides follow.
+    /// The inverse, row-major; it pays where there are many right-hand sides.
     pub(super) fn inverse(&self) -> Vec<f64> {
         let n = self.n;
         let mut inverse = vec![0.0; n * n];

@@ -1,41 +1,41 @@
 //! One element: nodes, delayed values, first guess, sweeps.
 //!
 //! A sweep evaluates the right-hand side at all nodes of the iterate and improves it by a step of
-//! Picard's or Newton's. It ends when what is left, |δ| θ / (1 − θ) by the ratio θ of the last two
-//! steps, is a small part of the tolerance. Where the Jacobian has served before, the ratio it
-//! showed last stands in for the second step, with a margin.
+//! Picard's or Newton's iteration. The sweeps end when the remaining error, |δ| θ / (1 − θ) with
+//! the ratio θ of the last two steps, is a small share of the tolerance. Where the Jacobian was
+//! used before, its last ratio replaces the second step, with a margin.
 
-use super::super::history::History;
+use super::chebyshev;
 use super::delayed::{Delayed, Place};
 use super::dense::dot;
+use super::history::History;
 use super::newton::Newton;
 use super::nodes::Nodes;
-use super::{Columns, Equation, Problem};
-use crate::dde::chebyshev;
+use super::problem::{Columns, Equation, Problem};
 use crate::{Error, Task};
 
-/// What iteration may leave, in tolerances.
+/// Largest remaining error of the iteration, in tolerances.
 const LEFT: f64 = 0.02;
-/// Sweeps of one element.
+/// Upper limit on the sweeps of one element.
 const MOST: u32 = 40;
-/// Margin on a ratio seen at an earlier element.
+/// Factor on a ratio that was observed at an earlier element.
 const MARGIN: f64 = 10.0;
 
-/// Step, in tolerances, up to which a ratio seen at an earlier element is believed.
+/// Largest step, in tolerances, for which a ratio observed at an earlier element is used.
 const BELIEVED: f64 = 300.0;
-/// Ratio that two steps alone do not prove to be smaller: the first of them may be anything.
+/// Lower limit on a ratio from two steps, because the first of them may have any size.
 const SLOWEST: f64 = 1e-3;
-/// Growth of the iterate from one sweep to the next that no convergent iteration shows.
+/// Growth of the iterate from one sweep to the next that counts as divergence.
 const WILD: f64 = 30.0;
-/// Place on the last piece, which ends at 1, beyond which extrapolation is idle.
+/// Furthest coordinate on the last piece, which ends at 1, to which it is extrapolated.
 const FARTHEST: f64 = 5.0;
-/// Terms of an extrapolation this much above the smallest one are noise.
+/// Terms of an extrapolation larger than this many times the smallest one are dropped.
 const GROWN: f64 = 4.0;
 
-/// How the sweeps ended.
+/// Outcome of the sweeps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Sweeps {
-    /// Converged after so many.
+    /// Converged after this number of sweeps.
     Converged(u32),
     /// Not converging.
     Stalled,
@@ -43,7 +43,7 @@ pub(super) enum Sweeps {
     NotFinite(usize),
 }
 
-/// Workspace for elements of a run.
+/// Memory for the elements of a run.
 #[derive(Debug, Default)]
 pub(super) struct Element {
     pub(super) start: f64,
@@ -54,7 +54,7 @@ pub(super) struct Element {
     /// Delayed values and slopes at the nodes, as in [`Columns`].
     pub(super) z: Vec<f64>,
     pub(super) dz: Vec<f64>,
-    /// The right-hand side there, as last evaluated.
+    /// The right-hand side at the nodes, from the last evaluation.
     pub(super) f: Vec<f64>,
     pub(super) coefficients: Vec<f64>,
     /// Tolerance of each component.
@@ -63,25 +63,25 @@ pub(super) struct Element {
     table: Vec<f64>,
     delayed: Delayed,
     pub(super) newton: Newton,
-    /// Ratio of the steps and first step, as last seen with Newton.
+    /// Ratio of the steps and first step, as last observed with Newton's iteration.
     seen: Option<(f64, f64)>,
     pub(super) calls: u64,
     pub(super) evaluated: u64,
 }
 
-/// What an element starts from.
+/// The starting point of an element.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Begin<'a> {
     pub(super) initial: &'a [f64],
     pub(super) history: &'a History,
-    /// Whether the last piece goes on smoothly enough to be extrapolated.
+    /// Does the last piece continue smoothly enough to be extrapolated?
     pub(super) smooth: bool,
-    /// Whether the right-hand side jumps at the start and at the end.
+    /// Does the right-hand side jump at the start and at the end?
     pub(super) jumps: (bool, bool),
 }
 
 impl Element {
-    /// Workspace that begins with what is known of the Jacobian.
+    /// Memory for a run, with what is known of the Jacobian.
     pub(super) fn new(newton: Newton) -> Self {
         Self {
             newton,
@@ -89,7 +89,7 @@ impl Element {
         }
     }
 
-    /// Place the element and read its past.
+    /// Set the place of the element and read its past.
     pub(super) fn set(
         &mut self,
         problem: &Problem,
@@ -121,12 +121,12 @@ impl Element {
         self.delayed
             .gather(begin.history, &problem.delays, place, dim, z, dz)?;
         if self.delayed.overlaps() != overlapped {
-            // What the Jacobian is made of has changed.
+            // The point at which the Jacobian was evaluated has changed.
             self.newton.turn_off();
             self.seen = None;
         }
         self.guess(n, begin);
-        // What the caller sees as the time of a jump must lie on the side of the element.
+        // The time of a jump that the caller receives must lie on the side of the element.
         if begin.jumps.0 {
             self.t[0] = start.next_up();
         }
@@ -136,7 +136,7 @@ impl Element {
         Ok(())
     }
 
-    /// The last piece extrapolated, as many terms of it as still fall at the far end.
+    /// The last piece extrapolated, with as many of its terms as still decrease at the far end.
     fn guess(&mut self, n: usize, begin: Begin<'_>) {
         self.y.clear();
         for initial in begin.initial {
@@ -225,7 +225,7 @@ impl Element {
         Ok(Sweeps::Stalled)
     }
 
-    /// Evaluate the Jacobian at the middle node of what was last evaluated.
+    /// Evaluate the Jacobian at the middle node of the last evaluation.
     pub(super) fn linearise<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
@@ -251,7 +251,8 @@ impl Element {
             .evaluate(equation, at, node, &self.delayed, task)
     }
 
-    /// Evaluate the Jacobian at the start, where the iterate is right whatever became of the sweeps.
+    /// Evaluate the Jacobian at the start, where the iterate is exact for any outcome of the
+    /// sweeps.
     pub(super) fn linearise_at_start<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
@@ -273,7 +274,7 @@ impl Element {
         }
     }
 
-    /// Add the step, and measure what its size is to be compared with; how much y has grown.
+    /// Add the step, and compute the size to which it is compared and the growth of y.
     fn step(&mut self, problem: &Problem, n: usize) -> f64 {
         self.scale.clear();
         let before = self.y.iter().fold(0.0_f64, |size, y| size.max(y.abs()));
@@ -298,7 +299,7 @@ impl Element {
         let rows = self.residual.chunks_exact(order).zip(&self.scale);
         rows.fold(0.0, |worst: f64, (row, scale)| {
             let sum = row.iter().fold(0.0, |worst: f64, step| {
-                // NaN must not be lost as `max` would lose it.
+                // NaN must not be lost, as `max` would do.
                 if step.is_finite() {
                     worst.max(step.abs())
                 } else {
@@ -309,7 +310,7 @@ impl Element {
         })
     }
 
-    /// Whether what is left after a step is small enough.
+    /// Is the remaining error after a step small enough?
     fn settled(&self, count: u32, size: f64, ratio: f64) -> bool {
         if size <= LEFT {
             return true;
@@ -327,10 +328,10 @@ impl Element {
     }
 }
 
-/// How many terms of a sum fall at `far`, which lies beyond its interval.
+/// Number of terms of a sum that decrease at `far`, which lies beyond its interval.
 fn falling(coefficients: &[f64], far: f64) -> usize {
     let (mut below, mut here) = (1.0, far);
-    // Even and odd functions have every other term zero: pairs are compared.
+    // In even and odd functions every other term is zero, so that pairs are compared.
     let (mut best, mut last) = ((f64::INFINITY, 1), 0.0);
     for (k, c) in coefficients.iter().enumerate().skip(1) {
         let term = (c * here).abs();

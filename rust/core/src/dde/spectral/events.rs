@@ -1,36 +1,37 @@
 //! Zeros of event functions along accepted elements.
 //!
 //! On the polynomial of an element an event is a function of time alone. It is sampled at the nodes
-//! and interpolated; where the interpolant explains four further samples to rounding, its zeros are
-//! taken apart, so that an event that is linear in y loses none. Where it does not, the element is
-//! halved, up to 32 parts of 25 samples; what is not smooth even there is searched between samples.
-//! An event is where the function reaches zero or changes its sign, also through a change of y at a
-//! jump; one that is zero at the start has none there, and one that only touches zero has none
-//! unless a sample meets it. The time is found by false position and bisection, to rounding.
+//! and interpolated; where the interpolant agrees with four further samples up to rounding errors,
+//! its zeros are separated, so that no zero of an event that is linear in y is missed. Otherwise
+//! the element is halved, up to 32 parts of 25 samples; a function that is not smooth even there is
+//! searched between samples. An event occurs where the function reaches zero or changes its sign,
+//! also through a change of y at a jump. A function that is zero at the start has no event there,
+//! and one that only touches zero has none unless a sample lies on the contact. The time is found
+//! by false position and bisection, to rounding.
 
 use std::ops::Range;
 
-use super::super::history::Piece;
+use super::chebyshev;
+use super::history::Piece;
 use super::isolate::separators;
 use super::nodes::{Nodes, nodes};
-use super::{Equation, Event};
+use super::problem::{Equation, Event};
 use crate::Error;
-use crate::dde::chebyshev;
 
-/// A false position is close to an end of its bracket within this part of it.
+/// A false position is close to an end of its bracket within this share of it.
 const CLOSE: f64 = 0.01;
-/// Where an interpolant is held against the function.
+/// Points at which an interpolant is compared with the function.
 const CHECKED: [f64; 4] = [-0.891_37, -0.314_59, 0.271_83, 0.857_21];
-/// Difference there, relative to the coefficients, that is rounding.
+/// Difference there, relative to the coefficients, that counts as rounding error.
 const ROUNDING: f64 = 1e-13;
-/// Difference that is noise if halving does not lessen it.
+/// Difference that counts as noise if halving does not reduce it.
 const NOISE: f64 = 1e-6;
-/// Part of a difference that is left when halving lessens it.
+/// Share of a difference below which halving has reduced it.
 const LESSENED: f64 = 0.25;
-/// Halvings of an element.
+/// Upper limit on the halvings of an element.
 const DEEPEST: u32 = 5;
 
-/// The event functions of a run and what was found.
+/// The event functions of a run and the events found.
 #[derive(Debug, Default)]
 pub(super) struct Watch {
     kinds: Vec<Event>,
@@ -54,12 +55,12 @@ struct Part {
     start: f64,
     end: f64,
     halvings: u32,
-    /// What the interpolant of twice the part was wrong by.
+    /// Error of the interpolant of twice the part.
     before: f64,
 }
 
 impl Watch {
-    /// Watch events from the start of a run.
+    /// Start to observe events.
     pub(super) fn new<E: Equation + ?Sized>(
         kinds: &[Event],
         equation: &mut E,
@@ -78,7 +79,7 @@ impl Watch {
         Ok(watch)
     }
 
-    /// Look at what a change of y did; whether it ends the run.
+    /// Process a change of y; does it end the run?
     pub(super) fn change<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
@@ -103,7 +104,7 @@ impl Watch {
         Ok(self.take(found).is_some())
     }
 
-    /// Note crossings in the order of time; the time of a terminal one.
+    /// Store crossings in the order of time; returns the time of a terminal one.
     fn take(&mut self, mut found: Vec<Crossing>) -> Option<f64> {
         found.sort_by(|a, b| a.time.total_cmp(&b.time));
         let mut stop = None;
@@ -121,7 +122,7 @@ impl Watch {
         stop
     }
 
-    /// Look at an element with values `y` (component, node); the time of a terminal event ends the
+    /// Search an element with values `y` (component, node); the time of a terminal event ends the
     /// run.
     pub(super) fn scan<E: Equation + ?Sized>(
         &mut self,
@@ -175,7 +176,7 @@ impl Watch {
         Ok(self.take(found))
     }
 
-    /// Append marks between which the event has no more than one zero, as far as it is smooth.
+    /// Append times between which the event has at most one zero, as far as it is smooth.
     fn divide<E: Equation + ?Sized>(
         &self,
         equation: &mut E,
@@ -262,7 +263,7 @@ fn only(event: usize) -> Range<usize> {
     event..event + 1
 }
 
-/// The time at a place of [−1, 1], exact at its ends.
+/// The time at a coordinate in [−1, 1], exact at its ends.
 fn time_at(start: f64, end: f64, x: f64) -> f64 {
     if x <= 0.0 {
         start + 0.5 * (end - start) * (1.0 + x)
@@ -280,9 +281,9 @@ fn refine<E: Equation + ?Sized>(
 ) -> Result<(f64, Vec<f64>), Error> {
     let y = vec![0.0; piece.coefficients.len() / piece.terms];
     let mut sampler = Sampler { piece, event, y };
-    // A false position close to an end is pushed away from it to twice the distance: most often
-    // beyond the zero, so that the bracket closes on it. Every fourth step bisects, so that it
-    // shrinks whatever the function is.
+    // A false position close to an end is moved to twice its distance from it, usually beyond the
+    // zero, so that the bracket closes on the zero. Every fourth step bisects, so that the bracket
+    // shrinks for every function.
     for round in 0..240 {
         let middle = 0.5 * (a + b);
         if fb == 0.0 || middle <= a || middle >= b {
@@ -311,7 +312,7 @@ fn refine<E: Equation + ?Sized>(
     Ok((b, sampler.y))
 }
 
-/// Whether a change from `before` to `after` is a crossing in a wanted direction.
+/// Is a change from `before` to `after` a crossing in a direction that counts?
 fn crosses(direction: i8, before: f64, after: f64) -> bool {
     let up = before < 0.0 && after >= 0.0;
     let down = before > 0.0 && after <= 0.0;

@@ -1,46 +1,47 @@
 //! Polynomial pieces for a history that is given as a function.
 //!
-//! The function is sampled evenly first, at no more than a given gap, and every piece must give the
-//! samples within it: what lasts longer than the gap is seen, what is shorter may be missed.
-//! Each piece is interpolated at 20 Chebyshev points of the first kind, which leave out its ends,
-//! so that what happens exactly at a jump does not matter. Where the last coefficients are not
-//! below the tolerance, or a sample is missed, the piece is halved. The tolerance is no less than
-//! what rounding of the time makes of the values. Around a kink or jump that nobody declared the pieces
-//! become tiny, and a run of them is a breaking point, at the tiniest. Close to a joint, where there
-//! are no points, it shows in values or slopes that differ there; it is found by bisection.
+//! The function is sampled evenly first, at no more than a given gap, and every piece must agree
+//! with the samples within it: a feature that lasts longer than the gap is found, a shorter one may
+//! be missed. Each piece is interpolated at 20 Chebyshev points of the first kind, which do not
+//! include its ends, so that the value exactly at a jump does not matter. Where the last
+//! coefficients are not below the tolerance, or a sample is missed, the piece is halved. The
+//! tolerance is at least the error that rounding of the time causes in the values. Around an
+//! undeclared kink or jump the pieces become very short, and the shortest of a sequence of them is
+//! taken as a breaking point. Close to a joint, where there are no points, a kink shows in values
+//! or slopes that differ there, and is found by bisection.
 
-use super::super::breaks::BreakingPoint;
-use super::Piece;
+use super::breaks::BreakingPoint;
+use super::chebyshev;
+use super::history::Piece;
 use crate::Error;
-use crate::dde::chebyshev;
 
 const POINTS: usize = 20;
 /// Coefficients at the end that must be small.
 const TAIL: usize = 4;
-/// Halvings of a stretch: below this a jump is located to rounding.
+/// Upper limit on the halvings of a stretch, at which a jump is located up to rounding errors.
 const DEEPEST: u32 = 44;
-/// Halvings from which on a piece tells of a kink.
+/// Number of halvings from which on a piece indicates a kink.
 const KINKED: u32 = 14;
-/// Differences at a joint, in tolerances, that are no noise.
+/// Differences at a joint, in tolerances, that indicate a break.
 const LOUD: f64 = 100.0;
-/// Breaking points closer than this part of the history are one.
+/// Breaking points closer than this share of the history are merged.
 const SAME: f64 = 1e-9;
-/// Distance from the ends at which a piece is checked, as a part of it.
+/// Distance from the ends at which a piece is checked, as a share of it.
 const EDGE: f64 = 1e-7;
-/// Tolerances that it may be off there: the sum of what the tail leaves out.
+/// Largest error there, in tolerances: the sum of what the tail neglects.
 const NEAR: f64 = 20.0;
-/// Part of a piece at its ends without points.
+/// Share of a piece at its ends without points.
 const MARGIN: f64 = 2e-3;
-/// Times the pieces are made anew with more breaking points.
+/// Upper limit on the rounds in which the pieces are computed again with more breaking points.
 const ROUNDS: u32 = 3;
-/// Pieces of one history.
+/// Upper limit on the pieces of one history.
 const MOST: usize = 20_000;
-/// Even samples of one history, at most.
+/// Upper limit on the even samples of one history.
 const MOST_SAMPLES: f64 = 1e6;
-/// Units of rounding of the time that a function may err by: it multiplies and adds as well.
+/// Error of a function in units of its time: its arithmetic has rounding errors as well.
 const UNITS: f64 = 8.0 * f64::EPSILON;
-/// What rounding of the time makes of the values, at most, as a part of how much they vary on a
-/// piece: where it is more, the piece is too short to be told from a jump.
+/// Largest error of the values from rounding of the time, as a share of their variation on a piece.
+/// Where it is larger, the piece is too short to be distinguished from a jump.
 const BLURRED: f64 = 1e-3;
 
 /// Pieces of a function, and the breaking points found in it.
@@ -55,7 +56,8 @@ pub struct Approximation {
 }
 
 /// Approximate `function`, which writes `dim` values, on [start, end] to `tolerance`, with joints
-/// at the `breaks` in between. What differs from a smooth function for longer than `gap` is seen.
+/// at the `breaks` in between. A deviation from a smooth function that lasts longer than `gap` is
+/// found.
 pub fn approximate(
     (start, end): (f64, f64),
     gap: f64,
@@ -107,7 +109,7 @@ struct Samples {
 }
 
 impl Samples {
-    /// At the middles of equal parts no longer than `gap`: never at a joint.
+    /// At the middles of equal parts no longer than `gap`, hence never at a joint.
     fn new(
         joints: &[f64],
         gap: f64,
@@ -142,8 +144,8 @@ impl Samples {
     }
 }
 
-/// Where a function passes from one piece to the next, close to their joint: no point of either
-/// lies there.
+/// The time near a joint at which a function passes from one piece to the next; neither piece has
+/// points there.
 fn meeting(
     left: &Piece,
     right: &Piece,
@@ -180,7 +182,8 @@ fn divide(
 ) -> Result<Approximation, Error> {
     let mut found = Approximation::default();
     let mut fitter = Fitter::new(dim);
-    // Largest values seen of each component: around a zero, a function is no better than they are.
+    // Largest values found of each component: near a zero the accuracy of a function is relative to
+    // them.
     let mut sizes = vec![0.0_f64; dim];
     for values in samples.values.chunks_exact(dim.max(1)) {
         for (size, value) in sizes.iter_mut().zip(values) {
@@ -230,7 +233,7 @@ fn divide(
                 continue;
             }
             if !good {
-                // It holds a jump, and no number between its ends tells where.
+                // It contains a jump, and no number between its ends locates it better.
                 piece = fitter.last_value(&piece);
             }
             match tiniest {
@@ -254,8 +257,8 @@ fn divide(
     Ok(found)
 }
 
-/// Whether two neighbours agree at their joint, in value and slope, as parts of one smooth
-/// function approximated to the tolerance do.
+/// Do two neighbours agree at their joint, in value and slope, as parts of one smooth function
+/// approximated to the tolerance would?
 fn joins(
     left: &Piece,
     right: &Piece,
@@ -286,12 +289,12 @@ fn size(coefficients: &[f64]) -> f64 {
     coefficients.iter().map(|c| c.abs()).sum()
 }
 
-/// The tolerance, no less than the rounding of values.
+/// The tolerance, but at least the rounding error of the values.
 fn allowed(tolerance: f64, size: f64) -> f64 {
     tolerance.max(1e-15 * size)
 }
 
-/// Whether the last coefficients are below what is allowed.
+/// Are the last coefficients below the allowed size?
 fn resolved(piece: &Piece, allowed: &[f64]) -> bool {
     let rows = piece.coefficients.chunks_exact(piece.terms).zip(allowed);
     rows.into_iter().all(|(c, allowed)| {
@@ -300,7 +303,7 @@ fn resolved(piece: &Piece, allowed: &[f64]) -> bool {
     })
 }
 
-/// Whether the piece gives the samples within it.
+/// Does the piece agree with the samples within it?
 fn holds_at_samples(piece: &Piece, samples: &Samples, allowed: &[f64]) -> bool {
     let mut found = vec![0.0; allowed.len()];
     samples
@@ -308,7 +311,7 @@ fn holds_at_samples(piece: &Piece, samples: &Samples, allowed: &[f64]) -> bool {
         .all(|(time, values)| agrees(piece, time, values, &mut found, allowed))
 }
 
-/// Whether the piece is right next to its ends too, where it has no points.
+/// Is the piece accurate next to its ends too, where it has no points?
 fn holds_at_ends(
     piece: &Piece,
     allowed: &[f64],
@@ -327,7 +330,7 @@ fn holds_at_ends(
     Ok(true)
 }
 
-/// Whether a piece gives these values.
+/// Does a piece have these values?
 fn agrees(piece: &Piece, time: f64, values: &[f64], found: &mut [f64], allowed: &[f64]) -> bool {
     piece.value(time, found);
     let mut pairs = values.iter().zip(&*found).zip(allowed);
@@ -386,7 +389,7 @@ impl Fitter {
         Ok(Piece::new(start, end, POINTS, coefficients))
     }
 
-    /// What rounding of the time makes of a component of the piece in hand.
+    /// Error that rounding of the time causes in a component of the current piece.
     fn blur(&self, component: usize, piece: &Piece) -> f64 {
         let values = || self.values[component..].iter().step_by(self.dim);
         let half = 0.5 * (piece.end - piece.start);
@@ -402,7 +405,7 @@ impl Fitter {
         (UNITS * time * rate).min(BLURRED * (high - low))
     }
 
-    /// The last values of the piece in hand, all along it.
+    /// The constant continuation of the last values of the current piece.
     fn last_value(&self, piece: &Piece) -> Piece {
         let mut coefficients = vec![0.0; piece.coefficients.len()];
         let last = &self.values[self.values.len() - self.dim..];
@@ -428,7 +431,7 @@ mod tests {
 
     fn error(found: &Approximation, function: impl Fn(f64) -> f64) -> f64 {
         let mut worst: f64 = 0.0;
-        // A piece that holds a jump is as short as numbers allow.
+        // A piece that contains a jump is as short as numbers allow.
         for piece in found
             .pieces
             .iter()

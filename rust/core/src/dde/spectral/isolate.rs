@@ -1,20 +1,21 @@
-//! Where the zeros of a polynomial are, each apart from the others.
+//! The zeros of a polynomial, separated from each other.
 //!
 //! A cell is halved until the Chebyshev coefficients on it prove that the polynomial has no zero
-//! there, |c_0| > Σ |c_k|, or that it is monotonic, the same of its derivative: |T_k| ≤ 1. What is
-//! still undecided in the smallest cells are zeros that rounding does not tell apart.
+//! there, |c_0| > Σ |c_k|, or that it is monotonic, the same of its derivative: |T_k| ≤ 1. Cells
+//! that are undecided at the smallest size hold zeros that rounding errors do not separate.
 
+use super::chebyshev;
 use super::nodes::nodes;
-use crate::dde::chebyshev;
 
-/// Halvings of [−1, 1]: beyond, two zeros drown in rounding between them.
+/// Upper limit on the halvings of [−1, 1]: beyond it rounding errors hide the gap between two
+/// zeros.
 const DEEPEST: u32 = 26;
-/// Cells of one polynomial, which no polynomial of these degrees needs.
+/// Upper limit on the cells of one polynomial; no polynomial of these degrees needs more.
 const MOST: usize = 4096;
-/// Rounding of a sum of coefficients, relative to their sizes.
+/// Rounding error of a sum of coefficients, relative to their moduli.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Append, in ascending order, places on [−1, 1] with no more than one zero between neighbours.
+/// Append, in ascending order, points of [−1, 1] with at most one zero between neighbours.
 pub(super) fn separators(coefficients: &[f64], out: &mut Vec<f64>) {
     let Some((first, others)) = coefficients.split_first() else {
         return;

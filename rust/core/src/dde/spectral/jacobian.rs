@@ -1,43 +1,44 @@
 //! The Jacobian of the right-hand side by forward differences, sparse where it is sparse.
 //!
-//! J = ∂f/∂y, with ∂f/∂z for the delays shorter than the element, at one node. The first calls
-//! take the base and three columns in which all components move at once, by signs drawn once: they
-//! tell how much each row can change, so that what only rounding moved is told from entries. A
-//! pattern given or found before is used by groups, and what it gives is held against the three
-//! columns; where they differ the pattern is found anew, a component at a time. Columns come in
-//! blocks, so that memory grows with the entries and not with the square of the components.
+//! J = ∂f/∂y, with ∂f/∂z for the delays shorter than the element, at one node. The first calls take
+//! the base and three columns in which all components move at once, with fixed pseudo-random signs.
+//! They show how much each row can change, so that changes by rounding errors are distinguished
+//! from entries. A pattern that was given or found before is used by groups, and its result is
+//! compared with the three columns; where they differ, the pattern is determined again, one
+//! component at a time. Columns come in blocks, so that memory grows with the entries and not with
+//! the square of the components.
 
 use super::dense::add_multiple;
 use super::nodes::Nodes;
+use super::problem::{Columns, Equation};
 use super::sparsity::Sparsity;
-use super::{Columns, Equation};
 use crate::{Error, Task};
 
-/// Columns in which everything moves.
+/// Number of columns in which all components move.
 const CHECKS: usize = 3;
-/// Components up to which every entry is kept and none is checked.
+/// Number of components up to which every entry is kept and none is checked.
 const FEW: usize = 8;
-/// Differences, as parts of what a row can change, that are rounding.
+/// Differences below this share of what a row can change count as rounding errors.
 const ROUNDING: f64 = 1e-6;
-/// Part of what a row can change by which a pattern may be wrong.
+/// Share of what a row can change by which a pattern may be wrong.
 const AGREED: f64 = 1e-2;
-/// Numbers in the arguments of one call.
+/// Upper limit on the numbers in the arguments of one call (bounds memory).
 const BLOCK: usize = 1 << 21;
-/// Entries kept of a Jacobian.
+/// Upper limit on the entries of a Jacobian (bounds memory).
 const MOST: usize = 1 << 22;
 
-/// A matrix in the order that makes its band narrow.
+/// A sparse matrix, with an order of the components that makes its band narrow.
 #[derive(Debug, Default)]
 pub(super) struct Jacobian {
     pattern: Sparsity,
     values: Vec<f64>,
-    /// Place of each component in a banded order.
+    /// Index of each component in the banded order.
     pub(super) place: Vec<usize>,
     band: usize,
 }
 
 impl Jacobian {
-    /// A matrix by its pattern and its entries.
+    /// A matrix from its pattern and its entries.
     pub(super) fn new(pattern: Sparsity, values: Vec<f64>) -> Self {
         let (place, band) = pattern.banded();
         Self {
@@ -53,7 +54,7 @@ impl Jacobian {
         self.pattern.dim()
     }
 
-    /// How far entries are from the diagonal in the banded order.
+    /// Largest distance of an entry from the diagonal in the banded order.
     pub(super) fn band(&self) -> usize {
         self.band
     }
@@ -88,20 +89,20 @@ impl Jacobian {
     }
 }
 
-/// Where a Jacobian is wanted.
+/// The point at which a Jacobian is evaluated.
 #[derive(Debug)]
 pub(super) struct Point<'a> {
     pub(super) t: f64,
     pub(super) y: &'a [f64],
     pub(super) z: &'a [f64],
     pub(super) dz: &'a [f64],
-    /// By how much each component is moved.
+    /// Shift of each component.
     pub(super) steps: &'a [f64],
-    /// Whether a delay is shorter than the element.
+    /// Is the delay shorter than the element?
     pub(super) inner: &'a [bool],
 }
 
-/// What is known of the pattern, and what differences have cost.
+/// The known pattern, and the cost of the differences so far.
 #[derive(Debug, Default)]
 pub(super) struct Differences {
     /// The pattern, the group of each column, and their number.
@@ -111,7 +112,7 @@ pub(super) struct Differences {
     pub(super) columns: u64,
 }
 
-/// What a column moves: nothing, one component, a group, or all of them by signs.
+/// The components that a column moves: none, one, a group, or all of them with signs.
 #[derive(Debug, Clone, Copy)]
 enum Move {
     None,
@@ -129,7 +130,7 @@ impl Differences {
         }
     }
 
-    /// Columns that a Jacobian takes.
+    /// Number of columns that a Jacobian needs.
     pub(super) fn cost(&self, dim: usize) -> usize {
         match &self.known {
             _ if dim <= FEW => dim + 1,
@@ -138,8 +139,8 @@ impl Differences {
         }
     }
 
-    /// The Jacobian at a point; only its diagonal where it has too many entries, `None` where it
-    /// is not finite.
+    /// The Jacobian at a point. Only its diagonal where it has too many entries; `None` where it is
+    /// not finite.
     pub(super) fn jacobian<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
@@ -219,7 +220,7 @@ impl Differences {
         Ok(values)
     }
 
-    /// Find the pattern, a component at a time.
+    /// Determine the pattern, one component at a time.
     fn detect<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
@@ -351,13 +352,13 @@ fn finite(pattern: Sparsity, values: Vec<f64>) -> Option<Jacobian> {
     all.then(|| Jacobian::new(pattern, values))
 }
 
-/// Columns of one call.
+/// Number of columns in one call.
 fn width(point: &Point<'_>) -> usize {
     let column = point.y.len() + point.z.len() + point.dz.len();
     (BLOCK / column.max(1)).max(FEW)
 }
 
-/// A sign that looks drawn, the same in every run.
+/// A pseudo-random sign, the same in every run.
 fn sign(check: usize, component: usize) -> f64 {
     let mut bits = (component as u64 + 1) ^ ((check as u64 + 1) << 40);
     for _ in 0..3 {
@@ -366,7 +367,7 @@ fn sign(check: usize, component: usize) -> f64 {
     if bits >> 63 == 0 { 1.0 } else { -1.0 }
 }
 
-/// Whether the entries explain what the right-hand side did when everything moved.
+/// Do the entries explain the change of the right-hand side when all components moved?
 fn agrees(pattern: &Sparsity, values: &[f64], steps: &[f64], base: &[f64], checks: &[f64]) -> bool {
     let dim = base.len();
     let mut size = vec![0.0_f64; dim];

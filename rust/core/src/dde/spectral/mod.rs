@@ -6,23 +6,26 @@
 //! the stored polynomials. Elements end on breaking points, so that every polynomial approximates
 //! something smooth. Length and degree follow the decay of the Chebyshev coefficients and the
 //! defect of the equation at the start of an element, where that of collocation is largest; both
-//! judge the polynomial everywhere, not only its end. An element whose nodes do not stand for all that
-//! the past holds is shortened.
-//! Not guaranteed: the estimates are local, as in every method of this kind; how errors of the
-//! past grow is the equation's affair.
+//! judge the polynomial everywhere, not only its end. An element whose nodes do not resolve the
+//! stored past is shortened. Not guaranteed: the estimates are local, as in every method of this
+//! kind; how errors of the past grow depends on the equation.
 
 mod banded;
+pub mod breaks;
+mod chebyshev;
 mod control;
 mod delayed;
 mod dense;
 mod element;
 mod events;
 mod fit;
+pub mod history;
 mod isolate;
 mod jacobian;
 mod newton;
 mod nodes;
 mod output;
+mod problem;
 mod run;
 mod shifted;
 mod sparsity;
@@ -31,246 +34,6 @@ mod tests;
 mod unread;
 
 pub use fit::{Approximation, approximate};
+pub use problem::{Columns, Equation, Event, Jump, Outcome, Problem, Solution};
 pub use run::solve;
 pub use sparsity::Sparsity;
-
-use std::ops::Range;
-
-use super::breaks::BreakingPoint;
-use super::history::{History, Piece};
-use crate::{Error, Task};
-
-/// Arguments of the right-hand side at many nodes; the node runs fastest.
-#[derive(Debug, Clone, Copy)]
-pub struct Columns<'a> {
-    /// Times, one a node.
-    pub t: &'a [f64],
-    /// y: component, node.
-    pub y: &'a [f64],
-    /// Delayed y: delay, component, node.
-    pub z: &'a [f64],
-    /// Delayed y′ likewise; empty unless the equation is neutral.
-    pub dz: &'a [f64],
-}
-
-/// The caller's side: the equation, its events, its jumps.
-pub trait Equation {
-    /// The right-hand side at all nodes, component by component like y.
-    fn slope(&mut self, at: Columns<'_>, out: &mut [f64], task: &Task) -> Result<(), Error>;
-
-    /// Whether a call costs much more than what it does for a node: sweeps are then worth saving.
-    fn is_costly(&self) -> bool {
-        false
-    }
-
-    /// Some of the event functions at a time.
-    fn events(
-        &mut self,
-        _t: f64,
-        _y: &[f64],
-        _which: Range<usize>,
-        _out: &mut [f64],
-    ) -> Result<(), Error> {
-        Ok(())
-    }
-
-    /// Change y at the jump with this index.
-    fn change(&mut self, _jump: usize, _t: f64, _y: &mut [f64]) -> Result<(), Error> {
-        Ok(())
-    }
-}
-
-/// Which zeros of an event function count, and whether they end the run.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Event {
-    /// 1 for upward crossings only, −1 for downward ones, 0 for both.
-    pub direction: i8,
-    /// End the run at the crossing with this number, counted from 1; 0 for never.
-    pub terminal: u32,
-}
-
-/// A time at which the right-hand side jumps, and perhaps y.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jump {
-    /// When.
-    pub time: f64,
-    /// Whether [`Equation::change`] is called.
-    pub changes: bool,
-}
-
-/// What is solved, and how well.
-#[derive(Debug, Clone, Default)]
-pub struct Problem {
-    /// Start of the solution.
-    pub start: f64,
-    /// End of the solution.
-    pub end: f64,
-    /// y at the start.
-    pub initial: Vec<f64>,
-    /// The constant delays.
-    pub delays: Vec<f64>,
-    /// Whether the right-hand side takes delayed derivatives.
-    pub neutral: bool,
-    /// The past, at least as long as the largest delay.
-    pub history: History,
-    /// Breaking points of the past and of the start.
-    pub breaks: Vec<BreakingPoint>,
-    /// Jumps of the right-hand side, in the order of time.
-    pub jumps: Vec<Jump>,
-    /// Events, as many as [`Equation::events`] writes.
-    pub events: Vec<Event>,
-    /// Relative tolerance.
-    pub rtol: f64,
-    /// Absolute tolerance: one, or one a component.
-    pub atol: Vec<f64>,
-    /// Largest length of an element.
-    pub longest: f64,
-    /// Times at which y is wanted, ascending; without them every node is given.
-    pub times: Option<Vec<f64>>,
-    /// Keep every piece instead of those that a delay still reaches.
-    pub keep: bool,
-    /// Which components the right-hand side depends on; found by differences where it is wanted.
-    pub sparsity: Option<Sparsity>,
-    /// Elements tried at most, accepted or not.
-    pub most: Option<u64>,
-}
-
-/// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Outcome {
-    /// At the end of the interval.
-    Finished,
-    /// At a terminal event.
-    Event,
-    /// Elements became as short as rounding allows at this time.
-    Shrunk(f64),
-    /// The right-hand side is not finite from this time on.
-    NotFinite(f64),
-    /// As many elements as allowed were tried by this time.
-    TooMany(f64),
-}
-
-/// A solution.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solution {
-    /// Times of the output.
-    pub times: Vec<f64>,
-    /// y at them, one time after the other.
-    pub values: Vec<f64>,
-    /// The pieces kept.
-    pub history: History,
-    /// Until where the pieces are the solution.
-    pub end: f64,
-    /// Times of the crossings of each event.
-    pub event_times: Vec<Vec<f64>>,
-    /// y at them, one crossing after the other.
-    pub event_values: Vec<Vec<f64>>,
-    /// The breaking points that were hit.
-    pub breaks: Vec<BreakingPoint>,
-    /// Calls of the right-hand side, and nodes in all of them.
-    pub calls: u64,
-    /// Nodes at which the right-hand side was evaluated.
-    pub nodes: u64,
-    /// Elements accepted.
-    pub elements: u64,
-    /// Elements tried and refused.
-    pub refused: u64,
-    /// How it ended.
-    pub outcome: Outcome,
-}
-
-impl Problem {
-    /// Number of components.
-    pub fn dim(&self) -> usize {
-        self.initial.len()
-    }
-
-    /// The largest delay, 0 without any.
-    pub fn memory(&self) -> f64 {
-        self.delays.iter().copied().fold(0.0, f64::max)
-    }
-
-    /// Refuse what makes no problem.
-    pub fn check(&self) -> Result<(), Error> {
-        let refuse = |message: String| Err(Error::argument(message));
-        if !(self.start.is_finite() && self.end.is_finite() && self.end > self.start) {
-            return refuse(format!(
-                "t_span=({}, {}): give two finite times, the later one second; an equation with \
-                 delays has no solution backwards in time",
-                self.start, self.end
-            ));
-        }
-        if let Some(delay) = self.delays.iter().find(|delay| **delay < 0.0) {
-            return refuse(format!(
-                "the delay {delay} is negative: the equation is of advanced type, its future \
-                 would decide its present; give delays above zero"
-            ));
-        }
-        if let Some(delay) = self
-            .delays
-            .iter()
-            .find(|delay| **delay == 0.0 || delay.is_nan())
-        {
-            return refuse(format!(
-                "the delay {delay} is not above zero: write y itself where the delay is 0"
-            ));
-        }
-        let resolution = 1e-13 * self.start.abs().max(self.end.abs());
-        if let Some(delay) = self.delays.iter().find(|delay| **delay <= resolution) {
-            return refuse(format!(
-                "the delay {delay} vanishes beside the times of t_span in double precision: leave \
-                 it out, or shift and scale time"
-            ));
-        }
-        if self.delays.iter().any(|delay| !delay.is_finite()) {
-            return refuse("a delay is infinite: leave it out".to_owned());
-        }
-        let first = self.history.pieces().next().map(|piece| piece.start);
-        let needed = self.start - self.memory() * (1.0 - 1e-12);
-        if let Some(first) = first.filter(|first| *first > needed) {
-            return refuse(format!(
-                "the history starts at {first}: give it from {} on, the start minus the largest \
-                 delay",
-                self.start - self.memory()
-            ));
-        }
-        if let Some(value) = self.initial.iter().find(|value| !value.is_finite()) {
-            return refuse(format!("y at the start is {value:?}: give finite numbers"));
-        }
-        if !(self.rtol >= 1e-14 && self.rtol < 1.0) {
-            return refuse(format!("rtol={}: give a number from 1e-14 to 1", self.rtol));
-        }
-        if let Some(atol) = self
-            .atol
-            .iter()
-            .find(|atol| !(**atol >= 0.0 && atol.is_finite()))
-        {
-            return refuse(format!(
-                "atol={atol}: give finite numbers that are not negative"
-            ));
-        }
-        if self.atol.len() != 1 && self.atol.len() != self.dim() {
-            return refuse(format!(
-                "atol has {} entries for {} components: give one, or one a component",
-                self.atol.len(),
-                self.dim()
-            ));
-        }
-        if self.longest.is_nan() || self.longest <= 0.0 {
-            return refuse(format!(
-                "max_step={}: give a number above zero",
-                self.longest
-            ));
-        }
-        let within = |time: f64| time >= self.start && time <= self.end;
-        if let Some(times) = &self.times
-            && !(times.is_sorted() && times.iter().all(|time| within(*time)))
-        {
-            return refuse(format!(
-                "t_eval must ascend and lie within t_span=({}, {})",
-                self.start, self.end
-            ));
-        }
-        Ok(())
-    }
-}

@@ -1,50 +1,50 @@
 //! Simplified Newton steps for the collocation equations.
 //!
-//! The residual R of Y = y_0 + (h/2) B F(Y) is answered by δ with (I − (h/2) B ⊗ J) δ = R, where
-//! J = ∂f/∂y at one node, together with ∂f/∂z for delays shorter than the element. With J = 0 this
-//! is a sweep of Picard's. Where the diagonal of J carries nearly all of it, or its factors would
-//! be too large, a real system a component is left. A small system is solved whole; of a large one
-//! the eigenvalues of B make complex ones of the size of J. Factors serve all sweeps, and all
-//! elements of the same length and order.
+//! For the residual R of Y = y_0 + (h/2) B F(Y) the step δ solves (I − (h/2) B ⊗ J) δ = R, where J
+//! = ∂f/∂y at one node, together with ∂f/∂z for delays shorter than the element. With J = 0 this is
+//! Picard's iteration. Where J is nearly diagonal, or its factors would be too large, one real
+//! system for each component remains. A small system is solved as a whole; a large one is divided
+//! by the eigenvalues of B into complex systems of the size of J. Factors are used for all sweeps,
+//! and for all elements of the same length and order.
 
 use super::delayed::Delayed;
 use super::dense::{Factors, add_multiple, dot};
 use super::jacobian::{Differences, Jacobian, Point};
 use super::nodes::Nodes;
+use super::problem::{Columns, Equation};
 use super::shifted::Shifted;
 use super::sparsity::Sparsity;
-use super::{Columns, Equation};
 use crate::{Error, Task};
 
 /// Off-diagonal part of J, relative to its diagonal, that is left to the sweeps.
 const OFF_DIAGONAL: f64 = 1e-3;
 
-/// Unknowns of a system that is solved whole.
+/// Largest number of unknowns of a system that is solved as a whole.
 const WHOLE: usize = 100;
-/// Components with one system from which on its inverse pays.
+/// Number of components with the same system from which on its inverse pays.
 const SHARED: usize = 14;
-/// Columns up to which a Jacobian costs no more than a sweep or two.
+/// Number of columns up to which a Jacobian costs no more than a sweep or two.
 const CHEAP: usize = 32;
-/// Columns up to which the first Jacobian is worth a look at what it is like.
+/// Number of columns up to which the first Jacobian is evaluated to find its structure.
 const WORTH_A_LOOK: usize = 260;
 
-/// The linearisation of a run as it stands.
+/// The current linearisation of a run.
 #[derive(Debug, Default)]
 pub(super) struct Newton {
     jacobian: Option<Jacobian>,
     differences: Differences,
-    /// The diagonal, where it is all that enters.
+    /// The diagonal, where only it is used.
     diagonal: Option<Vec<f64>>,
     /// (h/2, order) of the factors.
     key: Option<(f64, usize)>,
     whole: Option<Factors>,
     shifted: Option<Shifted>,
-    /// One system for each different entry of the diagonal.
+    /// One system for each distinct entry of the diagonal.
     single: Vec<Single>,
     known: Vec<f64>,
     /// Elements since J was evaluated.
     pub(super) age: u32,
-    /// J is full and large: it waits until sweeps without it fail.
+    /// J is full and large: it is not used until sweeps without it fail.
     waits: bool,
 }
 
@@ -53,12 +53,12 @@ pub(super) struct Newton {
 struct Single {
     slope: f64,
     factors: Factors,
-    /// Where many share it.
+    /// The inverse, where many components share it.
     inverse: Option<Vec<f64>>,
 }
 
 impl Newton {
-    /// No Jacobian yet, but perhaps its pattern.
+    /// Without a Jacobian, but perhaps with its pattern.
     pub(super) fn new(pattern: Option<&Sparsity>) -> Self {
         Self {
             differences: Differences::given(pattern),
@@ -66,28 +66,28 @@ impl Newton {
         }
     }
 
-    /// Whether there is a Jacobian.
+    /// Is there a Jacobian?
     pub(super) fn is_on(&self) -> bool {
         self.jacobian.is_some()
     }
 
-    /// Forget the Jacobian.
+    /// Discard the Jacobian.
     pub(super) fn turn_off(&mut self) {
         self.jacobian = None;
         self.key = None;
     }
 
-    /// Whether a Jacobian of so many components costs little.
+    /// Does a Jacobian of this many components cost little?
     pub(super) fn is_cheap(&self, dim: usize) -> bool {
         self.differences.cost(dim) <= CHEAP
     }
 
-    /// Whether the first sweep should have one, where calls cost more than nodes.
+    /// Should the first sweep use a Jacobian, because calls cost more than nodes?
     pub(super) fn comes_first(&self, dim: usize) -> bool {
         !self.waits && self.differences.cost(dim) <= WORTH_A_LOOK
     }
 
-    /// Leave a Jacobian whose factors cost much until sweeps without it fail.
+    /// Do not use a Jacobian with costly factors until sweeps without it fail.
     pub(super) fn wait_if_full(&mut self) {
         let dense = |jacobian: &Jacobian| Shifted::is_full(jacobian);
         let costly = self.diagonal.is_none() && self.jacobian.as_ref().is_some_and(dense);
@@ -150,7 +150,7 @@ impl Newton {
         Ok(true)
     }
 
-    /// Turn the residual (component, node) into the step δ; `false` where the system is singular.
+    /// Replace the residual (component, node) by the step δ; `false` where the system is singular.
     pub(super) fn solve(&mut self, nodes: &Nodes, half: f64, residual: &mut [f64]) -> bool {
         let order = nodes.order;
         if self.key != Some((half, order)) && !self.factorise(nodes, half) {
@@ -245,7 +245,7 @@ impl Newton {
     }
 }
 
-/// Entries that differ by no more than differences are wrong by.
+/// Do two entries differ by no more than the error of differences?
 fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
 }

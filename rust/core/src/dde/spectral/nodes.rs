@@ -4,16 +4,16 @@
 //! they carry the polynomial of degree N through the start of an element and its N nodes.
 //! Collocation Y′(p_i) = F_i at them is the Radau IIA method of N stages (Hairer and Wanner,
 //! Solving ODEs II, section IV.5): stiffly accurate, L-stable, order 2N − 1 at the end of an
-//! element and N + 1 within. In integral form Y = y_0 + (h/2) B F with
-//! B_ij = ∫ from −1 to p_i of the j-th Lagrange polynomial.
-//! The defect Y′ − f(Y) is c π(x) with π = P_N − P_{N−1} to leading order and largest at −1, where
-//! it can be measured; what it adds to Y there, |∫ π| / |π(−1)|, is bounded by `spread`.
-//! Matrices come from LU of the basis at the points, to within some hundred units of rounding.
+//! element and N + 1 within. In integral form Y = y_0 + (h/2) B F with B_ij = ∫ from −1 to p_i of
+//! the j-th Lagrange polynomial. The defect Y′ − f(Y) is c π(x) with π = P_N − P_{N−1} to leading
+//! order and largest at −1, where it can be measured; what it adds to Y there, |∫ π| / |π(−1)|, is
+//! bounded by `spread`. Matrices are computed by LU factors of the basis at the points, with errors
+//! of some hundred units in the last place.
 
 use std::sync::OnceLock;
 
+use super::chebyshev;
 use super::dense::Factors;
-use crate::dde::chebyshev;
 
 /// The numbers of nodes to choose from.
 pub(super) const ORDERS: [usize; 9] = [4, 6, 8, 10, 12, 14, 16, 20, 24];

@@ -1,13 +1,13 @@
-//! Which values of a run are given back.
+//! The values of a run that are returned.
 
-use super::super::history::Piece;
+use super::history::Piece;
 use crate::Error;
 use crate::memory::{append, push};
 
-/// What memory is asked for.
+/// What memory is requested for, in errors.
 const SOLUTION: &str = "the solution";
 
-/// Values at wanted times, or at all nodes.
+/// Values at requested times, or at all nodes.
 #[derive(Debug)]
 pub(super) struct Output<'a> {
     wanted: Option<&'a [f64]>,
@@ -18,7 +18,7 @@ pub(super) struct Output<'a> {
 }
 
 impl<'a> Output<'a> {
-    /// Nothing yet.
+    /// No values yet.
     pub(super) fn new(wanted: Option<&'a [f64]>) -> Self {
         Self {
             wanted,
@@ -28,8 +28,8 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// The state at the start, or after it was changed: wanted times get it from the element that
-    /// follows.
+    /// The state at the start, or after it was changed. Requested times receive it from the element
+    /// that follows.
     pub(super) fn start(&mut self, time: f64, state: &[f64]) -> Result<(), Error> {
         if self.wanted.is_none() {
             push(SOLUTION, &mut self.times, time)?;
@@ -48,8 +48,8 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// An element up to `until`, with its nodes: values (component, node) and times. A wanted time
-    /// at its end belongs to the next element, unless this is the last one.
+    /// An element up to `until`, with its nodes: values (component, node) and times. A requested
+    /// time at its end belongs to the next element, unless this is the last one.
     pub(super) fn give(
         &mut self,
         piece: &Piece,
@@ -74,7 +74,7 @@ impl<'a> Output<'a> {
                 push(SOLUTION, &mut self.values, row[node])?;
             }
         }
-        // The last node was perhaps moved off a jump, or lies beyond a terminal event.
+        // The last node may have been moved off a jump, or lie beyond a terminal event.
         self.value(piece, until)
     }
 

@@ -1,42 +1,43 @@
-//! A run from the start to the end: elements one after the other.
+//! A run from start to end, element by element.
 
-use super::super::breaks::{BreakingPoint, Breaks};
-use super::super::history::Piece;
-use super::control::{self, Verdict};
+use super::breaks::{BreakingPoint, Breaks};
+use super::control::Verdict;
 use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
+use super::history::Piece;
 use super::newton::Newton;
 use super::nodes::{Nodes, nodes};
 use super::output::Output;
+use super::problem::{Equation, Outcome, Problem, Solution};
 use super::unread::{Reading, Unread};
-use super::{Equation, Outcome, Problem, Solution};
-use crate::dde::chebyshev;
+use super::{chebyshev, control};
 use crate::{Error, Task};
 
-/// Elements shorter than this part of their time are rounding.
+/// Shortest element relative to its time; a shorter one consists of rounding errors.
 const SHORTEST: f64 = 64.0 * f64::EPSILON;
-/// An element may end this part earlier than wanted to keep in step with the past.
+/// Share of its length by which an element may end earlier to coincide with the ends of earlier
+/// elements.
 const IN_STEP: f64 = 0.45;
-/// Elements between two breaking points are made equal up to this many.
+/// Number of elements between two breaking points up to which they are made equal.
 const EQUAL: f64 = 4.0;
-/// Sweeps by Picard's from which on a Jacobian pays even where calls are cheap.
+/// Sweeps of Picard's iteration from which on a Jacobian pays even where calls are cheap.
 const MANY_SWEEPS: u32 = 12;
-/// Sweeps from which on a Jacobian is evaluated anew.
+/// Sweeps from which on a new Jacobian is evaluated.
 const STALE_SWEEPS: u32 = 4;
-/// Sweeps by Picard's from which on elements grow no longer.
+/// Sweeps of Picard's iteration from which on elements are not lengthened.
 const SLOW_SWEEPS: u32 = 16;
-/// A solution that takes this part of the coefficients at hand, or less, is smooth.
+/// A solution that needs at most one in this many of the coefficients is smooth.
 const FEW_TERMS: usize = 4;
-/// Shortening where sweeps stall or the right-hand side is not finite.
+/// Factor on the length where sweeps fail or the right-hand side is not finite.
 const RETREAT: f64 = 0.3;
-/// An element that holds its own delayed values takes many sweeps: it must be this many delays long
-/// to be worth them.
+/// An element that contains its own delayed values needs many sweeps: it must be at least this many
+/// delays long.
 const OVERLAP: f64 = 12.0;
-/// Elements to wait after one of that kind failed, at most.
-const PATIENCE: u32 = 4096;
-/// Orders of a jump that matter beside one for each digit of the tolerance.
+/// Upper limit on the elements before one of that kind is tried again.
+const LONGEST_WAIT: u32 = 4096;
+/// Orders of a jump that matter in addition to one for each digit of the tolerance.
 const UNSEEN: u32 = 2;
-/// A jump of a neutral slope below this part of the tolerance is none.
+/// A jump of a neutral slope below this share of the tolerance is negligible.
 const FAINT: f64 = 0.02;
 
 /// Solve to the end of the interval or a terminal event.
@@ -62,21 +63,22 @@ struct Run<'a> {
     problem: &'a Problem,
     solution: Solution,
     breaks: Breaks,
-    /// Jumps ahead.
+    /// Index of the next jump.
     jump: usize,
     watch: Watch,
     element: Element,
     reading: Reading,
     state: Vec<f64>,
-    /// The point at which the next element starts, if it is a breaking point not yet followed.
+    /// The start of the next element, if it is a breaking point that has not been followed.
     fresh: Option<BreakingPoint>,
     length: f64,
     order: usize,
     preferred: usize,
     shortest_delay: f64,
-    /// The longest element on which sweeps without a Jacobian failed since the last good one.
+    /// Length of the longest element on which sweeps without a Jacobian failed since the last one
+    /// that succeeded.
     stalled: f64,
-    /// Elements until one longer than a delay is tried, and how many it was last time.
+    /// Elements until one longer than a delay is tried, and the number last time.
     wait: (u32, u32),
     output: Output<'a>,
 }
@@ -180,7 +182,7 @@ impl<'a> Run<'a> {
                     }
                 }
                 Sweeps::Stalled => {
-                    // With a Jacobian of this place once more, then shorter.
+                    // Try again with a Jacobian of this point, then with a shorter element.
                     let newton = &self.element.newton;
                     let known = newton.is_on() && newton.age == 0;
                     let waits = !newton.is_on() && !newton.is_cheap(self.problem.dim());
@@ -211,8 +213,8 @@ impl<'a> Run<'a> {
                 }
             }
             if self.solution.refused > before && end - start > self.shortest_delay {
-                let patience = (2 * self.wait.1).min(PATIENCE);
-                self.wait = (patience, patience);
+                let wait = (2 * self.wait.1).min(LONGEST_WAIT);
+                self.wait = (wait, wait);
             }
         }
     }
@@ -243,12 +245,13 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Where the next element ends: at a breaking point, at the end, or in step with the past.
+    /// End of the next element: a breaking point, the end of the run, or the end of an earlier
+    /// element one delay before.
     fn next_end(&self) -> f64 {
         let start = self.solution.end;
         let length = self.length.min(self.longest());
         let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
-        // A point within rounding of the end is the end.
+        // A point within rounding errors of the end is the end.
         let end = self.problem.end;
         let last = ahead >= end - 2.0 * SHORTEST * end.abs().max(start.abs());
         let stop = if last { end } else { ahead };
@@ -278,7 +281,7 @@ impl<'a> Run<'a> {
             .any(|jump| jump.time == time)
     }
 
-    /// A larger order or a shorter element.
+    /// Choose a larger order or a shorter element.
     fn refuse(&mut self, verdict: Verdict) {
         let length = self.element.end - self.element.start;
         self.solution.refused += 1;
@@ -296,14 +299,15 @@ impl<'a> Run<'a> {
             .unread(self.problem, &self.element, nodes, history)
     }
 
-    /// Have the next try read what this one did not.
+    /// Make the next element read what this one did not resolve.
     fn read(&mut self, unread: Unread, verdict: Verdict) {
         let Some(time) = unread.end else {
             let error = unread.error;
             return self.refuse(Verdict { error, ..verdict });
         };
         self.solution.refused += 1;
-        // It ends this element only: its descendants are left to the same comparison.
+        // It ends only this element: the points that follow from it are left to the same
+        // comparison.
         let order = self.breaks.smooth() - 1;
         self.breaks.add(BreakingPoint { time, order });
     }
@@ -311,8 +315,8 @@ impl<'a> Run<'a> {
     /// Have a Jacobian where sweeps were many, a new one where it is stale; the length that the
     /// next element may have because of it.
     ///
-    /// A costly one waits until sweeps failed on elements much longer than the solution asks for:
-    /// that is what makes an equation stiff.
+    /// A costly one is not used until sweeps failed on elements much longer than the solution
+    /// needs, which is what makes an equation stiff.
     fn renew_jacobian<E: Equation + ?Sized>(
         &mut self,
         sweeps: u32,
@@ -378,20 +382,20 @@ impl<'a> Run<'a> {
         Ok(None)
     }
 
-    /// Take the breaking point at the end of an element, if there is one.
+    /// Process the breaking point at the end of an element, if there is one.
     fn reach(&mut self, time: f64) {
         self.fresh = self.breaks.reach(time);
         let Some(point) = self.fresh else { return };
         if time < self.problem.end {
             self.solution.breaks.push(point);
         }
-        // A neutral one waits for the slope after it.
+        // A neutral one is processed after the slope behind it is known.
         if !self.problem.neutral {
             self.breaks.follow(point);
         }
     }
 
-    /// Send a neutral breaking point at the start of the element just accepted on its way.
+    /// Follow a neutral breaking point at the start of the accepted element.
     fn follow(&mut self, piece: &Piece) {
         let Some(mut point) = self.fresh.filter(|_| self.problem.neutral) else {
             return;
@@ -415,7 +419,7 @@ impl<'a> Run<'a> {
         self.breaks.follow(point);
     }
 
-    /// What a jump does at `time`, and whether that is a terminal event.
+    /// Apply the jump at `time`; is it a terminal event?
     fn jump_at<E: Equation + ?Sized>(
         &mut self,
         time: f64,
@@ -444,7 +448,7 @@ impl<'a> Run<'a> {
         let factor = control::factor(verdict.error, self.order);
         let wanted = length * factor;
         self.wait.0 = self.wait.0.saturating_sub(1);
-        // Held back by a delay, the wish to be longer adds up.
+        // If a delay limits the length, the factors by which it should grow accumulate.
         self.length = if wanted > self.shortest_delay && !self.problem.neutral {
             wanted.max(self.length.min(OVERLAP * self.shortest_delay) * factor)
         } else {
@@ -452,7 +456,7 @@ impl<'a> Run<'a> {
         };
         let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
         let room = (ahead - self.solution.end).min(self.longest());
-        // Fewer nodes where it is not the error that limits the length.
+        // Use fewer nodes where the error does not limit the length.
         self.order = if wanted > 1.5 * room.min(length) && wanted > room {
             control::order_for(verdict.terms + 2, self.preferred)
         } else {

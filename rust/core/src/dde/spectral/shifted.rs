@@ -1,11 +1,11 @@
-//! The systems of Newton's method for collocation, taken apart.
+//! The systems of Newton's method for collocation, decoupled.
 //!
-//! (I − (h/2) B ⊗ J) δ = R couples all nodes and components of an element. With B = V Λ V⁻¹, and
-//! R and δ in the basis V, it falls into one system (I − (h/2) λ_k J) x_k = r_k of the size of J
-//! for each eigenvalue, and for a real J those of conjugate pairs are conjugate (Butcher, 1976;
+//! (I − (h/2) B ⊗ J) δ = R couples all nodes and components of an element. With B = V Λ V⁻¹, and R
+//! and δ in the basis V, it is equivalent to one system (I − (h/2) λ_k J) x_k = r_k of the size of
+//! J for each eigenvalue, and for a real J those of conjugate pairs are conjugate (Butcher, 1976;
 //! Bickart, 1977; Hairer and Wanner, Solving ODEs II, section IV.8). The condition of V grows from
-//! 30 for 4 nodes to 5e12 for 24, where δ comes out wrong by some 1e-2 of itself: the residual of
-//! the system is solved for again, as often as that takes.
+//! 30 for 4 nodes to 5e12 for 24, where δ has a relative error of some 1e-2; iterative refinement
+//! reduces it.
 
 use std::sync::OnceLock;
 
@@ -18,11 +18,11 @@ use super::dense::add_multiple;
 use super::jacobian::Jacobian;
 use super::nodes::Nodes;
 
-/// Numbers in the factors of all systems together.
+/// Upper limit on the numbers in the factors of all systems together (bounds memory).
 const MOST: usize = 1 << 24;
-/// How often a step is improved: each time its error falls by what the condition of V leaves.
-/// What remains is rough from node to node, and the defect at the start of an element, a
-/// derivative, sees it long before the values do.
+/// Number of refinement steps. Each reduces the error by a factor that depends on the condition of
+/// V. The remaining error is rough from node to node, and affects the defect at the start of an
+/// element, a derivative, long before the values.
 fn improvements(order: usize) -> u32 {
     match order {
         0..=10 => 0,
@@ -31,7 +31,7 @@ fn improvements(order: usize) -> u32 {
     }
 }
 
-/// One eigenvalue of B of each pair, with what leads to its basis and back.
+/// One eigenvalue of B of each pair, with the transformations to its basis and back.
 #[derive(Debug)]
 struct Mode {
     value: Complex64,
@@ -41,7 +41,7 @@ struct Mode {
     back: (Vec<f64>, Vec<f64>),
 }
 
-/// The eigenvalues and eigenvectors of B for an order, made on first use.
+/// The eigenvalues and eigenvectors of B for an order, computed on first use.
 fn modes(nodes: &Nodes) -> &'static [Mode] {
     const LARGEST: usize = 24;
     static TABLES: [OnceLock<Vec<Mode>>; LARGEST + 1] = [const { OnceLock::new() }; LARGEST + 1];
@@ -82,18 +82,18 @@ enum Factors {
 pub(super) struct Shifted {
     modes: &'static [Mode],
     factors: Vec<Factors>,
-    /// Place of each component in them.
+    /// Index of each component in them.
     place: Vec<usize>,
 }
 
 impl Shifted {
-    /// Whether factors within the band would be no smaller than full ones.
+    /// Would factors within the band be as large as full ones?
     pub(super) fn is_full(jacobian: &Jacobian) -> bool {
         let n = jacobian.dim();
         Banded::size(n, jacobian.band()) >= n * n
     }
 
-    /// Whether the factors for this Jacobian have room.
+    /// Do the factors for this Jacobian fit into the limit?
     pub(super) fn fits(jacobian: &Jacobian, order: usize) -> bool {
         let (n, band) = (jacobian.dim(), jacobian.band());
         order.div_ceil(2) * Banded::size(n, band).min(n * n) <= MOST
@@ -130,7 +130,7 @@ impl Shifted {
         })
     }
 
-    /// Turn the residual (component, node) into the step; `false` where it is not finite.
+    /// Replace the residual (component, node) by the step; `false` where it is not finite.
     pub(super) fn solve(
         &self,
         jacobian: &Jacobian,
@@ -183,7 +183,7 @@ impl Shifted {
     }
 }
 
-/// Rows of this length turned into columns.
+/// Transpose rows of this length.
 fn transposed(values: &[f64], length: usize) -> Vec<f64> {
     let rows = values.len() / length;
     let mut out = vec![0.0; values.len()];
@@ -197,9 +197,9 @@ fn transposed(values: &[f64], length: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::nodes::{ORDERS, nodes};
-    use super::super::sparsity::Sparsity;
     use super::*;
+    use crate::dde::spectral::nodes::{ORDERS, nodes};
+    use crate::dde::spectral::sparsity::Sparsity;
 
     /// A chain of neighbours, or everything coupled with everything.
     fn matrix(dim: usize, full: bool) -> Jacobian {

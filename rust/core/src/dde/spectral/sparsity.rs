@@ -2,16 +2,16 @@
 //!
 //! Columns without a common row form a group, whose differences come from one evaluation (Curtis,
 //! Powell and Reid, 1974; colours by the greedy rule). Cuthill and McKee's order, reversed (1969),
-//! gathers the entries of a sparse matrix near its diagonal, where its factors stay.
+//! moves the entries of a sparse matrix near its diagonal, where its factors remain.
 
 use std::collections::VecDeque;
 
 use crate::Error;
 
-/// Longest row, as a part of all columns, for which a search for groups pays.
+/// Longest row, as a share of all columns, for which grouping pays.
 const GROUPED: f64 = 0.25;
 
-/// The places of a square matrix that may be other than zero, column by column.
+/// The indices of a square matrix that may be other than zero, column by column.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sparsity {
     /// Where each column starts in `rows`, and the end of the last one.
@@ -32,7 +32,7 @@ impl Sparsity {
             .iter()
             .copied()
             .zip(rows.iter().copied())
-            // Newton's matrix has its diagonal anyway.
+            // Newton's matrix has its diagonal in any case.
             .chain((0..dim).map(|d| (d, d)))
             .collect();
         entries.sort_unstable();
@@ -53,7 +53,7 @@ impl Sparsity {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Places of the entries of a column.
+    /// Rows of the entries of a column.
     pub(super) fn column(&self, column: usize) -> std::ops::Range<usize> {
         self.starts[column]..self.starts[column + 1]
     }
@@ -78,7 +78,7 @@ impl Sparsity {
         }
         let mut group = vec![usize::MAX; dim];
         let mut count = 0;
-        // The column for which a group was last found taken.
+        // The last column for which each group was found to be used.
         let mut taken: Vec<usize> = Vec::new();
         for column in 0..dim {
             for &row in &self.rows[self.column(column)] {
@@ -99,7 +99,7 @@ impl Sparsity {
         (group, count)
     }
 
-    /// A new place for each component, and how far entries then are from the diagonal.
+    /// A new index for each component, and the largest distance of an entry from the diagonal then.
     pub(super) fn banded(&self) -> (Vec<usize>, usize) {
         let dim = self.dim();
         let mut near = self.transposed();
@@ -114,7 +114,7 @@ impl Sparsity {
             if seen[first] {
                 continue;
             }
-            // The component met last lies at an end of what is connected.
+            // The component that is found last lies at an end of its connected set.
             let mut reached = vec![first];
             let end = sweep(&near, first, &mut seen, &mut reached);
             reached.iter().for_each(|&index| seen[index] = false);
@@ -135,8 +135,8 @@ impl Sparsity {
     }
 }
 
-/// Append what is connected with `first`, the last of `order`, the nearest ones first and of
-/// those the least connected; the last one met.
+/// Append what is connected with `first`, the last one of `order`: the nearest ones first, and of
+/// those the least connected ones. Returns the one found last.
 fn sweep(near: &[Vec<usize>], first: usize, seen: &mut [bool], order: &mut Vec<usize>) -> usize {
     let mut open = VecDeque::from([first]);
     seen[first] = true;

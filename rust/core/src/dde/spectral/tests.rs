@@ -1,10 +1,11 @@
-//! Runs against closed forms, bounds of memory, hostile equations.
+//! Runs against closed forms, limits of memory, difficult equations.
 
 use proptest::prelude::*;
 
-use super::super::breaks::BreakingPoint;
-use super::super::history::{History, Piece};
+use super::breaks::BreakingPoint;
+use super::history::{History, Piece};
 use super::*;
+use crate::{Error, Task};
 
 /// A right-hand side node by node: f(t, y, z, dz, out).
 struct Plain<F> {
@@ -102,7 +103,7 @@ fn a_breaking_point_within_rounding_of_the_end_is_the_end() {
 
 #[test]
 fn memory_is_bounded_where_nobody_asks_for_the_past() {
-    // At this gain the solution oscillates for ever.
+    // At this gain the solution oscillates without end.
     let mut equation = Plain {
         function: |_, _: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| {
             out[0] = -std::f64::consts::FRAC_PI_2 * z[0];
@@ -283,7 +284,8 @@ fn elements_have_the_order_of_radau_collocation() {
         (error(length), within.fold(0.0, f64::max))
     };
     let (long, short) = (errors(0.8), errors(0.2));
-    // Two halvings of one element: 2N = 8 orders at its end, N + 1 = 5 within, the last not quite yet.
+    // Two halvings of one element: 2N = 8 orders at its end, N + 1 = 5 within, the last one not
+    // fully reached.
     assert!((long.0 / short.0).log2() > 14.0, "{long:?} {short:?}");
     assert!((long.1 / short.1).log2() > 8.0, "{long:?} {short:?}");
 }

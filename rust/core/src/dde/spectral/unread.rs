@@ -1,39 +1,39 @@
 //! What the nodes of an element leave unread of the past.
 //!
-//! An element takes each delayed value for the polynomial through its nodes. Where the delayed
+//! An element represents each delayed value by the polynomial through its nodes. Where the delayed
 //! element covers several stored pieces, or one of a higher degree, the stored solution is another
-//! function, and what it does between two nodes would be lost. So each stretch of the past that
-//! comes from one piece is compared with the polynomial through the nodes: both are polynomials
-//! there, and their difference is known from as many Chebyshev points as its degree needs, ends
-//! included. The right-hand side is not called. A stretch that the nodes do not stand for ends the
-//! element at its start or, where it is the first one, at its end.
+//! function, and its course between two nodes would be lost. Therefore each stretch of the past
+//! that comes from one piece is compared with the polynomial through the nodes: both are
+//! polynomials there, and their difference is known from as many Chebyshev points as its degree
+//! needs, ends included. The right-hand side is not called. A stretch that the nodes do not resolve
+//! ends the element at its start or, where it is the first one, at its end.
 
-use super::super::history::History;
-use super::Problem;
+use super::chebyshev;
 use super::element::Element;
+use super::history::History;
 use super::nodes::Nodes;
-use crate::dde::chebyshev;
+use super::problem::Problem;
 
-/// Tolerances that the polynomial may be off: stored pieces and nodes both err by a part of one.
+/// Largest difference in tolerances: stored pieces and nodes both have errors of a share of one.
 const UNREAD: f64 = 10.0;
-/// The same as a part of the values, at most, where the tolerance is loose.
+/// Largest difference as a share of the values, where the tolerance is large.
 const LOOSEST: f64 = 0.1;
-/// Stretches no longer than this part of the time are rounding of it: breaking points that far from
-/// each other are one.
+/// Stretches no longer than this share of the time are rounding errors of it: breaking points this
+/// close are merged.
 const SHORTEST: f64 = 1024.0 * f64::EPSILON;
-/// Rounding of values, summed by interpolation.
+/// Rounding errors of values, summed by interpolation.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
 
-/// A stretch of the past that the nodes do not stand for.
+/// A stretch of the past that the nodes do not resolve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unread {
-    /// The difference over what is allowed.
+    /// The difference relative to the allowed one.
     pub(super) error: f64,
-    /// Where an element ends that reads it; `None` where the element covers no other piece.
+    /// End of an element that resolves it; `None` where the element covers no other piece.
     pub(super) end: Option<f64>,
 }
 
-/// Workspace of one run.
+/// Memory for one run.
 #[derive(Debug, Default)]
 pub(super) struct Reading {
     /// Coefficients of the polynomial through the nodes, of its values and of its slopes.
@@ -50,7 +50,7 @@ pub(super) struct Reading {
 struct Stretch<'a> {
     low: f64,
     high: f64,
-    /// Where the piece itself starts and ends.
+    /// Start and end of the piece itself.
     span: (f64, f64),
     terms: usize,
     /// Coefficients of the values or of the slopes.
@@ -58,7 +58,7 @@ struct Stretch<'a> {
 }
 
 impl Reading {
-    /// The first stretch that the nodes of a converged element do not stand for.
+    /// The first stretch that the nodes of a converged element do not resolve.
     pub(super) fn unread(
         &mut self,
         problem: &Problem,
@@ -78,7 +78,7 @@ impl Reading {
             let mut low = window.0;
             let mut is_known = false;
             while low + thin < window.1 {
-                // What comes after the stored pieces is the element itself.
+                // After the stored pieces comes the element itself.
                 let piece = history.piece(index).filter(|_| low < element.start);
                 let (span, terms, rows) = match piece {
                     Some(piece) => (
@@ -137,9 +137,8 @@ impl Reading {
         None
     }
 
-    /// The difference on a stretch over what is allowed. Slopes come with the values at the nodes
-    /// and the length of the stretch: what is allowed of them is what values that differ by their
-    /// tolerance can make of it, by Markov's inequality.
+    /// The difference on a stretch relative to the allowed one. For slopes the allowed difference
+    /// follows from that of the values, by Markov's inequality for the length of the stretch.
     fn compare(
         &mut self,
         problem: &Problem,

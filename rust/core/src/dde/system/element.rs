@@ -1,36 +1,37 @@
-//! One element of time: forcing gathered, equation solved, resolution judged.
+//! One element of time: forcing, solution, and test of the resolution.
 //!
-//! Rounding of row i of x′ = A x + g is relative to F_i = Σ |a_ij| R_j + G_i, where G_i sums the
-//! moduli of all that makes up g_i and R_j is the size of x_j, but no less than a part [`NOISE`] of
-//! what F_j drives it to: a state that vanishes by cancellation is rounding of that, and must not
-//! be resolved like a signal. Delayed noise drives noise in turn; it is followed a few times
-//! round, by several kinds of sizes that each piece keeps, the first that of x itself. Followed
-//! for ever, it would grow where x does not.
-//! The element is resolved once the last coefficients of x′ are below [`RESOLVED`] F_i; those of
-//! x are smaller by another h/(4k).
+//! The rounding error of row i of x′ = A x + g is relative to F_i = Σ |a_ij| R_j + G_i, where G_i
+//! sums the moduli of all that makes up g_i and R_j is the size of x_j, but at least a share
+//! [`NOISE`] of the size to which F_j drives it: a state that vanishes by cancellation consists of
+//! rounding errors, and must not be resolved like a signal. Delayed rounding errors cause further
+//! ones; this is followed a few times, by several kinds of sizes that each piece stores, the first
+//! being that of x itself. Followed without end, the bound would grow where x does not. The element
+//! is resolved once the last coefficients of x′ are below [`RESOLVED`] F_i; those of x are smaller
+//! by another h/(4k).
 
 use super::legendre::{DEGREE, TERMS};
 use super::solver::Solver;
 use super::terms::Feed;
 use super::track::{KINDS, NEGLIGIBLE, Sizes, Track};
 
-/// Coefficients of x′ below this part of F are rounding: ten units, since each sums 25 values.
+/// Coefficients of x′ below this share of F count as rounding errors: ten units, because each sums
+/// 25 values.
 const RESOLVED: f64 = 10.0 * f64::EPSILON;
 
-/// Coefficients of x′ below this part of F are not kept.
+/// Coefficients of x′ below this share of F are dropped.
 const NOTHING: f64 = 0.25 * f64::EPSILON;
 
-/// Where the last coefficient that matters is no higher, an element twice as long may do.
+/// Index of the last coefficient that matters up to which an element twice as long may suffice.
 const ROOMY: usize = 12;
 
-/// The part of what drives it that a state is at least: its last coefficients carry a hundredth of
-/// one unit of rounding of that, and [`RESOLVED`] is ten.
+/// Least size of a state as a share of what drives it: its last coefficients have errors of one
+/// hundredth of a unit of that, and [`RESOLVED`] is ten.
 const NOISE: f64 = 1.0 / 32.0;
 
-/// Rounds of F and R: each takes noise through one more integration.
+/// Rounds of F and R: each follows rounding errors through one more integration.
 const ROUNDS: usize = 3;
 
-/// The equation, and the element in hand.
+/// The equation and the current element.
 #[derive(Debug)]
 pub(super) struct Element {
     a: Vec<(usize, usize, f64)>,
@@ -43,9 +44,9 @@ pub(super) struct Element {
     state_size: Vec<f64>,
     slope_size: Vec<f64>,
     forcing_size: Vec<Sizes>,
-    /// How fast A lets each state follow, see [`rates`].
+    /// The rate at which A lets each state follow, see [`rates`].
     rates: Vec<f64>,
-    /// What the pieces of state and slope keep.
+    /// Sizes that the pieces of state and slope store.
     state_sizes: Vec<Sizes>,
     slope_sizes: Vec<Sizes>,
     /// Last coefficient of x′ above [`RESOLVED`], and above [`NOTHING`].
@@ -76,18 +77,19 @@ impl Element {
         }
     }
 
-    /// What rounding of x is relative to on the latest element.
+    /// Size to which the rounding error of x is relative on the latest element.
     pub(super) fn state_size(&self) -> &[f64] {
         &self.state_size
     }
 
-    /// The same of x′.
+    /// The same for x′.
     pub(super) fn slope_size(&self) -> &[f64] {
         &self.slope_size
     }
 
-    /// Solve over [t, t + h] from `start`; `tracks` as the feeds. Where the series of what is
-    /// delayed stand only for a part of h, nothing is solved, and that part is returned.
+    /// Solve over [t, t + h] from `start`; `tracks` are in the order of the feeds. Where the series
+    /// of a delayed signal represents it only on a part of h, nothing is solved, and that part is
+    /// returned.
     pub(super) fn solve(
         &mut self,
         start: &[f64],
@@ -169,7 +171,7 @@ impl Element {
         }
     }
 
-    /// Is the truncated series exact to rounding?
+    /// Is the truncated series exact up to rounding errors?
     pub(super) fn is_resolved(&self) -> bool {
         self.needed < DEGREE - 1
     }
@@ -219,11 +221,11 @@ impl Element {
     }
 }
 
-/// Sweeps of balancing; powers of two hardly move after a few.
+/// Sweeps of balancing; powers of two hardly change after a few.
 const SWEEPS: usize = 8;
 
-/// Σ_j |a_ij| d_j/d_i, with units d of the states in which rows and columns of A are of one size
-/// (Osborne 1960): how fast a state follows what drives it, whatever its unit.
+/// Σ_j |a_ij| d_j/d_i, with units d of the states for which rows and columns of A have the same
+/// size (Osborne 1960): the rate at which a state follows its input, in any unit.
 fn rates(a: &[f64], n: usize) -> Vec<f64> {
     let mut units = vec![1.0; n];
     let row = |units: &[f64], i: usize, own: bool| -> f64 {

@@ -1,31 +1,32 @@
-//! Breaking points: where they come, and a bound on what jumps there.
+//! Breaking points: when they occur, and a bound on the jumps there.
 //!
 //! At a break b let Δ_k bound the jump of H^k/k! x^(k), H a fixed length. The equation's own
 //! recursion gives it from the breaks that arrive, at b − τ_j:
 //!
 //!   Δ_{k+1} = Σ |N_j| Δ_{k+1}(b − τ_j) + H/(k + 1) (|A_0| Δ_k + Σ |A_j| Δ_k(b − τ_j) + Σ |B_j| υ_k)
 //!
-//! with υ the same for u. So the lowest k that jumps rises by one at a return through A_j and does
-//! not through N_j, and breaks that come together add up. A jump s of the k-th derivative is taken
-//! by a polynomial of degree k − 1 over a length h to 2 s (h/4)^k/k!; once that is below rounding
-//! for every k the break is dropped, with all its returns. x itself may jump: exactly, by
-//! −Σ N_j times the jump at b − τ_j.
+//! with υ the same for u. The lowest k that jumps therefore rises by one at a return through A_j
+//! but not through N_j, and simultaneous breaks add up. A polynomial of degree k − 1 approximates a
+//! jump s of the k-th derivative over a length h up to 2 s (h/4)^k/k!; once this is below rounding
+//! errors for every k, the break is dropped together with all its returns. x itself may jump:
+//! exactly, by −Σ N_j times the jump at b − τ_j.
 
 use std::collections::VecDeque;
 
 use crate::Error;
 
 use super::legendre::TERMS;
-use super::slack;
 use super::terms::Feed;
+use crate::dde::limits::slack;
 
-/// A jump below this part of what rounding is relative to has faded.
+/// A jump below this share of the size to which rounding errors are relative is negligible.
 const FADED: f64 = f64::EPSILON;
 
-/// Breaks kept at a time beyond which the run is given up.
+/// Upper limit on the breaks stored at a time (bounds memory and time).
 const MOST_KEPT: usize = 200_000;
 
-/// Breaks up to this order are reported; later ones are below what a plot or a fit can see.
+/// Highest order of a break that is reported; breaks of higher order are too small to be seen in a
+/// plot or a fit.
 const REPORTED: usize = 10;
 
 /// A breaking point and the bounds on its jumps, Δ_k of component i at k width + i.
@@ -38,14 +39,14 @@ pub(super) struct Break {
 }
 
 impl Break {
-    /// Does a derivative that can be seen jump?
+    /// Does a derivative jump that is reported?
     pub(super) fn is_reported(&self, width: usize) -> bool {
         let seen = (REPORTED + 1) * width;
         self.bounds.iter().take(seen).any(|bound| *bound > 0.0)
     }
 }
 
-/// Breaks of one signal in order of time, and how many have been let go.
+/// Breaks of one signal in order of time, and the number of those removed.
 #[derive(Debug, Default)]
 struct Line {
     breaks: VecDeque<Break>,
@@ -58,7 +59,7 @@ impl Line {
     }
 }
 
-/// One way for breaks to come back: a matrix, its delay, and the next break to arrive.
+/// One way in which breaks return: a matrix, its delay, and the next break to arrive.
 #[derive(Debug)]
 struct Way {
     delay: f64,
@@ -74,18 +75,18 @@ enum Kind {
     Input,
 }
 
-/// What rounding is relative to, on the element before.
+/// Sizes to which rounding errors are relative, on the element before.
 #[derive(Debug)]
 pub(super) struct Scale<'a> {
     /// Of x.
     pub(super) state: &'a [f64],
     /// Of x′.
     pub(super) slope: &'a [f64],
-    /// Length of the elements to come, at most.
+    /// Largest length of the elements to come.
     pub(super) length: f64,
 }
 
-/// All breaks, those that have been and those to come.
+/// All breaks, past and future.
 #[derive(Debug)]
 pub(super) struct Jumps {
     n: usize,
@@ -153,7 +154,7 @@ impl Jumps {
         self.unit
     }
 
-    /// Note a break that has come.
+    /// Store a break that has occurred.
     pub(super) fn push(&mut self, passed: Break) -> Result<(), Error> {
         if self.states.breaks.len() >= MOST_KEPT {
             return Err(Error::TooMuch {
@@ -169,7 +170,7 @@ impl Jumps {
         Ok(())
     }
 
-    /// Forget breaks that have returned for the last time by `t`.
+    /// Remove breaks that have returned for the last time by `t`.
     pub(super) fn forget(&mut self, t: f64) {
         let old = t - self.longest - slack(t, self.longest);
         while self.states.breaks.front().is_some_and(|b| b.time < old) {
@@ -178,7 +179,7 @@ impl Jumps {
         }
     }
 
-    /// Time of the next break that matters before `reach`, infinite if there is none.
+    /// Time of the next break before `reach` that is not negligible, infinite if there is none.
     pub(super) fn next(&mut self, reach: f64, scale: &Scale<'_>) -> f64 {
         loop {
             if self.pending.is_none() {
@@ -198,7 +199,7 @@ impl Jumps {
         }
     }
 
-    /// The pending break, if it has come by `t`.
+    /// The pending break, if it occurs by `t`.
     pub(super) fn arrived(&mut self, t: f64) -> Option<Break> {
         self.pending
             .take_if(|pending| pending.time <= t + slack(t, self.longest))
@@ -211,7 +212,7 @@ impl Jumps {
         }
     }
 
-    /// Take together what comes next.
+    /// Combine the breaks that arrive next.
     fn gather(&mut self) -> Option<Break> {
         let time = self
             .ways
@@ -222,7 +223,7 @@ impl Jumps {
             return None;
         }
         let (n, reach) = (self.n, time + slack(time, self.longest));
-        // What arrives through A and B, before integration, and what arrives through N.
+        // Jumps that arrive through A and B, before integration, and through N.
         let mut source = vec![0.0; TERMS * n];
         let mut bounds = vec![0.0; TERMS * n];
         let mut leap = Vec::new();
@@ -258,7 +259,7 @@ impl Jumps {
         Some(Break { time, bounds, leap })
     }
 
-    /// Add H/(k + 1) (|A_0| Δ_k + source_k) to Δ_{k+1}, from the lowest k up.
+    /// Add H/(k + 1) (|A_0| Δ_k + source_k) to Δ_{k+1}, from the lowest k upwards.
     pub(super) fn integrate(&self, bounds: &mut [f64], source: &[f64]) {
         let n = self.n;
         for k in 0..TERMS - 1 {

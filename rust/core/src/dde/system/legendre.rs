@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 
 use crate::elementary::DoubleDouble;
 
-/// Degree of the series. An exponential e^{λt} is one element's as long as |λ| h < 7 or so.
+/// Degree of the series. An exponential e^{λt} fits one element as long as |λ| h is below about 7.
 pub(super) const DEGREE: usize = 24;
 
 /// Number of coefficients, and of Gauss nodes.
@@ -43,7 +43,7 @@ impl Tables {
             tables.back[k] = (k + 1) as f64 / (k + 2) as f64;
         }
         for i in 0..TERMS {
-            // Newton from Tricomi's guess; the nodes come in pairs, and one lies at zero.
+            // Newton's method from Tricomi's estimate; the nodes come in pairs, and one is zero.
             let angle = std::f64::consts::PI * (i as f64 + 0.75) / (TERMS as f64 + 0.5);
             let mut x = -libm::cos(angle);
             if 2 * i + 1 == TERMS {
@@ -66,8 +66,8 @@ impl Tables {
         tables
     }
 
-    /// One step of Newton's method for the inverse of P_k(ξ_i), the residual in twice the digits:
-    /// P_k moves by k²/2 units where a node is rounded.
+    /// One step of Newton's method for the inverse of P_k(ξ_i), with the residual in double-double
+    /// arithmetic: P_k changes by k²/2 units where a node is rounded.
     fn refine(&mut self) {
         let exact = self.nodes.map(precise_polynomials);
         let old = self.transform;
@@ -84,7 +84,7 @@ impl Tables {
     }
 }
 
-/// P_0(x) … P_DEGREE(x) in twice the digits.
+/// P_0(x) … P_DEGREE(x) in double-double arithmetic.
 fn precise_polynomials(x: f64) -> [DoubleDouble; TERMS] {
     let mut values = [DoubleDouble::ONE; TERMS];
     values[1] = x.into();
@@ -118,7 +118,7 @@ pub(super) fn nodes() -> &'static Series {
     &TABLES.nodes
 }
 
-/// What takes values at the nodes to coefficients: the part of value i in c_k at [i][k].
+/// The transformation of values at the nodes to coefficients: the part of value i in c_k at [i][k].
 pub(super) fn transform() -> &'static [Series; TERMS] {
     &TABLES.transform
 }
@@ -185,11 +185,17 @@ pub(super) fn restricted(series: &[f64], offset: f64, ratio: f64) -> Series {
             let mut values = [0.0; TERMS];
             at_nodes(series, offset, ratio, 0..TERMS, &mut values);
             let all = from_values(&values);
-            // A part of a polynomial has its degree; the rest is rounding.
+            // A part of a polynomial has its degree; higher coefficients are rounding errors.
             out[..series.len()].copy_from_slice(&all[..series.len()]);
         }
     }
     out
+}
+
+/// The Gauss nodes, and the transformation of values at them to coefficients: the part of value i
+/// in coefficient k at i m + k, where m is the number of both.
+pub fn legendre_tables() -> (Vec<f64>, Vec<f64>) {
+    (nodes().to_vec(), transform().concat())
 }
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
-//! What a run hands out: outputs, states and inputs at the times asked for, and the breaks.
+//! The requested outputs, states and inputs of a run, and its breaks.
 
-use super::slack;
+use super::equations::{SystemEquations, SystemResponse};
 use super::terms::Feed;
 use super::track::Track;
-use super::{SystemEquations, SystemResponse};
 use crate::Error;
-use crate::dde::wanted::RESPONSE;
+use crate::dde::limits::{RESPONSE, slack};
 use crate::memory::{push, reserved};
 
 /// The signals of a run, as far as they are known.
@@ -16,7 +15,7 @@ pub(super) struct Signals<'a> {
     pub(super) input: &'a Track,
 }
 
-/// The times asked for and what has been found for them.
+/// The requested times and the values so far.
 #[derive(Debug)]
 pub(super) struct Outputs<'a> {
     times: &'a [f64],
@@ -61,12 +60,12 @@ impl<'a> Outputs<'a> {
         })
     }
 
-    /// The last time asked for.
+    /// The last requested time.
     pub(super) fn last(&self) -> f64 {
         self.times.last().copied().unwrap_or(0.0)
     }
 
-    /// Serve the times before `end`.
+    /// Store the values at the times before `end`.
     pub(super) fn before(&mut self, end: f64, signals: &Signals<'_>) {
         while let Some(&t) = self.times.get(self.served) {
             if t >= end {
@@ -103,7 +102,7 @@ impl<'a> Outputs<'a> {
         self.served += 1;
     }
 
-    /// Note a break of the state at `t`, and when it shows in the output.
+    /// Store a break of the state at `t`, and the times at which it appears in the output.
     pub(super) fn state_break(&mut self, t: f64) -> Result<(), Error> {
         self.note(t)?;
         for i in 0..self.state.len() {
@@ -115,7 +114,7 @@ impl<'a> Outputs<'a> {
         Ok(())
     }
 
-    /// Note a break of the input at `t`, and when it shows in the output.
+    /// Store a break of the input at `t`, and the times at which it appears in the output.
     pub(super) fn input_break(&mut self, t: f64) -> Result<(), Error> {
         self.note(t)?;
         for i in 0..self.direct.len() {
@@ -131,7 +130,7 @@ impl<'a> Outputs<'a> {
         Ok(())
     }
 
-    /// All that was found, breaks in order and those within rounding of one another as one.
+    /// The result, with breaks in order; those that differ only by rounding errors are merged.
     pub(super) fn finish(mut self) -> SystemResponse {
         let longest = self.longest;
         self.found.breaks.sort_by(f64::total_cmp);

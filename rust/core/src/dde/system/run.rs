@@ -1,21 +1,23 @@
 //! The method of steps: elements from breaking point to breaking point.
 
-use crate::dde::linear::DIVERGED;
+use crate::dde::limits::DIVERGED;
 use crate::{Error, Task};
 
 use super::element::Element;
-use super::given::{first_break, passed_breaks};
+use super::equations::{Past, Signal, SystemEquations, SystemResponse};
+use super::input_breaks::{first_break, passed_breaks};
 use super::jumps::{Jumps, Scale};
 use super::legendre::TERMS;
 use super::outputs::{Outputs, Signals};
-use super::terms::{self, Feed};
+use super::terms;
+use super::terms::Feed;
 use super::track::{KINDS, Piece, Track};
-use super::{Past, Signal, SystemEquations, SystemResponse, slack};
+use crate::dde::limits::slack;
 
-/// Elements between two looks at the task.
+/// Elements between two checks for cancellation.
 const CHECK_EVERY: u64 = 256;
 
-/// More elements than anyone waits for.
+/// Upper limit on the number of elements (bounds time and memory).
 const MOST_ELEMENTS: u64 = 20_000_000;
 
 pub(super) fn run(
@@ -130,8 +132,8 @@ pub(super) fn run(
         let mut whole = reach.min(stop - t);
         let tracks = [&states, &slopes, &inputs.track];
         let h = loop {
-            // Equal parts: their delayed counterparts then lie on whole elements, and their
-            // factors serve again.
+            // Equal parts: their delayed counterparts then lie on whole elements, and their factors
+            // can be used again.
             let parts = (whole / suggested - 1e-9).ceil().max(1.0);
             let h = if parts > 1.0 { whole / parts } else { whole };
             if let Some(read) = element.solve(&x, t, h, tolerance, tracks) {
@@ -173,7 +175,7 @@ pub(super) fn run(
         jumps.forget(t);
         t = next;
     }
-    // What is left is the last time itself, just after any break there.
+    // Only the last time itself remains, just after any break there.
     let mut f = vec![0.0; n];
     element.slope_at(t, longest, &x, [&states, &slopes, &inputs.track], &mut f);
     let sizes = vec![[0.0; KINDS]; n];

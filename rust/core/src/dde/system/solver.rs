@@ -14,7 +14,7 @@
 
 use super::legendre::{DEGREE, TERMS};
 
-/// Lengths whose factors are kept.
+/// Number of lengths whose factors are stored.
 const KEPT: usize = 4;
 
 /// Solves elements for one A.
@@ -28,7 +28,7 @@ pub(super) struct Solver {
     work: Vec<f64>,
 }
 
-/// What depends on the length of the element.
+/// Factors that depend on the length of the element.
 #[derive(Debug)]
 struct Factors {
     h: f64,
@@ -47,8 +47,8 @@ impl Solver {
         }
     }
 
-    /// `x` from x(−1) and `g` of degree `degree`; then `f` = A x + g. Series of [`TERMS`]
-    /// coefficients a state. Lengths closer than `slack` are one.
+    /// `x` from x(−1) and `g` of degree `degree`; then `f` = A x + g. Series have [`TERMS`]
+    /// coefficients for each state. Lengths closer than `slack` are equal.
     pub(super) fn solve(
         &mut self,
         h: f64,
@@ -79,7 +79,7 @@ impl Solver {
         };
         let rho = 0.5 * factors.h;
         let (now, last) = self.work.split_at_mut(n);
-        // Down: the right sides take up what x_{k+1} carries of them.
+        // Downwards: eliminate x_{k+1} from the right sides.
         last.fill(0.0);
         for k in (0..TERMS).rev() {
             // `last` holds D_{k+1}⁻¹ r_{k+1}.
@@ -95,7 +95,7 @@ impl Solver {
                 last[i] = now[i];
             }
         }
-        // Up: x_k = D_k⁻¹ (r_k + z x_{k−1}/(2k − 1)).
+        // Upwards: x_k = D_k⁻¹ (r_k + z x_{k−1}/(2k − 1)).
         for k in 1..TERMS {
             let share = rho / (2 * k - 1) as f64;
             for i in 0..n {
@@ -122,7 +122,7 @@ impl Solver {
         }
     }
 
-    /// Place of the factors for this length.
+    /// Index of the factors for this length.
     fn factors(&mut self, h: f64, slack: f64) -> usize {
         if let Some(place) = self.kept.iter().position(|f| (f.h - h).abs() <= slack) {
             return place;
@@ -192,8 +192,8 @@ fn identity(n: usize) -> Vec<f64> {
     out
 }
 
-/// A matrix as L U with rows exchanged; a pivot of zero gives infinities, seen by the caller's
-/// check of growth.
+/// A matrix as L U with rows exchanged. A pivot of zero gives infinities, which the caller's check
+/// of growth detects.
 #[derive(Debug)]
 struct Lu {
     n: usize,

@@ -1,12 +1,12 @@
-//! Matrices by their delays, and what they do to series.
+//! Matrices with their delays, applied to series.
 
 use crate::Error;
 
 use super::legendre::TERMS;
-use super::slack;
 use super::track::{Sizes, Track};
+use crate::dde::limits::slack;
 
-/// A matrix, row-major, that acts with a delay in s.
+/// A matrix, row-major, with a delay in s.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     /// Delay τ_j ≥ 0.
@@ -39,10 +39,10 @@ impl Term {
     }
 }
 
-/// A column of a matrix: its number and its entries other than zero by their rows.
+/// A column of a matrix: its index and its non-zero entries by their rows.
 type Column = (usize, Vec<(usize, f64)>);
 
-/// A delayed signal on its way through a matrix.
+/// A delayed signal multiplied by a matrix.
 #[derive(Debug)]
 pub(super) struct Feed {
     pub(super) delay: f64,
@@ -51,7 +51,7 @@ pub(super) struct Feed {
 }
 
 impl Feed {
-    /// The terms of a group that do something.
+    /// The terms of a group with non-zero entries.
     pub(super) fn all(terms: &[Term], width: usize, sign: f64) -> Vec<Self> {
         terms
             .iter()
@@ -64,16 +64,16 @@ impl Feed {
             .collect()
     }
 
-    /// The entries other than zero: row, column, value.
+    /// The non-zero entries: row, column, value.
     pub(super) fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
         self.columns.iter().flat_map(|(column, entries)| {
             entries.iter().map(|(row, value)| (*row, *column, *value))
         })
     }
 
-    /// Add the matrix times the delayed track over [t, t + h] to the series `g`, and to `size` what
-    /// rounding of that is relative to; the degree of what was added, and how much of h it stands
-    /// for.
+    /// Add the matrix times the delayed track over [t, t + h] to the series `g`, and to `size` the
+    /// size to which its rounding error is relative. Returns the degree of what was added, and the
+    /// part of h on which it is valid.
     pub(super) fn add_series(
         &mut self,
         track: &Track,

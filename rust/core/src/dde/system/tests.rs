@@ -1,4 +1,5 @@
 use super::*;
+use crate::{Error, Task};
 
 fn term(delay: f64, matrix: &[f64]) -> Term {
     Term {

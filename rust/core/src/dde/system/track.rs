@@ -1,9 +1,10 @@
-//! Vector functions of time by pieces, each a Legendre series: state, derivative of the state and
-//! inputs alike.
+//! Vector functions of time in pieces of Legendre series: state, derivative of the state and
+//! inputs.
 
 use std::collections::VecDeque;
 
-use super::legendre::{self, DEGREE, Series, TERMS};
+use super::legendre;
+use super::legendre::{DEGREE, Series, TERMS};
 
 /// One piece: coefficient k of column j at `series[j (degree + 1) + k]`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -14,17 +15,19 @@ pub(super) struct Piece {
     pub(super) series: Vec<f64>,
     /// Sizes of each column, see [`super::element`].
     pub(super) size: Vec<Sizes>,
-    /// Exact values at the start, where they are known: the series sums to them but for rounding.
+    /// Exact values at the start, where they are known: the series gives them up to rounding
+    /// errors.
     first: Vec<f64>,
 }
 
-/// What a series through several pieces may differ from them between its nodes, as a part of what their
-/// rounding is relative to. The rounding of one piece is a joint to the next, and elements that ended at
-/// such joints would multiply with every delay: with 1e-11 a stiff neutral system of three delays no
-/// longer ends, with 1e-9 its cost is linear in time.
+/// Largest difference between a series through several pieces and these pieces between its nodes,
+/// as a share of the size to which their rounding errors are relative. With a smaller one, rounding
+/// errors at joints end elements, and the number of elements grows with every delay: with 1e-11 a
+/// run of a stiff neutral system with three delays does not end, with 1e-9 its cost is linear in
+/// time.
 const UNREAD: f64 = 1e-9;
 
-/// Stretches of a piece shorter than this many times the rounding of times are not looked at.
+/// Stretches of a piece shorter than this many times the rounding error of times are not compared.
 const THIN: f64 = 16.0;
 
 /// Values so close to the smallest number that they are not resolved relative to their size.
@@ -33,12 +36,12 @@ pub(super) const NEGLIGIBLE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 /// Kinds of sizes.
 pub(super) const KINDS: usize = 4;
 
-/// How large a signal is; then what its rounding is relative to, with the rounding of what drives
-/// it, and of what drives that, and so on.
+/// The size of a signal; then the sizes to which its rounding error is relative, with the rounding
+/// errors of what drives it, of what drives that, and so on.
 pub(super) type Sizes = [f64; KINDS];
 
 impl Piece {
-    /// From series of one length a column.
+    /// From series of equal length, one for each column.
     pub(super) fn new(start: f64, end: f64, degree: usize, series: Vec<f64>) -> Self {
         let size = series
             .chunks_exact(degree + 1)
@@ -87,8 +90,8 @@ impl Piece {
 
     /// Bounds of h^k/k! times the k-th derivative of a column, for all k up to [`DEGREE`].
     ///
-    /// Exact for lines. A series that is resolved to rounding belongs to a function whose rates
-    /// are below 8 over the length of the piece.
+    /// Exact for lines. A series that is resolved up to rounding errors represents a function whose
+    /// rates are below 8 over the length of the piece.
     pub(super) fn taylor_bounds(&self, s: f64, column: usize, h: f64) -> Series {
         let mut bounds = [0.0; TERMS];
         bounds[0] = self.at(s, column).abs();
@@ -107,8 +110,8 @@ impl Piece {
     }
 }
 
-/// Curves stand for a function to rounding of its largest values: next to a pulse its tail must not
-/// be resolved like a signal.
+/// Give all pieces of a curve the rounding error of its largest values: next to a pulse its tail
+/// must not be resolved like a signal.
 pub(super) fn share_rounding(pieces: &mut [Piece]) {
     let curved = |piece: &&mut Piece| piece.degree > 1;
     let mut largest: Vec<f64> = Vec::new();
@@ -125,7 +128,7 @@ pub(super) fn share_rounding(pieces: &mut [Piece]) {
     }
 }
 
-/// Pieces one after the other; places are numbers of pieces, counted from the first there ever was.
+/// Pieces one after the other; indices count from the first piece, including removed ones.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Track {
     width: usize,
@@ -144,7 +147,7 @@ impl Track {
         }
     }
 
-    /// Leave out what comes after `end`.
+    /// Remove what comes after `end`.
     pub(super) fn close(&mut self, end: f64) {
         while self.pieces.len() > 1 && self.pieces.back().is_some_and(|last| last.start >= end) {
             self.pieces.pop_back();
@@ -164,7 +167,8 @@ impl Track {
         self.pieces.iter()
     }
 
-    /// Append a piece from series of [`TERMS`] coefficients a column, those above `degree` zero.
+    /// Append a piece from series of [`TERMS`] coefficients for each column; those above `degree`
+    /// are zero.
     pub(super) fn push(
         &mut self,
         start: f64,
@@ -185,14 +189,14 @@ impl Track {
         self.pieces.push_back(piece);
     }
 
-    /// Name the values at the start of the last piece.
+    /// Set the exact values at the start of the last piece.
     pub(super) fn begin(&mut self, values: &[f64]) {
         if let Some(piece) = self.pieces.back_mut() {
             piece.first.extend_from_slice(values);
         }
     }
 
-    /// Forget pieces that end before `s`, but for the last.
+    /// Remove pieces that end before `s`, except the last one.
     pub(super) fn forget(&mut self, s: f64) {
         while self.pieces.len() > 1 && self.pieces.front().is_some_and(|piece| piece.end < s) {
             self.dropped += 1;
@@ -206,7 +210,7 @@ impl Track {
         self.pieces.get(place.saturating_sub(self.dropped))
     }
 
-    /// Move `place` to the piece that holds the time just after `s`.
+    /// Advance `place` to the piece that contains the time just after `s`.
     pub(super) fn seek(&self, place: &mut usize, s: f64, slack: f64) {
         *place = (*place).max(self.dropped);
         let last = (self.dropped + self.pieces.len()).saturating_sub(1);
@@ -232,8 +236,8 @@ impl Track {
             .map_or([0.0; TERMS], |piece| piece.taylor_bounds(s, column, h))
     }
 
-    /// Series of a column over [s, s + h], `place` being that of s; its degree; and up to where it
-    /// is the column: for less than h where it is not, see [`stretch_is_read`].
+    /// Series of a column over [s, s + h], where `place` is the index of the piece at s; its
+    /// degree; and the part of h on which it represents the column, see [`stretch_is_read`].
     pub(super) fn read(
         &self,
         place: usize,
@@ -283,8 +287,9 @@ impl Track {
         self.dropped + self.pieces.len() <= place + 1
     }
 
-    /// How far from s on a series that goes through several pieces stands for all of them: to the
-    /// start of the first one that it is not, or through that one where it is the first.
+    /// The length from s on which a series through several pieces represents all of them: up to the
+    /// start of the first one that it does not represent, or through that one where it is the
+    /// first.
     fn read_until(
         &self,
         place: usize,
@@ -318,8 +323,8 @@ impl Track {
     }
 }
 
-/// Whether a series over [s, s + h] is the piece on [low, high]: two polynomials that agree at all
-/// Gauss nodes of the stretch, rounding apart, are one. `size` is that of the series.
+/// Does a series over [s, s + h] equal the piece on [low, high]? Two polynomials that agree at all
+/// Gauss nodes of the stretch, up to rounding errors, are equal. `size` is that of the series.
 fn stretch_is_read(
     piece: &Piece,
     column: usize,
@@ -358,7 +363,7 @@ fn part(piece: &Piece, s: f64, h: f64, slack: f64, column: usize) -> Series {
     legendre::restricted(series, offset, ratio)
 }
 
-/// Offset and ratio that take ξ of [s, s + h] to that of the piece.
+/// Offset and ratio that map ξ of [s, s + h] to that of the piece.
 fn window(piece: &Piece, s: f64, h: f64) -> (f64, f64) {
     (piece.local(s + 0.5 * h), h / piece.length())
 }

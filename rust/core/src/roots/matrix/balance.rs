@@ -1,11 +1,12 @@
 //! Scaling of M(s) at one point: rows by e^(s τ_c(i)) and powers of two, columns by powers of two.
 //!
-//! With b_ij the logarithms of the moduli of the entries, the assignment of rows to columns with the
-//! largest sum, and its dual solution, b_ij ≤ u_i + v_j with equality where a row is assigned, make
-//! the scaled entries at most 1 and those assigned about 1 (Olschowka and Neumaier 1996). τ_c(i)
-//! is the delay that is largest in the entry assigned. Positive factors do not change the argument of
-//! the determinant, and powers of two are exact. The assignment is found by shortest augmenting paths
-//! (Kuhn 1955; Jonker and Volgenant 1987). No proof leans on the scaling being good.
+//! With b_ij the logarithms of the moduli of the entries, the assignment of rows to columns with
+//! the largest sum, and its dual solution, b_ij ≤ u_i + v_j with equality where a row is assigned,
+//! make the scaled entries at most 1 and those assigned about 1 (Olschowka and Neumaier 1996).
+//! τ_c(i) is the delay that is largest in the entry assigned. Positive factors do not change the
+//! argument of the determinant, and powers of two are exact. The assignment is found by shortest
+//! augmenting paths (Kuhn 1955; Jonker and Volgenant 1987). No proof depends on the quality of the
+//! scaling.
 
 use std::f64::consts::LN_2;
 
@@ -15,11 +16,11 @@ use super::system::{CharacteristicMatrix, Term};
 use crate::elementary::log;
 use crate::quasipoly::modulus;
 
-/// Stands for the cost of an entry that is zero.
+/// Cost that stands for an entry that is zero.
 const FORBIDDEN: f64 = 1e12;
 
-/// The power of two next to e^(−d x): taken out of the exponential, so that neither it nor the
-/// entries it belongs to leave the range of double precision unless their product does.
+/// The power of two next to e^(−d x). It is taken out of the exponential, so that neither the
+/// exponential nor the entries leave the range of double precision unless their product does.
 pub(super) fn exponent(gap: f64, x: f64) -> f64 {
     (-gap * x / LN_2).round().clamp(-1e9, 1e9)
 }
@@ -32,7 +33,7 @@ pub(super) struct Balanced {
     pub(super) rows: Vec<Vec<Term>>,
 }
 
-/// Scale M at `s`; `None` where its determinant is zero for the lack of entries.
+/// Scale M at `s`; `None` where its determinant is zero because of its pattern of zeros.
 pub(super) fn balance(system: &CharacteristicMatrix, s: Complex64) -> Option<Balanced> {
     let n = system.size();
     let distance = modulus(s);
@@ -91,7 +92,7 @@ pub(super) fn balance(system: &CharacteristicMatrix, s: Complex64) -> Option<Bal
 
 /// The column of each row, and potentials with u_i + v_j ≤ cost, for the least sum of costs.
 fn assign(n: usize, costs: &[f64]) -> Option<(Vec<usize>, Vec<f64>, Vec<f64>)> {
-    // Column n is where a row waits that has none yet.
+    // Column n holds the row that is not assigned yet.
     let (mut u, mut v) = (vec![0.0; n], vec![0.0; n + 1]);
     let mut rows: Vec<Option<usize>> = vec![None; n + 1];
     for row in 0..n {

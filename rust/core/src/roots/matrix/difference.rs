@@ -1,14 +1,14 @@
 //! Chains of neutral matrix systems: the difference part I + Σ C_j e^(−s τ_j), C_j = E⁻¹ N_j.
 //!
-//! Roots of large modulus lie near or left of Re s = C_D, where the largest spectral radius of
-//! C(θ) = Σ C_j e^(−σ τ_j + i θ_j) over all angles θ is 1 (Hale and Verduyn Lunel 2002); with delays
+//! Roots of large modulus lie near or left of Re s = C_D, where the largest spectral radius of C(θ)
+//! = Σ C_j e^(−σ τ_j + i θ_j) over all angles θ is 1 (Hale and Verduyn Lunel 2002); with delays
 //! free to vary that is attained or approached. It falls with σ, and a common angle does not
-//! matter. *Upper end*: the spectral radius is below 1 if ‖C(θ)^k‖ < 1 for k = 2^q. On a box of angles
-//! with centre θ₀, C differs by at most e = Σ ‖C_j‖ w_j h_j; squaring makes of (N, e) at most
-//! (‖C(θ₀)^2k‖, 2 N e + e²) and of rounding (n + 4) u |C|² more, |C| the Frobenius norm; boxes are halved until each is proved.
-//! *Lower end*: |tr C^k| ≤ n ρ^k at any one θ. ‖·‖ is the spectral norm, bounded by the Frobenius
-//! norm and by √(‖·‖₁ ‖·‖_∞). The spectral radius is
-//! plurisubharmonic (Vesentini 1968), as is ‖C^k‖: what holds on the torus holds for all smaller
+//! matter. *Upper end*: the spectral radius is below 1 if ‖C(θ)^k‖ < 1 for k = 2^q. On a box of
+//! angles with centre θ₀, C differs by at most e = Σ ‖C_j‖ w_j h_j; squaring makes of (N, e) at
+//! most (‖C(θ₀)^2k‖, 2 N e + e²) and of rounding (n + 4) u |C|² more, |C| the Frobenius norm; boxes
+//! are halved until each is proved. *Lower end*: |tr C^k| ≤ n ρ^k at any one θ. ‖·‖ is the spectral
+//! norm, bounded by the Frobenius norm and by √(‖·‖₁ ‖·‖_∞). The spectral radius is
+//! plurisubharmonic (Vesentini 1968), as is ‖C^k‖: a bound on the torus holds for all smaller
 //! moduli, hence right of σ, and ‖(I + C)⁻¹‖ ≤ Π (1 + N_2^i)/(1 − N_k).
 
 use std::f64::consts::{LN_2, PI, TAU};
@@ -21,17 +21,18 @@ use crate::{Error, Task};
 
 const MARGIN: f64 = 1.0 + 1e-9;
 
-/// Free angles that are searched; beyond, only norms are compared.
+/// Upper limit on the angles that are searched; with more of them, only norms are compared.
 const MAX_ANGLES: usize = 3;
 
-/// Squarings at which a box is given up and halved, and those for a single matrix.
+/// Squarings after which a box is halved, and those for a single matrix. More squarings need fewer
+/// boxes.
 const SQUARINGS: u32 = 16;
 const MANY_SQUARINGS: u32 = 24;
 
-/// Squarings at which a spectral radius is only compared.
+/// Squarings for a spectral radius that is only compared with others.
 const SAMPLE_SQUARINGS: u32 = 13;
 
-/// Operations spent on one line.
+/// Upper limit on the operations for one line (bounds the time).
 const MAX_WORK: f64 = 1e9;
 
 /// Samples of each angle, by the number of angles.
@@ -87,7 +88,8 @@ impl Difference {
         self.terms.len().saturating_sub(1)
     }
 
-    /// C at the angles of all terms but the first, on Re s = `sigma`, and what rounding costs.
+    /// C at the angles of all terms but the first, on Re s = `sigma`, and a bound on its rounding
+    /// errors.
     fn at(&self, sigma: f64, angles: &[f64]) -> (Rows, f64) {
         let mut sum = Rows::zeros(self.size);
         let mut lost = self.loss;
@@ -110,8 +112,8 @@ impl Difference {
         (sum, lost)
     }
 
-    /// A bound on ‖(I + C)⁻¹‖ on Re s ≥ `sigma` for all angles; `None` where it cannot be had,
-    /// which is so left of the chains.
+    /// A bound on ‖(I + C)⁻¹‖ on Re s ≥ `sigma` for all angles. `None` where it cannot be computed,
+    /// as left of the chains.
     pub(super) fn inverse_bound(&self, sigma: f64, task: &Task) -> Result<Option<f64>, Error> {
         if self.is_trivial() {
             return Ok(Some(1.0 / (1.0 - self.loss)));
@@ -131,7 +133,8 @@ impl Difference {
         };
         let n = self.size as f64;
         let mut work = MAX_WORK;
-        // A change of all signs of the angles conjugates C: the first of them need not be negative.
+        // Changing the signs of all angles conjugates C, so that the first angle need not be
+        // negative.
         let mut boxes = vec![Box {
             center: (0..free)
                 .map(|k| if k == 0 { 0.5 * PI } else { 0.0 })
@@ -174,7 +177,8 @@ impl Difference {
         Ok(Some(most))
     }
 
-    /// Where norms alone say that the chains end: Σ ‖C_j‖ e^(−σ τ_j) = 1 − (errors).
+    /// The abscissa at which norms alone show that the chains end: Σ ‖C_j‖ e^(−σ τ_j) = 1 −
+    /// (errors).
     fn norm_bound(&self) -> f64 {
         let room = 1.0 - self.loss;
         let count = self.terms.len() as f64;
@@ -217,7 +221,8 @@ impl Difference {
         }
         let top = self.norm_bound();
         let Some((guess, angles)) = self.estimate(top, task)? else {
-            // Nilpotent for every angle, as far as can be told: no chain is known to exist.
+            // The matrix is nilpotent for every angle, as far as can be decided: no chain is known
+            // to exist.
             return Ok((f64::NEG_INFINITY, self.least_proved(top, task)?));
         };
         let rate = 1.0 / self.longest();
@@ -248,7 +253,7 @@ impl Difference {
         Ok((lower, top))
     }
 
-    /// An upper bound where the chains cannot be estimated.
+    /// An upper bound for the case that the chains cannot be estimated.
     fn least_proved(&self, top: f64, task: &Task) -> Result<f64, Error> {
         let rate = 1.0 / self.longest();
         let mut best = top;
@@ -270,15 +275,16 @@ impl Difference {
             .fold(0.0, f64::max)
     }
 
-    /// About where the largest spectral radius is 1, and at which angles; `None` where there is none.
+    /// An estimate of where the largest spectral radius is 1, and at which angles; `None` where
+    /// there is none.
     fn estimate(&self, top: f64, task: &Task) -> Result<Option<(f64, Vec<f64>)>, Error> {
         let rate = 1.0 / self.longest();
         let mut sigma = top;
         let mut best: Option<Vec<f64>> = None;
         for _ in 0..30 {
             let (height, angles) = self.highest(sigma, best.as_deref(), task)?;
-            // The slope of log ρ lies between the delays: a step by the longest never goes too far
-            // to the left, where ρ may grow faster than linearly in the logarithm.
+            // The slope of log ρ lies between the delays: a step with the longest one never goes
+            // too far to the left, where ρ may grow faster than linearly in the logarithm.
             if !(height.is_finite() && sigma > top - 1e3 * rate) {
                 return Ok(None);
             }
@@ -342,7 +348,7 @@ impl Difference {
         Ok(self.highest_from(sigma, &best.1))
     }
 
-    /// Improve angles one at a time.
+    /// Improve the angles one at a time.
     fn highest_from(&self, sigma: f64, angles: &[f64]) -> (f64, Vec<f64>) {
         let mut best = (self.log_radius(sigma, angles), angles.to_vec());
         let mut step = 0.1;
@@ -390,7 +396,7 @@ fn norm(matrix: &Rows) -> f64 {
         largest = largest.max(row);
     }
     let tallest = columns.iter().fold(0.0f64, |a, b| a.max(*b));
-    // What squares lose in underflow is made up for by the last summand.
+    // The last summand covers what squares lose in underflow.
     ((largest * tallest).sqrt() * MARGIN).min(frobenius(matrix)) + 1e-150
 }
 
@@ -417,7 +423,7 @@ fn square(matrix: &Rows) -> Rows {
     found
 }
 
-/// A bound on ‖(I + C + any change of norm `off`)⁻¹‖ and the squarings done for it.
+/// A bound on ‖(I + C + any change of norm `off`)⁻¹‖ and the number of squarings used.
 fn inverse_bound(mut matrix: Rows, mut off: f64, squarings: u32) -> (Option<f64>, u32) {
     let rounding = (matrix.size as f64 + 4.0) * ROUNDING;
     let mut product = 1.0;
@@ -439,7 +445,7 @@ fn inverse_bound(mut matrix: Rows, mut off: f64, squarings: u32) -> (Option<f64>
 }
 
 /// Powers of a matrix scaled to norm 1 to 2, each the square of the one before: the logarithm of
-/// the factor taken out, the matrix, and what is lost.
+/// the factor taken out, the matrix, and a bound on its error.
 fn powers(matrix: Rows, lost: f64, squarings: u32, mut visit: impl FnMut(f64, f64, &Rows, f64)) {
     let rounding = (matrix.size as f64 + 4.0) * ROUNDING;
     let (mut matrix, mut off) = (matrix, lost);
@@ -466,7 +472,7 @@ fn powers(matrix: Rows, lost: f64, squarings: u32, mut visit: impl FnMut(f64, f6
     }
 }
 
-/// About log ρ, from norms of powers; −∞ for a nilpotent matrix.
+/// An estimate of log ρ from norms of powers; −∞ for a nilpotent matrix.
 fn log_radius(matrix: Rows, squarings: u32) -> f64 {
     let mut found = f64::NEG_INFINITY;
     powers(matrix, 0.0, squarings, |power, exponent, matrix, _| {
@@ -485,7 +491,8 @@ fn log_radius_below(matrix: Rows, lost: f64) -> f64 {
         MANY_SQUARINGS,
         |power, exponent, matrix, off| {
             let trace: Complex64 = (0..matrix.size).map(|i| matrix.get(i, i)).sum();
-            // A trace changes by n times the spectral norm of a change.
+            // A change of the matrix changes the trace by at most n times the spectral norm of the
+            // change.
             let least = (trace.norm() - n * off * MARGIN) * (1.0 - 1e-9) - 1e-15 * n;
             if least > 0.0 {
                 let value = (exponent * LN_2 + log(least / n)) / power;

@@ -1,14 +1,15 @@
-//! Factors and inverse of a complex matrix, with what their rounding amounts to.
+//! Factors and inverse of a complex matrix, with bounds on their rounding errors.
 //!
 //! Gaussian elimination with partial pivoting, written out here because the proofs rest on the
-//! rounding of exactly these operations. u = 2⁻⁵³; a complex product loses √5 u of its size (Brent,
-//! Percival and Zimmermann 2007), a sum u, a quotient, as product by the reciprocal, 6 u. An entry
-//! of L or U is a sum of at most n products and a quotient: the computed factors of the n × n matrix
-//! Ĝ, rows permuted, fulfil |Ĝ − L U| ≤ γ |L| |U| with γ = 1.02 (n + 12) u. Each column of the
-//! computed R solves (L + ΔL)(U + ΔU) r = e with |ΔL| ≤ γ |L|, |ΔU| ≤ γ |U| (Higham 2002, theorems
-//! 8.5 and 9.3), so that |Ĝ R − I| ≤ 3.01 γ |L| |U| |R|. The Frobenius norm of the last product is
-//! bounded by row norms: that of Σ_k a_k R_k is at most Σ |a_k| |R_k|.
-//! Underflow adds far less than FLOOR to what is bounded, while pivots are in the usable range.
+//! rounding errors of exactly these operations. u = 2⁻⁵³; a complex product has the relative error
+//! √5 u (Brent, Percival and Zimmermann 2007), a sum u, a quotient, computed as the product with
+//! the reciprocal, 6 u. An entry of L or U is a sum of at most n products and a quotient: the
+//! computed factors of the n × n matrix Ĝ, rows permuted, fulfil |Ĝ − L U| ≤ γ |L| |U| with γ =
+//! 1.02 (n + 12) u. Each column of the computed R solves (L + ΔL)(U + ΔU) r = e with |ΔL| ≤ γ |L|,
+//! |ΔU| ≤ γ |U| (Higham 2002, theorems 8.5 and 9.3), so that |Ĝ R − I| ≤ 3.01 γ |L| |U| |R|. The
+//! Frobenius norm of the last product is bounded by row norms: that of Σ_k a_k R_k is at most Σ
+//! |a_k| |R_k|. Underflow adds far less than FLOOR to what is bounded, while pivots are in the
+//! usable range.
 
 use num_complex::Complex64;
 
@@ -17,10 +18,10 @@ use crate::quasipoly::modulus;
 /// Moduli of pivots whose squares and reciprocals are normal numbers.
 const USABLE: std::ops::Range<f64> = 1e-140..1e140;
 
-/// Above all that underflow does.
+/// Larger than every effect of underflow.
 const FLOOR: f64 = 1e-150;
 
-/// u, enlarged by what bounds themselves lose in being computed.
+/// u, enlarged by the rounding errors of computing the bounds themselves.
 pub(super) const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
 /// A complex matrix by rows, real and imaginary parts apart.
@@ -72,7 +73,7 @@ impl Rows {
         }
     }
 
-    /// Take `factor` times row `from` off row `to`, from column `start` on.
+    /// Subtract `factor` times row `from` from row `to`, from column `start` on.
     #[inline(always)]
     fn eliminate(&mut self, to: usize, from: usize, factor: Complex64, start: usize) {
         let size = self.size;
@@ -85,7 +86,7 @@ impl Rows {
     }
 }
 
-/// Euclidean norm, within n u of itself; infinite or NaN where squares overflow.
+/// Euclidean norm with a relative error of n u; infinite or NaN where squares overflow.
 pub(super) fn norm((re, im): (&[f64], &[f64])) -> f64 {
     re.iter().chain(im).map(|x| x * x).sum::<f64>().sqrt()
 }
@@ -141,7 +142,7 @@ pub(super) struct Factored {
     pub(super) residual: f64,
 }
 
-/// Factor and invert; `None` where a pivot vanishes or leaves the usable range.
+/// Factor and invert; `None` where a pivot is zero or leaves the usable range.
 pub(super) fn factor(g: Rows) -> Option<Factored> {
     // The same operations in the same order, in wider registers where the machine has them.
     pulp::Arch::new().dispatch(|| eliminated(g))

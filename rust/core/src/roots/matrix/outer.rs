@@ -1,4 +1,4 @@
-//! Where roots of a matrix cannot be: the radius of a half plane, from norms.
+//! Where roots of a matrix cannot be: a radius for a half plane, from norms.
 //!
 //! Let F be the computed inverse of E, Y = I − F E. From M(s) x = 0 follows, multiplied by F,
 //!     s (I − Y + Σ F N_j e^(−s τ_j)) x = Σ F A_j e^(−s τ_j) x.
@@ -6,8 +6,9 @@
 //!     |s| (1 − |Y| − Σ |F N_j| w_j) ≤ Σ |F A_j| w_j.
 //! y is taken from the power iteration of the matrix of moduli, for which the bound is best. Where
 //! the bracket is not positive although Re s = σ lies right of the chains, the inverse of the
-//! difference part is bounded over all phases (`difference`). Products of F lose at most
-//! (n + 2) u |F| |N|, which is added; sums of non-negative numbers are within MARGIN.
+//! difference part is bounded over all phases (`difference`). Products with F have errors of at
+//! most (n + 2) u |F| |N|, which are added; the errors of sums of non-negative numbers are covered
+//! by MARGIN.
 
 use super::difference::Difference;
 use super::factor::{ROUNDING, Rows, factor};
@@ -18,7 +19,7 @@ use num_complex::Complex64;
 
 const MARGIN: f64 = 1.0 + 1e-9;
 
-/// Iterations for the weights of the norm.
+/// Power iterations for the weights of the norm.
 const ITERATIONS: usize = 40;
 
 /// F times the matrices of a system, by delay, with bounds on the moduli of their entries.
@@ -157,7 +158,8 @@ impl Leading {
                 .map(|((a, b), y)| a + b * a.max(1e-300) + 0.1 * y)
                 .collect();
             let top = next.iter().fold(0.0f64, |a, b| a.max(*b));
-            // Never far apart, so that the bounds themselves do not under- or overflow.
+            // The weights never differ by much, so that the bounds themselves do not underflow or
+            // overflow.
             y = next.iter().map(|x| (x / top).max(1e-30)).collect();
         }
         let norm = |matrix: &[Vec<f64>], y: &[f64]| {

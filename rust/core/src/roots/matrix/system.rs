@@ -5,24 +5,21 @@
 //! Reinsch 1969; Osborne 1960). That is exact and moves no root, and the inequalities of the
 //! proofs, which compare norms, hold over longer steps.
 
-use num_complex::Complex64;
-
-use super::place::Place;
 use crate::Error;
 
-/// Sweeps of balancing; it converges in few.
+/// Upper limit on the sweeps of balancing, which usually needs few.
 const SWEEPS: usize = 12;
 
-/// Exponents of the scaling stay within this, so that nothing over- or underflows.
+/// Largest exponent of the scaling, so that nothing underflows or overflows.
 const MOST_EXPONENT: i32 = 200;
 
 /// Sizes of entries that leave room for products in double precision.
 const USABLE: std::ops::Range<f64> = 1e-100..1e100;
 
-/// More states than anyone can wait for.
+/// Upper limit on the number of states (bounds the time of the dense factorisations).
 const MAX_STATES: usize = 200;
 
-/// What one delay contributes to one row of M: `(s · slope + value) e^(−s τ)` in each column.
+/// The contribution of one delay to one row of M: `(s · slope + value) e^(−s τ)` in each column.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Term {
     /// Index of the delay.
@@ -44,7 +41,8 @@ pub struct CharacteristicMatrix {
     rows: Vec<Vec<Term>>,
     /// Sorted, distinct, ≥ 0, the first one 0.
     delays: Vec<f64>,
-    /// Largest row sum of A, rows scaled to E and N: a rate that is typical, 1/s.
+    /// Largest row sum of A after the rows are scaled to E and N: a typical rate of the system,
+    /// 1/s.
     rate: f64,
 }
 
@@ -83,7 +81,7 @@ impl CharacteristicMatrix {
                     "a delay of {delay} s: give finite ones, not below 0"
                 )));
             }
-            // A matrix of zeros delays nothing.
+            // A matrix of zeros adds no delay.
             if matrix.iter().flatten().any(|x| *x != 0.0) {
                 delays.push(delay + 0.0);
             }
@@ -164,7 +162,7 @@ impl CharacteristicMatrix {
         &self.delays
     }
 
-    /// A rate that is typical of the system, in 1/s.
+    /// A typical rate of the system, in 1/s.
     pub(super) fn rate(&self) -> f64 {
         self.rate
     }
@@ -178,7 +176,7 @@ impl CharacteristicMatrix {
         self.delays.last().copied().unwrap_or(0.0)
     }
 
-    /// Factors on s and what is left, after scaling: dense, by rows, for one delay.
+    /// Factors of s and the remaining entries for one delay, after scaling: dense, by rows.
     pub(super) fn dense(&self, delay: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let size = self.size();
         let mut slopes = vec![vec![0.0; size]; size];
@@ -212,31 +210,9 @@ impl CharacteristicMatrix {
     }
 }
 
-/// Points, in units of the rate, at one of which a matrix that is regular at all is so in double
-/// precision.
-const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
-
-impl CharacteristicMatrix {
-    /// # Errors
-    /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
-    pub(super) fn check_regular(&self) -> Result<(), Error> {
-        let rate = self.rate;
-        let regular =
-            |(x, y): &(f64, f64)| Place::new(self, Complex64::new(x * rate, y * rate)).is_some();
-        if POINTS.iter().any(regular) {
-            return Ok(());
-        }
-        Err(Error::argument(
-            "the determinant of the characteristic matrix is zero for every s, or cannot be told \
-             from it: the equations do not determine the state, look for rows of E, N and A that \
-             depend on one another, or for entries that differ too much in size",
-        ))
-    }
-}
-
 type Matrices = [Vec<Vec<f64>>];
 
-/// Scale rows and columns of all matrices by powers of two; the rate of the scaled system.
+/// Scale rows and columns of all matrices by powers of two. Returns the rate of the scaled system.
 fn scale(slopes: &mut Matrices, values: &mut Matrices) -> f64 {
     let size = slopes.first().map_or(0, Vec::len);
     let sum = |group: &Matrices| {

@@ -1,5 +1,8 @@
 use super::*;
+use crate::Task;
 use crate::quasipoly::QuasiPolynomial;
+use crate::roots::Region;
+use num_complex::Complex64;
 
 fn ring(n: usize, delay: f64, gain: f64) -> CharacteristicMatrix {
     let unit = (0..n)

@@ -1,22 +1,23 @@
-//! How far arg det M turns along a line, and Newton's iteration on det M: walks on matrices.
+//! The change of arg det M along a line, and Newton's iteration on det M.
 //!
-//! Two neighbours reach to a point between them (`place`): the true change of arg det M is that
-//! expected from both, up to less than 2.5, and computed arguments are wrong by 0.1 at most. So the
-//! difference of the computed ones that is next to the expected change is the true one up to their
-//! errors, which cancel in the sum but at the two ends of the line.
+//! The reaches of two neighbouring points meet at a point between them (`local_enclosure`): the
+//! true change of arg det M is that expected from both, up to less than 2.5, and computed arguments
+//! are wrong by 0.1 at most. So the difference of the computed ones that is next to the expected
+//! change is the true one up to their errors, which cancel in the sum but at the two ends of the
+//! line.
 //!
-//! Newton's step is −1/tr(M⁻¹ M′). Where M is too close to singular for anything to be proved, a
-//! square about the iterate, as small as can be walked around, counts what it holds.
+//! Newton's step is −1/tr(M⁻¹ M′). Where M is too close to a singular matrix for a proof, the roots
+//! in a square about the iterate are counted, the smallest one around which arg det M can be
+//! followed.
 
 use num_complex::Complex64;
 
-use super::place::{Place, Reach};
+use super::local_enclosure::{LocalEnclosure, Reach};
 use super::system::CharacteristicMatrix;
 use crate::quasipoly::modulus;
-use crate::roots::cell::{Cell, Walk};
-use crate::roots::isolate::Seek;
-use crate::roots::newton::{Disc, Outcome};
-use crate::roots::winding::Turn;
+use crate::roots::counting::{Cell, Turn, Walk};
+use crate::roots::disc::Disc;
+use crate::roots::locating::{Outcome, Seek};
 use crate::{Error, Task};
 
 use std::f64::consts::{PI, TAU};
@@ -24,38 +25,39 @@ use std::f64::consts::{PI, TAU};
 /// Factorisations after which a computation is given up.
 pub(super) const MAX_EVALUATIONS: u64 = 1_000_000;
 
-/// Operations between two looks at the task, about.
+/// Approximate number of operations between two checks for cancellation.
 const CHECK_EVERY: u64 = 1_000_000;
 
-/// Hints kept of a walk, the first ones.
+/// Upper limit on the hints kept of one line; the first ones are kept.
 const MAX_HINTS: usize = 1000;
 
-/// Newton's steps from one start.
+/// Upper limit on Newton's steps from one start.
 const MAX_STEPS: usize = 40;
 
-/// Error of one step's arithmetic, in units of the angles that come up in it.
+/// Error of the arithmetic of one step, relative to the angles that occur in it.
 const STEP_ERROR: f64 = 16.0 * f64::EPSILON;
 
-/// Evaluations for the walk around a small square.
-const PATIENCE: u64 = 1000;
+/// Evaluations spent on a small square before a larger one is tried.
+const EAGER_LIMIT: u64 = 1000;
 
-/// Places next to a root that are tried before a line counts as blocked.
+/// Points next to a root that are tried before a line counts as blocked.
 const MOST_UNCLEAR: u32 = 5;
 
-/// How much longer than the own reach steps are tried, at most.
+/// Longest step that is tried, relative to the reach of its first point.
 const STRETCH: f64 = 1.9;
 
-/// Walks along lines; keeps the budget, the hints of roots and the discs already proved.
-pub(in crate::roots) struct MatrixWalker<'a> {
+/// Follows arg det M along lines. Keeps the number of evaluations, the hints of roots and the discs
+/// already proved.
+pub(super) struct MatrixWalker<'a> {
     system: &'a CharacteristicMatrix,
     task: &'a Task,
-    /// Where Newton's step from the points closest to a root leads to.
-    pub(in crate::roots) hints: Vec<Complex64>,
+    /// Ends of Newton's steps from the points closest to a root.
+    pub(super) hints: Vec<Complex64>,
     known: Vec<Disc>,
-    /// Where no single root could be proved.
+    /// Points next to which no single root could be proved.
     stalled: Vec<Complex64>,
-    /// Evaluations at which a small square is given up for a larger one.
-    patience: u64,
+    /// Number of evaluations at which a small square is replaced by a larger one.
+    eager_limit: u64,
     evaluations: u64,
     work: u64,
     limit: u64,
@@ -69,7 +71,7 @@ impl<'a> MatrixWalker<'a> {
             hints: Vec::new(),
             known: Vec::new(),
             stalled: Vec::new(),
-            patience: u64::MAX,
+            eager_limit: u64::MAX,
             evaluations: 0,
             work: 0,
             limit: limit.min(MAX_EVALUATIONS),
@@ -80,12 +82,12 @@ impl<'a> MatrixWalker<'a> {
         self.task
     }
 
-    /// Count an evaluation, look at the task and at the budget now and then.
+    /// Count an evaluation; check for cancellation and for the limit on evaluations.
     fn spend(&mut self) -> Result<(), Error> {
         let size = self.system.size() as u64;
         self.evaluations += 1;
         self.work += 20 * size * size * size + 1000;
-        if self.evaluations > self.patience {
+        if self.evaluations > self.eager_limit {
             return Err(Error::Contour {
                 place: Complex64::ZERO,
                 distance: 0.0,
@@ -107,16 +109,16 @@ impl<'a> MatrixWalker<'a> {
         Ok(())
     }
 
-    fn place(&mut self, s: Complex64) -> Result<Option<Place>, Error> {
+    fn enclosure(&mut self, s: Complex64) -> Result<Option<LocalEnclosure>, Error> {
         self.spend()?;
-        Ok(Place::new(self.system, s))
+        Ok(LocalEnclosure::new(self.system, s))
     }
 
-    /// The error of a line that cannot be proved to be clear of roots at `place`.
+    /// The error for a line that cannot be proved to be free of roots at `place`.
     fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
         let mut distance = 4.0 * f64::EPSILON * modulus(place).max(1e-3 * self.system.rate());
-        // The place may be clear itself, and the root as far as Newton's step leads.
-        if let Some(here) = Place::tried(self.system, place) {
+        // The point itself may be free of roots, and the root as far away as Newton's step leads.
+        if let Some(here) = LocalEnclosure::tried(self.system, place) {
             let correction = modulus(here.correction);
             if correction.is_finite() {
                 distance = distance.max(2.0 * correction);
@@ -125,7 +127,7 @@ impl<'a> MatrixWalker<'a> {
         for _ in 0..40 {
             let mut clear = true;
             for step in [Complex64::ONE, -Complex64::ONE, Complex64::I] {
-                clear &= self.place(place + step * distance)?.is_some();
+                clear &= self.enclosure(place + step * distance)?.is_some();
             }
             if clear {
                 break;
@@ -135,14 +137,14 @@ impl<'a> MatrixWalker<'a> {
         Ok(Error::Contour { place, distance })
     }
 
-    /// The next place, with the point between where both reaches meet: its distance from `here`.
+    /// The next point, with the distance from `here` of the point where both reaches meet.
     fn step(
         &mut self,
-        here: &Place,
+        here: &LocalEnclosure,
         to: Complex64,
         (along, rest): (Complex64, f64),
         stretch: &mut f64,
-    ) -> Result<(Place, Reach, f64, Reach), Error> {
+    ) -> Result<(LocalEnclosure, Reach, f64, Reach), Error> {
         let reach = here.reach(along, rest);
         let mut length = if reach.length >= rest {
             rest
@@ -159,19 +161,20 @@ impl<'a> MatrixWalker<'a> {
             if next == here.s {
                 break;
             }
-            if let Some(ahead) = self.place(next)? {
+            if let Some(ahead) = self.enclosure(next)? {
                 let gone = modulus(next - here.s) * (1.0 + 1e-12);
                 let back = ahead.reach(-along, gone);
                 if back.length + reach.length >= gone * (1.0 + 1e-9) || reach.length >= gone {
                     *stretch = (1.05 * *stretch).min(STRETCH);
-                    // As far from the end of either reach as can be.
+                    // As far from the end of either reach as possible.
                     let part = reach.length / (reach.length + back.length);
                     return Ok((ahead, reach, part * gone, back));
                 }
                 *stretch = (0.9 * *stretch).max(1.2);
                 length = (0.999 * reach.length).max(0.5 * length.min(reach.length));
             } else {
-                // Clear places can be had ever closer to a root, each a little less so.
+                // Points that are free of roots exist at any distance from a root, with shorter and
+                // shorter reaches.
                 unclear += 1;
                 if unclear > MOST_UNCLEAR {
                     break;
@@ -188,7 +191,7 @@ impl<'a> MatrixWalker<'a> {
         let mut half = 4.0 * f64::EPSILON * size.sqrt() * modulus(z).max(1e-3 * self.system.rate());
         let mut growth = 3.0;
         while half < most {
-            if self.place(z + half)?.is_some() {
+            if self.enclosure(z + half)?.is_some() {
                 // A square that would meet the real axis is made symmetric about it.
                 let symmetric = z.im.abs() <= 1.5 * half;
                 let (center, im) = if symmetric {
@@ -196,20 +199,20 @@ impl<'a> MatrixWalker<'a> {
                 } else {
                     (z, (z.im - half, z.im + half))
                 };
-                // Next to a defective root steps are as short as the square of the distance.
-                self.patience = self.evaluations + PATIENCE;
+                // Next to a defective root the steps are as short as the square of the distance.
+                self.eager_limit = self.evaluations + EAGER_LIMIT;
                 let cell = Cell::new(self, (center.re - half, center.re + half), im, symmetric);
-                growth = if self.evaluations > self.patience {
+                growth = if self.evaluations > self.eager_limit {
                     9.0
                 } else {
                     3.0
                 };
-                self.patience = u64::MAX;
+                self.eager_limit = u64::MAX;
                 match cell {
                     Ok(cell) if cell.count > 0 => {
                         return Ok(u32::try_from(cell.count).ok().map(|multiplicity| Disc {
                             center: Complex64::new(center.re, center.im.abs()),
-                            // The half-diagonal, with the rounding of the corners.
+                            // The half-diagonal, enlarged by the rounding errors of the corners.
                             radius: half * 1.4143 + 2.0 * f64::EPSILON * modulus(center),
                             isolation: half,
                             multiplicity,
@@ -224,7 +227,7 @@ impl<'a> MatrixWalker<'a> {
         Ok(None)
     }
 
-    /// The disc of a single root next to `z`, or of those next to it.
+    /// The disc of the single root next to `z`, or of the cluster next to it.
     fn proved(&mut self, z: Complex64) -> Result<Outcome, Error> {
         let up = Complex64::new(z.re, z.im.abs());
         let holds = |disc: &&Disc| (disc.center - up).norm() <= disc.isolation;
@@ -255,7 +258,7 @@ impl Walk for MatrixWalker<'_> {
             return Ok(Turn::default());
         }
         let along = (to - from) / ((to - from).re.abs() + (to - from).im.abs());
-        let Some(mut here) = self.place(from)? else {
+        let Some(mut here) = self.enclosure(from)? else {
             return Err(self.blocked(from)?);
         };
         let mut turn = Turn {
@@ -264,7 +267,7 @@ impl Walk for MatrixWalker<'_> {
         };
         let summands = self.system.size() as f64 + 8.0;
         let mut stretch = STRETCH;
-        // Newton's corrections at the last two points: a local minimum hints at a root.
+        // Newton's corrections at the last two points: a local minimum indicates a root.
         let mut before = (f64::INFINITY, f64::INFINITY);
         while here.s != to {
             let rest = (to - here.s).re.abs() + (to - here.s).im.abs();
@@ -295,7 +298,7 @@ impl Walk for MatrixWalker<'_> {
     }
 }
 
-/// The angle less whole turns, in [−π, π].
+/// The angle reduced to [−π, π].
 fn principal(angle: f64) -> f64 {
     let rest = angle - (angle / TAU).round() * TAU;
     rest.clamp(-PI, PI)
@@ -316,14 +319,15 @@ impl Seek for MatrixWalker<'_> {
         let mut slow = 0.0;
         for _ in 0..MAX_STEPS {
             self.spend()?;
-            let Some(here) = Place::tried(self.system, z) else {
+            let Some(here) = LocalEnclosure::tried(self.system, z) else {
                 return self.proved(z);
             };
             let step = here.correction;
             if !step.is_finite() {
                 return Ok(Outcome::Lost);
             }
-            // Next to an m-fold root steps shrink by 1 − 1/m only: take m of them at once.
+            // Next to an m-fold root steps shrink only by 1 − 1/m, so that m of them are taken at
+            // once.
             let ratio = modulus(step) / modulus(last);
             let settled = (0.4..0.97).contains(&ratio) && (ratio - slow).abs() < 0.05 * ratio;
             let fold = if settled {
@@ -360,7 +364,7 @@ impl Seek for MatrixWalker<'_> {
     }
 
     fn at_zero_if_exact(&self, disc: Disc) -> Disc {
-        // No sum of products is formed here that could be found to be exactly zero.
+        // No sum of products is formed here that could be exactly zero.
         disc
     }
 }

@@ -1,0 +1,1 @@
+"""What every room uses: errors, checked arguments, frozen results, processes, drawing, pages."""

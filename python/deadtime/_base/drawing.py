@@ -1,0 +1,111 @@
+"""What every drawing uses. Matplotlib is imported when something is drawn, not before."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from deadtime._base.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "as_svg",
+    "bare_axes",
+    "check_matplotlib",
+    "empty_figure",
+    "new_figure",
+    "shown_axes",
+    "shown_rows",
+]
+
+DATA: dict[str, Any] = {"color": "0.35", "lw": 0.9, "marker": ".", "ms": 3}
+REFERENCE: dict[str, Any] = {"color": "0.6", "lw": 1.0, "ls": "--"}
+COLOURS = ("#0b6fb8", "#d1481f", "#2f8f4e", "#8a4fbf")
+
+
+def check_matplotlib() -> None:
+    """Refuse to draw where matplotlib is missing, with the line that installs it."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError(
+            "drawing needs matplotlib, which is not installed; this line installs it: "
+            "pip install 'deadtime[plot]'"
+        ) from error
+
+
+def empty_figure(width: float, height: float) -> Figure:
+    """A figure that belongs to nobody's window, without axes."""
+    check_matplotlib()
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def new_figure(
+    width: float = 7.0, height: float = 4.0, rows: int = 1, columns: int = 1, even: bool = False
+) -> tuple[Figure, Any]:
+    """A figure that belongs to nobody's window, and its axes; rows share their x axis.
+
+    The first row is the highest unless they are to be even.
+    """
+    figure = empty_figure(width, height)
+    ratios = None if rows == 1 or even else [3.0, *([1.0] * (rows - 1))]
+    axes = figure.subplots(rows, columns, sharex=rows > 1, height_ratios=ratios)
+    for one in np.ravel(axes):
+        one.spines[["top", "right"]].set_visible(False)
+        one.grid(alpha=0.25)
+    return figure, axes
+
+
+def shown_axes(ax: Axes | None) -> Axes:
+    """The given axes, or those of a new pyplot figure."""
+    if ax is not None:
+        return ax
+    check_matplotlib()
+    from matplotlib import pyplot
+
+    return pyplot.subplots(layout="constrained")[1]
+
+
+def shown_rows(axes: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
+    """The given axes, or those of a new pyplot figure below one another."""
+    if axes is not None:
+        if len(axes) != rows:
+            raise ValueError(f"axes has {len(axes)} of them: give {rows}")
+        return axes
+    check_matplotlib()
+    from matplotlib import pyplot
+
+    return list(pyplot.subplots(rows, 1, sharex=True, layout="constrained")[1])
+
+
+def as_svg(figure: Figure, name: str) -> str:
+    """A figure as an SVG element to be put into a page; the same picture gives the same text.
+
+    Matplotlib names the parts of every picture alike; `name` before them tells the pictures of
+    one page apart.
+    """
+    import matplotlib
+
+    text = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "deadtime", "svg.fonttype": "none"}):
+        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    drawing = text.getvalue()
+    drawing = drawing[drawing.index("<svg") :]
+    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", drawing)
+
+
+def bare_axes(ax: Axes) -> Axes:
+    """The axes with a grid and without the lines above and on the right."""
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.grid(alpha=0.25)
+    return ax

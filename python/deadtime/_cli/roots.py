@@ -1,0 +1,104 @@
+"""``deadtime roots``: characteristic roots of a loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich import box
+from rich.table import Table
+
+from deadtime._base.drawing import new_figure
+from deadtime._cli import options as opt
+from deadtime._cli.show import console, print_json, print_table, save_figure
+from deadtime._cli.verdicts import listed, verdict
+from deadtime.roots import RootSet
+from deadtime.roots._plots import plot_root_set
+from deadtime.roots.certificate._plots import plot_certificate
+
+__all__ = ["list_roots"]
+
+Ends = tuple[float, float]
+
+
+def list_roots(
+    kp: opt.Kp,
+    delay: opt.Delay,
+    kv: opt.Kv = 0.0,
+    plant: opt.Plant = None,
+    gain: opt.Gain = 1.0,
+    lag: opt.Lag = 0.0,
+    sample_time: opt.Sample_time = None,
+    filter: opt.Filter = None,  # noqa: A002
+    re: Annotated[Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
+    im: Annotated[Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
+    rightmost: Annotated[
+        int, typer.Option(min=1, help="At most how many of those with Im s >= 0, without a region.")
+    ] = 3,
+    plot: opt.Plot = None,
+    certificate: Annotated[
+        Path | None,
+        typer.Option(help="File the proof of their number as JSON; with --plot, draw it, too."),
+    ] = None,
+    as_json: opt.As_json = False,
+) -> None:
+    """Characteristic roots of a loop: the rightmost ones, or all in a region."""
+    loop = opt.described_loop(
+        kp,
+        kv,
+        delay=delay,
+        gain=gain,
+        lag=lag,
+        sample_time=sample_time,
+        corner=filter,
+        plant=plant,
+    )
+    if (re is None) != (im is None):
+        raise ValueError("a region needs both --re and --im")
+    found = loop.rightmost(rightmost) if re is None else loop.poles(re, im)
+    chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
+    proof = None
+    if certificate is not None:
+        # Of a sampled loop there is no contour: `characteristic` says so.
+        reals, heights = found.region
+        proof = loop.certify(reals, heights)
+        certificate.write_text(proof.to_json(indent=1), encoding="utf-8")
+    if plot is not None:
+        figure, axes = new_figure(6.0, 4.5)
+        if proof is not None:
+            plot_certificate(axes, proof)
+        chains = () if loop.is_sampled else loop.characteristic().chains()
+        plot_root_set(axes, found, chains)
+        save_figure(figure, plot)
+    if as_json:
+        print_json(
+            {
+                "roots": [complex(root) for root in found.roots],
+                "multiplicities": found.multiplicities,
+                "radii": found.radii,
+                "counted": found.counted,
+                "region": {"re": found.region[0], "im": found.region[1]},
+                "chain_abscissa": chain,
+                "spectral_abscissa": loop.spectral_abscissa(),
+                "stable": loop.is_stable(),
+            }
+        )
+        return
+    print_table(_roots_table(found))
+    console.print(listed(found, rightmost if re is None else None, chain), highlight=False)
+    if np.isfinite(chain):
+        console.print(f"neutral: a chain of roots approaches Re s = {chain:.6g}", highlight=False)
+    console.print(verdict(loop), highlight=False)
+
+
+def _roots_table(found: RootSet) -> Table:
+    table = Table(box=box.SIMPLE_HEAD)
+    for head in ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius"):
+        table.add_column(head, justify="right")
+    for root, multiplicity, radius in zip(
+        found.roots, found.multiplicities, found.radii, strict=True
+    ):
+        table.add_row(f"{root.real:.10g}", f"{root.imag:.10g}", str(multiplicity), f"{radius:.1e}")
+    return table

@@ -1,0 +1,312 @@
+"""Delay differential equations with constant delays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, SupportsFloat
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime import _deadtime
+from deadtime._base.validation import finite, positive, real_array, whole_number
+from deadtime.dde._compiled import addresses
+from deadtime.dde._solution import DelayResult, DelaySolution
+
+__all__ = ["solve_dde"]
+
+Array = NDArray[np.float64]
+
+_METHODS = ("auto", "spectral")
+_NONE = np.empty(0)
+
+
+def solve_dde(
+    fun: Any,
+    t_span: tuple[SupportsFloat, SupportsFloat],
+    history: ArrayLike | Callable[[float], ArrayLike] | tuple[Callable[..., Any], ...],
+    delays: ArrayLike,
+    *,
+    y0: ArrayLike | None = None,
+    neutral: bool = False,
+    method: str = "auto",
+    rtol: float = 1e-6,
+    atol: ArrayLike = 1e-9,
+    t_eval: ArrayLike | None = None,
+    dense_output: bool = False,
+    events: Callable[..., Any] | Sequence[Callable[..., Any]] | None = None,
+    jumps: Iterable[Any] = (),
+    history_breaks: ArrayLike = (),
+    args: tuple[Any, ...] = (),
+    vectorized: bool = False,
+    max_step: float = np.inf,
+    max_steps: int | None = 100_000,
+    jac_sparsity: Any = None,
+) -> DelayResult:
+    r"""Solve :math:`y'(t) = f(t, y(t), y(t - \tau_1), \dots, y(t - \tau_m))`, constant delays.
+
+    Parameters
+    ----------
+    fun : callable or compiled function
+        ``fun(t, y, z)``, where ``z[j]`` is y(t − τ_j): `y` of shape (dim,), `z` of shape (delay,
+        dim), and (dim,) returned, also as a list. For neutral equations ``fun(t, y, z, dz)`` with
+        ``dz[j]`` = y'(t − τ_j). With `vectorized` it is called for many nodes at once: `t` of
+        shape (node,), `y` (dim, node), `z` (delay, dim, node), and (dim, node) returned; that is
+        by far the fastest way in Python. A compiled function, a `scipy.LowLevelCallable`, a numba
+        ``cfunc`` or a ctypes function pointer, has the signature ``void (double t, const double
+        *y, const double *z, const double *dz, double *dy, void *user_data)`` with `z` and `dz`
+        delay by delay; it is called a node at a time without the interpreter. One that is
+        declared with other types is refused.
+    t_span : (float, float)
+        Start and end.
+    history : float, array_like, callable or (callable, callable)
+        y up to the start: constant, one number for all components or (dim,), or a function of
+        one time that returns a number or (dim,). A pair is the function and its derivative.
+    delays : float or array_like, shape (m,)
+        The delays τ_j, each above zero.
+    y0 : array_like, optional
+        y at the start where it is not the end of the history: y then jumps there.
+    neutral : bool
+        Whether `fun` takes delayed derivatives. In a history without its derivative they are
+        those of the polynomials through it.
+    method : {'auto', 'spectral'}
+        The method; there is one so far.
+    rtol, atol : float, float or array_like
+        Tolerances: an element may err by ``atol + rtol * abs(y)`` in each component, between its
+        nodes as well as at them.
+    t_eval : array_like, optional
+        Ascending times at which y is wanted. By default all nodes of all elements are returned,
+        so that a plot is smooth.
+    dense_output : bool
+        Keep all polynomials, as ``sol``.
+    events : callable or list of callable, optional
+        As in `scipy.integrate.solve_ivp`: zeros of ``event(t, y, *args)``, with attributes
+        ``terminal`` (True, or the number of the crossing that ends the run) and ``direction``.
+        Every change of sign is found, to rounding, where the event is smooth along the solution,
+        one in `y` itself above all; features narrower than a twentieth of an element may be
+        missed, and `max_step` makes elements shorter. A change of sign at a jump of `y` is an
+        event at the time of the jump, with `y` after it. A zero at the start is none.
+    jumps : iterable of float or (float, callable)
+        Times at which the right-hand side jumps, with ``change(t, y)`` the times at which y
+        becomes what that returns. Those outside `t_span` are left out.
+    history_breaks : array_like
+        Times at which the history or one of its derivatives jumps. Undeclared ones are found,
+        at some cost, where they are further apart than a thousandth of the largest delay.
+    args : tuple
+        Further arguments of `fun` and the events.
+    vectorized : bool
+        Whether `fun` takes many nodes at once; never guessed.
+    max_step : float
+        Largest length of an element, and largest gap between samples of the history. `fun` is
+        called at nodes alone, so what it does with `t` for a shorter time may be missed.
+    max_steps : int or None
+        Elements tried at most, accepted or not, None for no limit. A run that reaches it ends with
+        status -1.
+    jac_sparsity : array_like or sparse matrix, shape (dim, dim), optional
+        As in `scipy.integrate.solve_ivp`: other than zero where a component of `fun` depends on a
+        component of `y`, or of ``z[j]`` for a delay shorter than the elements. Without it the
+        pattern is found by differences, where a Jacobian is wanted at all: that takes a column a
+        component once. A pattern that lacks entries is noticed and replaced.
+
+    Returns
+    -------
+    DelayResult
+        ``t, y, sol, t_events, y_events, breaks, nfev, status, message, success`` and counts.
+        ``status`` is -1, with ``y`` as far as it is known, where elements become too short or
+        too many or `fun` is not finite; the message says where and what to try.
+
+    Raises
+    ------
+    ValueError
+        For delays that are zero, negative (an equation of advanced type) or not finite, values of
+        the history or of `fun` at the start that are not finite, wrong shapes, times out of
+        order, unknown methods.
+    TypeError
+        If `fun`, an event or a change is no function, or returned None or complex numbers.
+    Exception
+        Whatever a function raises comes through unchanged.
+
+    Notes
+    -----
+    The solution is a polynomial of degree 4 to 24 on each element, by collocation at Radau points
+    (the Radau IIA family), so that stiff equations take long elements too. The Jacobian that this
+    needs is taken by differences; large systems have one only where sweeps without it fail, banded
+    or full as it comes out, and its diagonal alone beyond 4 million entries. Elements end on
+    breaking points: the start, the jumps, and what follows from them one delay later, an order
+    smoother each time, or as rough as before in neutral equations. Through a breaking point of a
+    neutral equation with a jump of y itself only the step is followed, not the impulse in y'.
+    Without `dense_output` the past is kept only as far as the largest delay.
+
+    Examples
+    --------
+    The equation of Mackey and Glass (1977):
+
+    >>> import deadtime as dtm
+    >>> def blood(t, y, z):
+    ...     return 0.2 * z[0] / (1 + z[0] ** 10) - 0.1 * y
+    >>> found = dtm.solve_dde(blood, (0, 100), 0.5, 17.0, vectorized=True, t_eval=[50, 100])
+    >>> print(found.y.round(4))
+    [[0.6441 1.05  ]]
+    """
+    if method not in _METHODS:
+        names = ", ".join(repr(name) for name in _METHODS)
+        raise ValueError(f"method={method!r}: give one of {names}")
+    start, end = (finite("t_span", time) for time in t_span)
+    lags = np.atleast_1d(real_array("delays", delays)).ravel()
+    past, slope = _history(history)
+    initial = _initial(past, y0, start)
+    if not callable(past) and past.size == 1:
+        past = np.repeat(past, initial.size)
+    compiled = addresses(fun)
+    if compiled is None and not callable(fun):
+        raise TypeError(f"fun={fun!r} is no function")
+    if compiled is not None and args:
+        raise ValueError("args: a compiled function takes its data from its LowLevelCallable")
+    times = None if t_eval is None else _vector("t_eval", t_eval)
+    run = _deadtime.solve_delay_equation(
+        fun if compiled is None else compiled,
+        tuple(args),
+        bool(vectorized),
+        (start, end),
+        initial,
+        lags,
+        bool(neutral),
+        past,
+        slope,
+        _vector("history_breaks", history_breaks),
+        (finite("rtol", rtol), _vector("atol", atol)),
+        max_step if max_step == np.inf else positive("max_step", max_step),
+        times,
+        bool(dense_output),
+        _pattern(jac_sparsity, initial.size),
+        None if max_steps is None else whole_number("max_steps", max_steps),
+        _events(events),
+        _jumps(jumps, start, end),
+    )
+    status = (0, 1, -1, -1, -1)[run.outcome]
+    return DelayResult(
+        t=run.times,
+        y=run.values,
+        sol=DelaySolution(run.pieces) if dense_output else None,
+        t_events=None if events is None else run.event_times,
+        y_events=None if events is None else run.event_values,
+        breaks=run.breaks,
+        nfev=run.calls,
+        n_nodes=run.nodes,
+        n_elements=run.elements,
+        n_rejected=run.refused,
+        status=status,
+        message=_message(run),
+        success=status >= 0,
+    )
+
+
+def _message(run: Any) -> str:
+    outcome, place = run.outcome, run.place
+    if outcome == 4:
+        return (
+            f"max_steps={run.elements + run.refused} elements were tried by t={place!r}, and "
+            f"{run.refused} of them refused. Where fun switches on y and holds it at the switch "
+            "(a sliding mode), smooth the switch; where fun is noisy, or rtol and atol ask for "
+            "less than the rounding of t, raise them; where the run is long, give a larger "
+            "max_steps."
+        )
+    if outcome == 0:
+        return "The end of t_span was reached."
+    if outcome == 1:
+        return "A terminal event occurred."
+    if outcome == 2:
+        return (
+            f"Elements became as short as rounding allows at t={place!r}: the solution grows "
+            "without bound there, or the right-hand side is rough. Declare times at which it "
+            "jumps (jumps), raise rtol and atol, or limit max_step; a linear loop with a limit "
+            "is solved exactly by ControlLoop.simulate."
+        )
+    return (
+        f"The right-hand side is not finite at t={place!r} and later: the solution leaves the "
+        "domain of fun there. Check fun for roots, logarithms and divisions, or end the run "
+        "with a terminal event."
+    )
+
+
+def _vector(name: str, values: ArrayLike) -> Array:
+    """Return `values` as one row of finite floats."""
+    array = np.ascontiguousarray(real_array(name, values).ravel())
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}={array}: give finite numbers")
+    return array
+
+
+def _history(history: Any) -> tuple[Any, Any]:
+    """Return the history, as a function or an array, and the function of its derivative."""
+    if callable(history):
+        return history, None
+    if isinstance(history, tuple) and any(callable(part) for part in history):
+        if len(history) != 2 or not all(callable(part) for part in history):
+            raise TypeError(f"history={history!r}: a pair is the function and its derivative")
+        return history
+    return np.atleast_1d(_vector("history", history)), None
+
+
+def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
+    """Return y at the start."""
+    if y0 is not None:
+        return _vector("y0", y0)
+    if not callable(past):
+        return np.asarray(past)
+    found = past(start)
+    if found is None:
+        raise TypeError(
+            f"history at t={start} returned None: end it with a return statement that gives the "
+            "values"
+        )
+    value = np.atleast_1d(real_array(f"history at t={start}", found))
+    if value.ndim != 1:
+        raise ValueError(
+            f"history returned shape {value.shape} at t={start}: give a number or (dim,)"
+        )
+    if not np.isfinite(value).all():
+        raise ValueError(
+            f"history is {value} at t={start}: give finite values, or y at the start as y0"
+        )
+    return np.ascontiguousarray(value)
+
+
+def _pattern(pattern: Any, dim: int) -> tuple[list[int], list[int]] | None:
+    """Return the rows and columns of the entries of a Jacobian."""
+    if pattern is None:
+        return None
+    if not hasattr(pattern, "tocoo"):
+        pattern = real_array("jac_sparsity", pattern)
+    if pattern.shape != (dim, dim):
+        raise ValueError(f"jac_sparsity has shape {pattern.shape}: give ({dim}, {dim})")
+    rows, columns = pattern.nonzero()
+    return rows.tolist(), columns.tolist()
+
+
+def _events(events: Any) -> list[tuple[Any, int, int]]:
+    """Return function, direction and terminal number of each event."""
+    if events is None:
+        return []
+    found = []
+    for event in (events,) if callable(events) else events:
+        if not callable(event):
+            raise TypeError(f"events: {event!r} is no function")
+        direction = int(np.sign(finite("direction", getattr(event, "direction", 0))))
+        terminal = finite("terminal", getattr(event, "terminal", None) or 0)
+        if terminal < 0 or terminal != int(terminal):
+            raise ValueError(f"terminal={terminal}: give True, or the number of a crossing")
+        found.append((event, direction, int(terminal)))
+    return found
+
+
+def _jumps(jumps: Iterable[Any], start: float, end: float) -> list[tuple[float, Any]]:
+    """Return times and changes of the jumps within the span, in order."""
+    found = []
+    for jump in jumps:
+        time, change = jump if isinstance(jump, tuple) else (jump, None)
+        if change is not None and not callable(change):
+            raise TypeError(f"jumps: {change!r} is no function of t and y")
+        found.append((finite("jumps", time), change))
+    found.sort(key=lambda jump: jump[0])
+    return [jump for jump in found if start < jump[0] < end]

@@ -1,0 +1,55 @@
+"""Estimate the delay of a control loop from a recording, with a confidence interval.
+
+`_estimate` chooses and runs a method, `_compare` runs several, `_result` is what they return.
+`methods` holds one file a method, `data` what they read from a recording, `models` what they fit,
+`fit` least squares, profiles and residuals, `planning` the bounds of planned experiments.
+"""
+
+from deadtime.estimation._compare import Comparison, compare_methods
+from deadtime.estimation._estimate import estimate_delay
+from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
+from deadtime.estimation.fit._residuals import Whiteness
+from deadtime.estimation.methods._arx_scan import ARXScan
+from deadtime.estimation.methods._cta import CTA
+from deadtime.estimation.methods._decay import Decay
+from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._frequency import Frequency
+from deadtime.estimation.methods._gcc import GCC
+from deadtime.estimation.methods._graphical import Graphical
+from deadtime.estimation.methods._grid import Grid
+from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.methods._overshoot import Overshoot, damping_ratio
+from deadtime.estimation.methods._relay import Relay
+from deadtime.estimation.methods._waveform import Waveform
+from deadtime.estimation.planning._identifiability import Identifiability, identifiability
+from deadtime.estimation.planning._monte_carlo import MonteCarlo
+from deadtime.estimation.planning._planned_bound import PlannedBound
+
+__all__ = [
+    "CTA",
+    "GCC",
+    "ARXScan",
+    "Comparison",
+    "CramerRaoBound",
+    "Decay",
+    "Decrement",
+    "DelayEstimate",
+    "FittedRun",
+    "Frequency",
+    "Graphical",
+    "Grid",
+    "Identifiability",
+    "Method",
+    "MonteCarlo",
+    "OutputError",
+    "Overshoot",
+    "PlannedBound",
+    "Relay",
+    "Waveform",
+    "Whiteness",
+    "compare_methods",
+    "damping_ratio",
+    "estimate_delay",
+    "identifiability",
+]

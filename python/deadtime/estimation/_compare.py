@@ -1,0 +1,257 @@
+"""`compare_methods`: estimates of one delay by several methods, and why they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.ranges import OpenRange
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._evidence import check_setpoint_active
+from deadtime.estimation.data._runs import paired_runs
+from deadtime.estimation.methods._decay import Decay
+from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
+from deadtime.estimation.methods._waveform import Waveform
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+
+__all__ = ["Comparison", "compare_methods"]
+
+#: Headings of the columns of `Comparison.rows`.
+COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
+
+#: Largest relative difference of two delays that agree.
+AGREEMENT = 0.03
+
+LABELS = {
+    "dominant": "paper's overshoot",
+    "exact": "exact overshoot",
+    "saturated": "overshoot with limit",
+    "decrement": "decrement",
+    "decay": "decay",
+    "waveform": "waveform",
+    "waveform with lag": "waveform with lag",
+    "output_error": "output error",
+    "output_error with lag": "output error with lag",
+}
+
+#: Names of the fits of all samples within a sentence.
+IN_WORDS = {
+    "waveform": "the fit of the whole waveform",
+    "output_error": "the fit to the logged command",
+}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Estimates of one delay by several methods.
+
+    Attributes
+    ----------
+    estimates : dict of str to DelayEstimate
+        By name: ``dominant``, ``exact``, ``saturated``, ``waveform``, ``waveform with lag``; where
+        a command was logged ``output_error`` and ``output_error with lag``; ``decrement`` and
+        ``decay`` where they give an estimate.
+    refusals : dict of str to str
+        The reasons of the other methods that gave no estimate.
+    """
+
+    estimates: Mapping[str, DelayEstimate]
+    refusals: Mapping[str, str]
+
+    @property
+    def trusted(self) -> str:
+        """Name of the preferred method: the logged command holds more information than the loop."""
+        return "output_error" if "output_error" in self.estimates else "waveform"
+
+    @property
+    def best(self) -> DelayEstimate:
+        """The preferred estimate.
+
+        The fit with a lag if the lag is above zero and the Bayesian information criterion favours
+        it, for the number of independent samples that the autocorrelation of the residuals gives;
+        otherwise the fit of delay and gain.
+        """
+        plain, lagged = self._fits()
+        if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
+            return plain
+        rho = min(0.99, max(0.0, lagged.whiteness.autocorrelation))
+        effective = lagged.residuals.size * (1.0 - rho) / (1.0 + rho)
+        gain = 2.0 * effective * np.log(plain.rms / lagged.rms) if lagged.rms > 0 else np.inf
+        return lagged if gain > np.log(max(effective, 2.0)) else plain
+
+    def _fits(self) -> tuple[DelayEstimate, DelayEstimate | None]:
+        """The trusted fit of delay and gain, and the one with a lag, if there is one."""
+        return self.estimates[self.trusted], self.estimates.get(f"{self.trusted} with lag")
+
+    def pictured(self) -> dict[str, DelayEstimate]:
+        """The estimates for one plot, by their labels in its legend."""
+        names = ("dominant", self.trusted, f"{self.trusted} with lag")
+        return {
+            f"{LABELS[name]}: {self.estimates[name].delay:.3f} s": self.estimates[name]
+            for name in names
+            if name in self.estimates
+        }
+
+    def rows(self) -> list[list[str]]:
+        """The estimates as cells of a table with the headings `COLUMNS`.
+
+        Values that were given, not fitted, are in brackets. A method that refused has one cell with
+        its reason.
+        """
+        rows = []
+        for name, fit in self.estimates.items():
+            interval, total = "–", "–"
+            if fit.calibrated:
+                interval = "{:.3f} – {:.3f}".format(*fit.ci(0.95))
+                total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
+            rows.append(
+                [
+                    LABELS[name],
+                    f"{fit.delay:.3f}",
+                    interval,
+                    _number(fit.gain, "gain" in fit.free),
+                    _number(fit.lag, "lag" in fit.free),
+                    total,
+                    "yes" if fit.adequate else "no",
+                ]
+            )
+        rows += [[LABELS[name], f"refused: {why}"] for name, why in self.refusals.items()]
+        return rows
+
+    def explanation(self) -> list[str]:
+        """Why the methods differ, in sentences."""
+        plain, lagged = self._fits()
+        dominant = self.estimates.get("dominant")
+        sentences = []
+        if dominant is None:
+            sentences.append(
+                f"The overshoot method gives no estimate: {self.refusals['dominant']}."
+            )
+        else:
+            sentences += _overshoot_against_fit(dominant, plain, IN_WORDS[self.trusted])
+        if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
+            sentences.append(
+                "The vehicle has a lag: with it fitted too, the residuals fall from "
+                f"{plain.rms:.3g} to {lagged.rms:.3g} rms, at {lagged.delay:.3f} s of delay and "
+                f"{lagged.lag:.3f} s of lag. Part of what looks like dead time is the dynamics of "
+                f"the vehicle; the sum, {lagged.delay_plus_lag:.3f} s, is what the recording "
+                "determines well."
+            )
+        if not plain.adequate:
+            sentences.append(
+                "The residuals of the fit without lag are coloured: that model only approximates "
+                "the vehicle, and its interval is the robust one."
+            )
+        return sentences
+
+
+def truth_row(numbers: Mapping[str, float]) -> list[str]:
+    """The true parameters of a simulated run, as a further row of `Comparison.rows`."""
+    return [
+        "the truth",
+        f"{numbers['delay']:.3f}",
+        "",
+        f"{numbers['gain']:.3f}",
+        f"{numbers['lag']:.3f}",
+        f"{numbers['delay+lag']:.3f}",
+        "",
+    ]
+
+
+def _number(value: float | None, fitted: bool) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.3f}" if fitted else f"({value:g})"
+
+
+def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: str) -> list[str]:
+    difference = plain.delay - dominant.delay
+    if abs(difference) <= AGREEMENT * plain.delay:
+        return [
+            f"The paper's overshoot method ({dominant.delay:.3f} s) and {fit} "
+            f"({plain.delay:.3f} s) agree."
+        ]
+    sentences = [
+        f"The paper's overshoot method says {dominant.delay:.3f} s, {fit} {plain.delay:.3f} s: "
+        f"they differ by {abs(difference):.3f} s."
+    ]
+    assumed, gain = dominant.gain, plain.gain
+    if assumed is None or gain is None or "gain" not in plain.stderr:
+        return sentences
+    low, high = plain.ci(0.95, "gain")
+    if not low <= assumed <= high:
+        weaker = "weaker" if gain < assumed else "stronger"
+        less = "less" if gain < assumed else "more"
+        short = "too short" if gain < assumed else "too long"
+        sentences.append(
+            f"The gain is not {assumed:g}, as the overshoot method assumes, but {gain:.3f} "
+            f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the "
+            f"estimated delay is {short}. With this gain the same overshoot would mean "
+            f"{dominant.delay * assumed / gain:.3f} s."
+        )
+    return sentences
+
+
+def compare_methods(
+    recording: Recording,
+    loop: ControlLoop,
+    window: OpenRange | None = None,
+) -> Comparison:
+    """Estimate the delay of a recording by every method that applies.
+
+    Parameters
+    ----------
+    recording, loop, window
+        As for `estimate_delay`.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    NotIdentifiableError
+        When no fit of delay and gain has a result.
+    """
+    runs = paired_runs(recording, loop, window)
+    check_setpoint_active(recording.window(*runs[0].window))
+    estimates: dict[str, DelayEstimate] = {}
+    refusals: dict[str, str] = {}
+    named: list[str] = [
+        name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")
+    ]
+    plain = [name for name in named if name != "lag"]
+    for name in get_args(OvershootMap):
+        try:
+            estimates[name] = Overshoot(map=name).estimate(runs, plain)
+        except (NotIdentifiableError, ValueError) as error:
+            refusals[name] = str(error).rstrip(".")
+    # One is for steps with overshoot, the other for steps without; their refusals need no report.
+    readings: list[Method] = [Decrement(), Decay()]
+    for method in readings:
+        with suppress(NotIdentifiableError, ValueError):
+            estimates[method.name] = method.estimate(runs, plain)
+    fits: list[Method] = [Waveform()]
+    if recording.command is not None:
+        fits.append(OutputError())
+    for method in fits:
+        frees = {method.name: plain}
+        if named != plain:
+            frees[f"{method.name} with lag"] = named
+        for name, free in frees.items():
+            try:
+                estimates[name] = method.estimate(runs, free)
+            except NotIdentifiableError as error:
+                refusals[name] = str(error).rstrip(".")
+    if not any(method.name in estimates for method in fits):
+        raise NotIdentifiableError(refusals["waveform"])
+    return Comparison(estimates, refusals)

@@ -1,0 +1,183 @@
+"""`estimate_delay`: choose and run an estimation method."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._evidence import check_setpoint_active
+from deadtime.estimation.data._runs import Loops, Recordings, Windows, paired_runs
+from deadtime.estimation.methods._arx_scan import ARXScan
+from deadtime.estimation.methods._cta import CTA
+from deadtime.estimation.methods._decay import Decay
+from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._frequency import Frequency
+from deadtime.estimation.methods._gcc import GCC
+from deadtime.estimation.methods._graphical import Graphical
+from deadtime.estimation.methods._grid import Grid
+from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.methods._overshoot import Overshoot
+from deadtime.estimation.methods._relay import Relay
+from deadtime.estimation.methods._waveform import Waveform
+from deadtime.recordings import Recording
+
+__all__ = ["JOINT", "METHODS", "automatic_method", "estimate_delay", "method_of"]
+
+#: The methods by name.
+METHODS: Mapping[str, type[Method]] = {
+    method.name: method
+    for method in (
+        OutputError,
+        Waveform,
+        Frequency,
+        Grid,
+        CTA,
+        Overshoot,
+        Decrement,
+        Decay,
+        Graphical,
+        Relay,
+        GCC,
+        ARXScan,
+    )
+}
+
+#: Names of those that fit several recordings together.
+JOINT = tuple(name for name, method in METHODS.items() if method.joint)
+
+
+def estimate_delay(
+    recording: Recordings,
+    loop: Loops,
+    *,
+    method: str | Method = "auto",
+    free: Sequence[str] = ("delay", "gain"),
+    window: Windows = None,
+) -> DelayEstimate:
+    """Estimate the delay of a closed loop from a recording of it.
+
+    Parameters
+    ----------
+    recording : Recording or list of Recording
+        Reference and output over time, as logged where the controller runs. Several recordings of
+        one vehicle are fitted together, by ``"output_error"`` and ``"waveform"``.
+    loop : ControlLoop or list of ControlLoop
+        What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
+        One for all recordings, or one each.
+    method : str or Method
+        What the delay is estimated from. An object of `deadtime.estimation` holds the options of a
+        method, for example ``Waveform(noise="loop")``; a name is the short form of that object
+        with its default options: ``"waveform"`` means ``Waveform()``.
+
+        - ``"output_error"`` (`OutputError`): the response of the vehicle to the command as it was
+          logged. Its standard error is the Cramér-Rao bound; ``"auto"`` takes it where all
+          recordings have a command.
+        - ``"waveform"`` (`Waveform`): the simulated response of the whole loop. ``"auto"`` takes it
+          elsewhere.
+        - ``"frequency"`` (`Frequency`): maximum likelihood at the lines of a spectrum, for periodic
+          experiments.
+        - ``"grid"`` (`Grid`): the cost over a range of delays, kept as a curve; ``"cta"`` (`CTA`):
+          the waveform with Chebyshev's approximation of the delay.
+        - ``"overshoot"`` (`Overshoot`): the overshoot of a step, as Armah & Yi did;
+          ``"decrement"`` (`Decrement`): successive peaks; ``"decay"`` (`Decay`): the tail where
+          nothing overshoots; ``"graphical"`` (`Graphical`): the beginning of a step.
+        - ``"relay"`` (`Relay`): the period of a limit cycle.
+        - ``"gcc"`` (`GCC`): generalised cross-correlation; ``"arx_scan"`` (`ARXScan`): what
+          MATLAB's `delayest` does.
+    free : sequence of str
+        What is fitted, any of ``"delay"``, ``"gain"``, ``"lag"`` and ``"time_constant"``, as the
+        plant has them; ``"waveform"`` also fits ``"limit"`` and ``"start"``, how much later than
+        that of the reference the clock of the output runs. ``"decrement"`` fits delay and gain;
+        ``"overshoot"``, ``"decay"``, ``"graphical"``, ``"relay"``, ``"gcc"`` and ``"arx_scan"``
+        the delay alone, and take what else they need as given.
+    window : (low, high) or list of them, optional
+        The part to use, s, None for an open end: one for all recordings, or a list with one each.
+        For ``"waveform"``, ``"grid"``, ``"cta"`` and all methods that read a step, it should begin
+        at rest and hold one step; ``"output_error"``, ``"frequency"``, ``"gcc"`` and
+        ``"arx_scan"`` take any in which the command changes.
+
+    Returns
+    -------
+    DelayEstimate
+
+    Raises
+    ------
+    NotIdentifiableError
+        When the recording does not determine what was asked for: no step, no overshoot
+        (Kp·Td below 1/e), an output that noise alone would explain, a setpoint that copies the
+        output, a limit cycle where the method is of linear theory, parameters that cannot be
+        distinguished.
+    RecordingError
+        When the window holds too few samples.
+    TypeError
+        For a method that is neither a name nor an object with options.
+    ValueError
+        For a method or free quantity that does not exist, or several recordings for a method that
+        takes one.
+
+    Notes
+    -----
+    A ground station sees the sum of all delays on the way round the loop; from its own log,
+    it cannot distinguish the part in the command from the part in the measurement. A model that
+    does not explain the recording is returned with ``adequate=False``, not refused. Several
+    recordings are weighted by the inverse of their noise where residuals are white, and by that of
+    their excitation where they are not.
+
+    References
+    ----------
+    S. Armah and S. Yi, "Analysis of Time Delays in Quadrotor Systems and Design of Control".
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> truth = dtm.ControlLoop(dtm.Integrator(0.8), dtm.P(2.4), delay=0.4, sample_time=0.065)
+    >>> time = np.arange(150) * 0.065
+    >>> step = np.where(time < 1.0, 0.0, 1.0)
+    >>> response = truth.simulate(time, step, reference_time=time)
+    >>> recording = dtm.Recording(time, step, response.outputs)
+    >>> known = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.4), sample_time=0.065)
+    >>> fit = dtm.estimate_delay(recording, known, free=("delay", "gain"))
+    >>> round(fit.delay, 6), round(fit.gain, 6), fit.adequate
+    (0.4, 0.8, True)
+
+    With an option of the method:
+
+    >>> from deadtime.estimation import Waveform
+    >>> fit = dtm.estimate_delay(recording, known, method=Waveform(initial_output=0.0))
+    >>> round(fit.delay, 6)
+    0.4
+    """
+    runs = paired_runs(recording, loop, window)
+    for run in runs:
+        check_setpoint_active(run.recording.window(*run.window))
+    chosen = method_of(method, (run.recording for run in runs))
+    if len(runs) > 1 and not chosen.joint:
+        raise ValueError(
+            f"the {chosen.name} method takes one recording, not {len(runs)}: fit them together by "
+            f"{' or '.join(map(repr, JOINT))}"
+        )
+    return chosen.estimate(runs, free)
+
+
+def automatic_method(recordings: Iterable[Recording]) -> str:
+    """Name of the method for ``method="auto"``, by whether all recordings have a command."""
+    logged = all(recording.command is not None for recording in recordings)
+    return "output_error" if logged else "waveform"
+
+
+def method_of(method: str | Method, recordings: Iterable[Recording]) -> Method:
+    """The method object: as it was given, or that of a name with its default options."""
+    if isinstance(method, Method):
+        return method
+    if not isinstance(method, str):
+        raise TypeError(
+            f"method must be a name or an object such as Waveform(), got {type(method).__name__}"
+        )
+    name = automatic_method(recordings) if method == "auto" else method
+    if name not in METHODS:
+        raise ValueError(
+            f"method={name!r} is not one of {', '.join(map(repr, ('auto', *METHODS)))}"
+        )
+    return METHODS[name]()

@@ -1,0 +1,340 @@
+"""Results of an estimation, with their uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.validation import real_array
+from deadtime.estimation.fit._profile import Profile, floor_of
+from deadtime.estimation.fit._residuals import Whiteness
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["CramerRaoBound", "DelayEstimate", "FittedRun"]
+
+Array = NDArray[np.float64]
+
+#: Quantities that are not times; a limit has the unit of the command.
+UNITLESS = ("gain", "limit")
+
+
+@dataclass(frozen=True, eq=False)
+class CramerRaoBound(ReadOnlyArrays):
+    """Smallest standard deviations an unbiased estimator can have on this recording.
+
+    Attributes
+    ----------
+    free : tuple of str
+        The parameters that are taken as unknown; the bound depends on them.
+    noise : float
+        Standard deviation of the white measurement noise it is for, in the output's unit.
+    stderr : dict of str to float
+        The bound for each free quantity, and for ``delay+lag`` where both are free.
+    """
+
+    free: tuple[str, ...]
+    noise: float
+    stderr: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRun(ReadOnlyArrays):
+    """One of the recordings of a fit, with its fitted loop.
+
+    Attributes
+    ----------
+    recording : Recording
+        The fitted window.
+    loop : ControlLoop
+        The recorded loop with the fitted parameters.
+    residuals : ndarray, shape (n,)
+        Recorded minus simulated output.
+    """
+
+    recording: Recording
+    loop: ControlLoop
+    residuals: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DelayEstimate(ReadOnlyArrays):
+    """An estimated delay, with the fitted loop and the uncertainty of every fitted parameter.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method.
+    loop : ControlLoop
+        The loop with the fitted parameters.
+    free : tuple of str
+        Names of the fitted parameters.
+    stderr : dict of str to float
+        Standard errors of the free quantities, s or the unit of the gain, and of ``delay+lag``
+        where the delay is free. They are robust ones where the residuals are not white, and NaN
+        where the method has none (see `uncalibrated`).
+    cov : ndarray, shape (len(free), len(free))
+        Their covariance.
+    crb : CramerRaoBound or None
+        The Cramér-Rao bound, with the parameters it takes as free.
+    recording : Recording
+        The fitted window.
+    residuals : ndarray
+        Recorded minus simulated output.
+    whiteness : Whiteness
+        Test of the residuals.
+    adequate : bool
+        Whether the model explains the recording up to white noise. If not, the intervals are
+        the robust ones, and the model only approximates the vehicle.
+    message : str
+        Description of the fit and remarks on it.
+    uncalibrated : str
+        Why there is no interval; empty where there is one.
+    details : dict
+        Further results of the method, such as the overshoot.
+    others : tuple of FittedRun
+        The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
+        the first.
+    """
+
+    method: str
+    loop: ControlLoop
+    free: tuple[str, ...]
+    stderr: dict[str, float]
+    cov: Array
+    crb: CramerRaoBound | None
+    recording: Recording
+    residuals: Array
+    whiteness: Whiteness
+    adequate: bool
+    message: str
+    uncalibrated: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
+    others: tuple[FittedRun, ...] = ()
+    _profile: Profile | None = None
+
+    @property
+    def runs(self) -> tuple[FittedRun, ...]:
+        """All recordings that were fitted together, the first one included."""
+        return (FittedRun(self.recording, self.loop, self.residuals), *self.others)
+
+    @property
+    def delay(self) -> float:
+        """The delay of the loop, s."""
+        return float(self.loop.parameters["delay"])
+
+    @property
+    def gain(self) -> float | None:
+        """Gain of the plant, fitted or as given; None if the plant has no such parameter."""
+        return self.loop.parameters.get("gain")
+
+    @property
+    def lag(self) -> float | None:
+        """Lag of the plant, s, fitted or as given; None if the plant has no such parameter."""
+        return self.loop.parameters.get("lag")
+
+    @property
+    def delay_plus_lag(self) -> float:
+        """The sum of delay and lag, s, which is well determined also where its parts are not."""
+        return self.delay + (self.lag or 0.0)
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the method has confidence intervals with the stated coverage."""
+        return not self.uncalibrated
+
+    @property
+    def has_profile(self) -> bool:
+        """Whether the method has a profile."""
+        return self._profile is not None
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals of all recordings, in the unit of the output."""
+        squares = [run.residuals**2 for run in self.runs]
+        return float(np.sqrt(np.mean(np.concatenate(squares))))
+
+    def ci(self, level: float = 0.95, name: str = "delay") -> tuple[float, float]:
+        """Confidence interval of a fitted quantity.
+
+        Parameters
+        ----------
+        level : float
+            Between 0 and 1.
+        name : str
+            One of `free`, or ``"delay+lag"`` (``"delay+time_constant"`` where that was fitted).
+
+        Returns
+        -------
+        (float, float)
+            In seconds for a delay or lag, and not below zero for these.
+
+        Raises
+        ------
+        ValueError
+            When the method cannot give an interval (the message says why), the level is not
+            between 0 and 1, or the quantity was not fitted.
+        """
+        from scipy import special
+
+        if not 0.0 < level < 1.0:
+            raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+        if not self.calibrated:
+            raise ValueError(f"no interval: {self.uncalibrated}")
+        if name not in self.stderr:
+            raise ValueError(
+                f"{name!r} was not fitted, there are intervals for {', '.join(self.stderr)}"
+            )
+        value = self._value(name)
+        if self._profile is not None and self._profile.preferred:
+            return self._profile.interval(name, value, self._reach(name), level)
+        freedom = max(1, sum(one.residuals.size for one in self.runs) - len(self.free))
+        reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
+        low = value - reach
+        return (max(low, floor_of(name)), value + reach)
+
+    def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Profile likelihood: the increase of the cost when one quantity is held.
+
+        Parameters
+        ----------
+        name : str
+            One of `free`, or ``"delay+lag"``.
+        values : array_like, shape (n,), optional
+            Values at which it is held; by default 41, four standard errors to either side.
+
+        Returns
+        -------
+        values, t : ndarray, shape (n,)
+            At each value the quantile t of the confidence interval that ends there: 1.96 at the
+            ends of a 95 % interval of many samples, and 0 at the fitted value.
+
+        Raises
+        ------
+        ValueError
+            When the method has no profile or the quantity was not fitted.
+        """
+        if self._profile is None:
+            raise ValueError(
+                f"the {self.method} method has no profile; 'output_error' and 'waveform' have"
+            )
+        if name not in self.stderr:
+            raise ValueError(
+                f"{name!r} was not fitted, there are profiles for {', '.join(self.stderr)}"
+            )
+        if values is None:
+            middle, reach = self._value(name), 4.0 * self._reach(name)
+            low = max(middle - reach, floor_of(name))
+            values = np.linspace(low, middle + reach, 41)
+        held = np.atleast_1d(real_array("values", values))
+        found = [self._profile.statistic(name, float(value)) for value in held]
+        return held, np.sqrt(np.array(found))
+
+    def _value(self, name: str) -> float:
+        """The fitted value of a quantity."""
+        known = {**self.loop.parameters, **self.details}
+        return float(sum(known.get(part, 0.0) for part in name.split("+")))
+
+    def _reach(self, name: str) -> float:
+        """About one standard error; for a quantity at its bound, the largest of the other times."""
+        return self.stderr[name] or max(
+            (error for other, error in self.stderr.items() if other not in UNITLESS), default=0.0
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All results but the arrays, as plain values for JSON."""
+        found: dict[str, Any] = {
+            "method": self.method,
+            "delay": self.delay,
+            "gain": self.gain,
+            "lag": self.lag,
+            "delay_plus_lag": self.delay_plus_lag,
+            "free": list(self.free),
+            "stderr": {name: _plain(value) for name, value in self.stderr.items()},
+            "interval_95": (
+                {name: list(self.ci(0.95, name)) for name in self.stderr}
+                if self.calibrated
+                else None
+            ),
+            "rms": self.rms,
+            "white": self.whiteness.white,
+            "residual_autocorrelation": self.whiteness.autocorrelation,
+            "adequate": self.adequate,
+            "message": self.message,
+        }
+        if self.uncalibrated:
+            found["no_interval_because"] = self.uncalibrated
+        return found | dict(self.details)
+
+    def summary(self) -> str:
+        """The result as a few lines of text."""
+        lines = [f"{self.method}: {self.message}"]
+        if self.others:
+            rows = " + ".join(str(len(run.recording)) for run in self.runs)
+            lines.append(f"  {len(self.runs)} recordings together, {rows} samples")
+        width = max((len(name) for name in self.stderr), default=0) + 1
+        for name, stderr in self.stderr.items():
+            unit = "" if name in UNITLESS else "s"
+            line = f"  {name:<{width}}{self._value(name):9.4f} {unit:<2}"
+            if self.calibrated:
+                low, high = self.ci(0.95, name)
+                line += f" ± {stderr:.4f}   95 % interval {low:.4f} to {high:.4f}"
+            lines.append(line.rstrip())
+        if not self.calibrated:
+            lines.append(f"  no interval: {self.uncalibrated}")
+        if self.crb is not None and "delay" in self.crb.stderr:
+            lines.append(
+                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for white noise of "
+                f"{self.crb.noise:.3g} with {', '.join(self.crb.free)} free"
+            )
+        kind = "white" if self.whiteness.white else "coloured"
+        lines.append(
+            f"  residuals {self.rms:.4g} rms, {kind} (lag-1 autocorrelation "
+            f"{self.whiteness.autocorrelation:.2f}); model adequate: "
+            f"{'yes' if self.adequate else 'no'}"
+        )
+        return "\n".join(lines)
+
+    def plot(self, ax: Sequence[Axes] | None = None) -> list[Axes]:
+        """Draw the fit over the data, the residuals, and the profile of the delay.
+
+        Needs matplotlib.
+
+        Parameters
+        ----------
+        ax : sequence of matplotlib.axes.Axes, optional
+            For each recording one for the output and one for the residuals, then one for the
+            profile where there is one. By default those of a new figure.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            If `ax` holds another number of axes.
+        """
+        from deadtime.estimation._plots import plot_estimate
+
+        return plot_estimate(self, ax)
+
+    def __repr__(self) -> str:
+        spread = f" ± {self.stderr['delay']:.3g}" if self.calibrated else ""
+        return (
+            f"<DelayEstimate {self.method}: delay {self.delay:.4g}{spread} s, "
+            f"adequate: {self.adequate}>"
+        )
+
+
+def _plain(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,156 @@
+"""Checks of what a fit can determine: free parameters, distinguishability, standard errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+from deadtime.recordings._recording import MINIMUM_SAMPLES
+
+__all__ = [
+    "LOOP_PARAMETERS",
+    "VEHICLE_PARAMETERS",
+    "check_distinguishable",
+    "check_response",
+    "check_setpoint_active",
+    "checked_names",
+    "embedded",
+    "excited",
+    "lag_name",
+    "standard_errors",
+]
+
+Array = NDArray[np.float64]
+
+#: Ratio of singular values of the scaled Jacobian below which the data do not distinguish two
+#: parameters. Rounding in difference quotients is at about 1e-8, so smaller values mistake rounding
+#: for information.
+INDISTINGUISHABLE = 1e-6
+
+#: Parameters of the vehicle, in the order in which fits report them, and those of the whole loop:
+#: `start` is by how much the clock of the output is later than that of the reference. A sample time
+#: is not among them: the cost jumps where a sample moves from before a step to after it.
+VEHICLE_PARAMETERS = ("delay", "gain", "lag", "time_constant")
+LOOP_PARAMETERS = (*VEHICLE_PARAMETERS, "start", "limit")
+
+#: Significance level of the F test that the response explains the output better than a constant.
+#: Over all delays that are tried, noise alone passes about once in some hundred recordings.
+F_TEST_LEVEL = 1e-4
+
+#: Largest unexplained share of the variance at which residuals count as independent samples in that
+#: test. Above it, autocorrelation reduces the number of samples.
+MOSTLY_EXPLAINED = 0.5
+
+
+def checked_names(
+    free: Sequence[str], loop: ControlLoop, known: tuple[str, ...] = VEHICLE_PARAMETERS
+) -> tuple[str, ...]:
+    """Return the names of what is to be fitted, or raise where this loop has no such parameter."""
+    if isinstance(free, str):
+        free = (free,)
+    unknown = [name for name in free if name not in known]
+    if unknown or not free:
+        raise ValueError(f"free={tuple(free)!r}: choose from {known}, at least one")
+    given = {"delay", "start"}
+    missing = [name for name in free if name not in given and name not in loop.parameters]
+    if missing:
+        raise ValueError(
+            f"this loop has no {missing[0]} to fit (its parameters are "
+            f"{', '.join(loop.parameters)}): give it a value to start from, or leave it out of "
+            "`free`"
+        )
+    if "delay" not in free and loop.delay is None:
+        raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
+    return tuple(name for name in known if name in free)
+
+
+def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
+    """Refuse parameters that the recording does not distinguish, by name."""
+    norms = np.linalg.norm(jacobian, axis=0)
+    if not np.all(np.isfinite(norms)) or np.any(norms == 0.0):
+        unseen = [name for name, norm in zip(names, norms, strict=True) if not norm > 0.0]
+        raise NotIdentifiableError(
+            f"the recording does not depend on the {' or '.join(unseen) or 'parameters'}: the "
+            "window holds no response to a step, or the command is at its limit throughout"
+        )
+    # The thin factor: the full one has as many entries as samples squared.
+    _, singular, directions = np.linalg.svd(jacobian / norms, full_matrices=False)
+    if singular[-1] < INDISTINGUISHABLE * singular[0]:
+        weights = np.abs(directions[-1])
+        mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]
+        raise NotIdentifiableError(
+            f"{' and '.join(mixed)} cannot be told apart by this recording: fix one of them, or "
+            "record a step that is not at the limit throughout"
+        )
+
+
+def excited(recording: Recording) -> float:
+    """Size of the excitation: the range of the reference, or of the output if that is constant."""
+    return float(np.ptp(recording.reference)) or float(np.ptp(recording.output))
+
+
+def check_setpoint_active(recording: Recording) -> None:
+    """Refuse a reference that equals the output, as loggers write it while a mode is inactive."""
+    moving = np.flatnonzero(np.diff(recording.output)) + 1
+    copied = int(np.sum(recording.reference[moving] == recording.output[moving]))
+    if moving.size >= MINIMUM_SAMPLES and copied > 0.5 * moving.size:
+        raise NotIdentifiableError(
+            f"the reference equals the output in {copied} of the {moving.size} rows in which the "
+            "output moves: the setpoint is inactive there, or one column was read twice; choose a "
+            "window in which the controller follows a setpoint of its own"
+        )
+
+
+def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: float) -> None:
+    """Refuse an output that the fitted response explains hardly better than a constant: noise.
+
+    The test is an F test. Coloured residuals count as fewer independent samples, unless most of
+    the variance is explained: then the model is incomplete, but there is a response.
+    """
+    from scipy import special
+
+    centred = output - output.mean()
+    constant, fitted = float(centred @ centred), float(misfit @ misfit)
+    if fitted == 0.0:
+        return
+    samples = float(misfit.size)
+    if fitted > MOSTLY_EXPLAINED * constant:
+        rho = min(0.99, max(0.0, autocorrelation))
+        samples *= (1.0 - rho) / (1.0 + rho)
+    freedom = max(1.0, samples - numbers - 1)
+    ratio = (constant - fitted) / numbers * freedom / fitted
+    if not ratio > 0.0 or special.fdtrc(numbers, freedom, ratio) > F_TEST_LEVEL:
+        explained = 100.0 * max(0.0, 1.0 - fitted / constant) if constant > 0.0 else 0.0
+        raise NotIdentifiableError(
+            f"the output does not respond to the excitation: the best fit explains {explained:.0f} "
+            "% of its variance, as much as for noise alone; check columns, signs and gains, "
+            "choose a window with a step, or record a larger one"
+        )
+
+
+def embedded(cov: Array, loose: list[int], size: int) -> Array:
+    """Covariance of all parameters; zero for those at a bound, which were not `loose`."""
+    full = np.zeros((size, size))
+    full[np.ix_(loose, loose)] = cov
+    return full
+
+
+def lag_name(names: Sequence[str]) -> str:
+    """The parameter that acts like a delay: ``time_constant`` where it is fitted, else ``lag``."""
+    return "time_constant" if "time_constant" in names else "lag"
+
+
+def standard_errors(names: tuple[str, ...], cov: Array) -> dict[str, float]:
+    """Standard errors of `names`, and of ``delay+lag`` where the delay is among them."""
+    errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
+    if "delay" in names:
+        slow = lag_name(names)
+        total = np.array([1.0 if name in ("delay", slow) else 0.0 for name in names])
+        count = len(names)
+        errors[f"delay+{slow}"] = float(np.sqrt(total @ cov[:count, :count] @ total))
+    return errors

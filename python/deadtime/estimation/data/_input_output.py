@@ -1,0 +1,110 @@
+"""Command and response of a vehicle, sample by sample, with its known dynamics inverted.
+
+With u_k the command held over each sample time h, or its mean over it, an integrator moves by
+(y_{k+1} - y_k)/h per second and a first-order plant with time constant c leaves
+(y_{k+1} - p y_k)/(1 - p), p = e^(-h/c), behind: in both cases the gain times the mean input between
+the two samples, which for the integrator is the command (1-f) u_{k-d} + f u_{k-d-1} at a delay of
+(d + f) h. This includes the half sample of the hold; where the plant cannot be inverted, the half
+sample is subtracted from the delay.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation.data._commands import commands_over_samples
+from deadtime.estimation.data._excitation import check_moves
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.loops import ControlLoop, FirstOrder, Integrator
+from deadtime.recordings import Recording
+
+__all__ = ["InputOutput", "read_input_output"]
+
+Array = NDArray[np.float64]
+
+#: Fewest samples for a delay by correlation or regression.
+FEWEST = 16
+
+#: Largest relative deviation of the time between samples from its median.
+EVEN = 0.01
+
+#: Longest delay of the search, as a share of the record.
+LONGEST = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class InputOutput:
+    """Input and output of a vehicle behind a delay.
+
+    Attributes
+    ----------
+    command : ndarray, shape (n,)
+        Command of each sample, less the one that keeps the vehicle at its initial output.
+    response : ndarray, shape (n,)
+        Gain times the mean input of the vehicle over each sample time.
+    sample_time : float
+        s.
+    late : float
+        Delay of the response besides the delay itself, s: what was not inverted of plant and hold.
+    source : str
+        Source of the commands.
+    remark : str
+        What else is part of the delay, in words; empty if nothing.
+    """
+
+    command: Array
+    response: Array
+    sample_time: float
+    late: float
+    source: str
+    remark: str
+
+    @property
+    def longest(self) -> int:
+        """Longest delay of the search, in samples."""
+        return int(LONGEST * self.command.size)
+
+
+def read_input_output(
+    recording: Recording, loop: ControlLoop, simulated: SimulatedRecording, method: str
+) -> InputOutput:
+    """Input and output over the window of `simulated`; refuses constant ones."""
+    data = simulated.recording
+    steps = np.diff(data.time)
+    h = data.sample_time
+    if float(np.max(np.abs(steps - h))) > EVEN * h:
+        raise NotIdentifiableError(
+            f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: the "
+            f"{method} method needs even ones; use method='output_error' or 'waveform'"
+        )
+    command, source = commands_over_samples(data, loop)
+    if len(data) < FEWEST:
+        raise NotIdentifiableError(
+            f"{len(data)} samples are too few for the {method} method, {FEWEST} are needed: widen "
+            "the window"
+        )
+    check_moves(data.output, command)
+    return _inverted(command, data.output, loop, h, source)
+
+
+def _inverted(
+    command: Array, output: Array, loop: ControlLoop, h: float, source: str
+) -> InputOutput:
+    """Command and response without the plant, as far as it can be inverted."""
+    plant = loop.plant
+    moved = output - float(output[0])
+    if isinstance(plant, Integrator):
+        return InputOutput(command[:-1], np.diff(moved) / h, h, plant.lag, source, "")
+    if isinstance(plant, FirstOrder):
+        kept = math.exp(-h / plant.time_constant)
+        response = (moved[1:] - kept * moved[:-1]) / (1.0 - kept)
+        resting = float(output[0]) / plant.gain
+        return InputOutput(command[:-1] - resting, response, h, 0.0, source, "")
+    remark = "; the plant was not inverted, so its lag is part of the delay"
+    centred = output - float(output.mean())
+    return InputOutput(command - float(command.mean()), centred, h, 0.5 * h, source, remark)

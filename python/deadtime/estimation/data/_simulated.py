@@ -1,0 +1,174 @@
+"""Simulations of the recorded loop over a window of the recording.
+
+This file alone turns a window of a recording into initial conditions: the loop starts at rest at
+its output at the beginning of the window, the simulation is evaluated at the time stamps of the
+recording, and in a sampled loop the commands of the last delay before the window, which its rows
+hold, are still to arrive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import RecordingError
+from deadtime.estimation.data._evidence import excited
+from deadtime.loops import ControlLoop, P
+from deadtime.recordings import Recording
+from deadtime.systems import Response
+
+__all__ = ["SimulatedRecording"]
+
+Array = NDArray[np.float64]
+
+#: Longest window, in samples of the recording and of the loop (bounds the time of a fit).
+MOST_SAMPLES = 50_000
+
+#: Relative step of difference quotients: of the parameter, the time between two samples, or the
+#: excitation.
+STEP = 1e-5
+
+#: Step of the difference quotient by a delay or lag of zero in a continuous loop, as a share of the
+#: time between two samples. A shorter one makes the loop stiff.
+STEP_FROM_ZERO = 0.25
+
+IN_S = frozenset({"delay", "lag", "start"})
+NOT_NEGATIVE = frozenset({"delay", "lag"})
+
+
+class SimulatedRecording:
+    """Simulations of one loop at the time stamps of one window of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        The whole recording.
+    loop : ControlLoop
+        The known part of the loop; its delay may be None.
+    window : (float or None, float or None)
+        The part that is simulated, s.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        loop: ControlLoop,
+        window: tuple[float | None, float | None] = (None, None),
+    ) -> None:
+        rows = recording.rows(*window)
+        # The recorded output is the one that the controller received, wherever the delay is.
+        self.loop = loop.replace(delay_path="command")
+        self.recording = recording.window(*window)
+        _check_work(self.recording, loop)
+        self._past = _past_commands(recording, loop, rows.start)
+
+    def output(self, values: Mapping[str, float], start: float) -> Array:
+        """Output of the loop with these parameters, from rest at the output `start`."""
+        return self._run(values, start).outputs
+
+    def slopes(self, values: Mapping[str, float], start: float) -> dict[str, Array]:
+        """Derivatives of the output by each of `values` and its start (``initial output``).
+
+        Exact where the loop has sensitivities, difference quotients elsewhere; the output itself
+        is there as ``output``.
+        """
+        exact = [name for name in values if name in self._differentiable]
+        loop = self.loop.replace(**_of_the_loop(values))
+        # At zero the derivative by a lag equals that by a delay.
+        no_lag = loop.parameters.get("lag") == 0.0
+        if no_lag and "lag" in exact:
+            exact = [*(name for name in exact if name not in ("lag", "delay")), "delay"]
+        if loop.delay == 0.0 and not loop.is_sampled:
+            exact = [name for name in exact if name != "delay"]
+        run = self._run(values, start, exact)
+        found = {"output": run.outputs, **run.sensitivities}
+        if no_lag and "delay" in found:
+            found["lag"] = found["delay"]
+        for name in values:
+            if name not in found:
+                found[name] = self._quotient(values, start, name)
+        change = STEP * excited(self.recording)
+        found["initial output"] = (self.output(values, start + change) - run.outputs) / change
+        return found
+
+    def _quotient(self, values: Mapping[str, float], start: float, name: str) -> Array:
+        """Difference quotient by one parameter, one-sided where it is at its lower bound."""
+        value = values[name]
+        change = STEP * max(abs(value), self.recording.sample_time if name in IN_S else 0.0)
+        if value == 0.0 and name in NOT_NEGATIVE and not self.loop.is_sampled:
+            change = STEP_FROM_ZERO * self.recording.sample_time
+        low = max(0.0, value - change) if name in NOT_NEGATIVE else value - change
+        higher = self.output({**values, name: value + change}, start)
+        return (higher - self.output({**values, name: low}, start)) / (value + change - low)
+
+    @cached_property
+    def _differentiable(self) -> frozenset[str]:
+        smooth = self.loop.controller._filter
+        on_samples = smooth is not None and smooth.discretisation is not None
+        if on_samples and self.loop.is_sampled:
+            return frozenset()
+        return frozenset({"delay", *self.loop.parameters})
+
+    def _run(
+        self, values: Mapping[str, float], start: float, sensitivities: Sequence[str] = ()
+    ) -> Response:
+        window = self.recording
+        # The clock of the output is late: its time stamp t was at t - late.
+        late = values.get("start", 0.0)
+        loop = self.loop.replace(**_of_the_loop(values))
+        phase = 0.0
+        if loop.sample_time is not None:
+            phase = late % loop.sample_time
+            phase = 0.0 if phase >= loop.sample_time else phase
+        return loop.simulate(
+            window.time - late,
+            window.reference,
+            reference_time=window.time,
+            initial_output=start,
+            command_history=self._past,
+            sample_phase=phase,
+            sensitivities=sensitivities,
+        )
+
+    def residuals(self, values: Mapping[str, float], start: float) -> Array:
+        """Recorded minus simulated output."""
+        return self.recording.output - self.output(values, start)
+
+
+def _of_the_loop(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if name != "start"}
+
+
+def _check_work(window: Recording, loop: ControlLoop) -> None:
+    """Refuse windows whose fit, some hundred simulations, would take minutes."""
+    advice = "use a window around one step"
+    if len(window) > MOST_SAMPLES:
+        raise RecordingError(
+            f"{len(window)} samples exceed the {MOST_SAMPLES} that a fit can simulate in "
+            f"reasonable time: {advice}, or keep every tenth sample"
+        )
+    held = 0.0
+    if loop.sample_time is not None:
+        held = float(window.time[-1] - window.time[0]) / loop.sample_time
+    if held > MOST_SAMPLES:
+        raise RecordingError(
+            f"the recording lasts {window.time[-1] - window.time[0]:g} s, {held:.3g} times the "
+            f"sample_time of {loop.sample_time:g} s: {advice}, and check that its time stamps are "
+            "seconds"
+        )
+
+
+def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array:
+    """Commands before row `start`, where the loop is sampled and the rows determine them."""
+    if loop.sample_time is None or start == 0:
+        return np.empty(0)
+    if recording.command is not None:
+        return recording.command[:start]
+    if not isinstance(loop.controller, P):
+        return np.empty(0)
+    command = loop.controller.Kp * (recording.reference[:start] - recording.output[:start])
+    limit = np.inf if loop.limit is None else loop.limit
+    return np.clip(command, -limit, limit)

@@ -1,0 +1,137 @@
+"""One step of the reference in a recording, and the step response as a share of the step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.loops import ControlLoop, Integrator, P
+from deadtime.recordings import Recording, Step
+
+__all__ = ["CLEARANCE", "StepReading", "noise_of_second_differences", "read_step", "stiffness_of"]
+
+#: Smallest size of what is read from the response, in standard deviations of the noise.
+CLEARANCE = 3.0
+
+#: Longest time before the step over which the initial output is averaged, s.
+BEFORE_STEP = 2.0
+
+#: Fewest samples at rest whose standard deviation alone gives the noise.
+ENOUGH = 20
+
+#: Least share of the step at the end; below it the output does not follow the reference.
+FOLLOWS = 0.5
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class StepReading:
+    """The response to one step.
+
+    Attributes
+    ----------
+    step : Step
+        The step.
+    start : float
+        Mean output before the step.
+    start_samples : int
+        Number of samples in that mean.
+    size : float
+        From `start` to the new reference.
+    noise : float
+        Standard deviation of the sensor noise, as a share of the step.
+    since : ndarray, shape (n,)
+        Time since the step, s.
+    travelled : ndarray, shape (n,)
+        Output as a share of the step: 0 at the start, 1 at the new reference.
+    """
+
+    step: Step
+    start: float
+    start_samples: int
+    size: float
+    noise: float
+    since: Array
+    travelled: Array
+
+    @property
+    def tail(self) -> Array:
+        """The last quarter of `travelled`."""
+        return self.travelled[-max(4, self.travelled.size // 4) :]
+
+
+def stiffness_of(loop: ControlLoop, method: str) -> float:
+    """K = gain·Kp of the loop, which has to be an integrator under proportional control."""
+    if not isinstance(loop.plant, Integrator) or not isinstance(loop.controller, P):
+        raise ValueError(
+            f"the {method} method is for an Integrator under P control, the loop has "
+            f"{type(loop.plant).__name__} under {type(loop.controller).__name__}: use "
+            "method='waveform'"
+        )
+    stiffness = loop.plant.gain * loop.controller.Kp
+    if stiffness <= 0.0:
+        raise ValueError(
+            f"gain·Kp = {stiffness:g}: the loop must have negative feedback; check the signs"
+        )
+    return stiffness
+
+
+def read_step(recording: Recording) -> StepReading:
+    """The response to the one step in a recording; refuses windows with none or several."""
+    steps = recording.steps()
+    if not steps:
+        raise NotIdentifiableError(
+            "the reference is constant in the window, so there is no step; begin the window some "
+            "samples before a step"
+        )
+    if len(steps) > 1:
+        times = ", ".join(f"{step.time:g}" for step in steps[:6])
+        raise NotIdentifiableError(
+            f"{len(steps)} steps of the reference in the window (at {times} s): choose a window "
+            "with one of them"
+        )
+    step = steps[0]
+    after = recording.output[step.index :]
+    before = recording.output[: step.index]
+    before = before[recording.time[: step.index] >= step.time - BEFORE_STEP]
+    if before.size == 0 or after.size < 4:
+        raise NotIdentifiableError(
+            f"the window leaves {before.size} samples before and {after.size} after the step at "
+            f"{step.time:g} s: widen it"
+        )
+    start = float(before.mean())
+    size = step.after - start
+    if size == 0.0 or math.copysign(1.0, size) != math.copysign(1.0, step.amplitude):
+        raise NotIdentifiableError(
+            f"the output is {start:g} before the step from {step.before:g} to {step.after:g}: the "
+            "loop was not at rest"
+        )
+    travelled = (after - start) / size
+    since = recording.time[step.index :] - step.time
+    tail = travelled[-max(4, travelled.size // 4) :]
+    if float(np.mean(tail)) < FOLLOWS:
+        raise NotIdentifiableError(
+            f"the output ends at {100 * float(np.mean(tail)):.3g} % of the step at {step.time:g} "
+            "s: it does not follow the reference; check columns and units, or widen the window"
+        )
+    noise = _noise(before, after[-max(4, after.size // 4) :]) / abs(size)
+    return StepReading(step, start, before.size, size, noise, since, travelled)
+
+
+def _noise(before: Array, tail: Array) -> float:
+    """Standard deviation of the sensor noise, from the samples at rest."""
+    resting = float(np.std(before, ddof=1)) if before.size >= 5 else 0.0
+    if before.size >= ENOUGH:
+        return resting
+    # Few samples often give too small a value.
+    return max(resting, noise_of_second_differences(tail))
+
+
+def noise_of_second_differences(values: Array) -> float:
+    """Standard deviation of the noise on a smooth signal of at least three values."""
+    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / math.sqrt(6.0)

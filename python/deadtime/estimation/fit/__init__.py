@@ -1,0 +1,1 @@
+"""Least squares, profile likelihood, and tests of residuals."""

@@ -1,0 +1,1 @@
+"""The methods of estimation, one file each, and what their results share."""

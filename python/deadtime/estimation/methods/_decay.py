@@ -1,0 +1,201 @@
+"""Delay from the exponential tail of a step response that does not overshoot.
+
+With K Td < 1/e the rightmost root of s (lag s + 1) + K e^(-s Td) = 0 is real, s = -r, and the
+control error decays as e^(-r t). The rate r is fitted to the tail by least squares; then
+
+    Td = ln(r (1 - lag r)/K)/r                    continuous,
+    K = -1/H(e^(-r h); Td)                        sampled every h, H the held plant,
+
+so the gain has to be known: an error of one per cent in it has about the effect of one in 1/r. The
+mode of the next root, also real, decays faster, but near K Td = 1/e hardly so: a later tail
+contains less of it, and less signal. The standard error is that of r by the delta method. The
+method assumes the gain, an output that ends at the reference, and no disturbance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.validation import positive
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._extremes import check_decays, read_extremes
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
+from deadtime.estimation.fit._residuals import robust_covariance
+from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
+from deadtime.estimation.models._held_transfer import held_transfer
+from deadtime.loops import ControlLoop
+
+__all__ = ["Decay"]
+
+Array = NDArray[np.float64]
+
+#: Fewest samples of a tail, and the smallest share of the step that is not rounding.
+FEWEST, LEAST = 5, 1e-6
+
+
+@dataclass(frozen=True)
+class Decay(Method):
+    """Delay from the exponential tail of a step response that does not overshoot.
+
+    Parameters
+    ----------
+    tail : float
+        The tail begins where this share of the step is left; between 0 and 1.
+
+    Raises
+    ------
+    ValueError
+        When the share is not between 0 and 1.
+    """
+
+    tail: float = 0.3
+
+    name: ClassVar[str] = "decay"
+
+    def __post_init__(self) -> None:
+        if positive("tail", self.tail) >= 1.0:
+            raise ValueError(
+                f"tail={self.tail}: the tail begins where this share of the step is left, so give "
+                "a number below 1"
+            )
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("decay", free)
+        stiffness = stiffness_of(loop, "decay")
+        simulated = SimulatedRecording(recording, loop, window)
+        reading = read_step(simulated.recording)
+        extremes = read_extremes(reading)
+        check_decays(extremes, "decay")
+        if extremes:
+            raise NotIdentifiableError(
+                "the output overshoots, so the rightmost roots are complex and the tail is no "
+                "exponential: use method='decrement', 'overshoot' or 'waveform'"
+            )
+        rate, error, samples = _tail_rate(reading, _begin(reading, loop, self.tail))
+        lag = loop.parameters["lag"]
+
+        def delay_of(r: float) -> float:
+            return _delay(r, stiffness, lag, loop.sample_time)
+
+        delay = delay_of(rate)
+        step = 1e-6 * rate
+        slope = (delay_of(rate + step) - delay_of(rate - step)) / (2.0 * step)
+        stderr = abs(slope) * error
+        if delay < 0.0:
+            raise NotIdentifiableError(
+                f"the tail decays with {rate:.4g} 1/s, slower than with K = {stiffness:.4g} 1/s "
+                "and no delay at all: the gain is smaller than given, or the tail "
+                "begins too late; check the gains"
+            )
+        held = 0.5 * (loop.sample_time or 0.0)
+        if rate * (delay + lag + held) >= 1.0:
+            raise NotIdentifiableError(
+                f"the tail decays with {rate:.4g} 1/s, faster than e·K = {math.e * stiffness:.4g} "
+                "1/s, the most without overshoot: K·Td is near or above 1/e; use "
+                "method='decrement' or 'waveform'"
+            )
+        return read_off_estimate(
+            "decay",
+            simulated,
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            reading.start,
+            message=(
+                f"{samples} samples of the tail decay with {rate:.4g} ± {error:.2g} 1/s: assumes "
+                f"a gain of {loop.parameters['gain']:g} and an output that ends at the reference"
+            ),
+            uncalibrated=(
+                "the decay method assumes the given gain and an exponential tail: noise "
+                f"alone makes the delay uncertain by {stderr:.2g} s, a gain that is 1 % off moves "
+                f"it by {0.01 / rate:.2g} s, and other modes in the tail shift it "
+                "further; use method='waveform' for an interval"
+            ),
+            details={"rate": rate, "rate_error": error, "tail_samples": samples},
+        )
+
+
+def _begin(reading: StepReading, loop: ControlLoop, share: float) -> float:
+    """Time after the step from which the error is below the share and no command was limited."""
+    left = 1.0 - reading.travelled
+    above = np.flatnonzero(left > share)
+    begin = float(reading.since[above[-1] + 1]) if above[-1] + 1 < left.size else math.inf
+    if loop.limit is not None:
+        most = loop.limit / (loop.parameters["Kp"] * abs(reading.size))
+        limited = np.flatnonzero(left > most)
+        if limited.size:
+            # The first movement of the output is an upper bound of the delay.
+            moved = reading.travelled > max(CLEARANCE * reading.noise, LEAST)
+            begin = max(begin, float(reading.since[limited[-1]] + reading.since[np.argmax(moved)]))
+    return begin
+
+
+def _tail_rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
+    """Rate of an exponential from `begin` on, its standard error and the number of samples."""
+    from scipy.optimize import least_squares
+
+    rows = reading.since >= begin
+    # Errors below rounding hold no information.
+    rows &= np.maximum.accumulate((1.0 - reading.travelled)[::-1])[::-1] > LEAST * 1e-3
+    time, left = reading.since[rows], 1.0 - reading.travelled[rows]
+    if time.size < FEWEST:
+        raise NotIdentifiableError(
+            f"{time.size} samples of a tail, {FEWEST} are needed: sample faster, record longer or "
+            "let the tail begin earlier with a larger `tail`"
+        )
+    time = time - time[0]
+    clear = left > max(CLEARANCE * reading.noise, 0.2 * float(left[0]))
+    first = max(2, int(np.argmin(clear)) if not clear.all() else left.size)
+    guess = -np.polyfit(time[:first], np.log(np.abs(left[:first]) + LEAST * 1e-6), 1)[0]
+
+    def misfit(point: Array) -> Array:
+        return np.asarray(point[0] * np.exp(-point[1] * time) - left)
+
+    found = least_squares(
+        misfit, [left[0], max(guess, 1e-3)], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14
+    )
+    height, rate = float(found.x[0]), float(found.x[1])
+    decays = np.exp(-rate * time)
+    jacobian = np.stack([decays, -height * time * decays], axis=1)
+    error = math.sqrt(robust_covariance(jacobian, -found.fun)[1, 1])
+    if height <= 0.0 or rate <= 0.0 or rate < CLEARANCE * error:
+        raise NotIdentifiableError(
+            f"the tail decays with {rate:.3g} ± {error:.2g} 1/s, not distinguishable from "
+            "zero: let it begin earlier with a larger `tail`, or use method='waveform'"
+        )
+    return rate, error, int(time.size)
+
+
+def _delay(rate: float, stiffness: float, lag: float, sample_time: float | None) -> float:
+    """Delay of the loop with the root -rate; negative where there is none."""
+    from scipy.optimize import brentq
+
+    if lag * rate >= 1.0:
+        raise NotIdentifiableError(
+            f"the tail decays with {rate:.4g} 1/s, faster than possible with a lag of {lag:g} s: "
+            "the lag is smaller than given"
+        )
+    delay = math.log(rate * (1.0 - lag * rate) / stiffness) / rate
+    if sample_time is None:
+        return delay
+    h = sample_time
+    z = math.exp(-rate * h)
+
+    def excess(late: float) -> float:
+        return math.log((-1.0 / held_transfer(complex(z), late, lag, h)).real / stiffness)
+
+    # The hold delays by about half a sample; a rate that is too small gives a negative delay.
+    if excess(0.0) <= 0.0:
+        return min(excess(0.0) / rate, -1e-300)
+    return float(brentq(excess, 0.0, max(delay, 0.0) + h, xtol=1e-15))

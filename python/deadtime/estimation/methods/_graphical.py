@@ -1,0 +1,193 @@
+"""Graphical construction of the delay from the beginning of one step response.
+
+An integrator under P control does not move for Td after a step. For another Td it rises along a
+straight line, because the commands that arrive were computed before it moved:
+
+* ``tangent``: the line through that straight part, from Td to 2 Td (in a sampled loop to Td after
+  the first sample that can see a movement), meets the initial output at Td. The straight part is
+  found by iteration.
+* ``two_point``: the line through the times at which two shares of the step are reached.
+* ``first_movement``: the first sample from which on the output stays above the noise; later than
+the
+  delay by the time this takes, and by up to a sample.
+
+A limit and a hold do not bend the line. A lag does: part of it counts as delay. Shares beyond K Td
+(or beyond limit Td over the step) are no longer on the line. Only the few samples on the line are
+used, and there is no interval.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._extremes import check_decays, read_extremes
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
+from deadtime.estimation.methods._method import Method, check_choice
+from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
+
+__all__ = ["Construction", "Graphical"]
+
+Construction = Literal["tangent", "two_point", "first_movement"]
+Array = NDArray[np.float64]
+
+#: Movements below this share of the step count as rounding.
+LEAST = 1e-9
+
+#: Most iterations of the tangent; one that has not converged by then alternates between two sets of
+#: samples.
+ITERATIONS = 30
+
+
+@dataclass(frozen=True)
+class Graphical(Method):
+    """Delay from the beginning of one step response, by a construction with straight lines.
+
+    Parameters
+    ----------
+    construction : {"tangent", "two_point", "first_movement"}
+        The line through the straight part of the rise, the line through two points of it, or the
+        first sample that stands out of the noise.
+    shares : (float, float)
+        Shares of the step that the two points of ``"two_point"`` have reached, increasing.
+
+    Raises
+    ------
+    ValueError
+        For another construction, or shares that do not increase between 0 and 1.
+    """
+
+    construction: Construction = "tangent"
+    shares: tuple[float, float] = (0.1, 0.35)
+
+    name: ClassVar[str] = "graphical"
+
+    def __post_init__(self) -> None:
+        check_choice("construction", self.construction, get_args(Construction))
+        low, high = self.shares
+        if not 0.0 < low < high < 1.0:
+            raise ValueError(f"shares={self.shares}: give two that increase, between 0 and 1")
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("graphical", free)
+        simulated = SimulatedRecording(recording, loop, window)
+        reading = read_step(simulated.recording)
+        check_decays(read_extremes(reading), "graphical")
+        moved = _first_movement(reading)
+        delay, stderr = float(reading.since[moved]), math.nan
+        if self.construction != "first_movement":
+            stiffness_of(loop, "graphical")
+        if self.construction == "two_point":
+            delay = _two_point(reading, *self.shares)
+        elif self.construction == "tangent":
+            delay, stderr = _tangent(reading, moved, loop.sample_time)
+        if not delay > 0.0:
+            raise NotIdentifiableError(
+                f"the line meets the initial output {-delay:.3g} s before the step: the samples on "
+                "it are too few or too noisy, or there is no delay; use method='waveform'"
+            )
+        return read_off_estimate(
+            "graphical",
+            simulated,
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            reading.start,
+            message=(
+                f"{self.construction.replace('_', ' ')} of one step: part of a lag counts as delay"
+            ),
+            uncalibrated=(
+                "the graphical method uses the first samples that move, and its error "
+                "by a lag or by its thresholds is not known; use method='waveform' for an interval"
+            ),
+            details={
+                "construction": self.construction,
+                "first_movement": float(reading.since[moved]),
+                "noise": reading.noise,
+            },
+        )
+
+
+def _first_movement(reading: StepReading) -> int:
+    """Row of the first sample from which on the output stays above the noise."""
+    least = max(CLEARANCE * reading.noise, LEAST)
+    still = np.flatnonzero(reading.travelled <= least)
+    moved = int(still[-1]) + 1 if still.size else 0
+    # An unstable response returns to the start later: take its first movement.
+    half = int(np.argmax(reading.travelled >= 0.5))
+    if moved > half:
+        moved = int(np.flatnonzero(reading.travelled[:half] <= least)[-1]) + 1 if half else 0
+    if moved == 0 or moved >= reading.travelled.size:
+        raise NotIdentifiableError(
+            f"the output moves within the first sample after the step at {reading.step.time:g} s, "
+            "or not at all, so no delay can be read"
+        )
+    return moved
+
+
+def _two_point(reading: StepReading, low: float, high: float) -> float:
+    """Time after the step, s, at which the line through two shares meets the initial output."""
+    if low < CLEARANCE * reading.noise:
+        raise NotIdentifiableError(
+            f"a share of {low:g} is within the noise of {reading.noise:.2g} of the step: give "
+            "larger `shares`, or a larger step"
+        )
+    times = []
+    for share in (low, high):
+        row = int(np.argmax(reading.travelled >= share))
+        before, after = reading.travelled[row - 1 : row + 1]
+        part = (share - before) / (after - before)
+        times.append(
+            float(reading.since[row - 1] + part * (reading.since[row] - reading.since[row - 1]))
+        )
+    return times[0] - (times[1] - times[0]) * low / (high - low)
+
+
+def _tangent(reading: StepReading, moved: int, held: float | None) -> tuple[float, float]:
+    """Time after the step, s, at which the straight part meets the initial output; its error."""
+    # Between the last sample that had not moved and the first that had.
+    delay = 0.5 * float(reading.since[moved - 1] + reading.since[moved])
+    line = (0.0, 0.0, math.nan)
+    for _ in range(ITERATIONS):
+        seen = delay if held is None else held * math.ceil(delay / held - 1e-9)
+        until = delay + seen
+        rows = (reading.since >= delay) & (reading.since <= until + 1e-9)
+        if int(rows.sum()) < 2:
+            raise NotIdentifiableError(
+                f"{int(rows.sum())} samples on the straight part, from {delay:.3g} to "
+                f"{until:.3g} s after the step: sample faster than twice a delay, or use "
+                "method='waveform'"
+            )
+        line = _line(reading.since[rows], reading.travelled[rows], reading.noise)
+        if line[0] <= 0.0:
+            raise NotIdentifiableError(
+                "the output falls where it should rise along a straight line: the noise hides "
+                "the beginning of the response; use method='waveform'"
+            )
+        updated = line[1]
+        if not 0.0 < updated < 2.0 * delay or abs(updated - delay) < 1e-12:
+            break
+        delay = updated
+    return line[1], line[2]
+
+
+def _line(time: Array, share: Array, noise: float) -> tuple[float, float, float]:
+    """Slope of a line, its zero, and the standard error of the zero."""
+    centre = float(time.mean())
+    power = float(np.sum((time - centre) ** 2))
+    slope = float((time - centre) @ share) / power
+    if slope == 0.0:
+        return 0.0, math.nan, math.nan
+    place = centre - float(share.mean()) / slope
+    variance = noise**2 / slope**2 * (1.0 / time.size + (centre - place) ** 2 / power)
+    return slope, place, math.sqrt(variance)

@@ -1,0 +1,349 @@
+"""Cost of the simulated loop over a grid of delays (Leva), its minimum refined.
+
+For each delay of a grid the loop is simulated with its hold and its limit, everything else that is
+free (gain, lag, initial output) at its best for that delay, and the sum of squared residuals is
+kept: the curve shows every local minimum, where a search finds one. From the lowest points, least
+squares over all free parameters gives the minimum and the curvature there, and from it the standard
+error, robust where the residuals are coloured.
+
+The input of the model is the reference, so it does not explain sensor noise that the controller
+acts on: the standard error from the curvature is then too small, which the residuals do not always
+show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.validation import increasing
+from deadtime.estimation._result import CramerRaoBound, DelayEstimate
+from deadtime.estimation.data._evidence import (
+    check_distinguishable,
+    checked_names,
+    embedded,
+    standard_errors,
+)
+from deadtime.estimation.data._excitation import (
+    ROUNDING,
+    check_excitation,
+    check_gain,
+    start_and_span,
+)
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime.estimation.methods._method import Method, check_initial_output
+
+__all__ = ["Grid"]
+
+Array = NDArray[np.float64]
+
+#: Points of the grid besides zero, and its ends as shares of the window.
+POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
+
+#: Shortest delay and lag of a continuous loop, as a share of the window and of the time between two
+#: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
+SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
+
+#: Local minima of the curve that are refined; the lowest is taken.
+REFINED = 3
+
+#: A lag is set to zero where this raises the cost by no more than this share: next to zero it acts
+#: like a delay, and the two cannot be distinguished.
+VANISHING = 1e-6
+
+#: Bound of the misfit of simulations that diverge, in units of the output's range.
+LARGEST_MISFIT = 1e3
+
+#: Two-sided 95 % quantile of the normal distribution.
+TWO_SIDED_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Grid(Method):
+    """Cost of the simulated loop over a grid of delays, its lowest point refined.
+
+    Parameters
+    ----------
+    delays : array_like, shape (n,), optional
+        Delays to try in s, increasing, three at least, none below zero. By default 25 from zero
+        to 60 % of the window.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        When the delays are fewer than three, do not increase, or are negative.
+    """
+
+    delays: ArrayLike | None = None
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "grid"
+
+    def __post_init__(self) -> None:
+        if self.delays is not None:
+            object.__setattr__(self, "delays", tuple(_checked(self.delays).tolist()))
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        names = checked_names(free, loop)
+        if "delay" not in names:
+            raise ValueError("the grid method searches the delay: keep it among `free`")
+        simulated = SimulatedRecording(recording, loop, window)
+        data = simulated.recording
+        check_excitation(data, len(names))
+        problem = _Problem(simulated, names, self.initial_output)
+        grid = problem.grid() if self.delays is None else np.array(self.delays)
+        costs, points = problem.over(grid)
+        point = problem.refined(costs, points)
+        problem.check_ends(point)
+
+        misfit, jacobian = problem.misfit(point), problem.jacobian(point)
+        residuals = -misfit
+        held = [
+            i
+            for i, name in enumerate(problem.labels)
+            if name == "lag" and problem.at_least(point, i)
+        ]
+        loose = [i for i in range(len(problem.labels)) if i not in held]
+        check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
+        whiteness = whiteness_of(residuals, len(names))
+        exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
+        adequate = whiteness.white or exact
+        size, count = len(problem.labels), len(names)
+        white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
+        spread = white
+        if not adequate:
+            spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
+        errors = standard_errors(names, spread)
+        check_gain(problem.values(point), errors)
+        noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
+        low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
+        return DelayEstimate(
+            method="grid",
+            loop=loop.replace(**problem.values(point)),
+            free=names,
+            stderr=errors,
+            cov=spread[:count, :count],
+            crb=CramerRaoBound(tuple(problem.labels), noise, standard_errors(names, white)),
+            recording=data,
+            residuals=residuals,
+            whiteness=whiteness,
+            adequate=adequate,
+            message=_message(names, grid, adequate),
+            uncalibrated=(
+                "the grid method fits the response to the reference, without the noise that the "
+                "controller acts on: the curvature of the cost gives "
+                f"{max(0.0, point[0] + low):.4g} to {point[0] + high:.4g} s (95 %), which has "
+                "this coverage only where the controller does not act on the noise; use "
+                "method='output_error' or 'waveform' for an interval"
+            ),
+            details={
+                "delays": grid.tolist(),
+                "costs": costs.tolist(),
+                "local_minima": [float(grid[i]) for i in _local_minima(costs)],
+                "curvature_interval_95": [max(0.0, float(point[0] + low)), float(point[0] + high)],
+                "initial_output": problem.start_of(point),
+            },
+        )
+
+
+def _checked(delays: ArrayLike) -> Array:
+    """The given delays, checked: a minimum has to lie between two of them."""
+    grid = increasing("delays", delays)
+    if grid.size < 3 or grid[0] < 0.0:
+        raise ValueError(
+            f"delays: {grid.size} from {grid[0] if grid.size else math.nan:g} s; give three at "
+            "least, none below zero"
+        )
+    return grid
+
+
+def _local_minima(costs: Array) -> list[int]:
+    """Rows of the grid with a lower cost than both neighbours."""
+    middle = costs[1:-1]
+    return [int(i) + 1 for i in np.flatnonzero((middle < costs[:-2]) & (middle <= costs[2:]))]
+
+
+@dataclass(eq=False)
+class _Problem:
+    """The misfit as a function of `labels`: the free parameters, then the initial output."""
+
+    simulated: SimulatedRecording
+    names: tuple[str, ...]
+    initial_output: float | None
+
+    def __post_init__(self) -> None:
+        data = self.simulated.recording
+        self.start, self.span = start_and_span(data)
+        self.range = max(float(np.ptp(data.output)), float(np.ptp(data.reference)))
+        self.sample = data.sample_time
+        self.labels = [*self.names, *(["initial output"] if self.initial_output is None else [])]
+        gain = self.simulated.loop.parameters.get("gain", 1.0)
+        low, high = sorted((1e-3 * gain, 1e3 * gain))
+        least = self.shortest
+        ends = {"delay": (least, self.span), "gain": (low, high), "lag": (least, self.span)}
+        bounds = [ends.get(label, (-np.inf, np.inf)) for label in self.labels]
+        self.low, self.high = (np.array(side) for side in zip(*bounds, strict=True))
+        scales = {"delay": self.sample, "gain": abs(gain), "lag": self.sample}
+        self.scale = np.array([scales.get(label, self.range) for label in self.labels])
+        guesses = {"gain": gain, "lag": self.sample, "initial output": self.start}
+        self.guess = np.array([guesses.get(label, 0.0) for label in self.labels])
+
+    @property
+    def shortest(self) -> float:
+        """Shortest delay and lag of the search."""
+        if self.simulated.loop.is_sampled:
+            return 0.0
+        return min(self.span * SHORTEST_OF_WINDOW, self.sample * SHORTEST_OF_SAMPLE)
+
+    def grid(self) -> Array:
+        """Delays from the shortest on, spaced geometrically."""
+        points = np.geomspace(SHORTEST, LONGEST, POINTS) * self.span
+        return np.concatenate([[self.shortest], points[points > self.shortest]])
+
+    def values(self, point: Array) -> dict[str, float]:
+        return dict(zip(self.names, (float(value) for value in point), strict=False))
+
+    def start_of(self, point: Array) -> float:
+        return float(point[-1]) if self.initial_output is None else self.initial_output
+
+    def misfit(self, point: Array) -> Array:
+        """Simulated minus recorded output, bounded where the simulation diverges."""
+        most = LARGEST_MISFIT * self.range
+        try:
+            output = self.simulated.output(self.values(point), self.start_of(point))
+        except ValueError:  # the response diverges
+            return np.full(len(self.simulated.recording), most)
+        return np.clip(output - self.simulated.recording.output, -most, most)
+
+    def cost(self, point: Array) -> float:
+        misfit = self.misfit(point)
+        return float(misfit @ misfit)
+
+    def jacobian(self, point: Array, first: int = 0) -> Array:
+        """Derivatives by the parameters from the `first` on; one-sided at a bound."""
+        columns = []
+        for place in range(first, point.size):
+            step = 1e-5 * self.scale[place]
+            up, down = point.copy(), point.copy()
+            up[place] += step
+            down[place] = max(self.low[place], down[place] - step)
+            change = up[place] - down[place]
+            columns.append((self.misfit(up) - self.misfit(down)) / change)
+        return np.stack(columns, axis=1)
+
+    def over(self, grid: Array) -> tuple[Array, Array]:
+        """Least cost at each delay, and the parameters there."""
+        costs, points = np.empty(grid.size), np.empty((grid.size, self.guess.size))
+        point = self.guess
+        for row, delay in enumerate(grid):
+            starts = [np.concatenate([[delay], start[1:]]) for start in (self.guess, point)]
+            point = self._improved(min(starts, key=self.cost))
+            costs[row], points[row] = self.cost(point), point
+        if int(np.argmin(costs)) == grid.size - 1:
+            raise NotIdentifiableError(
+                f"the cost falls up to a delay of {grid[-1]:g} s, the longest of the grid: the "
+                "output is no response of such a loop to this reference; check columns, signs, "
+                "units and gains, or give other `delays`"
+            )
+        return costs, points
+
+    def _improved(self, point: Array) -> Array:
+        """A Gauss-Newton step in all parameters but the delay, if it reduces the cost."""
+        if point.size == 1:
+            return point
+        jacobian = self.jacobian(point, first=1)
+        change = np.linalg.lstsq(jacobian, -self.misfit(point), rcond=None)[0]
+        moved = point.copy()
+        moved[1:] = np.clip(point[1:] + change, self.low[1:], self.high[1:])
+        return min((point, moved), key=self.cost)
+
+    def refined(self, costs: Array, points: Array) -> Array:
+        """The lowest of the refined local minima."""
+        minima = sorted({int(np.argmin(costs)), *_local_minima(costs)}, key=lambda row: costs[row])
+        found = [self._minimised(points[row]) for row in minima[:REFINED]]
+        return self._without_lag(min(found, key=self.cost))
+
+    def _without_lag(self, point: Array) -> Array:
+        """The point with the shortest lag and a longer delay, where that fits as well."""
+        if "lag" not in self.labels:
+            return point
+        delay, lag = self.labels.index("delay"), self.labels.index("lag")
+        without = point.copy()
+        without[delay] += point[lag] - self.low[lag]
+        without[lag] = self.low[lag]
+        without = self._minimised(without, held=lag)
+        rounding = len(self.simulated.recording) * (ROUNDING * self.range) ** 2
+        as_well = self.cost(without) <= self.cost(point) * (1.0 + VANISHING) + rounding
+        return without if as_well else point
+
+    def _minimised(self, point: Array, held: int | None = None) -> Array:
+        """Least squares over all parameters, or all but one, from a point."""
+        from scipy.optimize import least_squares
+
+        loose = [place for place in range(point.size) if place != held]
+
+        def at(moved: Array) -> Array:
+            whole = point.copy()
+            whole[loose] = moved
+            return whole
+
+        def misfit(moved: Array) -> Array:
+            return self.misfit(at(moved))
+
+        def jacobian(moved: Array) -> Array:
+            return self.jacobian(at(moved))[:, loose]
+
+        found = least_squares(
+            misfit,
+            np.clip(point, self.low, self.high)[loose],
+            jac=jacobian,
+            bounds=(self.low[loose], self.high[loose]),
+            x_scale=self.scale[loose],
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+            max_nfev=60,
+        )
+        return at(np.asarray(found.x))
+
+    def at_least(self, point: Array, place: int) -> bool:
+        """Whether a delay or lag is at the lower bound of the search."""
+        return bool(point[place] <= self.low[place] * (1.0 + 1e-6) + 1e-9)
+
+    def check_ends(self, point: Array) -> None:
+        """Refuse a parameter at a bound of its search; a delay or lag of zero is a valid result."""
+        for label, value, low, high in zip(self.labels, point, self.low, self.high, strict=True):
+            ends = (high,) if label in ("delay", "lag") else (low, high)
+            for end in ends:
+                if math.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
+                    raise NotIdentifiableError(
+                        f"the fit ends at a {label} of {end:g}, a bound of its search: the "
+                        "output is no response of such a loop to this reference; check columns, "
+                        "signs, units and gains, and choose a window around one step"
+                    )
+
+
+def _message(names: tuple[str, ...], grid: Array, adequate: bool) -> str:
+    others = [name for name in names if name != "delay"]
+    text = f"least cost over {grid.size} delays from {grid[0]:.3g} to {grid[-1]:.3g} s"
+    if others:
+        text += f", {' and '.join(others)} at their best values for each"
+    if not adequate:
+        text += (
+            "; the residuals are not white, so the loop only approximates the vehicle and "
+            "the standard errors are robust ones"
+        )
+    return text

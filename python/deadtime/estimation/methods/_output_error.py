@@ -1,0 +1,294 @@
+"""Output error: least squares on the response of the vehicle alone to the logged command.
+
+    y(t_i) = b + a F(t_i - Td; lag) + noise,
+
+F the exact response of 1/(s (lag s + 1)), or of another plant, to the command as it was held
+(`plant_path`), a the gain, b the output at the start. Because the command is known, a limit and
+noise that the controller acts on have no effect, and least squares is maximum likelihood for white
+noise: the standard error is the Cramér-Rao bound. For a given delay and lag the best a and b are
+linear least squares (variable projection, Golub & Pereyra 1973). The cost has several local minima
+over the delay, so a grid over delay and lag comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._commands import (
+    commands_over_samples,
+    known_commands,
+    moves_between_rows,
+)
+from deadtime.estimation.data._evidence import checked_names, excited
+from deadtime.estimation.data._excitation import check_moves
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.fit._joint import solve_jointly
+from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
+from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.methods._method import Method, check_initial_output
+from deadtime.estimation.models._plant_path import Path, path_of
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+
+__all__ = ["OutputError", "estimate_from_commands"]
+
+Array = NDArray[np.float64]
+
+#: Longest delay of the search, as a share of the window.
+LONGEST = 0.6
+
+#: Most points of the grid over the delay. It has four points a sample, or one where a lag is fitted
+#: too, whose response is smooth.
+MOST_POINTS = 600
+
+#: Lags of the grid, in samples, and factors of that over a time constant.
+LAGS = (0.0, 2.0, 8.0)
+FACTORS = (0.3, 1.0, 3.0)
+
+#: Values in one block of the grid: bounds the memory for long recordings.
+BLOCK = 200_000
+
+#: Largest relative difference between the time of a row and the sample time at which a command can
+#: be computed from the rows.
+ON_SAMPLES = 1e-3
+
+
+@dataclass(frozen=True)
+class OutputError(Method):
+    """Least squares on the response of the vehicle to the command as it was logged.
+
+    Parameters
+    ----------
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+    """
+
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "output_error"
+    joint: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the response of the plant to the logged commands."""
+        return estimate_from_commands(self.name, runs, free, self.initial_output)
+
+
+def estimate_from_commands(
+    method: str,
+    runs: Sequence[Run],
+    free: Sequence[str],
+    initial_output: float | None = None,
+    computed: bool = False,
+) -> DelayEstimate:
+    """Fit the response to the command: logged, or `computed` from the recorded output."""
+    names = checked_names(free, runs[0].loop)
+    models = [_model(run, names, initial_output, computed) for run in runs]
+    model, found = solve_jointly(models)
+    found = without_vanishing(model, found)
+    longest = min(LONGEST * one.span for one in models)
+    delay = dict(zip(names, found.point.tolist(), strict=False)).get("delay", 0.0)
+    if delay >= longest * (1.0 - 1e-3):
+        _refuse_longest(longest)
+    sources = {one.source for one in models}
+    message = f"least squares over {', '.join(names)} on the response to the command"
+    if computed:
+        message += " computed from the recorded output, on whose noise the controller acts"
+    elif sources != {"logged"}:
+        message += ", which was not logged but computed from reference and output"
+    start = found.point[len(names) :] if initial_output is None else [initial_output]
+    return concluded(
+        method,
+        model,
+        found,
+        [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)],
+        message=message,
+        details={
+            "initial_output": float(start[0]),
+            "command": " or ".join(sorted(sources)),
+            **({"noise": "loop"} if computed else {}),
+        },
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Model(ModelOfOne):
+    """Residuals of one recording; parameters are `names`, then the initial output if fitted."""
+
+    recording: Recording
+    path: Path
+    names: tuple[str, ...]
+    known: Mapping[str, float]
+    offset: float | None
+    source: str
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return (*self.names, *(["initial output"] if self.offset is None else []))
+
+    @cached_property
+    def size(self) -> float:
+        return excited(self.recording)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return (len(self.recording),)
+
+    @cached_property
+    def span(self) -> float:
+        return float(self.recording.time[-1] - self.recording.time[0])
+
+    @cached_property
+    def _sample(self) -> float:
+        return self.recording.sample_time
+
+    def ends(self, label: str) -> Ends:
+        size = abs(self.known.get(label, 1.0))
+        return {
+            "delay": Ends(0.0, LONGEST * self.span, self._sample),
+            "lag": Ends(0.0, self.span, self._sample),
+            "time_constant": Ends(1e-3 * size, 1e3 * size, size),
+            "initial output": Ends(-np.inf, np.inf, self.size),
+        }.get(label, Ends(-np.inf, np.inf, size))
+
+    def _values(self, point: Array) -> dict[str, float]:
+        return {**self.known, **dict(zip(self.names, point.tolist(), strict=False))}
+
+    def misfit(self, point: Array) -> Array:
+        values = self._values(point)
+        offset = float(point[-1]) if self.offset is None else self.offset
+        path = self.path.value(self.recording.time - values["delay"], values)
+        return values["gain"] * path + (offset - self.recording.output)
+
+    def jacobian(self, point: Array) -> Array:
+        values = self._values(point)
+        times = self.recording.time - values["delay"]
+        slopes = self.path.slopes(times, values, self.names)
+        columns = {name: values["gain"] * slope for name, slope in slopes.by.items()}
+        columns["delay"] = -values["gain"] * slopes.rate
+        if "gain" in self.names:
+            columns["gain"] = self.path.value(times, values)
+        columns["initial output"] = np.ones(len(self.recording))
+        return np.stack([columns[label] for label in self.labels], axis=1)
+
+    def starts(self) -> list[Array]:
+        """The best points of a grid over delay and lag, with the best gain and offset at each."""
+        found = []
+        for lags in self._lag_grid():
+            values = {**self.known, **lags}
+            delays = self._delays(4 if not lags else 1)
+            costs, gains, offsets = self._projected(delays, values)
+            padded = np.r_[np.inf, costs, np.inf]
+            minima = np.flatnonzero((costs <= padded[:-2]) & (costs <= padded[2:]))
+            for place in minima[np.argsort(costs[minima])][:2]:
+                values |= {"delay": float(delays[place]), "gain": float(gains[place])}
+                point = [values[name] for name in self.names]
+                tail = [float(offsets[place])] if self.offset is None else []
+                found.append((float(costs[place]), np.array([*point, *tail])))
+        return [point for _, point in sorted(found, key=lambda pair: pair[0])]
+
+    def _lag_grid(self) -> list[dict[str, float]]:
+        if "lag" in self.names:
+            return [{"lag": lag * self._sample} for lag in LAGS]
+        if "time_constant" in self.names:
+            size = self.known["time_constant"]
+            return [{"time_constant": factor * size} for factor in FACTORS]
+        return [{}]
+
+    def _delays(self, each: int) -> Array:
+        """The grid over the delay with `each` points a sample, or the known delay."""
+        if "delay" not in self.names:
+            return np.array([self.known["delay"]])
+        longest = LONGEST * self.span
+        points = int(min(MOST_POINTS, max(2.0, each * longest / self._sample)))
+        return np.linspace(0.0, longest, points + 1)
+
+    def _projected(self, delays: Array, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
+        """Least cost at each delay, with the best gain and offset there."""
+        rows = max(1, BLOCK // len(self.recording))
+        blocks = [
+            self._projected_block(delays[first : first + rows], values)
+            for first in range(0, delays.size, rows)
+        ]
+        costs, gains, offsets = (np.concatenate(part) for part in zip(*blocks, strict=True))
+        return costs, gains, offsets
+
+    def _projected_block(
+        self, delays: Array, values: Mapping[str, float]
+    ) -> tuple[Array, Array, Array]:
+        path = self.path.value(self.recording.time - delays[:, None], values)
+        target = self.recording.output - (self.offset or 0.0)
+        centres = path.mean(axis=1) if self.offset is None else np.zeros(delays.size)
+        level = float(target.mean()) if self.offset is None else 0.0
+        moved, target = path - centres[:, None], target - level
+        power = np.einsum("ij,ij->i", moved, moved)
+        if "gain" in self.names:
+            gains = np.divide(moved @ target, power, out=np.zeros(delays.size), where=power > 0.0)
+        else:
+            gains = np.full(delays.size, values["gain"])
+        left = target - gains[:, None] * moved
+        return np.einsum("ij,ij->i", left, left), gains, level - gains * centres
+
+
+def _refuse_longest(longest: float) -> None:
+    raise NotIdentifiableError(
+        f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is no "
+        "response to this command; check columns and units, or choose a longer window"
+    )
+
+
+def _model(
+    run: Run, names: tuple[str, ...], initial_output: float | None, computed: bool
+) -> _Model:
+    """Commands up to the end of the window, including those before its start where known."""
+    recording, loop, window = run
+    rows = recording.rows(*window)
+    data = recording.window(*window)
+    command, source = _commands(recording, loop, computed)
+    command = command[: rows.stop]
+    if len(data) < 2 * (len(names) + 2):
+        raise NotIdentifiableError(
+            f"{len(data)} samples are too few for {len(names)} parameters and an initial output: "
+            "widen the window"
+        )
+    check_moves(data.output, command)
+    return _Model(
+        recording=data,
+        path=path_of(loop.plant, recording.time[: rows.stop], command),
+        names=names,
+        known={"delay": 0.0, "gain": 1.0, **loop.parameters},
+        offset=initial_output,
+        source=source,
+    )
+
+
+def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[Array, str]:
+    """The command of every row: logged, or computed from reference and output."""
+    if recording.command is not None and not computed:
+        if moves_between_rows(recording, loop):
+            return commands_over_samples(recording, loop)
+        return known_commands(recording, loop)
+    found = known_commands(replace(recording, command=None), loop)
+    if loop.sample_time is None:
+        raise NotIdentifiableError(
+            "the recording holds no command, and that of a continuous controller cannot be "
+            "computed between its rows: log the command, or use method='waveform'"
+        )
+    between = recording.sample_time
+    if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
+        raise NotIdentifiableError(
+            f"rows are {between:g} s apart and the controller samples every {loop.sample_time:g} "
+            "s: its command cannot be computed from rows that are not its samples; log it, or use "
+            "method='waveform'"
+        )
+    return found

@@ -1,0 +1,277 @@
+"""Delay of an integrator under proportional control from the overshoot of a step.
+
+The loop is ``z'(t) = K (r − z)(t − Td)`` with ``K = gain·Kp``; everything depends on
+``x = K·Td`` alone. Three maps from the overshoot Mo to x:
+
+* ``dominant``: Armah & Yi's. Mo gives a damping ratio ζ as in a second-order system (their
+  eq. 5), and the rightmost root ``s = W₀(−K Td)/Td`` (eq. 3) has ``ζ = |Re s|/|s|`` (eq. 6). The
+  step response is approximated by that of one pair of roots, which makes the delay 0 to 4 % too
+  long.
+* ``exact``: the step response itself. With θ = t/Td the error ``e = 1 − z`` is the delayed
+  exponential ``e(θ) = Σ_j (−x)^j (θ − j + 1)^j / j!`` over ``j ≤ θ + 1`` (method of steps); z
+  peaks one delay after the first zero of e.
+* ``saturated``: the loop with its hold and its limit, simulated at the time stamps of the
+recording;
+  no closed form.
+
+All maps assume the given gain and no lag, and none corrects for the largest of many noisy samples
+being larger than the peak.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._extremes import check_decays, read_extremes
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
+from deadtime.estimation.methods._method import Method, check_choice
+from deadtime.estimation.methods._read_off import read_off_estimate
+from deadtime.recordings import Step
+
+__all__ = ["Overshoot", "OvershootMap", "damping_ratio"]
+
+OvershootMap = Literal["dominant", "exact", "saturated"]
+
+#: Below x = 1/e the rightmost root is real and the response does not overshoot.
+SMALLEST_X = math.exp(-1.0)
+
+
+@dataclass(frozen=True)
+class OvershootReading:
+    """The overshoot of one step of a recording.
+
+    Attributes
+    ----------
+    value : float
+        Peak beyond the reference over the size of the step; 0.3 is 30 %.
+    noise : float
+        Standard deviation of `value` by the sensor noise.
+    start : float
+        Output before the step.
+    step : Step
+        The step.
+    peak_time : float
+        Time of the peak, s.
+    """
+
+    value: float
+    noise: float
+    start: float
+    step: Step
+    peak_time: float
+
+
+def damping_ratio(overshoot: float) -> float:
+    """Damping ratio of a second-order system with this overshoot (Armah & Yi eq. 5).
+
+    ``ζ = −ln Mo / √(π² + ln² Mo)``.
+
+    Parameters
+    ----------
+    overshoot : float
+        Mo as a fraction, between 0 and 1 (both excluded).
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    NotIdentifiableError
+        When the equation has no solution: Mo ≤ 0 or Mo ≥ 1.
+
+    Examples
+    --------
+    >>> from deadtime import damping_ratio
+    >>> round(damping_ratio(0.0230), 4)
+    0.7684
+    """
+    if not 0.0 < overshoot < 1.0:
+        raise NotIdentifiableError(
+            f"an overshoot of {100 * overshoot:.4g} % has no damping ratio: equation (5) needs one "
+            "between 0 and 100 %; use map='exact' above, the waveform method below"
+        )
+    log = math.log(overshoot)
+    return -log / math.hypot(math.pi, log)
+
+
+def dominant_x(overshoot: float) -> float:
+    """``x = K·Td`` of the loop whose rightmost root has the damping ratio of `overshoot`.
+
+    With ζ = cos φ the root is ``Td·s = −ρ e^(∓iφ)``; ``w e^w = −x`` then says
+    ``ρ sin φ = φ`` and ``x = ρ e^(−ρ cos φ)``: eqs. 3 and 6 solved without iteration.
+    """
+    phi = math.acos(damping_ratio(overshoot))
+    rho = phi / math.sin(phi)
+    return rho * math.exp(-rho * math.cos(phi))
+
+
+def exact_overshoot(x: float) -> float:
+    """Overshoot of the exact step response for ``x = K·Td``; 0 where there is none."""
+    from scipy.optimize import brentq
+
+    if x >= 1.0:
+        return x - 0.5
+    if x <= SMALLEST_X:
+        return 0.0
+    low = 0.0
+    while _error(low + 0.5, x) > 0.0:
+        low += 0.5
+        if low > 200.0:  # x within 3e-4 of 1/e: the overshoot is below 1e-60
+            return 0.0
+    zero = brentq(_error, low, low + 0.5, args=(x,), xtol=1e-14, rtol=1e-15)
+    return max(0.0, -_error(zero + 1.0, x))
+
+
+def exact_x(overshoot: float) -> float:
+    """Inverse of `exact_overshoot`, which increases with x."""
+    from scipy.optimize import brentq
+
+    if overshoot >= 0.5:
+        return overshoot + 0.5
+    low = 0.375  # the overshoot is below 1e-7, close to rounding
+    if overshoot <= exact_overshoot(low):
+        raise NotIdentifiableError(
+            f"an overshoot of {100 * overshoot:.3g} % is too small: K·Td is at its "
+            f"limit 1/e = {SMALLEST_X:.4f}; use the waveform method"
+        )
+    return float(brentq(lambda x: exact_overshoot(x) - overshoot, low, 1.0, xtol=1e-15))
+
+
+def _error(theta: float, x: float) -> float:
+    """``e(θ)`` of the delayed exponential, summed from its largest terms down."""
+    terms = []
+    term_base = 1.0
+    for j in range(math.floor(theta) + 2):
+        if j > 0:
+            term_base *= -x / j
+        terms.append(term_base * (theta - j + 1.0) ** j)
+    return math.fsum(terms)
+
+
+@dataclass(frozen=True)
+class Overshoot(Method):
+    """Delay from the overshoot of one step, as Armah & Yi read it.
+
+    Parameters
+    ----------
+    map : {"dominant", "exact", "saturated"}
+        From the overshoot to the delay: by the rightmost pair of roots alone (the paper's), by
+        the exact step response, or by simulating the loop with its hold and limit.
+
+    Raises
+    ------
+    ValueError
+        For another map.
+    """
+
+    map: OvershootMap = "dominant"
+
+    name: ClassVar[str] = "overshoot"
+
+    def __post_init__(self) -> None:
+        check_choice("map", self.map, get_args(OvershootMap))
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        stiffness = stiffness_of(loop, "overshoot")
+        simulated = SimulatedRecording(recording, loop, window)
+        reading = read_step(simulated.recording)
+        if self.map != "saturated":  # which simulates the limit
+            check_decays(read_extremes(reading), "overshoot")
+        read = read_overshoot(reading)
+
+        def delay_of(value: float) -> float:
+            if self.map == "dominant":
+                return dominant_x(value) / stiffness
+            if self.map == "exact":
+                return exact_x(value) / stiffness
+            return _saturated_delay(value, read, simulated, exact_x(value) / stiffness)
+
+        delay = delay_of(read.value)
+        # A difference quotient with the noise as its step: the map is smooth and the noise small.
+        change = max(read.noise, 1e-6)
+        slope = (
+            abs(delay_of(read.value + change) - delay) / change if read.value + change < 1 else 0.0
+        )
+        stderr = slope * read.noise
+        details = {"map": self.map, "overshoot": read.value, "overshoot_noise": read.noise}
+        if 0.0 < read.value < 1.0:
+            details["damping_ratio"] = damping_ratio(read.value)
+        return read_off_estimate(
+            "overshoot",
+            simulated,
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            read.start,
+            message=(
+                f"{100 * read.value:.2f} % overshoot, map {self.map!r}: assumes a gain of "
+                f"{loop.parameters['gain']:g} and no lag"
+            ),
+            uncalibrated=(
+                "the overshoot method reads one peak: noise alone makes the delay uncertain by "
+                f"{stderr:.2g} s, but the largest of noisy samples is biased upwards and a wrong "
+                "gain, a lag or the hold shift it further; use method='waveform' for an interval"
+            ),
+            details=details,
+        )
+
+
+def read_overshoot(reading: StepReading) -> OvershootReading:
+    """The overshoot of a step response; refuses one without overshoot."""
+    row = int(np.argmax(reading.travelled))
+    value = float(reading.travelled[row]) - 1.0
+    settled = max(0.0, float(np.mean(reading.tail)) - 1.0)
+    if value - settled <= max(CLEARANCE * reading.noise, 1e-9):
+        beyond = max(0.0, value - settled)
+        raise NotIdentifiableError(
+            f"no overshoot: the output exceeds its final value by {100 * beyond:.2g} % of the "
+            f"step, noise alone gives {100 * CLEARANCE * reading.noise:.2g} %. Kp·Td is below or "
+            "near 1/e, where the overshoot does not determine the delay: raise Kp, or use "
+            "method='waveform'"
+        )
+    deviation = reading.noise * math.sqrt(1.0 + 1.0 / reading.start_samples)
+    peak_time = reading.step.time + float(reading.since[row])
+    return OvershootReading(value, deviation, reading.start, reading.step, peak_time)
+
+
+def _saturated_delay(
+    overshoot: float, read: OvershootReading, simulated: SimulatedRecording, start: float
+) -> float:
+    """Delay at which the simulated loop overshoots by this much at the recorded times."""
+    from scipy.optimize import brentq
+
+    def excess(delay: float) -> float:
+        output = simulated.output({"delay": delay}, read.start)
+        size = read.step.after - read.start
+        return float(np.max((output[read.step.index :] - read.start) / size)) - 1.0 - overshoot
+
+    low, high = 0.5 * start, 1.5 * start
+    for _ in range(40):
+        if excess(low) <= 0.0:
+            break
+        low *= 0.7
+    else:
+        raise NotIdentifiableError(
+            f"the loop overshoots by more than {100 * overshoot:.3g} % with no delay at all: the "
+            "hold alone explains it; check the gains and the sample time"
+        )
+    span = float(simulated.recording.time[-1] - read.step.time)
+    while excess(high) < 0.0:
+        high *= 1.3
+        if high > span:
+            raise NotIdentifiableError(
+                f"no delay up to {span:g} s gives an overshoot of {100 * overshoot:.3g} % within "
+                "the limit: check the limit and the gains"
+            )
+    return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-12))

@@ -1,0 +1,317 @@
+"""Delay from the limit cycle of an integrator under relay feedback (Åström & Hägglund 1984).
+
+The output climbs with slope a until one delay after the command has switched, then falls with the
+same slope: from one crossing c of the reference to the next, c', it takes 2 (s + Td - c), where s
+is the time of the switch. Each half cycle gives Td = (c + c')/2 - s, a quarter of the period where
+the relay switches at the crossing. A sampled relay switches at the next sample; where noise makes
+it switch several times, s is the time of one switch with the same effect. Crossings are those of
+lines fitted to the samples on the slope; the peak is a (s + Td - c).
+
+A known lag is subtracted (exactly where the relay switches at the crossing, within a millisecond or
+two where samples are as long as the lag). An unknown lag counts as delay: almost all of it where it
+is shorter than a quarter of the period. Half cycles are averaged in pairs, in which an offset or a
+drift cancels to first order; the standard error is that of the mean of these cycles.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.validation import positive
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._step_reading import noise_of_second_differences
+from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._read_off import check_delay_alone, estimate_with_residuals
+from deadtime.estimation.models._held_response import HeldResponse
+from deadtime.loops import Integrator
+from deadtime.recordings import Recording
+
+__all__ = ["Relay"]
+
+Array = NDArray[np.float64]
+
+#: Crossings at the beginning that are left out: from rest, where noise alone switches the relay,
+#: the limit cycle is not yet reached.
+LEFT_OUT = 2
+
+#: Fewest half cycles after these: a standard error takes two pairs.
+FEWEST = 4
+
+#: Share of the path from a crossing to its peaks that is taken as straight, also with a lag.
+STRAIGHT = 0.6
+
+#: Distance from the reference that counts as a crossing, in standard deviations of the noise.
+CLEARANCE = 4.0
+
+#: Largest relative standard deviation of the half cycles, and smallest ratio of the last peak to
+#: the first, of a limit cycle.
+UNEVEN, SHRINKING = 0.25, 0.7
+
+#: Least share of the samples in which the command of a relay is at one of its two values.
+AT_VALUES = 0.9
+
+
+@dataclass(frozen=True)
+class Relay(Method):
+    """Delay from the period of a limit cycle under relay feedback.
+
+    Parameters
+    ----------
+    amplitude : float, optional
+        Amplitude of the relay, where the command was not logged; only the residuals need it.
+
+    Raises
+    ------
+    ValueError
+        When the amplitude is not above zero.
+    """
+
+    amplitude: float | None = None
+
+    name: ClassVar[str] = "relay"
+
+    def __post_init__(self) -> None:
+        if self.amplitude is not None:
+            positive("amplitude", self.amplitude)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the one recording."""
+        ((recording, loop, window),) = runs
+        check_delay_alone("relay", free)
+        plant = loop.plant
+        if not isinstance(plant, Integrator):
+            raise ValueError(
+                f"the relay method is for an Integrator, the loop has a {type(plant).__name__}: "
+                "use method='waveform'"
+            )
+        data = recording.window(*window)
+        signs, height = _relay(data, self.amplitude)
+        error = data.output - data.reference
+        crossings = _crossings(data.time, error)[LEFT_OUT:]
+        _check_cycle(crossings, error, data.time)
+        switches = _switches(data.time, signs, crossings, loop.is_sampled)
+        half = float(np.mean(np.diff(crossings)))
+        readings = 0.5 * (crossings[1:] + crossings[:-1]) - switches
+        cycles = _paired(readings)
+        late = _delay_by_lag(plant.lag, half)
+        delay = float(cycles.mean()) - late
+        stderr = _error_of_mean(cycles)
+        if delay <= 0.0:
+            raise NotIdentifiableError(
+                f"a quarter of the period, {0.5 * half:.3g} s, is explained by lag and hold: the "
+                f"lag is shorter than the given {plant.lag:g} s, or there is no delay"
+            )
+        path = _Path(data, switches, signs, delay, plant.lag)
+        first, last = data.time[path.rows[[0, -1]]]
+        slope = abs(plant.gain) * height if height is not None else path.slope
+        waits = float(np.mean(switches - crossings[:-1]))
+        peaks = _peaks(data.time, error, crossings)
+        return estimate_with_residuals(
+            "relay",
+            loop,
+            data.window(float(first), float(last)),
+            {"delay": delay},
+            np.array([[stderr**2]]),
+            path.residuals(slope),
+            message=(
+                f"{cycles.size} cycles of {2.0 * half:.4g} s; "
+                + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
+                + (f"a lag of {plant.lag:g} s subtracted" if plant.lag else "a lag counts as delay")
+            ),
+            uncalibrated=(
+                f"the relay method gives the scatter of {cycles.size} cycles, {stderr:.2g} s for "
+                "their mean, but not what a lag or a drift adds to each of them; use "
+                "method='output_error' for an interval"
+            ),
+            details={
+                "period": 2.0 * half,
+                "cycles": int(cycles.size),
+                "wait_of_hold": waits,
+                "amplitude": float(peaks.mean()),
+                "amplitude_expected": slope * (delay + waits),
+                "slope": path.slope,
+            },
+        )
+
+
+def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | None]:
+    """Sign of the command at every sample, and its amplitude where it is known."""
+    error = data.reference - data.output
+    if data.command is None:
+        size = None if amplitude is None else positive("amplitude", amplitude)
+        return np.where(error >= 0.0, 1.0, -1.0), size
+    size = float(np.median(np.abs(data.command)))
+    at = np.abs(np.abs(data.command) - size) <= 0.01 * size
+    if size == 0.0 or float(np.mean(at)) < AT_VALUES:
+        raise NotIdentifiableError(
+            f"the command is at ±{size:.3g} in {100 * float(np.mean(at)):.0f} % of the samples "
+            "only, so it is not that of a relay; use method='output_error', or run Experiment.relay"
+        )
+    return np.where(data.command >= 0.0, 1.0, -1.0), size
+
+
+def _crossings(time: Array, error: Array) -> Array:
+    """Times at which the output crosses the reference, between samples."""
+    # Second differences of straight lines are noise, except at the corners.
+    beyond = max(CLEARANCE * noise_of_second_differences(error), 1e-9 * float(np.ptp(error)))
+    rough, side, last = [], 0.0, 0
+    for row, value in enumerate(error):
+        if abs(value) <= beyond:
+            continue
+        here = math.copysign(1.0, value)
+        if side and here != side:
+            # Between the last sample clearly on one side and the first clearly on the other.
+            part = error[last] / (error[last] - value)
+            rough.append(float(time[last] + part * (time[row] - time[last])))
+        side, last = here, row
+    if len(rough) < 2:
+        return np.array(rough)
+    reach = STRAIGHT * 0.5 * float(np.median(np.diff(rough)))
+    return np.array([_on_a_line(time, error, place, reach) for place in rough])
+
+
+def _on_a_line(time: Array, error: Array, place: float, reach: float) -> float:
+    """Zero of a line fitted to the samples near a crossing."""
+    near = np.abs(time - place) <= reach
+    if int(near.sum()) < 3:
+        return place
+    slope, level = np.polyfit(time[near] - place, error[near], 1)
+    moved = -float(level) / float(slope) if slope != 0.0 else math.inf
+    return place + moved if abs(moved) <= reach else place
+
+
+def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
+    """Refuse what is no sustained oscillation around the reference."""
+    if float(np.ptp(error)) == 0.0:
+        raise NotIdentifiableError("the output does not move: there is no limit cycle")
+    if crossings.size < FEWEST + 1:
+        raise NotIdentifiableError(
+            f"the output crosses the reference {crossings.size} times after the first {LEFT_OUT}, "
+            f"{FEWEST + 1} are needed: there is no limit cycle, or the window is too short"
+        )
+    halves = np.diff(crossings)
+    if float(np.std(halves)) > UNEVEN * float(np.mean(halves)):
+        raise NotIdentifiableError(
+            f"the output crosses the reference every {float(halves.min()):.3g} to "
+            f"{float(halves.max()):.3g} s: that is noise or a changing reference, no limit cycle"
+        )
+    peaks = _peaks(time, error, crossings)
+    if peaks[-1] < SHRINKING * peaks[0]:
+        raise NotIdentifiableError(
+            f"the oscillation decays from {peaks[0]:.3g} to {peaks[-1]:.3g}, so no relay sustains "
+            "it; use method='decrement' or 'waveform'"
+        )
+
+
+def _peaks(time: Array, error: Array, crossings: Array) -> Array:
+    """Largest error between each crossing and the next."""
+    rows = np.searchsorted(time, crossings)
+    return np.array(
+        [float(np.max(np.abs(error[low:high]))) for low, high in itertools.pairwise(rows)]
+    )
+
+
+def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Array:
+    """Time of the switch at each crossing but the last; the crossing itself without samples."""
+    if not sampled:
+        return crossings[:-1]
+    rows = np.flatnonzero(np.diff(signs)) + 1
+    middles = 0.5 * (crossings[1:] + crossings[:-1])
+    ends = np.concatenate([[2.0 * crossings[0] - middles[0]], middles])
+    found = []
+    for place, (low, high) in enumerate(itertools.pairwise(ends)):
+        own = time[rows[(time[rows] > low) & (time[rows] <= high)]]
+        if own.size % 2 == 0:
+            raise NotIdentifiableError(
+                f"the command switches {own.size} times around the crossing at "
+                f"{crossings[place]:.3g} s: the noise hides the limit cycle, or another "
+                "command caused it; use a larger relay"
+            )
+        found.append(float(np.sum(own[::2]) - np.sum(own[1::2])))
+    return np.array(found)
+
+
+def _paired(readings: Array) -> Array:
+    """Means of pairs of successive half cycles."""
+    even = readings[readings.size % 2 :]
+    return np.asarray(even.reshape(-1, 2).mean(axis=1))
+
+
+def _error_of_mean(cycles: Array) -> float:
+    """Standard error of the mean of cycles that share a crossing with their neighbours.
+
+    Without a hold the errors of all crossings but the first and the last cancel.
+    """
+    off = cycles - cycles.mean()
+    count = cycles.size
+    power = float(off @ off) / (count - 1)
+    neighbours = float(off[1:] @ off[:-1]) / (count - 1)
+    return math.sqrt(max(power + 2.0 * neighbours, power / count) / count)
+
+
+def _delay_by_lag(lag: float, half: float) -> float:
+    """Increase of a quarter of the period by a lag, for half a period of `half`.
+
+    From the arrival of one switch to that of the next the speed goes from -v to v as
+    1 - (1 + v) e^(-t/lag), v = tanh(half/2 lag), and the output from -p to p. The zero of the
+    output is later than the middle by the returned time.
+    """
+    from scipy.optimize import brentq
+
+    if lag == 0.0:
+        return 0.0
+    v = math.tanh(0.5 * half / lag)
+    begin = -0.5 * half + v * lag
+
+    def output(t: float) -> float:
+        return begin + t - (1.0 + v) * lag * -math.expm1(-t / lag)
+
+    return float(brentq(output, 0.5 * half, half)) - 0.5 * half
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The output caused by the switches, from the second of them on."""
+
+    data: Recording
+    switches: Array
+    signs: Array
+    delay: float
+    lag: float
+
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        begin = self.switches[1] + self.delay
+        return np.flatnonzero(
+            (self.data.time >= begin) & (self.data.time <= self.switches[-1] + self.delay)
+        )
+
+    def fitted(self) -> tuple[Array, float, Array]:
+        """Unit path, slope and recorded output at `rows`, both about their means."""
+        first = -1.0 if self.data.output[self.rows[0]] > self.data.reference[self.rows[0]] else 1.0
+        values = np.full(self.switches.size, first)
+        values[::2] = -first
+        response = HeldResponse(self.switches, values)
+        path = response.at(self.data.time[self.rows] - self.delay, self.lag).value
+        output = self.data.output[self.rows]
+        path, output = path - path.mean(), output - output.mean()
+        return path, float(path @ output) / float(path @ path), output
+
+    @property
+    def slope(self) -> float:
+        """Slope of the best fit."""
+        return abs(self.fitted()[1])
+
+    def residuals(self, slope: float) -> Array:
+        """Recorded output minus the path of this slope."""
+        path, found, output = self.fitted()
+        return np.asarray(output - math.copysign(slope, found) * path)

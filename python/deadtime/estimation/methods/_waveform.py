@@ -1,0 +1,263 @@
+"""Least squares of the simulated loop on the whole recording.
+
+The output of the loop, simulated with its hold and its limit at the recording's time stamps, is
+fitted to the recorded one. The output at the start of the window is fitted too, because one noisy
+sample is a poor initial condition. The cost has several local minima over the delay (a delay that
+is longer by a period of the oscillation fits almost as well), so a grid over delay and gain comes
+first and its best points are refined, with the exact sensitivities of the loop.
+
+The residuals are white only if the model is complete and the noise is added to the recording alone.
+Where the controller acts on the noise (`noise="loop"`), the controller of the model reads the
+recorded output instead of the simulated one: the residuals are then the innovations, and they are
+white. Both models have the same number of parameters, so the one with the smaller residuals is
+likelier. The rows of a sampled controller hold what it read, so the innovations are taken unless
+the other model is likelier by far (`noise="auto"`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._evidence import (
+    LOOP_PARAMETERS,
+    VEHICLE_PARAMETERS,
+    checked_names,
+    excited,
+)
+from deadtime.estimation.data._excitation import check_excitation, start_and_span
+from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.fit._joint import solve_jointly
+from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
+from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.methods._method import Method, check_choice, check_initial_output
+from deadtime.estimation.methods._output_error import estimate_from_commands
+
+__all__ = ["NoisePath", "Waveform"]
+
+Array = NDArray[np.float64]
+
+#: Where sensor noise goes: into the recording alone, or through the controller as well.
+NoisePath = Literal["auto", "recording", "loop"]
+
+#: Points of the initial grid over the delay, and factors of that over the gain: more points find a
+#: narrow minimum more often and take proportionally longer.
+DELAY_POINTS = 24
+GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
+
+#: Shortest delay and lag of a continuous loop, as a share of the window and of the time between two
+#: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
+SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
+
+#: Shortest lag of a sampled loop, as a share of the time between two samples; shorter ones
+#: overflow.
+LEAST_LAG = 1e-6
+
+#: Bound of the residuals of simulations that diverge, in units of the excitation.
+LARGEST_MISFIT = 1e3
+
+#: Residuals below this share of the excitation count as rounding.
+ROUNDING = 1e-9
+
+#: Noise is taken to be in the recording alone where its log likelihood is larger by this (a factor
+#: of 20). Larger values prefer the innovations more often.
+LIKELIHOOD_RATIO = 3.0
+
+
+@dataclass(frozen=True)
+class Waveform(Method):
+    """Least squares on the simulated response of the whole loop.
+
+    Parameters
+    ----------
+    noise : {"auto", "recording", "loop"}
+        Where the sensor noise goes: ``"recording"`` where it is in the recording alone, ``"loop"``
+        where the controller acted on it too. ``"auto"`` takes ``"loop"`` for rows that are the
+        samples of a P controller, unless ``"recording"`` is likelier by a factor of 20.
+    initial_output : float, optional
+        True output at the start of the window; fitted if not given.
+
+    Raises
+    ------
+    ValueError
+        For another `noise`.
+    """
+
+    noise: NoisePath = "auto"
+    initial_output: float | None = None
+
+    name: ClassVar[str] = "waveform"
+    joint: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_choice("noise", self.noise, get_args(NoisePath))
+        check_initial_output(self.initial_output)
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Fit `free` to the windows of the runs."""
+        if self.noise == "loop":
+            return self._by_innovations(runs, free)
+        simulated = self._by_simulation(runs, free)
+        if self.noise == "recording" or not set(free) <= set(VEHICLE_PARAMETERS):
+            return simulated
+        try:
+            innovations = self._by_innovations(runs, free)
+        except NotIdentifiableError:  # the command cannot be computed, or does not determine `free`
+            return simulated
+        likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
+        return simulated if likelier > LIKELIHOOD_RATIO else innovations
+
+    def _by_innovations(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        return estimate_from_commands(self.name, runs, free, self.initial_output, computed=True)
+
+    def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        names = checked_names(free, runs[0].loop, LOOP_PARAMETERS)
+        models = [_model(run, names, self.initial_output) for run in runs]
+        model, found = solve_jointly(models)
+        found = without_vanishing(model, found)
+        _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
+        return concluded(
+            self.name,
+            model,
+            found,
+            [Run(one.simulated.recording, run.loop) for one, run in zip(models, runs, strict=True)],
+            message=f"least squares over {', '.join(names)} on the response of the loop",
+            details={
+                "initial_output": float([*found.point, self.initial_output][len(names)]),
+                "noise": "recording",
+            },
+        )
+
+
+def _unlikelihood(fit: DelayEstimate) -> float:
+    """Negative log likelihood, but for a constant, of Gaussian noise of unknown size.
+
+    Residuals are taken as no smaller than rounding.
+    """
+    total = 0.0
+    for one in fit.runs:
+        scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))
+        total += one.residuals.size * math.log(scatter)
+    return total
+
+
+@dataclass(frozen=True, eq=False)
+class _Model(ModelOfOne):
+    """Residuals of one recording; parameters are `names`, then the initial output if fitted."""
+
+    simulated: SimulatedRecording
+    names: tuple[str, ...]
+    offset: float | None
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return (*self.names, *(["initial output"] if self.offset is None else []))
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return (len(self.simulated.recording),)
+
+    @cached_property
+    def span(self) -> float:
+        return start_and_span(self.simulated.recording)[1]
+
+    @cached_property
+    def size(self) -> float:
+        return excited(self.simulated.recording)
+
+    @cached_property
+    def _shortest(self) -> float:
+        if self.simulated.loop.is_sampled:
+            return LEAST_LAG * self.simulated.recording.sample_time
+        between = self.simulated.recording.sample_time
+        return min(SHORTEST_OF_WINDOW * self.span, SHORTEST_OF_SAMPLE * between)
+
+    def ends(self, label: str) -> Ends:
+        tenth, shortest = 0.1 * self.span, self._shortest
+        no_delay = 0.0 if self.simulated.loop.is_sampled else shortest
+        found = {
+            "delay": Ends(no_delay, self.span, tenth),
+            "lag": Ends(shortest, self.span, tenth),
+            "start": Ends(-0.25 * self.span, 0.25 * self.span, tenth),
+            "initial output": Ends(-np.inf, np.inf, self.size),
+        }.get(label)
+        if found is not None:
+            return found
+        value = self.simulated.loop.parameters[label]
+        low, high = sorted((1e-3 * value, 1e3 * value))
+        return Ends(low, high, abs(value))
+
+    def _values(self, point: Array) -> tuple[dict[str, float], float]:
+        """Numbers of the loop, and the output at the start."""
+        start = float(point[-1]) if self.offset is None else self.offset
+        return dict(zip(self.names, point.tolist(), strict=False)), start
+
+    def misfit(self, point: Array) -> Array:
+        """Simulated minus recorded output; bounded where the loop with these numbers is not."""
+        bound = LARGEST_MISFIT * self.size
+        recorded = self.simulated.recording.output
+        try:
+            output = self.simulated.output(*self._values(point))
+        except ValueError:  # the response with these numbers grows without bound
+            return np.full(recorded.size, bound)
+        return np.clip(output - recorded, -bound, bound)
+
+    def jacobian(self, point: Array) -> Array:
+        """Derivatives of the misfit; zero where it is at its bound."""
+        try:
+            slopes = self.simulated.slopes(*self._values(point))
+        except ValueError:
+            return np.zeros((sum(self.sizes), point.size))
+        columns = np.stack([slopes[label] for label in self.labels], axis=1)
+        bounded = (
+            np.abs(slopes["output"] - self.simulated.recording.output) < LARGEST_MISFIT * self.size
+        )
+        return np.where(bounded[:, None], columns, 0.0)
+
+    def starts(self) -> list[Array]:
+        """The points of a grid over delay and gain, the best first."""
+        start, _ = start_and_span(self.simulated.recording)
+        along = [start] if self.offset is None else []
+        points = [np.array([*point, *along]) for point in itertools.product(*self._grid())]
+        costs = [float(np.sum(self.misfit(point) ** 2)) for point in points]
+        return [points[int(index)] for index in np.argsort(costs)]
+
+    def _grid(self) -> list[Array]:
+        known = self.simulated.loop.parameters
+        grids = {
+            "delay": np.geomspace(0.003, 0.6, DELAY_POINTS) * self.span,
+            "gain": np.array(GAIN_FACTORS) * known.get("gain", 1.0),
+            "lag": np.array([0.02]) * self.span,
+            "start": np.zeros(1),
+        }
+        return [grids[name] if name in grids else np.array([known[name]]) for name in self.names]
+
+
+def _model(run: Run, names: tuple[str, ...], offset: float | None = None) -> _Model:
+    simulated = SimulatedRecording(*run)
+    in_motion = simulated.recording.time[0] > run.recording.time[0]
+    check_excitation(simulated.recording, len(names), in_motion=in_motion)
+    return _Model(simulated, names, offset)
+
+
+def _check_ends(values: Mapping[str, float], low: Array, high: Array) -> None:
+    """Refuse a fit at a bound of its search; a delay or lag of zero is a valid result."""
+    for (name, value), least, most in zip(values.items(), low, high, strict=False):
+        for end in (least, most):
+            inner = name in ("delay", "lag") and end == least
+            if not inner and abs(value - end) <= 1e-3 * abs(end):
+                raise NotIdentifiableError(
+                    f"the fit ends at a {name} of {end:g}, a bound of its search: the output is "
+                    "no response of such a loop to this reference; check columns, signs, units "
+                    "and gains, and choose a window around one step"
+                )

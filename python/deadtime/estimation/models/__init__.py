@@ -1,0 +1,1 @@
+"""Models of the output of a vehicle under recorded commands."""

@@ -1,0 +1,1 @@
+"""What an experiment will tell, before it is run."""

@@ -1,0 +1,209 @@
+"""Monte Carlo simulation of an experiment: many noisy runs, and an estimate from each.
+
+Each run has a seed of its own, so results do not depend on how runs are divided among processes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import DeadtimeError, NotIdentifiableError
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.processes import Progress, shared_out
+from deadtime._base.validation import whole_number
+from deadtime.estimation._estimate import estimate_delay
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.methods._method import Method
+from deadtime.experiments import Experiment
+from deadtime.loops import ControlLoop
+
+__all__ = ["SLOW", "MonteCarlo", "Plan", "run_many_times"]
+
+Array = NDArray[np.float64]
+
+#: Parameters whose effect is similar to that of a delay.
+SLOW = ("lag", "time_constant")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MonteCarlo(ReadOnlyArrays):
+    """Errors of a method over many simulated runs of one experiment.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method.
+    runs : int
+        Number of runs.
+    truth : dict of str to float
+        The true value of each quantity.
+    estimates : dict of str to ndarray, shape (m,)
+        The estimates from the runs that were not refused, in the order of their seeds.
+    rmse, bias : dict of str to float
+        Root mean square and mean of the error of each quantity.
+    mean_bound : dict of str to float
+        Mean over the runs of the Cramér-Rao bounds that were reported with the estimates;
+        empty where the method reports none.
+    level : float
+        Level of the intervals.
+    coverage : dict of str to float
+        Share of the intervals that held the truth; empty where the method gives none.
+    failures : dict of str to int
+        How many runs were refused, by reason; numbers in reasons are left out.
+    """
+
+    method: str
+    runs: int
+    truth: dict[str, float]
+    estimates: dict[str, Array]
+    rmse: dict[str, float]
+    bias: dict[str, float]
+    mean_bound: dict[str, float]
+    level: float
+    coverage: dict[str, float]
+    failures: dict[str, int]
+
+    def summary(self) -> str:
+        """The figures as a few lines of text."""
+        refused = sum(self.failures.values())
+        lines = [
+            f"{self.method}: {self.runs} runs, {refused} refused",
+            f"  {'':<12}{'rmse':>11}{'bias':>11}{'mean bound':>12}{'coverage':>10}",
+        ]
+        for name in self.rmse:
+            bound = f"{self.mean_bound[name]:.3g}" if name in self.mean_bound else "-"
+            held = f"{100.0 * self.coverage[name]:.1f} %" if name in self.coverage else "-"
+            lines.append(
+                f"  {name:<12}{self.rmse[name]:>11.3g}{self.bias[name]:>11.2g}{bound:>12}{held:>10}"
+            )
+        lines += [f"  refused {count}: {reason}" for reason, count in self.failures.items()]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{name} {error:.3g}" for name, error in self.rmse.items())
+        return f"<MonteCarlo of {self.method}: {self.runs} runs, rmse {errors}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What is simulated, and how each run is estimated from."""
+
+    loop: ControlLoop
+    experiment: Experiment
+    noise: float
+    free: tuple[str, ...]
+    initial_output: float | None
+    known: ControlLoop
+    method: Method
+    noise_in_loop: bool
+    level: float
+
+
+class _Outcome(NamedTuple):
+    """Result of one run: estimates, bounds, whether intervals held the truth; or the refusal."""
+
+    values: dict[str, float]
+    bounds: dict[str, float]
+    held: dict[str, bool]
+    refusal: str = ""
+
+
+def run_many_times(
+    plan: Plan,
+    runs: int,
+    seed: int,
+    processes: int | None,
+    progress: Progress,
+) -> MonteCarlo:
+    """Simulate and estimate `runs` times, and collect the statistics."""
+    count = whole_number("runs", runs)
+    if not 0.0 < plan.level < 1.0:
+        raise ValueError(f"level={plan.level!r} is not between 0 and 1: 0.95 is usual")
+    outcomes = shared_out(partial(_outcomes, plan, seed), count, processes, progress)
+    return _summed_up(plan, outcomes)
+
+
+def _outcomes(plan: Plan, seed: int, runs: range) -> list[_Outcome]:
+    # The children of one seed, as its `spawn` makes them.
+    return [_outcome(plan, np.random.SeedSequence(seed, spawn_key=(i,))) for i in runs]
+
+
+def _outcome(plan: Plan, seed: np.random.SeedSequence) -> _Outcome:
+    recording = plan.experiment.run(plan.loop, plan.noise, seed, plan.noise_in_loop)
+    try:
+        fit = estimate_delay(recording, plan.known, method=plan.method, free=plan.free)
+        truth = _with_sum(plan.loop.parameters)
+        fitted = _with_sum(fit.loop.parameters)
+        values = {name: fitted[name] for name in fit.stderr}
+        bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
+        held = {}
+        if fit.calibrated:
+            held = {name: _holds(fit, name, truth[name], plan.level) for name in values}
+    except DeadtimeError as refusal:
+        return _Outcome({}, {}, {}, str(refusal))
+    return _Outcome(values, bounds, held)
+
+
+def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
+    """Whether the interval holds the truth.
+
+    One value of the profile decides it; the ends of the interval would take about ten each.
+    """
+    from scipy import special
+
+    profile = fit._profile
+    if profile is not None and profile.preferred:
+        quantile = float(special.stdtrit(profile.freedom, 0.5 + level / 2.0)) ** 2
+        return profile.statistic(name, truth) <= quantile
+    low, high = fit.ci(level, name)
+    return low <= truth <= high
+
+
+def _with_sum(values: Mapping[str, float]) -> dict[str, float]:
+    """The parameters of a loop, and the sum of its delay and its lag or time constant."""
+    sums = {f"delay+{name}": values["delay"] + values[name] for name in SLOW if name in values}
+    return dict(values) | {"delay+lag": values["delay"]} | sums
+
+
+def _summed_up(plan: Plan, outcomes: list[_Outcome]) -> MonteCarlo:
+    answered = [outcome for outcome in outcomes if not outcome.refusal]
+    reasons = Counter(_without_numbers(outcome.refusal) for outcome in outcomes if outcome.refusal)
+    if not answered:
+        raise NotIdentifiableError(
+            f"all {len(outcomes)} runs were refused, most of them because "
+            f"{reasons.most_common(1)[0][0]}"
+        )
+    everything = _with_sum(plan.loop.parameters)
+    truth = {name: everything[name] for name in answered[0].values}
+    estimates = {name: np.array([one.values[name] for one in answered]) for name in truth}
+    errors = {name: estimates[name] - truth[name] for name in truth}
+    return MonteCarlo(
+        method=plan.method.name,
+        runs=len(outcomes),
+        truth=truth,
+        estimates=estimates,
+        rmse={name: float(np.sqrt(np.mean(error**2))) for name, error in errors.items()},
+        bias={name: float(np.mean(error)) for name, error in errors.items()},
+        mean_bound={
+            name: float(np.mean([one.bounds[name] for one in answered]))
+            for name in answered[0].bounds
+        },
+        level=plan.level,
+        coverage={
+            name: float(np.mean([one.held[name] for one in answered])) for name in answered[0].held
+        },
+        failures=dict(reasons.most_common()),
+    )
+
+
+def _without_numbers(reason: str) -> str:
+    """The reason with its numbers left out, so that equal reasons are counted together."""
+    return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", reason)

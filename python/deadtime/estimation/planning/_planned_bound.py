@@ -1,0 +1,151 @@
+"""The Cramér-Rao bound of a planned experiment.
+
+For output y_i = f(t_i; p) + white noise of standard deviation sigma, no unbiased estimator of p
+has a smaller covariance than sigma^2 (J^T J)^-1, J = df/dp. Two bounds, for two kinds of log:
+
+* command logged: f is the response of the plant to that command, which is known, with the noise
+  that the controller acted on. With P its transfer function, w the command and T the delay,
+  df/dT = -s P e^(-sT) w, df/dlag = -s/(lag s + 1) P e^(-sT) w, df/dgain = f/gain: plants with
+  delay themselves, simulated exactly.
+* reference only: f is the output of the whole loop, whose controller does not act on the noise; J
+  is the sensitivity of its simulation.
+
+Both are taken along the run without noise. Noise that the controller acts on moves the command too,
+which adds information; the information of the first kind is then the mean of J^T J over runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._result import CramerRaoBound
+from deadtime.estimation.data._evidence import check_distinguishable, standard_errors
+from deadtime.experiments import Experiment
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+from deadtime.roots import delay, s
+from deadtime.systems import TransferFunction
+
+__all__ = ["PlannedBound", "bound_of", "from_the_command", "from_the_reference"]
+
+Array = NDArray[np.float64]
+
+#: Where a delay is a whole number of samples, the derivative is one-sided, towards a longer delay:
+#: the delay is increased by this share of a sample, which is more than rounding.
+LONGER = 1e-9
+
+#: Change of the initial output, as a share of the noise, in the difference quotient by it.
+START_CHANGE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedBound(CramerRaoBound):
+    """The Cramér-Rao bound of an experiment, with its covariance and sensitivities.
+
+    Attributes
+    ----------
+    free : tuple of str
+        What is taken as unknown; a bound without this says nothing.
+    noise : float
+        Standard deviation of the white measurement noise it is for, in the output's unit.
+    stderr : dict of str to float
+        The bound for each free quantity, and for ``delay+lag`` where both are free.
+    cov : ndarray, shape (len(free), len(free))
+        Smallest covariance, in the order of `free`.
+    sensitivities : dict of str to ndarray, shape (n,)
+        Derivative of the output by each free quantity, at the samples of the experiment.
+    """
+
+    cov: Array
+    sensitivities: dict[str, Array]
+
+    def correlation(self, one: str, other: str) -> float:
+        """Correlation of the errors of two free quantities.
+
+        Parameters
+        ----------
+        one, other : str
+            Of `free`.
+
+        Returns
+        -------
+        float
+            Near -1 or 1 the experiment hardly tells them apart.
+
+        Raises
+        ------
+        ValueError
+            If one of them is not free.
+        """
+        for name in (one, other):
+            if name not in self.free:
+                raise ValueError(f"{name!r} is not free, which are {', '.join(self.free)}")
+        i, j = self.free.index(one), self.free.index(other)
+        return float(self.cov[i, j] / np.sqrt(self.cov[i, i] * self.cov[j, j]))
+
+
+def bound_of(
+    runs: Sequence[dict[str, Array]], names: tuple[str, ...], noise: float
+) -> PlannedBound:
+    """The bound from the mean information of runs; the sensitivities of the first are kept."""
+    labels = tuple(runs[0])
+    jacobian = np.concatenate([np.stack(list(run.values()), axis=1) for run in runs])
+    check_distinguishable(jacobian, list(labels))
+    scale = np.linalg.norm(jacobian, axis=0)
+    # P P^T is the inverse of J^T J for the pseudoinverse P of J.
+    inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
+    cov = noise**2 * len(runs) * inverse @ inverse.T
+    return PlannedBound(labels, noise, standard_errors(names, cov), cov, runs[0])
+
+
+def from_the_command(
+    loop: ControlLoop, recording: Recording, names: Sequence[str], offset: bool
+) -> dict[str, Array]:
+    """Sensitivities of the plant's response to the recorded command, held between samples."""
+    num, den = loop.plant.polynomials()
+    if len(num) == len(den):
+        raise NotIdentifiableError(
+            f"{loop.plant!r} passes its command straight to its output, which jumps with it: there "
+            "is no derivative by the delay; give the plant a lag"
+        )
+    values, command, time = loop.parameters, recording.command, recording.time
+    assert command is not None
+    late = delay(values["delay"] + LONGER * recording.sample_time)
+    plant = TransferFunction(num, den)
+
+    def response(system: TransferFunction) -> Array:
+        return np.asarray((system * late).simulate(time, command, input_time=time).outputs)
+
+    slopes: dict[str, Array] = {}
+    for name in names:
+        if name == "delay":
+            slopes[name] = -response(plant * s)
+        elif name == "gain":
+            slopes[name] = response(plant) / values["gain"]
+        else:  # a lag or time constant
+            slopes[name] = -response(plant * s / (values[name] * s + 1.0))
+    if offset:
+        slopes["initial output"] = np.ones(len(recording))
+    return slopes
+
+
+def from_the_reference(
+    loop: ControlLoop, experiment: Experiment, names: Sequence[str], offset: bool, noise: float
+) -> dict[str, Array]:
+    """Sensitivities of the output of the whole loop."""
+    time, reference = experiment.time, experiment.reference_in_run()
+    response = loop.simulate(time, reference, reference_time=time, sensitivities=tuple(names))
+    slopes = {name: response.sensitivities[name] for name in names}
+    if offset:
+        change = START_CHANGE * noise
+        high, low = (
+            loop.simulate(time, reference, reference_time=time, initial_output=start).outputs
+            for start in (change, -change)
+        )
+        slopes["initial output"] = (high - low) / (2.0 * change)
+    return slopes

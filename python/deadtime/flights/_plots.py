@@ -1,0 +1,102 @@
+"""Plots of flights: the steps with the fits, and the parts of the delay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from deadtime._base.drawing import COLOURS, DATA, REFERENCE
+from deadtime.flights._runs import FlownSteps, Telemetry
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from deadtime.estimation import DelayEstimate
+
+__all__ = ["plot_checked", "plot_learned", "plot_telemetry"]
+
+#: Plotted time before and after a step, s.
+BEFORE, AFTER = 0.5, 4.5
+
+
+def plot_learned(
+    axes: Sequence[Axes], flights: Sequence[FlownSteps], fit: DelayEstimate
+) -> Sequence[Axes]:
+    """Draw each of the first flights, with the fit to its commands."""
+    for ax, flight, fitted in zip(axes, flights, fit.runs, strict=True):
+        shown, window = flight.recording, fitted.recording
+        ax.step(shown.time, shown.reference, where="post", label="reference", **REFERENCE)
+        ax.plot(shown.time, shown.output, label="height", **DATA)
+        explained = window.output - fitted.residuals
+        ax.plot(window.time, explained, color=COLOURS[0], lw=1.6, label="fit to its commands")
+        ax.set(title=flight.name, ylabel="height / m")
+        ax.title.set_fontsize("small")
+    axes[0].legend(frameon=False, fontsize="small")
+    axes[-1].set_xlabel("time / s")
+    return axes
+
+
+def plot_telemetry(
+    axes: Sequence[Axes], telemetry: Telemetry, flight: FlownSteps
+) -> Sequence[Axes]:
+    """Draw the command, the echoed setpoint and the climb around the first step."""
+    upper, lower = axes
+    at = flight.recording.steps()[0].time
+    low, high = at - BEFORE, at + 2.0
+    sent = (telemetry.command_time >= low) & (telemetry.command_time <= high)
+    came = (telemetry.time >= low) & (telemetry.time <= high)
+    upper.step(
+        telemetry.command_time[sent] - at,
+        telemetry.command[sent],
+        where="post",
+        color="0.35",
+        lw=1.2,
+        label="command sent",
+    )
+    time = telemetry.time[came] - at
+    upper.step(
+        time,
+        telemetry.setpoint[came],
+        where="post",
+        color=COLOURS[1],
+        lw=1.6,
+        label="echoed setpoint",
+    )
+    upper.plot(time, telemetry.climb[came], color=COLOURS[0], lw=1.0, label="reported climb")
+    upper.set(ylabel="vertical speed / (m/s)")
+    upper.legend(frameon=False, fontsize="small")
+    lower.plot(time, telemetry.height[came], color="0.35", lw=1.2)
+    lower.set(xlabel="time since the step / s", ylabel="height / m")
+    return axes
+
+
+def plot_checked(axes: Sequence[Axes], flights: Sequence[FlownSteps]) -> Sequence[Axes]:
+    """Draw the first step of several flights, and their commands below."""
+    upper, lower = axes
+    for colour, flight in zip(COLOURS, flights, strict=False):
+        step = flight.recording.steps()[0]
+        time = flight.recording.time - step.time
+        rows = (time >= -BEFORE) & (time <= AFTER)
+        name = f"{flight.name}: {flight.overshoot:.0f} % overshoot, " + (
+            f"settled in {flight.settling_time:.1f} s"
+            if np.isfinite(flight.settling_time)
+            else "not settled"
+        )
+        height = flight.recording.output[rows]
+        upper.plot(time[rows], height, color=colour, lw=1.6, label=name)
+        if flight.recording.command is not None:
+            command = flight.recording.command[rows]
+            lower.step(time[rows], command, where="post", color=colour, lw=1.1)
+    reference = flights[0].recording.steps()[0]
+    upper.step(
+        [-BEFORE, 0.0, AFTER],
+        [reference.before, reference.after, reference.after],
+        where="post",
+        **REFERENCE,
+    )
+    upper.set(ylabel="height / m")
+    upper.legend(frameon=False, fontsize="small", loc="lower right")
+    lower.set(xlabel="time since the step / s", ylabel="command / (m/s)")
+    return axes

@@ -1,0 +1,38 @@
+"""Notice when the parent process ends: it holds the other end of standard input.
+
+The system closes that end when its holder ends, in whatever way, by ``kill -9`` as well.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import threading
+from contextlib import suppress
+
+__all__ = ["parent_ended"]
+
+
+def parent_ended() -> asyncio.Event:
+    """An event of the running loop that is set when standard input ends.
+
+    What is read until then is discarded. Without a standard input it has ended already.
+    """
+    ended = asyncio.Event()
+    if sys.stdin is None:  # its number may be that of another file by now
+        ended.set()
+        return ended
+    loop, number = asyncio.get_running_loop(), sys.stdin.fileno()
+
+    def read() -> None:
+        # Not by sys.stdin: at its end the interpreter wants a lock that this thread would hold.
+        with suppress(OSError):
+            while os.read(number, 4096):
+                pass
+        with suppress(RuntimeError):  # the loop may have ended before
+            loop.call_soon_threadsafe(ended.set)
+
+    # A daemon: nobody waits for input that may never end.
+    threading.Thread(target=read, daemon=True).start()
+    return ended

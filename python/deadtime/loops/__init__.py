@@ -1,0 +1,38 @@
+"""Control loops with a delay: plant, controller, hold and limit.
+
+`_control_loop` is the loop, `_plants`, `_controllers` and `_derivative_filter` are its parts.
+`_specification` checks them and builds the equations of `_model`; `_in_time`, `_poles` and `_gain`
+hold the questions that a loop answers, `_run`, `_stability` and the `_sampled_*` files how.
+`_sweep` runs many loops, `_fixed_step` imitates block diagrams in fixed steps.
+"""
+
+from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._controllers import PD, PI, PID, PV, Controller, P
+from deadtime.loops._derivative_filter import DerivativeFilter
+from deadtime.loops._fixed_step import simulate_fixed_step
+from deadtime.loops._given_plants import PlantWithDelays
+from deadtime.loops._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
+from deadtime.loops._simulate import simulate
+from deadtime.loops._sweep import Sweep, SweepStatus, sweep
+
+__all__ = [
+    "PD",
+    "PI",
+    "PID",
+    "PV",
+    "ControlLoop",
+    "Controller",
+    "DerivativeFilter",
+    "FirstOrder",
+    "Integrator",
+    "P",
+    "Plant",
+    "PlantWithDelays",
+    "RationalPlant",
+    "Sweep",
+    "SweepStatus",
+    "kit_plant",
+    "simulate",
+    "simulate_fixed_step",
+    "sweep",
+]

@@ -1,0 +1,54 @@
+"""Transfer functions of a continuous loop, its limit left out.
+
+With the plant b/a, the feedback F = f/g and the reference path R = r/g of the controller, the loop
+has the characteristic function a g + b f e^(-s delay).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from deadtime.loops._controllers import Controller
+from deadtime.loops._plants import Plant
+from deadtime.loops._polynomials import in_s
+from deadtime.roots import delay
+from deadtime.systems import TransferFunction
+
+__all__ = ["characteristic", "closed_loop", "open_loop", "reference_to_command"]
+
+
+def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
+    """Build a g + b f e^(-s delay) from numbers or symbols in `values`."""
+    b, a = plant._fraction(values)
+    f, g = map(in_s, controller._feedback(values))
+    return a * g + b * f * delay(values["delay"])
+
+
+def open_loop(
+    plant: Plant, controller: Controller, values: Mapping[str, float]
+) -> TransferFunction:
+    """Build b f e^(-s delay) / (a g)."""
+    b, a = plant._fraction(values)
+    f, g = map(in_s, controller._feedback(values))
+    return TransferFunction(b * f * delay(values["delay"]), a * g)
+
+
+def closed_loop(
+    plant: Plant, controller: Controller, values: Mapping[str, float], delay_path: str
+) -> TransferFunction:
+    """Build b r [e^(-s delay)] / (a g + b f e^(-s delay)), delayed where the command is."""
+    b, _ = plant._fraction(values)
+    num = b * in_s(controller._reference(values)[0])
+    if delay_path == "command":
+        num = num * delay(values["delay"])
+    return TransferFunction(num, characteristic(plant, controller, values))
+
+
+def reference_to_command(
+    plant: Plant, controller: Controller, values: Mapping[str, float]
+) -> TransferFunction:
+    """Build a r / (a g + b f e^(-s delay))."""
+    _, a = plant._fraction(values)
+    num = a * in_s(controller._reference(values)[0])
+    return TransferFunction(num, characteristic(plant, controller, values))

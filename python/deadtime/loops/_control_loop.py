@@ -1,0 +1,172 @@
+"""A feedback loop with a delay: plant, controller, delay, and the hold and limit around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+from deadtime._base.validation import non_negative
+from deadtime.loops._controllers import Controller
+from deadtime.loops._gain import LoopGain
+from deadtime.loops._given_plants import plant_and_delay
+from deadtime.loops._in_time import LoopInTime
+from deadtime.loops._plants import Plant
+from deadtime.loops._poles import LoopPoles
+from deadtime.loops._specification import LoopSpecification
+
+__all__ = ["ControlLoop"]
+
+
+@dataclass(frozen=True, init=False)
+class ControlLoop(LoopInTime, LoopPoles, LoopGain):
+    """A plant under feedback with one delay in the loop.
+
+    The command u of the controller is limited, delayed by `delay` and reaches the plant as w.
+    With `sample_time` the controller computes u only every `sample_time` seconds and holds it;
+    such a loop is not a continuous one, and everything here treats it exactly.
+
+    Parameters
+    ----------
+    plant : Plant, TransferFunction, DelaySystem or a system of python-control or scipy.signal
+        `Integrator`, `FirstOrder` or `RationalPlant`; or a continuous system with one input and
+        one output. A delay in series with it is added to `delay`, and is not part of the `plant`
+        of the loop. With delays inside it becomes a `deadtime.loops.PlantWithDelays`, which takes
+        no `sample_time` and no `limit`.
+    controller : Controller
+        `P`, `PV`, `PD`, `PI` or `PID`.
+    delay : float, optional
+        Delay in s, zero or more; None where it is not known yet.
+    sample_time : float, optional
+        Sample time in s; None for continuous time.
+    limit : float, optional
+        Bound of the command, abs(u) <= limit; None for no bound.
+    delay_path : {"command", "measurement"}
+        Where the delay sits. Between command and plant, the output starts to move `delay` after a
+        step; in the measurement, the output itself is the same function `delay` earlier. A plant
+        with a delay in series has it between command and output, and takes "command" only.
+
+    Raises
+    ------
+    ValueError
+        If a number is negative, not finite or zero where it must not be; the message names it. If
+        the plant is sampled, has several inputs or outputs, or is not proper and causal.
+    TypeError
+        If `plant` or `controller` is none.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=2.4), delay=0.36, sample_time=0.065)
+    >>> loop.is_stable()
+    True
+    >>> info = loop.step_response().info()
+    >>> round(info["overshoot"], 1), round(info["settling_time"], 2)
+    (44.0, 4.31)
+
+    A plant as a transfer function, its delay with it:
+
+    >>> G = 0.9 / (dtm.s * (0.1 * dtm.s + 1)) * dtm.delay(0.36)
+    >>> dtm.ControlLoop(G, dtm.P(Kp=1.5)).margin()
+    <Margins: gain 2.697 at 3.442 rad/s, phase 54.78° at 1.338 rad/s, delay 0.7145 s at ...>
+    """
+
+    plant: Plant
+    controller: Controller
+    delay: float | None = None
+    sample_time: float | None = None
+    limit: float | None = None
+    delay_path: Literal["command", "measurement"] = "command"
+
+    def __init__(
+        self,
+        plant: object,
+        controller: Controller,
+        *,
+        delay: float | None = None,
+        sample_time: float | None = None,
+        limit: float | None = None,
+        delay_path: Literal["command", "measurement"] = "command",
+    ) -> None:
+        own, in_series = plant_and_delay(plant)
+        if in_series > 0.0:
+            if delay_path == "measurement":
+                raise ValueError(
+                    f"delay_path='measurement': the plant has a delay of {in_series:g} s between "
+                    "command and output; leave delay_path out, or give the plant without its delay"
+                )
+            delay = in_series + (0.0 if delay is None else non_negative("delay", delay))
+        specification = LoopSpecification(own, controller, delay, sample_time, limit, delay_path)
+        put = object.__setattr__
+        put(self, "specification", specification)
+        for name in _NAMES:
+            put(self, name, getattr(specification, name))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Without what is kept for speed.
+        return _loop_of, tuple(getattr(self, name) for name in _NAMES)
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the command is held between samples."""
+        return self.sample_time is not None
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The named numbers of the loop: those of plant and controller, then its own.
+
+        Returns
+        -------
+        dict of str to float
+            ``delay``, ``sample_time`` and ``limit`` are there where they are not None.
+        """
+        return self.specification.parameters
+
+    def replace(self, **changes: Any) -> ControlLoop:
+        """Return the loop with other numbers or other parts.
+
+        Parameters
+        ----------
+        **changes
+            Names of `parameters`, or the arguments of `ControlLoop`.
+
+        Returns
+        -------
+        ControlLoop
+
+        Raises
+        ------
+        ValueError
+            If the loop has no such name.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=2.4))
+        >>> loop.replace(delay=0.36, Kp=3.0).parameters
+        {'gain': 1.0, 'lag': 0.0, 'Kp': 3.0, 'delay': 0.36}
+        """
+        parts = {name: changes.pop(name, getattr(self, name)) for name in _NAMES}
+        for part in ("plant", "controller"):
+            if isinstance(parts[part], (Plant, Controller)):
+                mine = parts[part].parameters
+                numbers = {name: changes.pop(name) for name in mine if name in changes}
+                if numbers:
+                    parts[part] = parts[part]._replace(numbers)
+        if changes:
+            raise ValueError(
+                f"{', '.join(changes)}: no such number in this loop, which has "
+                f"{', '.join(self.parameters)}"
+            )
+        return ControlLoop(**parts)
+
+    def continuous(self) -> ControlLoop:
+        """Return the same loop without the hold, as if the controller computed all the time."""
+        return self.replace(sample_time=None)
+
+
+#: What a loop is made from.
+_NAMES = tuple(field.name for field in fields(LoopSpecification))
+
+
+def _loop_of(*values: Any) -> ControlLoop:
+    return ControlLoop(**dict(zip(_NAMES, values, strict=True)))

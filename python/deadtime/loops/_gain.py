@@ -1,0 +1,229 @@
+"""The loop gain of a control loop: margins, frequency response and transfer functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.validation import real_array
+from deadtime.loops._characteristic import closed_loop, open_loop
+from deadtime.loops._sampled_gain import SampledLoopGain
+from deadtime.loops._sampled_margins import sampled_margins
+from deadtime.loops._sampled_ranges import SampledNumber, further_delay
+from deadtime.loops._specification import LoopSpecification
+from deadtime.loops._stability import sampled_abscissa, sampled_is_stable
+from deadtime.systems import Margins, TransferFunction
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["LoopGain"]
+
+
+class LoopGain:
+    """The part of `ControlLoop` that cuts it at the command."""
+
+    specification: LoopSpecification
+
+    def open_loop(self) -> TransferFunction:
+        """Return the loop gain of the continuous loop, cut at the command, its limit left out.
+
+        Returns
+        -------
+        TransferFunction
+            b f exp(-s delay) / (a g) for the plant b/a and the feedback f/g; ``feedback`` of it
+            has `characteristic` as its denominator.
+
+        Raises
+        ------
+        ValueError
+            If the loop is sampled or its delay is None.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).open_loop()
+        (2 + 0.3 s) exp(-0.36 s) / s
+        """
+        self.specification.refuse_hold(
+            "has a hold in it, which this transfer function would leave out: use "
+            "continuous().open_loop() to leave it out on purpose"
+        )
+        loop = self.specification
+        _ = loop.known_delay
+        return open_loop(loop.plant, loop.controller, loop.parameters)
+
+    def closed_loop(self) -> TransferFunction:
+        """Return the transfer function from reference to output, the limit left out.
+
+        Returns
+        -------
+        TransferFunction
+            With the delay in the numerator where `delay_path` is "command".
+
+        Raises
+        ------
+        ValueError
+            If the loop is sampled or its delay is None.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).closed_loop()
+        2 exp(-0.36 s) / (s + (2 + 0.3 s) exp(-0.36 s))
+        """
+        self.specification.refuse_hold(
+            "has a hold in it, which this transfer function would leave out: use "
+            "continuous().closed_loop() to leave it out on purpose"
+        )
+        loop = self.specification
+        _ = loop.known_delay
+        return closed_loop(loop.plant, loop.controller, loop.parameters, loop.delay_path)
+
+    def margin(self) -> Margins:
+        """Return the gain, phase and delay margin of the loop, its limit left out.
+
+        Returns
+        -------
+        Margins
+            Of a sampled loop: hold and delay taken exactly. Its `delay_margins` are empty, because
+            further delay changes the hold's share and with it every crossing; `delay_margin` is
+            what `stable_range` finds.
+
+        Raises
+        ------
+        ValueError
+            If the delay is None, or the gain grows with frequency.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36)
+        >>> loop.margin()
+        <Margins: gain 2.182 at 4.363 rad/s, phase 48.75° at 2 rad/s, delay 0.4254 s at 2 rad/s>
+        >>> round(loop.stable_range("delay")[1] - loop.delay, 4)
+        0.4254
+
+        The hold costs a part of each:
+
+        >>> loop.replace(sample_time=0.065).margin()
+        <Margins: gain 2.012 at 4.002 rad/s, phase 45.09° at 1.997 rad/s, delay 0.3939 s at ...>
+        """
+        loop = self.specification
+        if loop.sample_time is not None:
+            abscissa = sampled_abscissa(loop.model, loop.known_delay, loop.sample_time)
+            return sampled_margins(self._sampled_gain, abscissa < 0.0, self._further_delay)
+        return self.open_loop().margin()
+
+    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """Return the loop gain, cut at the command, at frequencies; its limit left out.
+
+        Parameters
+        ----------
+        omega : array_like
+            Frequencies in rad/s; of a sampled loop from 0 to pi/sample_time.
+
+        Returns
+        -------
+        ndarray of complex, shape of `omega`
+            Of a continuous loop ``open_loop().frequency_response(omega)``. Of a sampled one
+            L(z) at z = exp(j omega sample_time), hold and delay taken exactly: minus the command
+            that comes back for one that goes out.
+
+        Raises
+        ------
+        ValueError
+            If the delay is None, or a frequency is out of range.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
+        >>> print(loop.frequency_response([1.0, 2.0]).round(4), loop.phase(2.0).round(4))
+        [-0.7647-1.8473j -0.7058-0.7064j] -2.3558
+        """
+        if self.specification.sample_time is not None:
+            return self._sampled_gain.frequency_response(omega)
+        return self.open_loop().frequency_response(omega)
+
+    def phase(self, omega: ArrayLike) -> NDArray[np.float64]:
+        """Return the argument of `frequency_response` in rad, continuous from zero frequency on.
+
+        Parameters
+        ----------
+        omega : array_like
+            Frequencies in rad/s.
+
+        Returns
+        -------
+        ndarray of float, shape of `omega`
+
+        Raises
+        ------
+        ValueError
+            As in `frequency_response`.
+        """
+        if self.specification.sample_time is not None:
+            return self._sampled_gain.phase(omega)
+        return self.open_loop().phase(omega)
+
+    def bode(
+        self, omega: ArrayLike | None = None, *, axes: Sequence[Axes] | None = None
+    ) -> Sequence[Axes]:
+        """Draw gain and phase of the loop gain over frequency, and mark the margins.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Frequencies in rad/s, above zero and increasing; by default from two decades below
+            the gain crossover to where the delay has turned the phase a few times, of a sampled
+            loop to pi/sample_time.
+        axes : sequence of two matplotlib.axes.Axes, optional
+            Where to draw gain and phase; a new figure by default.
+
+        Returns
+        -------
+        sequence of two matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            As in `frequency_response` and `margin`.
+        """
+        from deadtime._base.drawing import shown_rows
+        from deadtime.systems._plots import plot_bode
+
+        loop, found = self.specification, self.margin()
+        if omega is None:
+            marks = [*found.gain_crossovers, 1.0 / max(loop.known_delay, 1e-9)]
+            low, high = 0.01 * min(marks), 20.0 * max(marks)
+            if loop.sample_time is not None:
+                high = np.pi / loop.sample_time
+                low = min(low, 0.01 * high)
+            omega = np.geomspace(low, high, 1001)
+        drawn = shown_rows(axes, 2)
+        plot_bode(drawn, self, real_array("omega", omega), found)
+        return drawn
+
+    def _delay_margin(self) -> float:
+        """Further delay that the stable loop bears, s."""
+        loop = self.specification
+        if loop.sample_time is None:
+            return self.margin()._delay_margin()
+        if not sampled_is_stable(loop.model, loop.known_delay, loop.sample_time):
+            raise ValueError("the loop is not stable as it is: it has no delay margin")
+        return self._further_delay()[0]
+
+    @cached_property
+    def _sampled_gain(self) -> SampledLoopGain:
+        loop = self.specification
+        return SampledLoopGain.of(loop.model, loop.known_delay, cast(float, loop.sample_time))
+
+    def _further_delay(self) -> tuple[float, float]:
+        """How much more delay a stable sampled loop bears, and the frequency it then swings at."""
+        loop = self.specification
+        return further_delay(SampledNumber(loop.model_at, loop.parameters, "delay"))

@@ -1,0 +1,143 @@
+"""Plants given as transfer functions or systems, of this package or of another one.
+
+A rational transfer function with one delay in series becomes a `RationalPlant`, and the delay is
+that of the loop. Anything else with delays becomes a `PlantWithDelays`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from deadtime._base.validation import non_zero
+from deadtime.loops._plants import NO_GAIN, Plant, RationalPlant
+from deadtime.roots import QuasiPolynomial
+from deadtime.systems import DelaySystem, TransferFunction
+
+__all__ = ["PlantWithDelays", "plant_and_delay", "transfer_function_of"]
+
+
+@dataclass(frozen=True)
+class PlantWithDelays(Plant):
+    """gain * transfer(s), a plant with delays that are not one delay in series.
+
+    `ControlLoop` makes it from a transfer function or system with such delays. Its loop is
+    continuous and has no limit: poles, margins, stable ranges, maps, crossings and exact simulation
+    are there; what needs a state space of the plant is refused.
+
+    Parameters
+    ----------
+    transfer : TransferFunction
+        Proper and causal.
+    gain : float
+        Factor on the whole, not zero: the number that a map varies.
+
+    Raises
+    ------
+    ValueError
+        If the transfer function is not proper or not causal, or `gain` is zero.
+
+    Examples
+    --------
+    A plant with a delayed state, and a delay in the loop:
+
+    >>> import deadtime as dtm
+    >>> G = 1.0 / (dtm.s + 0.5 * dtm.delay(1.0))
+    >>> loop = dtm.ControlLoop(G, dtm.P(0.5), delay=0.2)
+    >>> loop.characteristic()
+    s + 0.5 exp(-0.2 s) + 0.5 exp(-s)
+    >>> loop.is_stable()
+    True
+    """
+
+    transfer: TransferFunction
+    gain: float = 1.0
+
+    def __post_init__(self) -> None:
+        num, den = self.transfer.num, self.transfer.den
+        if not self.transfer.is_proper:
+            raise ValueError(
+                f"plant={self.transfer!r}: the numerator has degree {num.degree} and the "
+                f"denominator {den.degree}; a plant cannot differentiate its command"
+            )
+        if not self.transfer.is_causal:
+            raise ValueError(
+                f"plant={self.transfer!r}: its output would depend on later commands; give a plant "
+                "that is causal"
+            )
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
+
+    @property
+    def is_rational(self) -> bool:
+        """False: it has delays inside."""
+        return False
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``gain``."""
+        return {"gain": self.gain}
+
+    def transfer_function(self) -> TransferFunction:
+        """Return the plant as a transfer function.
+
+        Returns
+        -------
+        TransferFunction
+        """
+        return self.gain * self.transfer
+
+    def _fraction(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
+        return values["gain"] * self.transfer.num, self.transfer.den
+
+    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
+        raise ValueError(
+            f"plant={self.transfer!r} has delays inside, so that no state space of it exists, "
+            "which this needs: give a plant that is rational but for one delay in series, or ask "
+            "for poles, margins, stable ranges, maps or a simulation of the continuous loop"
+        )
+
+
+def plant_and_delay(given: object) -> tuple[Plant, float]:
+    """Return a plant, and the delay in s that was in series with it."""
+    if isinstance(given, Plant):
+        return given, 0.0
+    G = transfer_function_of(given)
+    if G is None:
+        raise TypeError(
+            f"plant={given!r}: give a plant, for example Integrator(), a TransferFunction or "
+            "DelaySystem, or a system of python-control or scipy.signal"
+        )
+    if len(G.num.delays) > 1 or len(G.den.delays) > 1:
+        return PlantWithDelays(G), 0.0
+    late = float(G.num.delays[0] - G.den.delays[0])
+    if late < 0.0:
+        raise ValueError(
+            f"plant={G!r}: its output would come {-late:g} s before its command; give a plant that "
+            "is causal"
+        )
+    num, den = (h.coefficients[0, ::-1].tolist() for h in (G.num, G.den))
+    return RationalPlant(num, den), late
+
+
+def transfer_function_of(given: object) -> TransferFunction | None:
+    """Return a system with one input and one output as a transfer function; None for others."""
+    if isinstance(given, TransferFunction):
+        return given
+    if isinstance(given, Plant):
+        return given.transfer_function()
+    if isinstance(given, QuasiPolynomial):
+        return TransferFunction(given)
+    if isinstance(given, DelaySystem):
+        if (given.n_inputs, given.n_outputs) != (1, 1):
+            raise ValueError(
+                f"{given!r} as a plant: give a system with one input and one output, or one of its "
+                "transfer functions, system.transfer_function(output, input)"
+            )
+        return given.transfer_function()
+    package = type(given).__module__
+    if package.startswith("control."):
+        return TransferFunction.from_control(given)
+    if package.startswith("scipy.signal"):
+        return TransferFunction.from_scipy(given)
+    return None

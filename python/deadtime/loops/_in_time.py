@@ -1,0 +1,142 @@
+"""What a control loop does in time: simulations and step responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from numpy.typing import ArrayLike
+
+from deadtime._base.validation import finite
+from deadtime.loops._run import settled_step, simulate_loop
+from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
+from deadtime.loops._specification import LoopSpecification
+from deadtime.systems import Response
+
+__all__ = ["LoopInTime"]
+
+
+class LoopInTime:
+    """The part of `ControlLoop` that simulates it."""
+
+    specification: LoopSpecification
+
+    def simulate(
+        self,
+        time: ArrayLike,
+        reference: ArrayLike = 1.0,
+        *,
+        initial_output: float = 0.0,
+        reference_before: float | None = None,
+        reference_time: ArrayLike | None = None,
+        command_history: ArrayLike = (),
+        sample_phase: float = 0.0,
+        sensitivities: Sequence[str] = (),
+    ) -> Response:
+        """Response to a reference that is constant between jumps, exact to rounding.
+
+        The run starts at ``time[0]`` with the plant at rest at `initial_output`, under the command
+        that keeps it there.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            Output times in s, increasing.
+        reference : float or array_like, shape (m,)
+            A number: a step to it at the start. An array: values that hold from the times in
+            `reference_time` on.
+        initial_output : float
+            Output at the start.
+        reference_before : float, optional
+            Reference before the first jump; `initial_output` by default.
+        reference_time : array_like, shape (m,), optional
+            Times of the values of an array `reference`, increasing, in the same clock as `time`;
+            `time` itself where the lengths agree.
+        command_history : array_like, optional
+            Sampled loops: the commands issued at the samples before the start, the latest last.
+            Those still under way arrive as they did; before them the plant was at rest.
+        sample_phase : float
+            Sampled loops: time in s from the start to the first sample, in [0, sample_time).
+        sensitivities : sequence of str, optional
+            Names of `parameters` with respect to which the response is differentiated: see
+            `Response.sensitivities`.
+
+        Returns
+        -------
+        Response
+
+        Raises
+        ------
+        ValueError
+            If the delay is None, an argument is out of its range, or the response grows beyond
+            1e150; the message says when.
+
+        Notes
+        -----
+        Continuous loops are integrated by the method of steps in Taylor elements that end at
+        every breaking point, sampled ones by matrix exponentials between events; see the
+        description of the delay differential equations in the manual. A sampled controller reads
+        output and reference at the sample; one that lies on a jump reads the reference after it.
+
+        Sensitivities are exact as well: the same engines run in numbers that carry a slope, and
+        jumps, samples and switching times move with the parameter. At a time at which the
+        response jumps, the derivative is that of what follows the jump; where the delay is a
+        whole number of samples, that for a longer delay.
+
+        A loop whose plant has delays inside is simulated by its transfer functions; it starts at
+        rest under `reference_before`, and has no sensitivities.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.31), delay=0.36, limit=1.0)
+        >>> response = loop.simulate([0.0, 1.0, 2.0, 10.0], reference=2.0)
+        >>> print(response.outputs)
+        [0.         0.64       1.63876861 2.        ]
+
+        How the output answers to the delay and to the gain:
+
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.31), delay=0.36)
+        >>> response = loop.simulate([0.0, 0.5, 1.0], sensitivities=("delay", "Kp"))
+        >>> print(response.sensitivities["delay"])       # before 2 delays: y = Kp (t - delay)
+        [ 0.         -1.31       -0.348984]
+        """
+        run = simulate_loop if self.specification.plant.is_rational else simulate_with_delays
+        return run(
+            self.specification,
+            time,
+            reference,
+            initial_output=initial_output,
+            reference_before=reference_before,
+            reference_time=reference_time,
+            command_history=command_history,
+            sample_phase=sample_phase,
+            sensitivities=sensitivities,
+        )
+
+    def step_response(self, time: ArrayLike | None = None, amplitude: float = 1.0) -> Response:
+        """Response to a step of the reference from rest at zero.
+
+        Parameters
+        ----------
+        time : array_like, optional
+            Output times in s; by default 501 from the step until the response has settled, or
+            has visibly failed to.
+        amplitude : float
+            Height of the step.
+
+        Returns
+        -------
+        Response
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=2.0), delay=0.36)
+        >>> round(loop.step_response().info()["overshoot"], 3)
+        22.475
+        """
+        if time is not None:
+            return self.simulate(time, amplitude)
+        rational = self.specification.plant.is_rational
+        run = settled_step if rational else settled_step_with_delays
+        return run(self.specification, finite("amplitude", amplitude))

@@ -1,0 +1,197 @@
+"""Plant and controller put together as the equations that the stepper takes.
+
+x' = A x + B w + E r, u = K x + L w + M r, y = C x + D w, w(t) = sat(u(t - Td)): the plant's states
+come first in x, the controller's after them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._deadtime import LinearLoop
+from deadtime.loops._batched_matrices import column, number, vector, zeros
+from deadtime.loops._controllers import Controller, FilterUpdate
+from deadtime.loops._plants import Plant, StateSpace, realise, rest
+
+__all__ = ["LoopModel", "rest_of", "state_at_rest"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LoopModel:
+    """The matrices of a loop with numbers in the place of every parameter.
+
+    Where the numbers are arrays, the matrices of one loop an element are in the leading axes.
+    """
+
+    A: Vector
+    B: Vector
+    E: Vector
+    K: Vector
+    L: Any
+    M: Any
+    C: Vector
+    D: Any
+    impulse: Any
+    #: J, G, H of x := J x + G w + H r at samples, where a discretised filter has states.
+    update: tuple[Vector, Vector, Vector] | None = None
+    #: The plant alone.
+    plant: StateSpace | None = None
+
+    @classmethod
+    def build(cls, plant: Plant, controller: Controller, values: Mapping[str, Any]) -> LoopModel:
+        """Close the loop around `plant`, numbers taken from `values`."""
+        p = realise(*plant._polynomials(values))
+        c = controller._equations(values)
+        if np.any(c.q != 0.0) and np.any(p.D != 0.0):
+            raise ValueError(
+                f"the plant passes its command straight to its output (D={p.D}), so its output "
+                "has no ideal derivative: give the controller a DerivativeFilter"
+            )
+        n, m = p.B.shape[-1], c.B.shape[-1]
+        A = zeros((n + m, n + m), p.A, c.A, c.B[..., None])
+        A[..., :n, :n] = p.A
+        A[..., n:, :n] = c.B[..., None] * p.C
+        A[..., n:, n:] = c.A
+        feedback = column(c.p) * p.C + column(c.q) * (p.C @ p.A)
+        return cls(
+            A=A,
+            B=_joined(p.B, c.B * column(p.D)),
+            E=_joined(np.zeros(n), c.E),
+            K=_joined(feedback, c.C),
+            L=number(c.p * p.D + c.q * (p.B @ p.C)),
+            M=number(c.M),
+            C=np.concatenate([p.C, np.zeros(m)]),
+            D=p.D,
+            impulse=number(c.impulse),
+            update=None if c.update is None else _update(p, c.update, n + m),
+            plant=p,
+        )
+
+    def row(self, delay: Any, sample_time: Any = None, limit: Any = None) -> NDArray[Any]:
+        """Write the loop, or each of many, as one row of numbers for the native part.
+
+        Returns
+        -------
+        ndarray, shape (..., n * n + 4 n + 7)
+            A, B, E, K, C, L, M, D, impulse, the delay, the sample time (0 for none) and the limit
+            (infinite for none).
+        """
+        flat = self.A.reshape(*self.A.shape[:-2], -1)
+        period = 0.0 if sample_time is None else sample_time
+        bound = np.inf if limit is None else limit
+        numbers = vector([self.L, self.M, self.D, self.impulse, delay, period, bound])
+        return _joined(flat, self.B, self.E, self.K, self.C, numbers)
+
+    def native(
+        self, delay: float, sample_time: float | None = None, limit: float | None = None
+    ) -> LinearLoop:
+        """Return the loop as the stepper holds it."""
+        return LinearLoop(
+            self.A,
+            self.B,
+            self.E,
+            self.K,
+            self.L,
+            self.M,
+            self.C,
+            self.D,
+            delay,
+            sample_time,
+            limit,
+            self.impulse,
+            self.update,
+        )
+
+    @cached_property
+    def rest_gains(self) -> tuple[float, float] | None:
+        """Output and command at rest under a unit reference, None where there is no such rest."""
+        n = len(self.B)
+        matrix = np.zeros((n + 1, n + 1))
+        A, B, E = self.A, self.B, self.E
+        if self.update is not None:
+            # What a sample moves rests where the sample does not move it.
+            states, command, reference = self.update
+            A, B, E = A + states - np.eye(n), B + command, E + reference
+        matrix[:n, :n] = A
+        matrix[:n, n] = B
+        matrix[n, :n] = self.K
+        matrix[n, n] = self.L - 1.0
+        scale = np.abs(matrix).sum(axis=1)
+        if not scale.all():
+            return None
+        matrix /= scale[:, None]
+        right = -np.append(E, self.M) / scale
+        if np.linalg.cond(matrix) > 1e13:
+            return None
+        x = np.linalg.solve(matrix, right)
+        return float(self.C @ x[:n] + self.D * x[n]), float(x[n])
+
+
+def _update(plant: StateSpace, update: FilterUpdate, size: int) -> tuple[Vector, Vector, Vector]:
+    """What a sample does to all states: the filter reads the output, its states come last."""
+    states, command, reference = np.eye(size), np.zeros(size), np.zeros(size)
+    n = len(plant.B)
+    states[-2:, -2:] = update.F
+    states[-2:, :n] = np.outer(update.G, plant.C)
+    command[-2:] = update.G * plant.D
+    reference[-2:] = update.H
+    return states, command, reference
+
+
+def refuse_discretised(controller: Controller, sample_time: float | None, what: str) -> None:
+    """Raise where a filter runs in samples, which `what` cannot do."""
+    smooth = controller._filter
+    if sample_time is not None and smooth is not None and smooth.discretisation is not None:
+        raise ValueError(
+            f"{what} cannot run a filter in samples (discretisation={smooth.discretisation!r}): "
+            "leave its discretisation out, or take loops one by one"
+        )
+
+
+def _joined(*parts: NDArray[Any]) -> NDArray[Any]:
+    """Concatenate vectors whose leading axes broadcast."""
+    if all(part.ndim == 1 for part in parts):
+        return np.concatenate(parts)
+    leading = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
+    return np.concatenate(
+        [np.broadcast_to(part, leading + part.shape[-1:]) for part in parts], axis=-1
+    )
+
+
+def rest_of(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Output and command at rest under a unit reference, NaN where there is no such rest.
+
+    `LoopModel.rest_gains` of many loops: with plant b/a, feedback f/g and reference path q/g they
+    are b q / (a g + b f) and a q / (a g + b f) at s = 0.
+    """
+    b, a = (part[-1] for part in plant._polynomials(values))
+    f, g = (part[-1] for part in controller._feedback(values))
+    q = controller._reference(values)[0][-1]
+    total = a * g + b * f
+    exists = np.abs(total) > 1e-13 * (np.abs(a * g) + np.abs(b * f))
+    total = np.where(exists, total, np.nan)
+    return b * q / total, a * q / total
+
+
+def state_at_rest(
+    plant: Plant,
+    controller: Controller,
+    values: Mapping[str, Any],
+    output: float,
+    reference: float,
+    space: StateSpace | None = None,
+) -> tuple[Vector, Any]:
+    """State of a loop whose plant rests at `output`, and the command that holds it there.
+
+    `space` is the plant's state space, where that is known.
+    """
+    state, command = rest(*plant._polynomials(values), output, space)
+    return np.concatenate([state, controller._rest(values, output, reference, command)]), command

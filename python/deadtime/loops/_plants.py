@@ -1,0 +1,350 @@
+r"""Plants: what the delayed command acts on.
+
+A plant is a proper rational transfer function b(s)/a(s) in floats (those with delays inside:
+`_given_plants`). Its state space is the
+observable canonical form: with a monic of degree n and D = b\ :sub:`0`,
+
+    x_i' = -a_i x_1 + x_{i+1} + (b_i - a_i D) w,   y = x_1 + D w,
+
+in which the first state is the output and a plant at rest is found by inspection.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, SupportsFloat, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.validation import finite, non_negative, non_zero, unmasked
+from deadtime.loops._batched_matrices import matrix, number, vector
+from deadtime.loops._polynomials import in_s
+from deadtime.systems import TransferFunction
+
+__all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
+
+
+class StateSpace(NamedTuple):
+    """x' = A x + B w, y = C x + D w with one input and one output.
+
+    Attributes
+    ----------
+    A : ndarray, shape (n, n)
+    B : ndarray, shape (n,)
+    C : ndarray, shape (n,)
+    D : float
+    """
+
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
+    C: NDArray[np.float64]
+    D: float
+
+
+class Plant(ABC):
+    """A proper transfer function from the delayed command w to the output y."""
+
+    @property
+    def is_rational(self) -> bool:
+        """Whether it is a ratio of polynomials; else it has delays inside."""
+        return True
+
+    @property
+    @abstractmethod
+    def parameters(self) -> dict[str, float]:
+        """The plant's named numbers."""
+
+    def _replace(self, numbers: Mapping[str, float]) -> Plant:
+        """Return the same plant with other numbers."""
+        return cast(Plant, replace(cast(Any, self), **numbers))
+
+    @abstractmethod
+    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
+        """Numerator and denominator, descending, in numbers, arrays or symbols of `values`."""
+
+    def _fraction(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Numerator and denominator as quasi-polynomials, or families of them."""
+        num, den = self._polynomials(values)
+        return in_s(num), in_s(den)
+
+    def polynomials(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Numerator and denominator of the transfer function.
+
+        Returns
+        -------
+        (num, den) : tuple of ndarray
+            Coefficients in descending powers of s, without leading zeros.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.Integrator(gain=0.9, lag=0.2).polynomials()
+        (array([0.9]), array([0.2, 1. , 0. ]))
+        """
+        num, den = self._polynomials(self.parameters)
+        return _trimmed(num), _trimmed(den)
+
+    def transfer_function(self) -> TransferFunction:
+        """Return the plant as a transfer function.
+
+        Returns
+        -------
+        TransferFunction
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.Integrator(gain=0.9, lag=0.2).transfer_function() * dtm.delay(0.36)
+        0.9 exp(-0.36 s) / (s + 0.2 s^2)
+        """
+        return TransferFunction(*self.polynomials())
+
+    def state_space(self) -> StateSpace:
+        """State space in observable canonical form: the first state is y - D w.
+
+        Returns
+        -------
+        StateSpace
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.FirstOrder(gain=2.0, time_constant=0.5).state_space()
+        StateSpace(A=array([[-2.]]), B=array([4.]), C=array([1.]), D=0.0)
+        """
+        return realise(*self._polynomials(self.parameters))
+
+
+# Why numbers cannot be zero.
+NO_GAIN = "a plant without gain does not answer its command, so the loop is open"
+NO_TIME = "the plant is then a gain alone, RationalPlant([gain], [1.0])"
+
+
+@dataclass(frozen=True)
+class Integrator(Plant):
+    """gain / (s (lag s + 1)).
+
+    The height of a hovering vehicle answers the vertical speed it is told to fly so: the command
+    becomes speed after a first-order lag, and speed adds up to height.
+
+    Parameters
+    ----------
+    gain : float
+        Output per second and unit of command, not zero.
+    lag : float
+        Time constant of the lag in s, zero for none.
+
+    Raises
+    ------
+    ValueError
+        If `gain` is zero or a number is not finite, or `lag` is negative.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.Integrator(gain=0.9, lag=0.2).parameters
+    {'gain': 0.9, 'lag': 0.2}
+    """
+
+    gain: float = 1.0
+    lag: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
+        object.__setattr__(self, "lag", non_negative("lag", self.lag))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``gain`` and ``lag``."""
+        return {"gain": self.gain, "lag": self.lag}
+
+    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
+        return [values["gain"]], [values["lag"], 1.0, 0.0]
+
+
+@dataclass(frozen=True)
+class FirstOrder(Plant):
+    """gain / (time_constant s + 1).
+
+    Parameters
+    ----------
+    gain : float
+        Steady output per unit of command, not zero.
+    time_constant : float
+        In s, above zero for a stable plant; a negative one is an unstable plant. Not zero.
+
+    Raises
+    ------
+    ValueError
+        If a number is zero or not finite.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> loop = dtm.ControlLoop(dtm.FirstOrder(2.0, time_constant=0.5), dtm.P(1.0), delay=0.1)
+    >>> float(round(loop.step_response().steady_state, 6))         # proportional: an error stays
+    0.666667
+    """
+
+    gain: float = 1.0
+    time_constant: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
+        object.__setattr__(
+            self, "time_constant", non_zero("time_constant", self.time_constant, NO_TIME)
+        )
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``gain`` and ``time_constant``."""
+        return {"gain": self.gain, "time_constant": self.time_constant}
+
+    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
+        return [values["gain"]], [values["time_constant"], 1.0]
+
+
+@dataclass(frozen=True)
+class RationalPlant(Plant):
+    """gain * num(s) / den(s), proper.
+
+    Parameters
+    ----------
+    num, den : sequence of float
+        Coefficients in descending powers of s; the degree of `num` is at most that of `den`.
+    gain : float
+        Factor on the whole, not zero: the number that a fit or a map varies.
+
+    Raises
+    ------
+    ValueError
+        If a polynomial is empty or zero, the plant is not proper, or a number is not finite.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> dtm.RationalPlant([1.0], [1.0, 0.4, 4.0]).parameters
+    {'gain': 1.0}
+    """
+
+    num: Sequence[float]
+    den: Sequence[float]
+    gain: float = 1.0
+
+    def __post_init__(self) -> None:
+        num = _coefficients("num", self.num)
+        den = _coefficients("den", self.den)
+        if len(num) > len(den):
+            raise ValueError(
+                f"num has degree {len(num) - 1} and den {len(den) - 1}: a plant cannot "
+                "differentiate its command, give den at least the degree of num"
+            )
+        object.__setattr__(self, "num", num)
+        object.__setattr__(self, "den", den)
+        object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``gain``."""
+        return {"gain": self.gain}
+
+    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
+        return [values["gain"] * b for b in self.num], list(self.den)
+
+
+def kit_plant() -> RationalPlant:
+    """Height model of the AR Drone Simulink Development Kit.
+
+    (0.15265 s + 5.1529) / (s (s + 5.820)), from vertical speed command in m/s to height in m,
+    without the delay of the link.
+
+    Returns
+    -------
+    RationalPlant
+
+    References
+    ----------
+    D. Escobar Sanabria and P. J. Mosterman, AR Drone Simulink Development Kit, v1.1.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> num, den = dtm.kit_plant().polynomials()
+    >>> round(float(num[-1] / den[-2]), 3)          # m/s of climb per m/s of command
+    0.885
+    """
+    return RationalPlant(num=(0.15265, 5.1529), den=(1.0, 5.820, 0.0))
+
+
+def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
+    """Observable canonical form of num/den (descending, proper); entries may be arrays."""
+    a, b = _led(den), _led(num)
+    b = [0.0] * (len(a) - len(b)) + b
+    direct, n = b[0] / a[0], len(a) - 1
+    poles, gains = ([c / a[0] for c in part[1:]] for part in (a, b))
+    chain = np.eye(n, k=1)
+    rows = [[0.0 - pole, *chain[i, 1:]] for i, pole in enumerate(poles)]
+    drive = [gain - pole * direct for gain, pole in zip(gains, poles, strict=True)]
+    return StateSpace(matrix(rows), vector(drive), np.eye(1, n)[0], number(direct))
+
+
+def rest(
+    num: Sequence[Any], den: Sequence[Any], output: float, plant: StateSpace | None = None
+) -> tuple[Any, Any]:
+    """State and command of a plant at rest with the given output, for `realise`'s state.
+
+    `plant` is what `realise` makes of `num` and `den`, where that is known.
+    """
+    plant = realise(num, den) if plant is None else plant
+    n = len(plant.B)
+    zeros, poles = num[-1], den[-1]
+    if poles == 0.0 or output == 0.0:
+        command: Any = 0.0
+    elif zeros == 0.0:
+        raise ValueError(
+            f"initial_output={output}: this plant has no steady gain and rests only at zero, "
+            "start it there"
+        )
+    else:
+        command = output * poles / zeros
+    state: list[Any] = []
+    if n:
+        state.append(output - plant.D * command)
+        for i in range(n - 1):
+            state.append(-(plant.A[i, 0] * state[0] + plant.B[i] * command))
+    return vector(state), command
+
+
+def _led(coefficients: Sequence[Any]) -> list[Any]:
+    """Drop leading entries that are zero throughout, keep at least one."""
+    first = next((i for i, c in enumerate(coefficients) if _is_something(c)), -1)
+    return list(coefficients)[first:]
+
+
+def _is_something(coefficient: Any) -> bool:
+    """Whether a number, or any of an array, is other than zero."""
+    if isinstance(coefficient, float):
+        return coefficient != 0.0
+    return bool(np.any(coefficient != 0.0))
+
+
+def _trimmed(coefficients: Sequence[float]) -> NDArray[np.float64]:
+    """Drop leading zeros, keep at least one coefficient."""
+    array = np.asarray(coefficients, dtype=np.float64)
+    first = int(np.argmax(array != 0.0))
+    return array[first:] if array[first] != 0.0 else array[-1:]
+
+
+def _coefficients(name: str, given: Sequence[SupportsFloat]) -> tuple[float, ...]:
+    given = unmasked(name, given)
+    try:
+        listed = list(given)
+    except TypeError as error:
+        raise TypeError(f"{name}={given!r}: give a sequence of coefficients") from error
+    numbers = np.asarray([finite(name, c) for c in listed], dtype=np.float64)
+    if numbers.size == 0 or not numbers.any():
+        raise ValueError(f"{name}={listed}: give at least one coefficient other than zero")
+    return tuple(float(c) for c in _trimmed(numbers.tolist()))

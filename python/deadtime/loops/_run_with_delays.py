@@ -1,0 +1,119 @@
+"""Simulation of a loop whose plant has delays inside, by the transfer functions of the whole loop.
+
+With the plant b/a, the feedback f/g and the reference path r/g of the controller, the reference
+drives the output by b r e^(-s delay) / h and the command by a r / h, h = a g + b f e^(-s delay).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.validation import finite, one_dimensional
+from deadtime.loops._characteristic import closed_loop, reference_to_command
+from deadtime.loops._run import reference_jumps
+from deadtime.loops._specification import LoopSpecification
+from deadtime.systems import Response, TransferFunction
+from deadtime.systems._run import respond, step_response
+
+__all__ = ["settled_step_with_delays", "simulate_with_delays"]
+
+Vector = NDArray[np.float64]
+
+#: Relative error to which an initial output must be the one at rest.
+_AT_REST = 1e-9
+
+
+@dataclass(frozen=True)
+class _Again:
+    """The output at any times: the run is made again for them."""
+
+    dense: Callable[[Vector], Vector]
+
+    def __call__(self, times: Vector) -> Vector:
+        outputs: Vector = np.atleast_2d(self.dense(times))[0]
+        return outputs
+
+
+def simulate_with_delays(
+    loop: LoopSpecification,
+    time: ArrayLike,
+    reference: ArrayLike,
+    *,
+    initial_output: float = 0.0,
+    reference_before: float | None = None,
+    reference_time: ArrayLike | None = None,
+    command_history: ArrayLike = (),
+    sample_phase: float = 0.0,
+    sensitivities: Sequence[str] = (),
+) -> Response:
+    """Check the arguments of `ControlLoop.simulate` and run the loop."""
+    others = {
+        "command_history": np.size(command_history) > 0,
+        "sample_phase": sample_phase != 0.0,
+        "sensitivities": len(sensitivities) > 0,
+    }
+    for name, is_given in others.items():
+        if is_given:
+            raise ValueError(
+                f"{name}: a loop whose plant has delays inside takes no such argument; it needs a "
+                "plant that is rational but for one delay in series"
+            )
+    times = one_dimensional("time", time)
+    if times.size == 0:
+        raise ValueError("time is empty: give at least one output time")
+    initial = finite("initial_output", initial_output)
+    before = initial if reference_before is None else finite("reference_before", reference_before)
+    jumps = reference_jumps(times, reference, reference_time, before)
+    start = float(times[0])
+    past = jumps.just_before(start)
+    output, command = _driven(loop)
+    rest = output.dcgain() * past if past != 0.0 else 0.0
+    if not abs(rest - initial) <= _AT_REST * max(abs(rest), abs(initial)):
+        raise ValueError(
+            f"initial_output={initial:g}: under the reference {past:g} before the start, this loop "
+            f"rests at {rest:g}, and with delays inside its plant it can only start there"
+        )
+    later = jumps.times >= start
+    when = np.append(start, jumps.times[later])
+    held = np.append(past, jumps.values[later])
+    if when.size > 1 and when[1] == start:
+        when, held = when[1:], held[1:]
+    runs = [
+        respond(driven, times, held, input_time=when, input_before=past)
+        for driven in (output, command)
+    ]
+    steady = output.dcgain() * float(jumps.values[-1])
+    dense = runs[0]._dense
+    return Response(
+        time=times,
+        outputs=runs[0].outputs,
+        inputs=runs[1].outputs,
+        breaks=np.union1d(runs[0].breaks, runs[1].breaks),
+        reference=jumps.at(times),
+        steady_state=steady if np.isfinite(steady) else None,
+        _dense=None if dense is None else _Again(dense),
+    )
+
+
+def settled_step_with_delays(loop: LoopSpecification, amplitude: float) -> Response:
+    """Step response up to where it has settled."""
+    found = step_response(_driven(loop)[0], None, amplitude, 0)
+    return simulate_with_delays(loop, found.time, amplitude)
+
+
+def _driven(loop: LoopSpecification) -> tuple[TransferFunction, TransferFunction]:
+    """From the reference to the output, and to the command."""
+    _ = loop.known_delay
+    parts = loop.plant, loop.controller, loop.parameters
+    command = reference_to_command(*parts)
+    if not command.is_proper:
+        raise ValueError(
+            "a step of the reference is an impulse of the command of this loop: give its "
+            "derivative a DerivativeFilter, or take the derivative of the measurement alone, as PV "
+            "does"
+        )
+    return closed_loop(*parts, loop.delay_path), command

@@ -1,0 +1,122 @@
+"""Margins of a sampled loop, from all crossings of its loop gain on the upper unit circle.
+
+The poles move continuously with a factor k on L or a turn e^(-j phi) of it, so that a stable loop
+first loses stability where a pole comes to the unit circle:
+
+    k = 1/abs(L) where L(e^(j angle)) is real and negative (angles 0 and pi among these),
+    phi = pi + arg L where abs(L) = 1.
+
+A further delay changes the fraction of a sample and with it L itself, so the delay margin is not
+read off L: it is the first loss of stability of the loop as its delay grows.
+
+Crossings are sought between angles that keep poles, zeros and turns of the delay apart, and at
+the extrema between them; they are refined to rounding. A pair of crossings closer together than
+that, with an extremum that no angle shows, would be missed: this is no proof.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from deadtime.loops._sampled_gain import SampledLoopGain
+from deadtime.systems import Margins
+
+__all__ = ["sampled_margins"]
+
+Vector = NDArray[np.float64]
+
+
+def sampled_margins(
+    gain: SampledLoopGain, stable: bool, further_delay: Callable[[], tuple[float, float]]
+) -> Margins:
+    """Margins of the loop gain; `further_delay` gives the delay margin and its frequency."""
+    period = gain.sample_time
+
+    def side(angle: Vector) -> Vector:
+        values = gain.at(angle)
+        return values.imag / np.abs(values)
+
+    crossovers, turn = _gain_crossovers(gain)
+    degrees = np.degrees(np.where(turn > np.pi, turn - 2.0 * np.pi, turn))
+
+    # L is real at both ends of the half circle, at 0 unless a pole stands there.
+    inner = gain.angles[:-1]
+    ends = [np.pi] if gain.integrators else [0.0, np.pi]
+    places = np.unique(np.append(_crossings(side, inner), ends))
+    real = gain.at(places).real
+    places, factors = places[real < 0.0], -1.0 / real[real < 0.0]
+
+    nan, omegas = math.nan, places / period
+    up, up_at = _first_loss(factors, omegas, factors > 1.0, 1.0, math.inf)
+    down, down_at = _first_loss(factors, omegas, factors < 1.0, -1.0, 0.0)
+    turned, turned_at = _first_loss(
+        np.abs(degrees), crossovers / period, np.isfinite(degrees), 1.0, math.inf
+    )
+    late, late_at = further_delay() if stable else (nan, nan)
+    if not stable:
+        up = down = turned = up_at = down_at = turned_at = nan
+    return Margins(
+        stable=stable,
+        gain_margin=up,
+        gain_reduction=down,
+        phase_margin=turned,
+        delay_margin=late,
+        gain_margin_omega=up_at,
+        gain_reduction_omega=down_at,
+        phase_margin_omega=turned_at,
+        delay_margin_omega=late_at,
+        gain_crossovers=crossovers / period,
+        phase_margins=degrees,
+        delay_margins=np.zeros(0),
+        phase_crossovers=omegas,
+        gain_margins=factors,
+        searched=(math.inf, math.inf),
+    )
+
+
+def _gain_crossovers(gain: SampledLoopGain) -> tuple[Vector, Vector]:
+    """Angles at which abs(L) = 1, and by how much L may turn there, in [0, 2 pi)."""
+    found = _crossings(lambda angle: np.log(np.abs(gain.at(angle))), gain.angles)
+    return found, np.mod(np.pi + np.angle(gain.at(found)), 2.0 * np.pi)
+
+
+def _crossings(f: Callable[[Vector], Vector], angles: Vector) -> Vector:
+    """Zeros of `f` between `angles`, pairs around an extremum between two of them included."""
+    values = f(angles)
+
+    def one(angle: float) -> float:
+        return float(f(np.array([angle]))[0])
+
+    brackets = [(angles[i], angles[i + 1]) for i in np.flatnonzero(values[:-1] * values[1:] < 0.0)]
+    sizes = np.abs(values)
+    lowest = (sizes[1:-1] <= sizes[:-2]) & (sizes[1:-1] <= sizes[2:])
+    same = (values[1:-1] * values[:-2] > 0.0) & (values[1:-1] * values[2:] > 0.0)
+    for i in np.flatnonzero(lowest & same) + 1:
+        sign = math.copysign(1.0, values[i])
+        found = minimize_scalar(
+            lambda angle, sign=sign: sign * one(angle),
+            bounds=(angles[i - 1], angles[i + 1]),
+            method="bounded",
+            options={"xatol": 1e-9 * angles[i]},
+        )
+        if found.fun < 0.0:
+            brackets += [(angles[i - 1], found.x), (found.x, angles[i + 1])]
+    zeros = [brentq(one, low, high, xtol=1e-15, rtol=1e-14) for low, high in brackets]
+    exact = angles[values == 0.0]
+    return np.unique(np.append(np.array(zeros, dtype=np.float64), exact))
+
+
+def _first_loss(
+    values: Vector, places: Vector, allowed: NDArray[np.bool_], sign: float, none: float
+) -> tuple[float, float]:
+    """The smallest (or with sign -1 the largest) allowed value and its place."""
+    if not allowed.any():
+        return none, math.nan
+    chosen = np.flatnonzero(allowed)
+    best = chosen[np.argmin(sign * values[chosen])]
+    return float(values[best]), float(places[best])

@@ -1,0 +1,66 @@
+"""Whether a response that is in its settling band at the end of a run is there for good.
+
+A response may pass through the band, or creep or swing out of it later than anyone looked. It
+counts as settled where it has been inside for three of the slowest time constants of the closed
+loop, 1/abs(abscissa). Poles of a loop cost many times what its simulation does, so that they are
+only asked for where the native part did not see the response die down well within the band, or
+where a pole or zero of plant or controller is slow against the time simulated: closed-loop poles
+are slow near these, or near the stability limit, where the response rings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import DeadtimeError
+from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._stability import sampled_grid
+
+__all__ = ["TIME_CONSTANTS", "abscissae", "slowest_times"]
+
+Vector = NDArray[np.float64]
+
+#: How many of the slowest time constants a settled response has been in its band.
+TIME_CONSTANTS = 3.0
+
+
+def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None) -> Vector:
+    """Spectral abscissa in 1/s of each set, limit left out; NaN where there is none to be had."""
+    count = max(np.size(value) for value in numbers.values())
+    moving = {name: value for name, value in numbers.items() if name != "limit"}
+    if loop.is_sampled:
+        return sampled_grid(loop.plant, loop.controller, moving, threads=threads)[0]
+    columns = {name: np.broadcast_to(value, count).tolist() for name, value in moving.items()}
+    found = np.full(count, np.nan)
+    for i in range(count):
+        try:
+            found[i] = loop.specification.abscissa_at(
+                {name: column[i] for name, column in columns.items()}
+            )
+        except (DeadtimeError, ValueError):
+            continue
+    return found
+
+
+def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any], count: int) -> Vector:
+    """At least the longest 1/abs(root) of plant and controller, roots at zero left out, s.
+
+    1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... (Fujiwara 1916).
+    """
+    longest = np.zeros(count)
+    parts = (*loop.plant._polynomials(numbers), *loop.controller._feedback(numbers))
+    for coefficients in parts:
+        rising = [np.abs(np.broadcast_to(c, count)) for c in coefficients[::-1]]
+        open_ = np.ones(count, dtype=bool)
+        for low, c in enumerate(rising[:-1]):
+            # The first coefficient that is not zero: what lies below it are roots at zero.
+            here = open_ & (c > 0.0)
+            for k, other in enumerate(rising[low + 1 :], 1):
+                ratio = np.divide(other, c, out=np.zeros(count), where=here)
+                longest = np.maximum(longest, 2.0 * ratio ** (1.0 / k))
+            open_ &= c == 0.0
+    return longest

@@ -1,0 +1,152 @@
+"""What a control loop consists of, checked once, and the equations that follow from it.
+
+`ControlLoop` is this specification and the questions that can be asked of it; the files that answer
+them take the specification.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.validation import non_negative, positive
+from deadtime.loops._characteristic import characteristic
+from deadtime.loops._controllers import Controller
+from deadtime.loops._model import LoopModel, rest_of, state_at_rest
+from deadtime.loops._plants import Plant
+
+if TYPE_CHECKING:
+    from deadtime._deadtime import LinearLoop
+
+__all__ = ["DELAY_PATHS", "LoopSpecification"]
+
+#: Where the delay of a loop can sit.
+DELAY_PATHS = ("command", "measurement")
+
+
+@dataclass(frozen=True)
+class LoopSpecification:
+    """Plant, controller, delay, hold and limit of a loop; see `ControlLoop` for each."""
+
+    plant: Plant
+    controller: Controller
+    delay: float | None = None
+    sample_time: float | None = None
+    limit: float | None = None
+    delay_path: Literal["command", "measurement"] = "command"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.plant, Plant):
+            raise TypeError(f"plant={self.plant!r}: give a plant, for example Integrator()")
+        if not isinstance(self.controller, Controller):
+            raise TypeError(f"controller={self.controller!r}: give a controller, such as P(Kp=1)")
+        if self.delay is not None:
+            object.__setattr__(self, "delay", non_negative("delay", self.delay))
+        if self.sample_time is not None:
+            object.__setattr__(self, "sample_time", positive("sample_time", self.sample_time))
+        if self.limit is not None:
+            object.__setattr__(self, "limit", positive("limit", self.limit))
+        if self.delay_path not in DELAY_PATHS:
+            raise ValueError(
+                f"delay_path={self.delay_path!r}: give one of {', '.join(map(repr, DELAY_PATHS))}"
+            )
+        if self.plant.is_rational:
+            # Building the model checks that its parts fit.
+            _ = self.model
+            return
+        for name, value in (("sample_time", self.sample_time), ("limit", self.limit)):
+            if value is not None:
+                raise ValueError(
+                    f"{name}={value}: a hold or a limit needs a plant that is rational but for one "
+                    f"delay in series, and this one has delays inside; leave {name} out"
+                )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The cached native loop does not pickle, and is quickly built again.
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The named numbers of plant and controller, then those of the loop that are not None."""
+        own = {name: getattr(self, name) for name in ("delay", "sample_time", "limit")}
+        known = {name: value for name, value in own.items() if value is not None}
+        return self.plant.parameters | self.controller.parameters | known
+
+    @property
+    def known_delay(self) -> float:
+        """The delay in s; raises where it is None."""
+        if self.delay is None:
+            raise ValueError(
+                "the delay of this loop is None: set it with loop.replace(delay=...) or estimate "
+                "it from a recording first"
+            )
+        return self.delay
+
+    def refuse_hold(self, why: str) -> None:
+        """Raise where the loop is sampled."""
+        if self.sample_time is not None:
+            raise ValueError(f"a loop with sample_time={self.sample_time} {why}")
+
+    @property
+    def output_lead(self) -> float:
+        """How much earlier than its measurement the output is, s."""
+        return self.known_delay if self.delay_path == "measurement" else 0.0
+
+    @cached_property
+    def model(self) -> LoopModel:
+        """The equations of the loop with its own numbers."""
+        return self.model_at(self.parameters)
+
+    def model_at(self, values: Mapping[str, Any]) -> LoopModel:
+        """The equations with other numbers, arrays of them, or complex ones."""
+        return LoopModel.build(self.plant, self.controller, values)
+
+    def abscissa_at(self, values: Mapping[str, Any]) -> float:
+        """Spectral abscissa in 1/s with other numbers, also beyond what a loop may have."""
+        _ = self.known_delay
+        if self.sample_time is None:
+            return float(self.characteristic_at(values).spectral_abscissa())
+        poles = self.model_at(values).native(values["delay"], values["sample_time"]).poles()
+        return float(poles[0].real)
+
+    def characteristic_at(self, values: Mapping[str, Any]) -> Any:
+        """The characteristic function with numbers or symbols, one for each of `parameters`."""
+        return characteristic(self.plant, self.controller, values)
+
+    @cached_property
+    def native(self) -> LinearLoop:
+        """The loop as the stepper holds it."""
+        return self.model.native(self.known_delay, self.sample_time, self.limit)
+
+    def rest_at(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
+        """State in which the plant rests at `output`, and the command that keeps it there."""
+        if output == 0.0 and reference == 0.0:
+            return self._rest_at_zero
+        return self._rest_at(output, reference)
+
+    @cached_property
+    def _rest_at_zero(self) -> tuple[NDArray[np.float64], float]:
+        return self._rest_at(0.0, 0.0)
+
+    def _rest_at(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
+        numbers, space = self.parameters, self.model.plant
+        return state_at_rest(self.plant, self.controller, numbers, output, reference, space)
+
+    def steady_state(self, reference: float) -> float | None:
+        """Output at rest under a constant reference; None without such a rest within the limit."""
+        if self.model.update is None:
+            output, command = rest_of(self.plant, self.controller, self.parameters)
+            gains = None if np.isnan(output) else (float(output), float(command))
+        else:
+            gains = self.model.rest_gains
+        if gains is None:
+            return None
+        output, command = gains
+        if self.limit is not None and abs(command * reference) > self.limit:
+            return None
+        return output * reference

@@ -1,0 +1,274 @@
+"""Poles of a sampled loop, and stable ranges of the numbers of any loop, limit left out.
+
+A sampled loop has the poles s = ln(z)/Ts, z the eigenvalues of its transition matrix.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eig, matrix_balance
+
+from deadtime import _deadtime
+from deadtime.loops._characteristic import characteristic
+from deadtime.loops._controllers import Controller
+from deadtime.loops._model import LoopModel, refuse_discretised
+from deadtime.loops._plants import Plant
+from deadtime.loops._sampled_ranges import SampledNumber, further_delay
+from deadtime.roots import Parameter, QuasiPolynomial, RootSet
+
+__all__ = [
+    "continuous_range",
+    "sampled_abscissa",
+    "sampled_grid",
+    "sampled_is_stable",
+    "sampled_range",
+    "sampled_roots",
+]
+
+# Numbers of a loop that cannot be negative, and those that keep their sign because the loop has no
+# meaning at zero; those of a filter.
+_NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"})
+_KEEPS_SIGN = frozenset({"time_constant"})
+_OF_FILTER = frozenset({"omega", "damping"})
+
+# What counts as zero on the way down to it, and how far a sampled loop is followed where it may be
+# stable for ever, as parts of the value.
+_NEARLY_ZERO = 1e-6
+_FARTHEST = 1e6
+
+
+def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> float:
+    """Return ln(rho)/Ts with rho the largest modulus of the loop's eigenvalues."""
+    return float(model.native(delay, sample_time).poles()[0].real)
+
+
+def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> bool:
+    """Whether all poles of a sampled loop are inside the unit circle.
+
+    Raises
+    ------
+    ValueError
+        If a pole is nearer to the circle than the rounding of the transition matrix.
+    """
+    native = model.native(delay, sample_time)
+    matrix = native.balanced_matrix()
+    largest = np.exp(native.poles()[0].real * sample_time)
+    # Rounding moves a triple pole by the third root of itself.
+    if abs(largest - 1.0) > 10.0 * np.cbrt(_rounding(matrix)):
+        return bool(largest < 1.0)
+    matrix = _balanced(matrix)
+    largest = np.abs(np.linalg.eigvals(matrix)).max()
+    if abs(largest - 1.0) > 10.0 * np.cbrt(_rounding(matrix)):
+        return bool(largest < 1.0)
+    z, errors = _eigenvalues(matrix)
+    sizes = np.abs(z)
+    if (sizes + errors < 1.0).all():
+        return True
+    # Without feedback a pole at z = 1 is an integrator of the plant, and stays there.
+    is_open = not model.K.any() and model.L == 0.0
+    if (sizes - errors > 1.0).any() or (is_open and (z == 1.0).any()):
+        return False
+    nearest = int(np.argmax(sizes))
+    raise ValueError(
+        f"a pole at abs(z)={sizes[nearest]:.15g}, known to {errors[nearest]:.1e}, is as near to "
+        "the unit circle as rounding: whether this loop is stable is beyond double precision; "
+        "change a gain, or take a sample_time nearer to the time constants of the loop"
+    )
+
+
+def _balanced(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The matrix in units that make its norm small, each command in its own."""
+    with np.errstate(invalid="ignore"):  # units beyond integers, read as places as well
+        return np.asarray(matrix_balance(matrix, permute=False)[0], dtype=np.float64)
+
+
+def _rounding(matrix: NDArray[np.float64]) -> float:
+    """Backward error of the QR algorithm."""
+    return float(len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix))
+
+
+def _eigenvalues(
+    matrix: NDArray[np.float64],
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """Eigenvalues and first-order bounds on their errors."""
+    z, left, right = cast(Any, eig)(matrix, left=True, right=True)
+    # |dz| <= ||error|| / |y* x|.
+    overlap = np.abs(np.sum(left.conj() * right, axis=0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return z.astype(np.complex128), _rounding(matrix) / overlap
+
+
+def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> RootSet:
+    """Return the `n` rightmost poles and their mirror images, with first-order error bounds."""
+    z, errors = _eigenvalues(_balanced(matrix))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        poles = np.asarray(np.log(z) / sample_time, dtype=np.complex128)
+        radii = errors / (np.abs(z) * sample_time)
+    order = np.lexsort((-z.imag, np.abs(poles.imag), -poles.real))
+    # A pole and its mirror image are neighbours, the upper one first: keep n uppers.
+    order = order[np.cumsum(z[order].imag >= 0.0) <= n]
+    roots, radii = poles[order], radii[order]
+    with np.errstate(invalid="ignore"):  # z = 0 is a pole at minus infinity, never resolved
+        gaps = np.abs(roots[:, None] - poles[None, :])
+    gaps[np.arange(len(order)), order] = np.inf
+    furthest = float(roots.real.min())
+    return RootSet(
+        roots,
+        np.ones(len(roots), dtype=np.int64),
+        radii,
+        radii < 0.5 * gaps.min(axis=1),
+        len(roots),
+        ((furthest, np.inf), (-np.pi / sample_time, np.pi / sample_time)),
+    )
+
+
+def continuous_range(
+    plant: Plant, controller: Controller, values: Mapping[str, float], name: str
+) -> tuple[float, float]:
+    """Stable values of one number of a continuous loop, around its present one."""
+    value = values[name]
+    family = characteristic(plant, controller, {**values, name: Parameter(name)})
+    if name == "delay":
+        return _deadtime.delay_range(family._family, value)
+    if name in _OF_FILTER:
+        seek = _deadtime.damping_range if name == "damping" else _deadtime.corner_range
+        return seek(family._family, value, _highest_crossing(plant, controller, values))
+    return _deadtime.gain_range(family._family, value, _bounds(name, value))
+
+
+def _highest_crossing(plant: Plant, controller: Controller, values: Mapping[str, float]) -> float:
+    """A frequency beyond which the loop gain is below one; infinite where there is none.
+
+    Whatever the corner of its filter is, and for all dampings from the present one on.
+    """
+    b, a = plant._polynomials(values)
+    terms, damping = controller._terms(values), values["damping"]
+    # The least modulus of x^2 + 2 damping x + 1 where Re x >= 0.
+    least = 1.0 if damping >= math.sqrt(0.5) else 2.0 * damping * math.sqrt(1.0 - damping * damping)
+    feedback = [abs(terms.derivative) / least, abs(terms.proportional), abs(terms.integral)]
+    gain = np.polymul(np.abs(b), feedback)[::-1]
+    rest = np.append(0.0, np.asarray(a, dtype=np.float64)[::-1])
+    return _deadtime.end_of_gain(
+        QuasiPolynomial([gain], [0.0])._native, QuasiPolynomial([rest], [0.0])._native, 1.0
+    )
+
+
+def sampled_range(
+    plant: Plant, controller: Controller, values: Mapping[str, float], name: str
+) -> tuple[float, float]:
+    """Stable values of one number of a sampled loop, around its present one."""
+    number = SampledNumber(lambda given: LoopModel.build(plant, controller, given), values, name)
+    low, high = _bounds(name, number.value)
+    if number.is_idle:
+        return low, high
+    if name == "delay":
+        before = number.loss(0.0)
+        return 0.0 if before is None else before.value, number.value + further_delay(number)[0]
+    return _sampled_end(number, low, -1.0), _sampled_end(number, high, 1.0)
+
+
+def _sampled_end(number: SampledNumber, end: float, sign: float) -> float:
+    size = abs(number.value) if number.value != 0.0 else 1.0
+    if number.value == end:
+        return end
+    if end == 0.0:
+        found = number.loss(-sign * _NEARLY_ZERO * size)
+        return 0.0 if found is None else found.value
+    may_be_forever = number.name in _NON_NEGATIVE or number.name in _KEEPS_SIGN
+    found = number.loss(sign * _FARTHEST * size if may_be_forever else end)
+    if found is None:
+        raise ValueError(
+            f"the loop is stable from {number.name}={number.value:g} to "
+            f"{sign * _FARTHEST * size:g}, and nothing beyond is ruled out"
+        )
+    return found.value
+
+
+def _bounds(name: str, value: float) -> tuple[float, float]:
+    """Between what a number can be."""
+    if name in _KEEPS_SIGN and value < 0.0:
+        return -math.inf, 0.0
+    return (0.0 if name in _NON_NEGATIVE or name in _KEEPS_SIGN else -math.inf), math.inf
+
+
+def sampled_grid(
+    plant: Plant,
+    controller: Controller,
+    values: Mapping[str, ArrayLike],
+    decay: float = 0.0,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+    """Abscissa, number of poles outside exp(-decay Ts) and status of loops of one structure.
+
+    `values` names every number of the loop; each is one for all cells or an array with one entry
+    a cell. The feedback is linear in the controller's gains and the plant's input in its gain, so
+    these, the delay and the sample time vary inside one native call; every distinct combination
+    of the other numbers makes a call of its own.
+    """
+    refuse_discretised(controller, 1.0, "a map")
+    arrays = {name: np.atleast_1d(np.asarray(v, dtype=np.float64)) for name, v in values.items()}
+    cells = max(len(array) for array in arrays.values())
+    inside = (*controller._gains(), "gain", "delay", "sample_time")
+    outside = [name for name, array in arrays.items() if name not in inside and len(array) > 1]
+    groups: list[Any] = [slice(None)]
+    if outside:
+        columns = np.column_stack([np.broadcast_to(arrays[name], cells) for name in outside])
+        _, place = np.unique(columns, axis=0, return_inverse=True)
+        order = np.argsort(place.ravel(), kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(place.ravel()[order])) + 1)
+
+    abscissa = np.empty(cells)
+    unstable = np.empty(cells, dtype=np.int32)
+    status = np.empty(cells, dtype=np.uint8)
+    done = 0
+    for group in groups:
+        part = {name: a if len(a) == 1 else a[group] for name, a in arrays.items()}
+        size = cells if isinstance(group, slice) else len(group)
+        report = None if progress is None else lambda n, done=done: progress(done + n)
+        abscissa[group], unstable[group], status[group] = _grid_of_gains(
+            plant, controller, part, size, decay, threads, report
+        )
+        done += size
+    return abscissa, unstable, status
+
+
+def _grid_of_gains(
+    plant: Plant,
+    controller: Controller,
+    arrays: Mapping[str, NDArray[np.float64]],
+    cells: int,
+    decay: float,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+    """Like `sampled_grid`, where only gains, delay and sample time vary."""
+    fixed = {name: float(array[0]) for name, array in arrays.items()} | {"gain": 1.0}
+    gains = controller._gains()
+    feedback: Any = 0.0
+    direct: Any = 0.0
+    for name in gains:
+        alone = fixed | dict.fromkeys(gains, 0.0) | {name: 1.0}
+        model = LoopModel.build(plant, controller, alone)
+        feedback = feedback + arrays[name][:, None] * model.K
+        direct = direct + arrays[name] * model.L
+    scale = arrays["gain"] if "gain" in arrays else np.ones(1)
+    return _deadtime.sampled_abscissa_grid(
+        cells,
+        len(model.B),
+        np.ascontiguousarray(model.A),
+        model.B,
+        feedback,
+        direct * scale,
+        scale,
+        arrays["delay"],
+        arrays["sample_time"],
+        decay,
+        threads,
+        progress,
+    )

@@ -1,0 +1,509 @@
+"""Step responses of many loops at once: one loop a set of numbers, their figures or their outputs.
+
+The matrices of all sets are built together, the equations of a loop being evaluated on arrays, and
+handed to the native part in blocks, so that memory stays bounded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.ranges import given_points, is_range
+from deadtime._base.validation import finite, increasing, positive, real_array, thread_number
+from deadtime._deadtime import sweep_figures, sweep_responses
+from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._model import refuse_discretised, rest_of
+from deadtime.loops._run import LEAST, SHORTEST
+from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
+
+__all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
+
+Vector = NDArray[np.float64]
+
+#: Sets built and simulated together.
+_BLOCK = 1 << 15
+
+# Sets that have not settled are measured over a longer time, up to so many steps of it. It lasts
+# until the output has been in its band for long enough, or so many of the slowest time constants
+# where it is still outside: an answer of the size of the step has then come down and stayed there.
+# Times are powers of the square root of 2, so that the sets of one time run together.
+_PER_DOUBLING = 2
+_MOST_STEPS = 10 * _PER_DOUBLING
+_TO_SETTLE = 8.0
+
+# What the native part gives where the response was inside its band at the end, and did not show
+# that it stays there.
+_DOUBTFUL = 4
+
+#: Figures in the order in which the native part gives them.
+_FIGURES = (
+    "rise_time",
+    "settling_time",
+    "peak_time",
+    "overshoot",
+    "undershoot",
+    "settling_min",
+    "settling_max",
+    "peak",
+    "steady_state",
+)
+_SETTLING = _FIGURES.index("settling_time")
+
+
+class SweepStatus(IntEnum):
+    """What became of one set of a `Sweep`."""
+
+    OK = 0
+    """Simulated to the end; where metrics were asked for, settled."""
+    UNSETTLED = 1
+    """Outside its settling band at the end, or inside it for less than three of the slowest time
+    constants of the closed loop: the settling time is NaN, and the rise time where the step was
+    not climbed either. An unstable loop held by its limit ends here."""
+    DIVERGED = 2
+    """Grown beyond 1e150 before the end: all NaN."""
+    REFUSED = 3
+    """Not simulated: the numbers make no loop that can be simulated, or endless work: all NaN."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(ReadOnlyArrays):
+    """Responses of many loops, or their metrics; made by `sweep`.
+
+    Attributes
+    ----------
+    values : dict of str to ndarray
+        The numbers that vary, each as it was given; they broadcast to `shape`.
+    shape : tuple of int
+        Shape of the sets.
+    time : ndarray, shape (n,)
+        Output times, or first and last time of what was measured, in s.
+    status : ndarray of uint8, shape `shape`
+        `SweepStatus` of each set.
+    metrics : dict of str to ndarray, each of shape `shape`
+        The figures of `Response.info`; empty where outputs were asked for.
+    outputs : ndarray, shape (..., n), or None
+        Outputs, behind the axes of `shape`, where they were asked for.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36, sample_time=0.065)
+    >>> found = dtm.sweep(loop, {"Kp": np.array([1.0, 2.0, 9.0])}, 20.0)
+    >>> found
+    <Sweep: 3 sets over Kp, 1 unsettled>
+    >>> found["overshoot"][:2].round(2)
+    array([ 0.03, 28.74])
+    """
+
+    values: dict[str, Vector]
+    shape: tuple[int, ...]
+    time: Vector
+    status: NDArray[np.uint8]
+    metrics: dict[str, Vector]
+    outputs: Vector | None = None
+
+    def __repr__(self) -> str:
+        sets = "x".join(map(str, self.shape)) or "1"
+        told = [
+            f"{int(np.count_nonzero(self.status == status))} {status.name.lower()}"
+            for status in SweepStatus
+            if status and np.any(self.status == status)
+        ]
+        names = ", ".join(self.values)
+        return f"<Sweep: {', '.join([f'{sets} sets over {names}', *told])}>"
+
+    def __getitem__(self, name: str) -> Vector:
+        try:
+            return self.metrics[name]
+        except KeyError:
+            raise KeyError(
+                f"{name!r}: this sweep holds {', '.join(self.metrics) or 'outputs, no metrics'}"
+            ) from None
+
+    def best(self, metric: str = "settling_time") -> dict[str, float]:
+        """Return the numbers of the set whose metric is smallest.
+
+        Parameters
+        ----------
+        metric : str
+            Name of a metric.
+
+        Returns
+        -------
+        dict of str to float
+
+        Raises
+        ------
+        KeyError
+            If there is no such metric.
+        ValueError
+            If no set has one.
+        """
+        measured = self[metric]
+        if not np.isfinite(measured).any():
+            raise ValueError(f"no set has a {metric}: lengthen the time or change the ranges")
+        place = np.unravel_index(np.nanargmin(measured), self.shape)
+        return {
+            name: float(np.broadcast_to(array, self.shape)[place])
+            for name, array in self.values.items()
+        }
+
+
+def sweep(
+    loop: ControlLoop,
+    values: Mapping[str, ArrayLike],
+    time: ArrayLike | None = None,
+    *,
+    responses: bool = False,
+    amplitude: float = 1.0,
+    settling: float = 0.02,
+    rise: tuple[float, float] = (0.1, 0.9),
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Sweep:
+    """Simulate the step response of a loop for many sets of its numbers.
+
+    Every set starts at rest at zero when the reference steps to `amplitude`, as in
+    `ControlLoop.step_response`, and is simulated as exactly.
+
+    Parameters
+    ----------
+    loop : ControlLoop
+        What all sets have in common.
+    values : mapping of str to (low, high, n) or array_like
+        Numbers that vary, by their names in `ControlLoop.parameters`, or ``delay``,
+        ``sample_time`` and ``limit``. Each range ``(low, high, n)`` of n points is an axis of the
+        results, in the order given; two of them make a grid. Arrays broadcast against one another
+        behind these axes: arrays of one length are sets of numbers.
+    time : float or array_like, shape (n,)
+        For metrics, the time in s up to which responses are measured, from zero; of an array, the
+        first and the last time. By default ten times the longest delay or time constant, and for
+        the sets that have not settled by then as long as their closed-loop poles ask for, up to a
+        thousand times that. For responses, the output times, increasing, the first one being that
+        of the step.
+    responses : bool
+        Return outputs instead of metrics.
+    amplitude : float
+        Height of the step, not zero.
+    settling : float
+        Half width of the settling band as a part of the step.
+    rise : (float, float)
+        Parts of the step between which the rise time is measured.
+    threads : int, optional
+        Number of threads; by default ``DEADTIME_NUM_THREADS``, else all cores.
+    progress : callable, optional
+        Called now and then with the number of finished sets.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    ValueError
+        If the loop has no such number, a number is out of its range, the arrays do not broadcast,
+        or no delay is known.
+    TypeError
+        If `loop` is no `ControlLoop` or `values` no mapping.
+
+    Notes
+    -----
+    Metrics are those of `Response.info`, but measured on the response itself instead of a grid of
+    times: no peak is missed and the settling range begins where the rise ends, not at the first
+    output after it. A set that diverges has NaN for all metrics, and `Sweep.status` says so; NaN
+    elsewhere is what `Response.info` gives: a settling or rise time that was not reached. A
+    settling time is given only where the output was in the band for three of the slowest time
+    constants 1/abs(abscissa) of the closed loop before the end, or had died down to a twentieth of
+    the band with no slow pole or zero of plant or controller in play. That is evidence and no
+    proof: `design` proves what follows.
+
+    Sampled loops with a plain integrator run in vector registers, one set a lane; the others one
+    by one on all threads. The result for a set does not depend on which other sets there are, on
+    the number of threads or on the machine's instruction set.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=0.065, limit=1.0)
+    >>> delays = np.array([0.1, 0.2, 0.36])
+    >>> found = dtm.sweep(loop, {"Kp": (0.5, 2.5, 5), "delay": delays}, 15.0)
+    >>> found["settling_time"].round(2)
+    array([[7.39, 7.07, 6.5 ],
+           [3.46, 3.09, 2.2 ],
+           [2.26, 1.85, 2.48],
+           [1.72, 1.35, 3.19],
+           [1.42, 1.78, 3.95]])
+    >>> found.best()
+    {'Kp': 2.0, 'delay': 0.2}
+    """
+    require_loop(loop)
+    arrays, shape = _sets(values)
+    common = _checked(loop, arrays)
+    height = finite("amplitude", amplitude)
+    if height == 0.0:
+        raise ValueError("amplitude=0: there is no step, give a number other than zero")
+    parts = (finite("rise", rise[0]), finite("rise", rise[1]))
+    if not 0.0 <= parts[0] < parts[1]:
+        raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
+    band = positive("settling", settling)
+    sampled = 1.0 if "sample_time" in values else common.sample_time
+    refuse_discretised(common.controller, sampled, "a sweep")
+    sets = _Sets(common, arrays, shape, height, band, parts, thread_number(threads))
+    if time is None and not responses:
+        return sets.until_settled(progress)
+    times = _times(time, responses)
+    if responses:
+        return sets.outputs(times, progress)
+    return sets.decided(times, progress)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sets:
+    """What `sweep` was asked for, checked."""
+
+    loop: ControlLoop
+    arrays: Mapping[str, Vector]
+    shape: tuple[int, ...]
+    height: float
+    band: float
+    rise: tuple[float, float]
+    threads: int | None
+
+    def only(self, places: NDArray[np.intp]) -> _Sets:
+        """Some of the sets, in one row."""
+        arrays = {
+            name: np.broadcast_to(array, self.shape).reshape(-1)[places]
+            for name, array in self.arrays.items()
+        }
+        return replace(self, arrays=arrays, shape=places.shape)
+
+    def blocks(
+        self, progress: Callable[[int], object] | None
+    ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any], tuple[int, Vector, float, bool], Any]]:
+        """Places, numbers, rows for the native part, and its progress, block by block."""
+        flat = {name: np.broadcast_to(a, self.shape).ravel() for name, a in self.arrays.items()}
+        loop, done = self.loop, 0
+        for place, part in _blocks(loop, flat, math.prod(self.shape)):
+            numbers: dict[str, Any] = loop.parameters | part
+            model = loop.specification.model_at(numbers)
+            row = model.row(*(numbers.get(name) for name in ("delay", "sample_time", "limit")))
+            rows = np.ascontiguousarray(np.broadcast_to(row, (len(place), row.shape[-1])))
+            ahead = loop.delay_path == "measurement"
+            report = None if progress is None else lambda n, done=done: progress(done + n)
+            yield place, numbers, (model.B.shape[-1], rows, self.height, ahead), report
+            done += len(place)
+
+    def outputs(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+        """Outputs at given times."""
+        count = math.prod(self.shape)
+        found, status = np.full((count, len(times)), np.nan), np.empty(count, dtype=np.uint8)
+        for place, _, rows, report in self.blocks(progress):
+            found[place], status[place] = sweep_responses(
+                *rows, times - times[0], self.threads, report
+            )
+        outputs = found.reshape(*self.shape, len(times))
+        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
+
+    def measured(self, times: Vector, progress: Callable[[int], object] | None = None) -> Sweep:
+        """Metrics; the status tells of sets that are in the band, but may leave it later."""
+        count, span = math.prod(self.shape), float(times[-1] - times[0])
+        found, status = np.full((count, len(_FIGURES)), np.nan), np.empty(count, dtype=np.uint8)
+        for place, numbers, rows, report in self.blocks(progress):
+            steady = np.broadcast_to(_steady(self.loop, numbers, self.height), (len(place),))
+            figures, ended = sweep_figures(
+                *rows, steady, span, self.band, self.rise, self.threads, report
+            )
+            inside = span - figures[:, _SETTLING]
+            slow = TIME_CONSTANTS * slowest_times(self.loop, numbers, len(place)) > inside
+            ended[slow & (ended == SweepStatus.OK)] = _DOUBTFUL
+            found[place], status[place] = figures, ended
+        metrics = {
+            name: column.reshape(self.shape).copy()
+            for name, column in zip(_FIGURES, found.T, strict=True)
+        }
+        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), metrics)
+
+    def decided(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+        """Metrics; doubtful sets are decided by how long they have been in the band."""
+        found = self.measured(times, progress)
+        status, settled = found.status.flatten(), found.metrics["settling_time"].ravel()
+        doubtful = np.flatnonzero(status == _DOUBTFUL)
+        if doubtful.size:
+            inside = float(times[-1] - times[0]) - settled[doubtful]
+            stays = inside * self.only(doubtful).rates() >= TIME_CONSTANTS
+            status[doubtful[stays]] = SweepStatus.OK
+        return self._told(found, times, found.metrics, status)
+
+    def until_settled(self, progress: Callable[[int], object] | None) -> Sweep:
+        """Metrics of all sets, over a longer time where a set has not settled."""
+        loop = self.loop
+        numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
+        waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
+        slowest = [
+            1.0 / abs(pole)
+            for pole in np.linalg.eigvals(loop.specification.model.A)
+            if abs(pole) > 0.0
+        ]
+        span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
+        found = self.measured(np.array([0.0, span]), progress)
+        metrics = {name: figures.flatten() for name, figures in found.metrics.items()}
+        settled, status = metrics["settling_time"], found.status.flatten()
+
+        def run_on(places: NDArray[np.intp], step: float) -> None:
+            longer = self.only(places).measured(np.array([0.0, span * _longer(step)]))
+            done = longer.status != SweepStatus.REFUSED
+            for name, figures in longer.metrics.items():
+                metrics[name][places[done]] = figures[done]
+            status[places] = np.where(done, longer.status, SweepStatus.UNSETTLED)
+
+        due, longest = np.flatnonzero(_is_open(status)), 0.0
+        if due.size:
+            # Most settle soon after the first time: only then are poles asked for.
+            longest = float(_PER_DOUBLING)
+            run_on(due, longest)
+            due = due[_is_open(status[due])]
+        rates = self.only(due).rates() if due.size else np.empty(0)
+        steps = np.full(due.size, longest)
+        while due.size:
+            # NaN where the output is outside at the end.
+            since = settled[due]
+            stays = (span * _longer(steps) - since) * rates >= TIME_CONSTANTS
+            status[due[stays]] = SweepStatus.OK
+            more = ~stays & (rates > 0.0) & (steps < _MOST_STEPS)
+            due, rates, steps, since = due[more], rates[more], steps[more], since[more]
+            lasts = np.where(np.isnan(since), _TO_SETTLE / rates, since + TIME_CONSTANTS / rates)
+            wanted = np.ceil(_PER_DOUBLING * np.log2(lasts / span) + 1e-6)
+            steps = np.minimum(np.maximum(wanted, steps + 1.0), _MOST_STEPS)
+            longest = max(longest, steps.max(initial=0.0))
+            for step in np.unique(steps):
+                run_on(due[steps == step], step)
+            late = _is_open(status[due])
+            due, rates, steps = due[late], rates[late], steps[late]
+        return self._told(found, np.array([0.0, span * _longer(longest)]), metrics, status)
+
+    def _told(
+        self, found: Sweep, times: Vector, metrics: dict[str, Vector], status: NDArray[np.uint8]
+    ) -> Sweep:
+        """What is known in the end: sets still in doubt have not settled."""
+        status = np.where(status == _DOUBTFUL, SweepStatus.UNSETTLED, status).astype(np.uint8)
+        status = status.reshape(self.shape)
+        late = status == SweepStatus.UNSETTLED
+        told = {name: np.array(figures).reshape(self.shape) for name, figures in metrics.items()}
+        told["settling_time"][late] = np.nan
+        return replace(found, time=times, metrics=told, status=status)
+
+    def rates(self) -> Vector:
+        """Decay rate of the slowest root of each set, 1/s."""
+        numbers = self.loop.parameters | dict(self.arrays)
+        rates = -abscissae(self.loop, numbers, self.threads)
+        return np.asarray(np.broadcast_to(rates, self.shape))
+
+
+def _is_open(status: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    return np.asarray(np.isin(status, (SweepStatus.UNSETTLED, _DOUBTFUL)))
+
+
+def _longer(steps: Any) -> Any:
+    """How much longer than the first simulation one of so many steps is."""
+    return 2.0 ** (steps / _PER_DOUBLING)
+
+
+def require_loop(loop: object) -> None:
+    """Raise where something else was given in the place of a loop."""
+    if not isinstance(loop, ControlLoop):
+        raise TypeError(
+            f"a {type(loop).__name__} is no ControlLoop: write the plant as Integrator, FirstOrder "
+            "or RationalPlant, and give ControlLoop(plant, P(1.0), delay=...)"
+        )
+
+
+def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int, ...]]:
+    if not isinstance(values, Mapping) or not values:
+        raise TypeError(f"values={values!r}: give a dict such as {{'Kp': (0.5, 2.5, 5)}}")
+    arrays = {name: given_points(name, given) for name, given in values.items()}
+    ranges = [name for name, given in values.items() if is_range(given)]
+    behind = max((array.ndim for name, array in arrays.items() if name not in ranges), default=0)
+    for place, name in enumerate(ranges):
+        arrays[name] = arrays[name].reshape(-1, *[1] * (len(ranges) - place - 1 + behind))
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} holds {array[~np.isfinite(array)][0]}: give finite numbers")
+    try:
+        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError as error:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ValueError(
+            f"the arrays do not broadcast: {shapes}; give equal lengths, or numpy.ix_ of them for "
+            "a grid"
+        ) from error
+    return arrays, shape
+
+
+def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
+    """Have the loop itself refuse what lies outside its ranges; the loop with numbers of all."""
+    gains = loop.controller.gains
+    for name, array in arrays.items():
+        flat = array.ravel()
+        if flat.size and name not in gains:
+            for place in {int(flat.argmin()), int(flat.argmax()), int(np.abs(flat).argmin())}:
+                loop = loop.replace(**{name: float(flat[place])})
+    _ = loop.specification.known_delay
+    sizes = [np.abs(arrays.get(name, gain)) for name, gain in gains.items()]
+    if np.any(sum(sizes) == 0.0):
+        raise ValueError(
+            f"a set has {', '.join(gains)} of zero: its loop is open, give it a gain other than "
+            "zero"
+        )
+    return loop
+
+
+def _times(time: ArrayLike | None, responses: bool) -> Vector:
+    if time is None:
+        raise ValueError("responses need output times: give an array of them as time")
+    times = real_array("time", time)
+    if times.ndim == 0 and not responses:
+        return np.array([0.0, positive("time", float(times))])
+    if times.ndim == 0:
+        raise ValueError(f"time={times}: responses need an array of output times")
+    times = np.array(increasing("time", times))
+    if times.size < 2 and not responses:
+        raise ValueError("time holds one time: give the first and the last one, or a number")
+    if times.size == 0:
+        raise ValueError("time is empty: give at least one output time")
+    return times
+
+
+def _blocks(
+    loop: ControlLoop, flat: Mapping[str, Vector], count: int
+) -> Iterator[tuple[NDArray[np.intp], dict[str, Vector]]]:
+    """Places and numbers of sets of one structure, not too many at a time."""
+    for first in range(0, count, _BLOCK):
+        places = np.arange(first, min(first + _BLOCK, count))
+        part = {name: array[places] for name, array in flat.items()}
+        # A leading coefficient of zero, such as a lag of none, takes a state away.
+        orders = np.zeros(len(places), dtype=np.int64)
+        for coefficients in loop.plant._polynomials(loop.parameters | part):
+            leads = np.ones(len(places), dtype=bool)
+            for c in coefficients:
+                leads = leads & (c == 0.0)
+                orders = 2 * orders + leads
+        for order in np.unique(orders):
+            chosen = np.flatnonzero(orders == order)
+            yield places[chosen], {name: array[chosen] for name, array in part.items()}
+
+
+def _steady(loop: ControlLoop, numbers: Mapping[str, Any], amplitude: float) -> Any:
+    """Steady output of every set, NaN where there is none within the limit."""
+    output, command = rest_of(loop.plant, loop.controller, numbers)
+    limit = numbers.get("limit", np.inf)
+    return np.where(np.abs(command * amplitude) <= limit, output * amplitude, np.nan)

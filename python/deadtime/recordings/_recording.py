@@ -1,0 +1,263 @@
+"""Recordings of a control loop: reference, output and command over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.errors import RecordingError
+from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
+from deadtime._base.validation import unmasked
+
+__all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
+
+#: Largest absolute value. The squares of larger ones may overflow, and no physical quantity has
+#: them.
+LARGEST = 1e100
+
+#: Fewest samples of a recording: enough for two parameters, an initial output, and a test of the
+#: residuals.
+MINIMUM_SAMPLES = 8
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a reference.
+
+    Attributes
+    ----------
+    index : int
+        First row with the new reference.
+    time : float
+        Time of that row, s.
+    before, after : float
+        Reference before and after.
+    """
+
+    index: int
+    time: float
+    before: float
+    after: float
+
+    @property
+    def amplitude(self) -> float:
+        """Reference after the step minus that before."""
+        return self.after - self.before
+
+
+@dataclass(frozen=True, eq=False)
+class Recording(ReadOnlyArrays):
+    """Reference and output of a loop over time, with the command where it was logged.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Time stamps in seconds, strictly increasing.
+    reference : array_like, shape (n,)
+        The reference of the loop.
+    output : array_like, shape (n,)
+        The measured output, in the unit of the reference.
+    command : array_like, shape (n,), optional
+        The command sent to the plant, after any limit.
+    units : dict of str to str, optional
+        Unit of each signal, for labels.
+    source : str, optional
+        Origin of the recording, for messages and labels.
+
+    Raises
+    ------
+    RecordingError
+        When the time does not increase, lengths differ, values are not finite or beyond 1e100,
+        or there are fewer than 8 samples; when a masked row hides a change of the reference or
+        of the command.
+
+    Notes
+    -----
+    A row in which one of the columns is masked (`numpy.ma`) is left out.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> t = np.arange(20) * 0.1
+    >>> recording = dtm.Recording(t, np.where(t < 0.5, 0.0, 1.0), np.zeros(20))
+    >>> recording.steps()
+    [Step(index=5, time=0.5, before=0.0, after=1.0)]
+    """
+
+    time: NDArray[np.float64]
+    reference: NDArray[np.float64]
+    output: NDArray[np.float64]
+    command: NDArray[np.float64] | None = None
+    units: dict[str, str] = field(default_factory=dict)
+    source: str = ""
+
+    def __init__(
+        self,
+        time: ArrayLike,
+        reference: ArrayLike,
+        output: ArrayLike,
+        command: ArrayLike | None = None,
+        units: dict[str, str] | None = None,
+        source: str = "",
+    ) -> None:
+        columns = {"time": time, "reference": reference, "output": output}
+        if command is not None:
+            columns["command"] = command
+        arrays = {name: _column(name, values) for name, values in _unmasked_rows(columns).items()}
+        lengths = {name: array.size for name, array in arrays.items()}
+        if len(set(lengths.values())) > 1:
+            raise RecordingError(f"the columns of a recording differ in length: {lengths}")
+        _check_time(arrays["time"])
+        object.__setattr__(self, "time", arrays["time"])
+        object.__setattr__(self, "reference", arrays["reference"])
+        object.__setattr__(self, "output", arrays["output"])
+        object.__setattr__(self, "command", arrays.get("command"))
+        object.__setattr__(self, "units", FrozenDict(units or {}))
+        object.__setattr__(self, "source", source)
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    def __repr__(self) -> str:
+        origin = f" from {self.source}" if self.source else ""
+        signals = "reference, output" + (", command" if self.command is not None else "")
+        return (
+            f"<Recording{origin}: {len(self)} samples, {self.time[0]:g} to {self.time[-1]:g} s, "
+            f"{signals}>"
+        )
+
+    @property
+    def sample_time(self) -> float:
+        """Median time between samples, s."""
+        return float(np.median(np.diff(self.time)))
+
+    def window(self, start: float | None = None, stop: float | None = None) -> Recording:
+        """The part with ``start <= time <= stop``; `None` leaves an end open.
+
+        Raises
+        ------
+        RecordingError
+            When fewer than 8 samples lie in the window.
+        """
+        rows = self.rows(start, stop)
+        return replace(
+            self,
+            time=self.time[rows],
+            reference=self.reference[rows],
+            output=self.output[rows],
+            command=None if self.command is None else self.command[rows],
+        )
+
+    def rows(self, start: float | None = None, stop: float | None = None) -> slice:
+        """The rows with ``start <= time <= stop``, as a slice."""
+        low = -np.inf if start is None else float(start)
+        high = np.inf if stop is None else float(stop)
+        if not low < high:
+            raise RecordingError(
+                f"the window ({start}, {stop}) s is empty: give (low, high) with low below high"
+            )
+        # Time stamps printed with few digits may miss the ends by rounding.
+        slack = 1e-6 * self.sample_time
+        first = int(np.searchsorted(self.time, low - slack, side="left"))
+        last = int(np.searchsorted(self.time, high + slack, side="right"))
+        if last - first < MINIMUM_SAMPLES:
+            raise RecordingError(
+                f"the window ({start}, {stop}) s holds {max(0, last - first)} samples, at least "
+                f"{MINIMUM_SAMPLES} are needed: the recording runs from {self.time[0]:g} to "
+                f"{self.time[-1]:g} s"
+            )
+        return slice(first, last)
+
+    def steps(self) -> list[Step]:
+        """Every change of the reference, in order of time."""
+        changed = np.flatnonzero(np.diff(self.reference)) + 1
+        return [
+            Step(
+                int(row),
+                float(self.time[row]),
+                float(self.reference[row - 1]),
+                float(self.reference[row]),
+            )
+            for row in changed
+        ]
+
+
+def _unmasked_rows(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
+    """Leave out the rows in which a column is masked.
+
+    Reference and command hold until they change, so a missing row loses no information where
+    neither changes. Where one changes, or may change, the time of the change is unknown: refused.
+    """
+    masks = {
+        name: np.ma.getmaskarray(values)
+        for name, values in columns.items()
+        if isinstance(values, np.ma.MaskedArray)
+    }
+    if len({np.shape(values) for values in columns.values()}) > 1:
+        return columns  # refused below, with the lengths
+    missing = np.logical_or.reduce(list(masks.values())) if masks else np.zeros(0, dtype=bool)
+    if missing.ndim != 1 or not missing.any():
+        return columns
+    kept = np.flatnonzero(~missing)
+    # Each missing row, and the kept rows before and after it.
+    rows = np.flatnonzero(missing)
+    place = np.searchsorted(kept, rows)
+    rows, place = rows[(place > 0) & (place < kept.size)], place[(place > 0) & (place < kept.size)]
+    before, after = kept[place - 1], kept[place]
+    for name in ("reference", "command"):
+        if name not in columns:
+            continue
+        values: Any = np.ma.asarray(columns[name])
+        unknown = masks.get(name, np.zeros(missing.size, dtype=bool))[rows]
+        data = values.data
+        moved = np.where(unknown, data[after] != data[before], data[rows] != data[before])
+        if moved.any():
+            raise RecordingError(
+                f"row {rows[moved][0]} is masked, and the {name} changes there, at an unknown "
+                "time; fill in the masked values, or choose a window without them"
+            )
+    return {name: np.ma.getdata(values)[kept] for name, values in columns.items()}
+
+
+def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    try:
+        given = np.asarray(unmasked(name, values))
+        if given.dtype.kind == "c":
+            raise TypeError("it is complex")
+        array = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"the {name} is not an array of numbers: {error}") from None
+    if array.ndim != 1:
+        raise RecordingError(f"the {name} has shape {array.shape}: give a column (n,)")
+    if array.size < MINIMUM_SAMPLES:
+        raise RecordingError(
+            f"the {name} has {array.size} samples, at least {MINIMUM_SAMPLES} are needed"
+        )
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise RecordingError(
+            f"the {name} is {array[bad[0]]} at row {bad[0]} ({bad.size} such values): leave these "
+            "rows out, or choose a window without them"
+        )
+    if np.max(np.abs(array)) > LARGEST:
+        raise RecordingError(
+            f"the {name} reaches {array[np.argmax(np.abs(array))]:g}: values beyond {LARGEST:g} "
+            "may overflow; use another unit"
+        )
+    array.flags.writeable = False
+    return array
+
+
+def _check_time(time: NDArray[np.float64]) -> None:
+    backward = np.flatnonzero(np.diff(time) <= 0)
+    if backward.size:
+        row = int(backward[0]) + 1
+        what = "repeats" if time[row] == time[row - 1] else "goes back"
+        raise RecordingError(
+            f"the time {what} at row {row}: {time[row - 1]!r} is followed by {time[row]!r} "
+            f"({backward.size} such places); sort the rows and keep one of each time stamp"
+        )

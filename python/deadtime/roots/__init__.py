@@ -1,0 +1,37 @@
+"""Quasi-polynomials, their characteristic roots, and where roots cross the imaginary axis.
+
+`_quasipolynomial` and `_parametric` are the functions, `_characteristic` the questions about
+their roots, `_root_set`, `_chains`, `_sensitivity` and `_expansion` the answers. `_crossings`
+varies one number. `_determinant` and `_matrix_roots` serve systems of matrices, `_scalar_delay`
+the scalar equation. `certificate` holds proofs of root counts and an independent program that
+checks them.
+"""
+
+from deadtime.roots._chains import Chain
+from deadtime.roots._crossings import Crossings, crossings, delay_margin
+from deadtime.roots._expansion import Expansion
+from deadtime.roots._parametric import Parameter, ParametricQuasiPolynomial, parameters
+from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, s
+from deadtime.roots._root_set import RootSet
+from deadtime.roots._scalar_delay import dde_roots, rightmost_branches
+from deadtime.roots._sensitivity import RootSensitivity
+from deadtime.roots.certificate._certificate import Certificate
+
+__all__ = [
+    "Certificate",
+    "Chain",
+    "Crossings",
+    "Expansion",
+    "Parameter",
+    "ParametricQuasiPolynomial",
+    "QuasiPolynomial",
+    "RootSensitivity",
+    "RootSet",
+    "crossings",
+    "dde_roots",
+    "delay",
+    "delay_margin",
+    "parameters",
+    "rightmost_branches",
+    "s",
+]

@@ -1,0 +1,178 @@
+"""Determinants of matrices of quasi-polynomials, expanded while their roots stand it.
+
+Nothing is rounded on the way: floats are dyadic rationals, so that coefficients are integers over
+a power of two, and delays are fractions. Each coefficient and delay is rounded once, at the end.
+
+That alone does not make the roots of the expansion good: where its terms are much larger than
+det M responds to the entries of M, rounding them moves the roots more than the entries' own
+rounding does. To first order, rounding the coefficients changes the determinant by at most
+u sum |terms|, and relative changes of u of the entries by u sum_ij |M_ij| |cofactor_ij|: the
+ratio of the two is measured, and an expansion with a large one refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.roots._quasipolynomial import QuasiPolynomial
+
+__all__ = ["Entry", "NotExpandedError", "expanded"]
+
+#: A quasi-polynomial by power of s and delay.
+Entry: TypeAlias = Mapping[tuple[int, float], float]
+#: A quasi-polynomial without rounding: integer coefficients by power of s and delay.
+_Exact: TypeAlias = dict[tuple[int, Fraction], int]
+
+# Most states and most terms that are expanded: the work grows like n 2^n times the terms.
+_LARGEST = 10
+_MOST_TERMS = 1000
+# Rounding the coefficients may cost at most so many times what rounding the entries costs.
+_MOST_GROWTH = 1e4
+# Frequencies among which the worst are sought, on the imaginary axis, where stability is decided,
+# and those of them at which it is measured.
+_CANDIDATES = 4001
+_SAMPLES = 64
+
+
+class NotExpandedError(ValueError):
+    """The determinant is there, but its coefficients would not say where its roots are."""
+
+
+def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> QuasiPolynomial:
+    """Determinant of a matrix of quasi-polynomials; NotExpandedError where that is not safe.
+
+    With `bordered` one row and column belong to an output and an input, and the determinant may
+    be zero. This is the one place at which expansion is decided on: what is refused here is
+    searched for roots by factorising the matrix itself.
+    """
+    size = len(entries)
+    states = size - int(bordered)
+    if states > _LARGEST:
+        raise NotExpandedError(
+            f"the determinant of {states} states is not expanded, only up to {_LARGEST}: its "
+            "coefficients would no longer say where its roots are; poles(), rightmost(), "
+            "is_stable() and frequency_response() work for any number"
+        )
+    # One power of two makes integers of all entries.
+    shift = max(
+        (Fraction(v).denominator for row in entries for e in row for v in e.values()), default=1
+    )
+    whole = [
+        [{(k, Fraction(t)): int(Fraction(v) * shift) for (k, t), v in e.items()} for e in row]
+        for row in entries
+    ]
+    exact = _determinant(whole)
+    if not exact:
+        if bordered:
+            return QuasiPolynomial([[0.0]], [0.0])
+        raise ValueError(
+            "the determinant of the characteristic matrix is zero for every s: the equations do "
+            "not determine the state, look for a row of E, N and A that is zero or repeated"
+        )
+    h = _rounded(exact, shift**size)
+    growth = _growth(entries, h)
+    if growth > _MOST_GROWTH:
+        raise NotExpandedError(
+            f"expanding the determinant of these {states} states could move its roots {growth:.1e} "
+            f"times as far as rounding the entries does, above {_MOST_GROWTH:.0e}: scale time or "
+            "the states so that the entries are of similar size, or ask for poles(), rightmost() "
+            "and frequency_response(), which do without"
+        )
+    return h
+
+
+def _determinant(rows: Sequence[Sequence[_Exact]]) -> _Exact:
+    """Laplace's expansion along the rows; minors of the first k rows are kept by their columns."""
+    minors: dict[int, _Exact] = {0: {(0, Fraction(0)): 1}}
+    for row in rows:
+        following: dict[int, _Exact] = {}
+        for columns, minor in minors.items():
+            for j, entry in enumerate(row):
+                if not entry or columns >> j & 1:
+                    continue
+                sign = -1 if (columns >> j).bit_count() & 1 else 1
+                target = following.setdefault(columns | 1 << j, {})
+                for (k, t), a in minor.items():
+                    for (m, u), b in entry.items():
+                        key = (k + m, t + u)
+                        target[key] = target.get(key, 0) + sign * a * b
+                if len(target) > _MOST_TERMS:
+                    raise NotExpandedError(
+                        f"the determinant has more than {_MOST_TERMS} terms: it is not expanded, "
+                        "ask for poles(), rightmost() and frequency_response(), which do without"
+                    )
+        minors = following
+    full = minors.get((1 << len(rows)) - 1, {})
+    return {key: value for key, value in full.items() if value}
+
+
+def _rounded(exact: _Exact, scale: int) -> QuasiPolynomial:
+    """Coefficients over `scale` and delays as floats, each rounded once."""
+    delays = sorted({float(t) for _, t in exact})
+    degree = max(k for k, _ in exact)
+    sums: dict[tuple[int, float], int] = {}
+    for (k, t), value in exact.items():
+        sums[k, float(t)] = sums.get((k, float(t)), 0) + value
+    coefficients = np.zeros((len(delays), degree + 1))
+    for (k, tau), value in sums.items():
+        try:
+            coefficients[delays.index(tau), k] = float(Fraction(value, scale))
+        except OverflowError as error:
+            raise NotExpandedError(
+                "a coefficient of the determinant is beyond 1e308: scale time or the equations"
+            ) from error
+    return QuasiPolynomial(coefficients, delays)
+
+
+def _growth(entries: Sequence[Sequence[Entry]], h: QuasiPolynomial) -> float:
+    """What rounding the coefficients does to h, over what rounding the entries does, at worst.
+
+    Since n |det| <= sum |M_ij| |cofactor_ij|, that is large only where |h| is small compared with
+    the sum of its terms: it is measured where this is most so, from a hundredth of the smallest
+    to a hundred times the largest frequency at which two terms of h are equal in size.
+    """
+    size = np.abs(h.coefficients).sum(axis=0)
+    used = np.flatnonzero(size)
+    slopes = [
+        (size[a] / size[b]) ** (1.0 / (b - a)) for i, a in enumerate(used) for b in used[i + 1 :]
+    ]
+    if not slopes:
+        slopes = [1.0]
+    omega = np.geomspace(0.01 * min(slopes), 100.0 * max(slopes), _CANDIDATES)
+    with np.errstate(all="ignore"):
+        cancelled = np.abs(h(1j * omega)) / np.polyval(size[::-1], omega)
+    omega = omega[np.argsort(cancelled)[:_SAMPLES]]
+    n = len(entries)
+    values = np.zeros((_SAMPLES, n, n), dtype=np.complex128)
+    moduli = np.zeros((_SAMPLES, n, n))
+    for i, row in enumerate(entries):
+        for j, entry in enumerate(row):
+            for (k, t), v in entry.items():
+                values[:, i, j] += v * (1j * omega) ** k * np.exp(-1j * omega * t)
+                moduli[:, i, j] += abs(v) * omega**k
+    with np.errstate(all="ignore"):
+        terms = np.polyval(size[::-1], omega)
+        response = (moduli * _cofactors(values)).sum(axis=(1, 2))
+        ratios = terms / response
+    known = ratios[np.isfinite(ratios)]
+    return float(known.max()) if known.size else np.inf
+
+
+def _cofactors(matrices: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Moduli of the cofactors of a stack of matrices.
+
+    From determinants of their own, because the inverse is accurate only compared with its largest
+    entry, and the entries may have different units.
+    """
+    n = matrices.shape[-1]
+    moduli = np.empty(matrices.shape)
+    for i in range(n):
+        rows = np.delete(matrices, i, axis=-2)
+        for j in range(n):
+            moduli[..., i, j] = np.abs(np.linalg.det(np.delete(rows, j, axis=-1)))
+    return moduli

@@ -1,0 +1,108 @@
+"""Roots of det M(s) from the matrices themselves, with the methods of a quasi-polynomial.
+
+M(s) = s E + sum (s N_j - A_j) e^{-s tau_j} is factorised at each point of a contour; nothing is
+expanded, so that the number of states and the size of coefficients do not matter.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime import _deadtime
+from deadtime._base.ranges import OpenRange, open_interval
+from deadtime.roots._root_set import RootSet, root_set
+from deadtime.roots.certificate._certificate import Certificate
+
+__all__ = ["MatrixDeterminant"]
+
+_NOT_EXACT = (
+    "with its delays taken as exact, a neutral system is judged by its expanded determinant, which "
+    "this one does not have"
+)
+
+_Matrix = NDArray[np.float64]
+
+
+class MatrixDeterminant:
+    """The determinant of a characteristic matrix, never expanded."""
+
+    __slots__ = ("_native",)
+
+    _native: _deadtime.CharacteristicMatrix
+
+    def __init__(self, E: _Matrix, N: Mapping[float, _Matrix], A: Mapping[float, _Matrix]) -> None:
+        def listed(group: Mapping[float, _Matrix]) -> list[tuple[float, _Matrix]]:
+            return [(tau, np.ascontiguousarray(matrix)) for tau, matrix in group.items()]
+
+        self._native = _deadtime.CharacteristicMatrix(np.ascontiguousarray(E), listed(N), listed(A))
+
+    @property
+    def is_invertible(self) -> bool:
+        """Whether the inverse of E can be verified."""
+        return self._native.is_invertible()
+
+    def count(
+        self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: str = "error"
+    ) -> int:
+        """Count the roots in a region, with multiplicity, and prove the number."""
+        _refuse_edge(edge)
+        return self._native.count(open_interval("re", re), open_interval("im", im))
+
+    def certify(self, re: OpenRange | None = None, im: OpenRange | None = None) -> Certificate:
+        """Refuse: certificates hold the coefficients of an expanded function."""
+        raise ValueError(
+            "a certificate needs the expanded determinant, which this system does not have: "
+            "count() proves the same number without writing the proof down"
+        )
+
+    def roots(
+        self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: str = "error"
+    ) -> RootSet:
+        """Locate every root in a region, each in a disc proved to hold it."""
+        _refuse_edge(edge)
+        return root_set(self._native.roots(open_interval("re", re), open_interval("im", im)))
+
+    def rightmost(self, n: int = 1) -> RootSet:
+        """Locate the rightmost roots, right of the chains of a neutral system."""
+        number = operator.index(n)
+        if number < 1:
+            raise ValueError(f"n={n}: ask for at least 1 rightmost root")
+        return root_set(self._native.rightmost(number))
+
+    def spectral_abscissa(self, strong: bool = True) -> float:
+        """Give the largest real part of a root, or that of the chains."""
+        found = self._native.spectral_abscissa()
+        if strong or found > self.chain_enclosure()[1]:
+            return found
+        raise ValueError(f"strong=False: {_NOT_EXACT}; its strong abscissa is {found:.6g} 1/s")
+
+    def chain_enclosure(self) -> tuple[float, float]:
+        """Lower and upper bound of the real part that chains come to, delays free to vary."""
+        return self._native.chain_abscissa()
+
+    def chain_abscissa(self, strong: bool = True) -> float:
+        """Give the upper end of `chain_enclosure`."""
+        found = self.chain_enclosure()[1]
+        if strong or found == -math.inf:
+            return found
+        raise ValueError(f"strong=False: {_NOT_EXACT}; its strong abscissa is {found:.6g} 1/s")
+
+    def is_stable(self, strong: bool = True) -> bool:
+        """Tell whether every root is proved to lie left of the imaginary axis."""
+        stable = self._native.is_stable()
+        if stable or strong or self.chain_enclosure()[1] < 0.0:
+            return stable
+        raise ValueError(f"strong=False: {_NOT_EXACT}; it is not strongly stable")
+
+
+def _refuse_edge(edge: str) -> None:
+    if edge != "error":
+        raise ValueError(
+            f"edge={edge!r}: roots on the edge of a region are told apart by the expanded "
+            "determinant, which this system does not have; move the edge"
+        )

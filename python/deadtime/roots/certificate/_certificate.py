@@ -1,0 +1,270 @@
+"""Proofs of root counts that can be filed and checked by someone else."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import reprlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
+
+from deadtime.roots.certificate._check import check
+from deadtime.roots.certificate._form import check_form
+from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Range, Segment
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Certificate"]
+
+_T = TypeVar("_T")
+
+_FORMAT: Final = "deadtime certificate"
+
+
+@dataclass(frozen=True)
+class Certificate(Proof):
+    """The proved number of roots in a region, with all that is needed to prove it again.
+
+    Made by `QuasiPolynomial.certify`. Complete in itself: function, region, number and proof.
+
+    Attributes
+    ----------
+    coefficients : tuple of tuple of float
+        Row j holds the ascending powers of s that belong to ``delays[j]``.
+    delays : tuple of float
+        In s.
+    region : tuple of (float, float)
+        Ranges of the real and the imaginary part; infinite ends are open.
+    count : int
+        Roots in the region, with multiplicity.
+    scale, zeros : int
+        The values in the proof are those of 2^scale h(s) / s^zeros: roots at 0 that stand in the
+        coefficients are exact.
+    beyond : tuple of (int, float) or None
+        Row and radius, where the imaginary part is open: where ``abs(s)`` is at least the radius,
+        in the strip of the region, the row's leading term exceeds all others together.
+    closed : tuple of (float, float)
+        The region with open sides closed where no root can lie beyond: by `beyond`, or since far
+        to the right (left) the first (last) row exceeds the others. Mirrored at the real axis if
+        it lies more below it than above.
+    contours : tuple of Contour
+        Paths around the closed region: around the part symmetric about the real axis, of which
+        the upper half is walked, and around what lies above that.
+    real : tuple of Segment or Monotone
+        The real axis in parts, where it is the edge of the region: real roots belong to it.
+
+    See Also
+    --------
+    QuasiPolynomial.certify
+
+    Examples
+    --------
+    >>> from deadtime import delay, s
+    >>> from deadtime.roots import Certificate
+    >>> proof = (s + 2.0 * delay(0.36)).certify(re=(0, None))
+    >>> proof
+    <Certificate: 0 roots in re=(0, inf), im=(-inf, inf), proved on 3 segments>
+    >>> proof.verify()
+    0
+    >>> Certificate.from_json(proof.to_json()) == proof
+    True
+    """
+
+    def __repr__(self) -> str:
+        (a, b), (c, d) = self.region
+        pieces = sum(len(contour.segments) for contour in self.contours) + len(self.real)
+        return (
+            f"<Certificate: {self.count} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g}), "
+            f"proved on {pieces} segments>"
+        )
+
+    def verify(self) -> int:
+        """Check every claim again, without the code that made it.
+
+        The checker is plain Python: polynomials in exact whole numbers, exponentials and angles
+        enclosed in fixed point to 120 binary digits below the value, inequalities between
+        fractions. It shares nothing with the native code, whose bounds it confirms or refutes.
+        Some tenths of a millisecond per segment, a few milliseconds right beside a root of high
+        multiplicity.
+
+        Returns
+        -------
+        int
+            The count.
+
+        Raises
+        ------
+        CertificateError
+            If a claim is false, with the first one that is, or takes more digits to check than
+            any that `QuasiPolynomial.certify` makes.
+
+        Notes
+        -----
+        Along a segment the function stays in a disc that does not hold 0, so its argument changes
+        by less than a half turn from one middle to the next; added up around the region the
+        changes are 2 pi times the number of roots (argument principle).
+
+        Examples
+        --------
+        >>> import dataclasses
+        >>> from deadtime import delay, s
+        >>> proof = (s + 5.0 * delay(0.36)).certify(re=(0, None))
+        >>> proof.verify()
+        2
+        >>> dataclasses.replace(proof, count=0).verify()
+        Traceback (most recent call last):
+            ...
+        deadtime._base.errors.CertificateError: the certificate is false: 2 roots are proved, not 0
+        """
+        return check(self)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the contour in its segments, coloured by the argument of h; needs matplotlib.
+
+        The colours run through their circle once for every root inside.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; default is a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from deadtime._base.drawing import shown_axes
+        from deadtime.roots.certificate._plots import plot_certificate
+
+        axes = shown_axes(ax)
+        plot_certificate(axes, self)
+        return axes
+
+    def to_json(self, indent: int | None = None) -> str:
+        """Write the certificate as JSON, numbers in hexadecimal so that none is rounded.
+
+        Parameters
+        ----------
+        indent : int, optional
+            As in `json.dumps`.
+
+        Returns
+        -------
+        str
+        """
+        return json.dumps({"format": _FORMAT, **_plain(self)}, indent=indent)
+
+    @classmethod
+    def from_json(cls, text: str) -> Certificate:
+        """Read what `to_json` wrote; nothing is believed before `verify`.
+
+        Parameters
+        ----------
+        text : str
+
+        Returns
+        -------
+        Certificate
+
+        Raises
+        ------
+        ValueError
+            If it is no certificate, or has numbers that none has.
+        """
+        try:
+            data = json.loads(text)
+            if data.pop("format") != _FORMAT:
+                raise KeyError("format")
+            read = cls(
+                coefficients=_each(lambda row: _each(_number, row), data.pop("coefficients")),
+                delays=_each(_number, data.pop("delays")),
+                region=_box(data.pop("region")),
+                count=data.pop("count"),
+                scale=data.pop("scale"),
+                zeros=data.pop("zeros"),
+                beyond=_bound(data.pop("beyond")),
+                closed=_box(data.pop("closed")),
+                contours=_each(_contour, data.pop("contours")),
+                real=_each(_part, data.pop("real")),
+            )
+            check_form(read)
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise ValueError(f"this is not the text of a certificate: {error}") from error
+        except RecursionError:
+            raise ValueError(
+                "this is not the text of a certificate: brackets are nested deeper than in one"
+            ) from None
+        return read
+
+
+def _plain(value: Any) -> Any:
+    """Turn a value into what JSON holds; floats and complex numbers as hexadecimal text."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = dataclasses.fields(value)
+        return {field.name: _plain(getattr(value, field.name)) for field in fields}
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    if isinstance(value, complex):
+        return [value.real.hex(), value.imag.hex()]
+    return value.hex() if isinstance(value, float) else value
+
+
+def _number(text: Any) -> float:
+    if not isinstance(text, str):
+        raise TypeError(f"{reprlib.repr(text)}: a number is written in hexadecimal")
+    return float.fromhex(text)
+
+
+def _each(read: Callable[[Any], _T], values: Any) -> tuple[_T, ...]:
+    if not isinstance(values, list):
+        raise TypeError(f"{reprlib.repr(values)} is not a list")
+    return tuple(map(read, values))
+
+
+def _pair(read: Callable[[Any], _T], values: Any) -> tuple[_T, _T]:
+    first, second = _each(read, values)
+    return first, second
+
+
+def _complex(values: Any) -> complex:
+    return complex(*_pair(_number, values))
+
+
+def _range(values: Any) -> Range:
+    return _pair(_number, values)
+
+
+def _box(values: Any) -> tuple[Range, Range]:
+    return _pair(_range, values)
+
+
+def _bound(values: Any) -> tuple[int, float] | None:
+    if values is None:
+        return None
+    row, radius = _pair(lambda value: value, values)
+    return row, _number(radius)
+
+
+_READERS: Final[dict[Any, Callable[[Any], Any]]] = {
+    complex: _complex,
+    float: _number,
+    int: lambda value: value,
+}
+
+
+def _part(data: Any) -> Segment | Monotone:
+    kind = Monotone if "bend" in data else Segment
+    hints = get_type_hints(kind)
+    fields: dict[str, Any] = {name: _READERS[hints[name]](x) for name, x in data.items()}
+    return kind(**fields)
+
+
+def _contour(data: Any) -> Contour:
+    return Contour(
+        _range(data["re"]),
+        _range(data["im"]),
+        data["symmetric"],
+        data["count"],
+        _each(_part, data["segments"]),  # type: ignore[arg-type]
+    )

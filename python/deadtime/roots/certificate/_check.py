@@ -1,0 +1,405 @@
+"""Re-verification of certificates: exact numbers and own enclosures, nothing of the prover.
+
+The claims of a certificate are taken one by one, none on trust:
+
+1. what is cut off from the region holds no root (`_check_closing`);
+2. the paths are those around the closed region, without a gap (`_check_path`);
+3. along each segment g = h e^(s tau_c) keeps to the disc about the stated value: the value is
+   enclosed anew at the middle, the slope bounded anew in the disc about it (`_check_segment`);
+4. the values then turn about 0 by less than a half turn each, so their turns add up exactly; where
+   tau_c changes and at the ends, g is enclosed once more; the sum is a whole number (`_turns`);
+5. on the real axis, where it is an edge, signs tell the roots (`_real_roots`).
+
+Polynomials with the coefficients and points given (doubles are exact numbers) are computed
+without any rounding, exponentials enclosed in fixed point (`_enclosures`), inequalities decided
+between whole numbers or fractions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from fractions import Fraction
+from itertools import pairwise
+
+from deadtime._base.errors import CertificateError
+from deadtime.roots.certificate._enclosures import angle, pi
+from deadtime.roots.certificate._form import check_form
+from deadtime.roots.certificate._function import (
+    ExactFunction,
+    above,
+    affordable,
+    exponential_above,
+    fail,
+    pair,
+)
+from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Segment
+
+__all__ = ["check"]
+
+
+def check(certificate: Proof) -> int:
+    """Verify everything a certificate claims; the count if it is true.
+
+    Raises
+    ------
+    CertificateError
+        With the first claim found false.
+    """
+    try:
+        check_form(certificate)
+        return _Checker(certificate).count()
+    except (OverflowError, ZeroDivisionError, ValueError, IndexError) as error:
+        raise CertificateError(
+            f"the certificate has a number out of range, or a part of no use: {error}"
+        ) from error
+
+
+class _Checker:
+    """The function of a certificate as whole numbers, and the claims about it."""
+
+    def __init__(self, certificate: Proof) -> None:
+        self.certificate = certificate
+        self.function = ExactFunction(
+            certificate.coefficients, certificate.delays, certificate.scale, certificate.zeros
+        )
+
+    # The claims, from the count down
+
+    def count(self) -> int:
+        """Verify all; the number of roots."""
+        claimed = self.certificate
+        (a, b), (c, d) = claimed.region
+        if not (a < b and c < d and a < math.inf and b > -math.inf):
+            fail(f"the region {claimed.region} has a range that does not increase")
+        total = self._zeros()
+        re, im = self._check_closing()
+        wanted = []
+        if re[0] < re[1] and im[0] < im[1]:
+            if im[0] <= 0:
+                height = im[1] if im[0] == 0 else -im[0]
+                wanted.append((re, (0.0, height), True))
+                if height < im[1]:
+                    wanted.append((re, (height, im[1]), False))
+            else:
+                wanted.append((re, im, False))
+        given = [(contour.re, contour.im, contour.symmetric) for contour in claimed.contours]
+        if given != wanted:
+            fail(f"the paths go around {given}, not around {wanted}")
+        for contour in claimed.contours:
+            number = self._turns(contour)
+            if number != contour.count:
+                fail(f"the function turns {number} times, not {contour.count}")
+            if contour.symmetric and im[0] == 0:
+                real = self._real_roots(contour.re)
+                if number < real or (number - real) % 2:
+                    fail(f"{real} of {number} roots are real: the others would not be pairs")
+                number = real + (number - real) // 2
+            total += number
+        if total != claimed.count:
+            fail(f"{total} roots are proved, not {claimed.count}")
+        return total
+
+    def _zeros(self) -> int:
+        """Exact roots at 0 that count."""
+        zeros = self.certificate.zeros
+        (a, b), (c, d) = self.certificate.region
+        if zeros < 0:
+            fail(f"{zeros} roots at 0")
+        if zeros == 0 or a > 0 or b < 0 or c > 0 or d < 0:
+            return 0
+        if a == 0 or b == 0:
+            fail("a root at 0 lies on the edge")
+        return zeros
+
+    # 1: what is cut off
+
+    def _check_closing(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        claimed = self.certificate
+        (a, b), (c, d) = claimed.region
+        if c + d < 0:
+            c, d = -d, -c
+        re, im = claimed.closed
+        if not all(map(math.isfinite, (*re, *im))):
+            fail("the closed region is not finite")
+        radius = math.inf
+        if math.isinf(c) or math.isinf(d):
+            if claimed.beyond is None:
+                fail("no bound is given for an open imaginary part")
+            row, radius = claimed.beyond
+            self._check_dominance(row, radius, (a, b))
+        height = max(abs(im[0]), abs(im[1]))
+        left = re[0] == a or a < re[0] <= -radius
+        left = left or (a == -math.inf and self._is_left_edge(re[0], height))
+        right = re[1] == b or b > re[1] >= radius
+        right = right or (b == math.inf and self._is_right_edge(re[1], height))
+        lower = im[0] == c or c < im[0] <= -radius
+        upper = im[1] == d or d > im[1] >= radius
+        if not (left and right and lower and upper):
+            fail(f"roots between the region {claimed.region} and {claimed.closed} are possible")
+        return re, im
+
+    def _check_dominance(self, index: int, radius: float, re: tuple[float, float]) -> None:
+        """One leading term exceeds all others where |s| >= radius, in a strip.
+
+        Divided by |s|^n the others fall with |s|, so the radius itself is the worst.
+        """
+        degree = max(map(len, self.function.rows)) - 1
+        if not (0 <= index < len(self.function.rows) and 0 <= radius < math.inf):
+            fail("the bound of the roots is not one")
+        if len(self.function.rows[index]) != degree + 1:
+            fail("the row that is said to dominate does not have the highest degree")
+        room = abs(self.function.rows_exact[index][degree])
+        lower = [Fraction(0)] * degree
+        for j, row in enumerate(self.function.rows_exact):
+            gap = self.function.delays_exact[j] - self.function.delays_exact[index]
+            if gap == 0:
+                weight = Fraction(1)
+            else:
+                edge = re[0] if gap > 0 else re[1]
+                if math.isinf(edge):
+                    fail("no term dominates in a strip open to that side")
+                weight = exponential_above(-gap * Fraction(edge))
+            for k, c in enumerate(row):
+                if k < degree:
+                    lower[k] += weight * abs(c)
+                elif j != index:
+                    room -= weight * abs(c)
+        r = Fraction(radius)
+        affordable(self.function.rows, r)
+        # Beyond 0 itself only a constant has no roots.
+        positive = radius > 0 or degree == 0
+        if not positive or room * r**degree <= sum(c * r**k for k, c in enumerate(lower)):
+            fail(f"roots beyond |s| = {radius} are not excluded")
+
+    def _is_right_edge(self, x: float, height: float) -> bool:
+        return _dominates_rightward(self.function.rows_exact, self.function.delays_exact, x, height)
+
+    def _is_left_edge(self, x: float, height: float) -> bool:
+        """As on the right, for h(-s) e^(-s tau_last)."""
+        rows = [
+            [-c if k % 2 else c for k, c in enumerate(row)]
+            for row in reversed(self.function.rows_exact)
+        ]
+        delays = [
+            self.function.delays_exact[-1] - tau for tau in reversed(self.function.delays_exact)
+        ]
+        return _dominates_rightward(rows, delays, -x, height)
+
+    # 2: paths
+
+    def _check_path(self, contour: Contour) -> None:
+        """The segments lead around the rectangle, each beginning where another ends."""
+        (a, b), (c, d) = contour.re, contour.im
+        corners = [complex(b, c), complex(b, d), complex(a, d), complex(a, c)]
+        if not contour.symmetric:
+            corners = [complex(a, c), *corners]
+        segments = iter(contour.segments)
+        for start, end in pairwise(corners):
+            here = start
+            while here != end:
+                segment = next(segments, None)
+                if segment is None:
+                    fail(f"the path breaks off at {here}")
+                if segment.start != here:
+                    fail(f"the path has a gap between {here} and {segment.start}")
+                here = segment.end
+                if not _goes_on(segment.start, here, end):
+                    fail(f"the path strays from its edge at {here}")
+        if next(segments, None) is not None:
+            fail("the path goes on behind its end")
+
+    # 3: segments
+
+    def _check_segment(self, segment: Segment) -> None:
+        """Verify that g keeps to the disc of radius error + slope r about `value`, without 0."""
+        if not 0 <= segment.reference < len(self.function.rows):
+            fail(f"there is no delay number {segment.reference}")
+        if not (segment.error >= 0 and segment.slope >= 0):
+            fail("a bound is negative")
+        where = f"between {segment.start} and {segment.end}"
+        radius = _radius(segment.start, segment.middle, segment.end)
+        value = pair(segment.value)
+        spread = Fraction(segment.error) + Fraction(segment.slope) * radius
+        if not spread**2 < value[0] ** 2 + value[1] ** 2:
+            fail(f"the function may vanish {where}")
+        # More digits where the slope, times r, is compared with the value.
+        size = abs(segment.value) / max(1.0, float(radius))
+        found = self.function.enclose(segment.middle, segment.reference, size)
+        if not found.is_within(value, Fraction(segment.error)):
+            fail(f"the value stated for {segment.middle}, {where}, is not the function's")
+        bend = self.function.bend(segment.middle, radius, segment.reference)
+        steepest = found.slope_above() + bend * radius
+        claimed = Fraction(segment.slope)
+        if steepest > claimed:
+            # Next to several roots.
+            steepest = self.function.steepness(segment.middle, radius, segment.reference, size)
+        if steepest > claimed:
+            fail(f"the slope stated {where} can be exceeded")
+
+    # 4: turns
+
+    def _turns(self, contour: Contour) -> int:
+        """Verify a contour; how often h turns along it, in half turns if it is symmetric."""
+        self._check_path(contour)
+        half_turns = 0
+        # In units of 2^-64 rad.
+        total, slack = Fraction(0), 0
+        for leg in _legs(contour.segments):
+            for segment in leg:
+                self._check_segment(segment)
+            first, last = leg[0], leg[-1]
+            ends = [
+                self._clear_end(first.start, first),
+                self._clear_end(last.end, last),
+            ]
+            values = [ends[0], *(pair(segment.value) for segment in leg), ends[1]]
+            for before, after in pairwise(values):
+                half_turns += 2 * _crossing(before, after)
+            angles = [_angle(value) for value in ends]
+            gone = Fraction(last.end.imag) - Fraction(first.start.imag)
+            total += angles[1] - angles[0]
+            total -= self.function.delays_exact[first.reference] * gone * (1 << 64)
+            # An end is known to 2^-20 of itself, an angle to 8 units.
+            slack += 2 * ((1 << 45) + 8)
+        turn = pi(64)
+        number = half_turns + round(total / turn)
+        off = abs(total - (number - half_turns) * turn) + abs(number - half_turns) + slack
+        if off >= turn // 4:
+            fail("the function does not turn a whole number of times")
+        unit = 1 if contour.symmetric else 2
+        if number < 0 or number % unit:
+            fail(f"{number} half turns are no number of roots")
+        return number // unit
+
+    def _clear_end(self, place: complex, segment: Segment) -> tuple[Fraction, Fraction]:
+        """Enclose g where a leg begins or ends, to 2^-20 of itself."""
+        found = self.function.enclose(place, segment.reference, abs(segment.value))
+        if found.lost << 20 > max(abs(found.vr), abs(found.vi)):
+            fail(f"the function may vanish at {place}")
+        unit = Fraction(1, 1 << found.bits)
+        return found.vr * unit, found.vi * unit
+
+    # 5: the real axis
+
+    def _real_roots(self, re: tuple[float, float]) -> int:
+        total = 0
+        here = re[0]
+        for part in self.certificate.real:
+            start, end = part.start.real, part.end.real
+            if start != here or not start < end:
+                fail(f"the real axis has a gap between {here} and {start}")
+            if isinstance(part, Monotone):
+                total += self._check_monotone(part)
+            else:
+                if part.start.imag or part.end.imag or part.middle.imag:
+                    fail("a part of the real axis lies off it")
+                if not start <= part.middle.real <= end:
+                    fail("a middle lies outside its segment")
+                self._check_segment(part)
+            here = end
+        if here != re[1]:
+            fail(f"the real axis is not covered beyond {here}")
+        return total
+
+    def _check_monotone(self, part: Monotone) -> int:
+        """One root or none where g' keeps its sign."""
+        if not 0 <= part.reference < len(self.function.rows) or not (
+            part.error >= 0 and part.bend >= 0
+        ):
+            fail("a part of the real axis is badly formed")
+        start, end, middle = map(Fraction, (part.start, part.end, part.middle))
+        radius = max(end - middle, middle - start)
+        slope, error, bend = map(Fraction, (part.slope, part.error, part.bend))
+        if not error + bend * radius < abs(slope) or not start <= middle <= end:
+            fail(f"the function may turn around between {part.start} and {part.end}")
+        found = self.function.enclose(complex(part.middle), part.reference, abs(part.slope))
+        unit = Fraction(1, 1 << found.bits)
+        if abs(found.wr * unit - slope) + found.worse * unit > error:
+            fail(f"the slope stated at {part.middle} is not the function's")
+        if self.function.bend(complex(part.middle), radius, part.reference) > bend:
+            fail(f"the curvature stated about {part.middle} can be exceeded")
+        signs = set()
+        for end_point in (part.start, part.end):
+            found = self.function.enclose(
+                complex(end_point), part.reference, abs(part.slope) * 1e-9
+            )
+            if abs(found.vr) <= found.lost:
+                fail(f"the function may vanish at {end_point}")
+            signs.add(found.vr > 0)
+        return len(signs) - 1
+
+
+def _dominates_rightward(
+    rows: list[list[Fraction]], delays: list[Fraction], x: float, height: float
+) -> bool:
+    """Whether the first row's leading term exceeds all others for Re s >= x, |Im s| <= height.
+
+    Divided by (Re s)^n every other term falls with Re s: at once without delay, and from
+    (k - n)/delay on with a delay and s^k.
+    """
+    if not x > 0:
+        return False
+    edge = Fraction(x)
+    size = above(edge, Fraction(height))
+    affordable(rows, size)
+    degree = len(rows[0]) - 1
+    total = Fraction(0)
+    for row, tau in zip(rows, delays, strict=True):
+        gap = tau - delays[0]
+        if gap > 0 and edge * gap < len(row) - 1 - degree:
+            return False
+        weight = exponential_above(-gap * edge)
+        for k, c in enumerate(row):
+            if gap > 0 or k < degree:
+                total += weight * abs(c) * size**k
+    return total < abs(rows[0][degree]) * edge**degree
+
+
+def _goes_on(start: complex, end: complex, corner: complex) -> bool:
+    """Whether `end` lies on the straight way from `start` to `corner`."""
+    if start.imag == end.imag == corner.imag:
+        a, b, c = start.real, end.real, corner.real
+    elif start.real == end.real == corner.real:
+        a, b, c = start.imag, end.imag, corner.imag
+    else:
+        return False
+    return a < b <= c or a > b >= c
+
+
+def _radius(start: complex, middle: complex, end: complex) -> Fraction:
+    """How far the ends are from the middle, which lies on the line between them."""
+    if start.imag == middle.imag == end.imag:
+        a, m, b = start.real, middle.real, end.real
+    elif start.real == middle.real == end.real:
+        a, m, b = start.imag, middle.imag, end.imag
+    else:
+        fail(f"a middle lies off its segment, between {start} and {end}")
+    return max(abs(Fraction(m) - Fraction(a)), abs(Fraction(b) - Fraction(m)))
+
+
+def _legs(segments: Iterable[Segment]) -> list[list[Segment]]:
+    """Runs of segments with the same reference."""
+    legs: list[list[Segment]] = []
+    for segment in segments:
+        if legs and legs[-1][-1].reference == segment.reference:
+            legs[-1].append(segment)
+        else:
+            legs.append([segment])
+    return legs
+
+
+def _crossing(a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction]) -> int:
+    """How the turn from a to b, less than a half turn, crosses the negative real axis."""
+    if (a[1] >= 0) == (b[1] >= 0):
+        return 0
+    cross = a[0] * b[1] - a[1] * b[0]
+    if a[1] >= 0:
+        return 1 if cross > 0 else 0
+    return -1 if cross < 0 else 0
+
+
+def _angle(value: tuple[Fraction, Fraction]) -> int:
+    x, y = value
+    common = x.denominator * y.denominator
+    return angle(int(x * common), int(y * common))

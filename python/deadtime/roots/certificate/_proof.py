@@ -1,0 +1,42 @@
+"""Certificates from the proofs that the native part writes down."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from deadtime import _deadtime
+from deadtime.roots.certificate._certificate import Certificate
+from deadtime.roots.certificate._parts import Contour, Monotone, Segment
+
+__all__ = ["proved"]
+
+_T = TypeVar("_T")
+
+
+def proved(
+    coefficients: list[list[float]], delays: list[float], proof: _deadtime.Certificate
+) -> Certificate:
+    """What the native part proved of a function."""
+    return _copied(
+        Certificate,
+        proof,
+        coefficients=tuple(map(tuple, coefficients)),
+        delays=tuple(delays),
+        contours=tuple(
+            _copied(Contour, contour, segments=tuple(map(_copied_part, contour.segments)))
+            for contour in proof.contours
+        ),
+        real=tuple(map(_copied_part, proof.real)),
+    )
+
+
+def _copied(kind: type[_T], native: Any, **made: Any) -> _T:
+    """Build a dataclass from an object with the same names, but for those that are given."""
+    names: tuple[str, ...] = kind.__match_args__  # type: ignore[attr-defined]
+    return kind(**{name: made[name] if name in made else getattr(native, name) for name in names})
+
+
+def _copied_part(part: _deadtime.Segment | _deadtime.Monotone) -> Segment | Monotone:
+    if isinstance(part, _deadtime.Monotone):
+        return _copied(Monotone, part)
+    return _copied(Segment, part)

@@ -1,0 +1,23 @@
+"""Stability over ranges of gains and delays: maps, proved boxes, robust maps, stability radius.
+
+`_map` is `stability_map`, `_boundaries` its crossing curves; `_boxes`, `_robust` and `_radius`
+prove what holds for whole ranges, which `_intervals` reads from the arguments.
+"""
+
+from deadtime.stability._boxes import ProvedBoxes, largest_stable_box, proved_boxes
+from deadtime.stability._map import MapStatus, StabilityMap, stability_map
+from deadtime.stability._radius import StabilityRadius, stability_radius
+from deadtime.stability._robust import RobustMap, robust_map
+
+__all__ = [
+    "MapStatus",
+    "ProvedBoxes",
+    "RobustMap",
+    "StabilityMap",
+    "StabilityRadius",
+    "largest_stable_box",
+    "proved_boxes",
+    "robust_map",
+    "stability_map",
+    "stability_radius",
+]

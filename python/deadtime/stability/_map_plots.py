@@ -1,0 +1,123 @@
+"""Pictures of stability maps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.drawing import COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from deadtime.stability._boundaries import Boundary
+    from deadtime.stability._map import StabilityMap
+
+__all__ = ["plot_stability_map"]
+
+#: Colours for one, two, ... unstable roots; more share the last one.
+_COUNTED = 8
+
+#: Curves with fewer points than this share of the map's side carry no label.
+_LABELLED = 0.15
+
+#: Labels of one picture.
+_MOST_LABELS = 8
+
+
+def plot_stability_map(
+    ax: Axes, chart: StabilityMap, chosen: Mapping[str, float] | None, show: str
+) -> None:
+    """Shade the cells, draw the boundaries with their frequencies, mark the chosen point."""
+    across, up = chart.names
+    x, y = chart.axes[across], chart.axes[up]
+    if show == "abscissa":
+        _shade_abscissa(ax, chart, x, y)
+    else:
+        _shade_counts(ax, chart, x, y)
+    _draw_boundaries(ax, chart, x, y)
+    if chosen:
+        ax.plot(chosen[across], chosen[up], "*", color=COLOURS[1], ms=14, mec="w", zorder=4)
+    ax.set(xlabel=across, ylabel=up, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+
+
+def _shade_abscissa(
+    ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> None:
+    """Spectral abscissa where the loop is stable."""
+    shading = np.where(chart.stable, chart.abscissa, np.nan).T
+    if np.any(np.isfinite(shading)):
+        drawn = ax.pcolormesh(x, y, shading, cmap="viridis_r", shading="auto", rasterized=True)
+        ax.figure.colorbar(drawn, ax=ax, label="spectral abscissa / (1/s)")
+
+
+def _shade_counts(
+    ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> None:
+    """Number of unstable roots: green for none, grey for no end of them."""
+    from matplotlib import colormaps
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    counts = chart.unstable.astype(float)
+    counts[counts == -1.0] = _COUNTED + 1.0
+    counts[counts == -2.0] = np.nan
+    counts = np.where((counts > _COUNTED) & (chart.unstable > 0), float(_COUNTED), counts)
+    steps = colormaps["Blues"](np.linspace(0.15, 0.95, _COUNTED))
+    colours = ListedColormap([(0.86, 0.95, 0.86, 1.0), *steps, (0.45, 0.45, 0.45, 1.0)])
+    norm = BoundaryNorm(np.arange(-0.5, _COUNTED + 2.0), colours.N)
+    drawn = ax.pcolormesh(
+        x, y, counts.T, cmap=colours, norm=norm, shading="nearest", rasterized=True
+    )
+    bar = ax.figure.colorbar(drawn, ax=ax, label="unstable roots", ticks=range(_COUNTED + 2))
+    bar.ax.set_yticklabels([*map(str, range(_COUNTED)), f"{_COUNTED}+", "no end"])
+
+
+def _draw_boundaries(
+    ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> None:
+    """Crossing curves where they are known, else the edge of the stable cells."""
+    try:
+        curves = chart.boundaries
+    except ValueError:
+        curves = ()
+    for curve in curves:
+        ax.plot(*(curve.values[name] for name in chart.names), color="k", lw=1.0, zorder=3)
+    least = _LABELLED * min(len(x), len(y))
+    for curve in [curve for curve in curves if len(curve) >= least][:_MOST_LABELS]:
+        _label(ax, chart, curve)
+    edges = _missing_edges(chart) if curves else chart.stable
+    if 0.0 < edges.mean() < 1.0:
+        # The abscissa is continuous, so its zero line lies between the cells it separates. Where
+        # it is missing or infinite, the boundary goes by the cells themselves.
+        whole = not curves and np.all(np.isfinite(chart.abscissa))
+        level = chart.abscissa if whole else 0.5 - edges.astype(float)
+        ax.contour(
+            x, y, level.T, levels=[-chart.decay if whole else 0.0], colors="k", linewidths=1.2
+        )
+
+
+def _missing_edges(chart: StabilityMap) -> NDArray[np.bool_]:
+    """Cells with finitely many unstable roots: chains end them where no curve does."""
+    finite: NDArray[np.bool_] = chart.unstable != -1
+    return finite
+
+
+def _label(ax: Axes, chart: StabilityMap, curve: Boundary) -> None:
+    """Write the frequencies of a curve beside it, in the middle of its course."""
+    across, up = chart.names
+    high = float(curve.omega.max())
+    middle = len(curve) // 2
+    text = "ω = 0" if high == 0.0 else f"ω = {curve.omega[middle]:.3g}"
+    ax.annotate(
+        text,
+        (float(curve.values[across][middle]), float(curve.values[up][middle])),
+        textcoords="offset points",
+        xytext=(4, 4),
+        fontsize="x-small",
+        color="0.15",
+        bbox={"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7},
+        zorder=5,
+    )

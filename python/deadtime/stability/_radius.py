@@ -1,0 +1,120 @@
+"""How far gains and delays may move, all at once, without loss of stability: proved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import SupportsFloat
+
+from deadtime import _deadtime
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.ranges import Range
+from deadtime._base.validation import finite, positive
+from deadtime.roots._family import family_of
+from deadtime.stability._intervals import MOST_MOVING, System, Values
+
+__all__ = ["StabilityRadius", "stability_radius"]
+
+#: Boxes that the search for a radius looks at before it gives what it has.
+_RADIUS_BOXES = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityRadius(ReadOnlyArrays):
+    """How far parameters may move; made by `stability_radius`.
+
+    Attributes
+    ----------
+    radius : float
+        Proved: every member with each parameter within ``radius * scale`` is stable.
+    upper : float
+        The radius cannot exceed this: a member at this distance is not stable, or parameters
+        cannot go further because a delay would be negative. Infinite if neither was met.
+    witness : dict of str to float, or None
+        That member.
+    ranges : dict of str to (low, high)
+        The proved box; delays end at 0.
+    """
+
+    radius: float
+    upper: float
+    witness: dict[str, float] | None
+    ranges: dict[str, Range]
+
+
+def stability_radius(
+    family: System,
+    point: Mapping[str, SupportsFloat],
+    scales: Mapping[str, SupportsFloat] | None = None,
+    *,
+    at: Values | None = None,
+    tol: float = 1e-3,
+) -> StabilityRadius:
+    """How far gains and delays may move away from a point, all at once, without loss of stability.
+
+    Parameters
+    ----------
+    family : ParametricQuasiPolynomial or ControlLoop
+        What to judge.
+    point : mapping of str to float
+        The parameters that move, one to three of them, and where they are: a stable point.
+    scales : mapping of str to float, optional
+        The unit in which each parameter moves; its modulus by default.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
+    tol : float
+        Relative width of the interval from `radius` to `upper`.
+
+    Returns
+    -------
+    StabilityRadius
+        Every p with ``abs(p_i - point_i) <= radius * scale_i`` is proved stable, delays cut off
+        at 0.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As in `proved_boxes`; ValueError also if the point is not stable, or no parameter moves.
+
+    Examples
+    --------
+    The gain and the delay of an integrator may both grow by a factor r with r**2 = pi / (2 K T):
+
+    >>> import deadtime as dtm
+    >>> K, T = dtm.parameters("K T")
+    >>> found = dtm.stability_radius(dtm.s + K * dtm.delay(T), {"K": 2.0, "T": 0.36})
+    >>> round(found.radius, 2), found.radius <= found.upper
+    (0.48, True)
+    """
+    if not isinstance(point, Mapping) or not point:
+        raise TypeError(f"point={point!r}: give a dict such as {{'Kp': 2.0, 'delay': 0.36}}")
+    values = {name: finite(name, value) for name, value in point.items()}
+    names = tuple(values)
+    units = {name: abs(value) for name, value in values.items()}
+    if scales is not None:
+        if not isinstance(scales, Mapping):
+            raise TypeError(f"scales={scales!r}: give a dict such as {{'Kp': 1.0}}")
+        unknown = [name for name in scales if name not in values]
+        if unknown:
+            raise ValueError(f"scale of {unknown[0]}: the point has {', '.join(names)}")
+        units |= {name: positive(f"scale of {name}", scales[name]) for name in scales}
+    for name, unit in units.items():
+        if unit == 0.0 and name not in (scales or ()):
+            raise ValueError(f"{name}=0 has no scale of its own: give scales={{{name!r}: ...}}")
+    if len(names) > MOST_MOVING:
+        raise ValueError(f"more than {MOST_MOVING} parameters move: give the others in at={{...}}")
+    known = family_of(family, names, at)
+    found = _deadtime.stability_radius(
+        known._family, values, units, tol=positive("tol", tol), max_boxes=_RADIUS_BOXES
+    )
+    # Parameters that a delay depends on.
+    delays = {name for _, _, (_, slopes) in known._terms for name, _ in slopes}
+    ranges = {}
+    for name, value in values.items():
+        reach = found.radius * units[name]
+        # Inwards: a sum may round to a place just outside.
+        low = min(math.nextafter(value - reach, math.inf), value)
+        high = max(math.nextafter(value + reach, -math.inf), value)
+        ranges[name] = (min(max(low, 0.0), value) if name in delays else low, high)
+    return StabilityRadius(found.radius, found.upper, found.witness, ranges)

@@ -1,0 +1,166 @@
+"""Maps over two parameters that hold for all values of others in intervals: proved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime import _deadtime
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.ranges import Points, Range
+from deadtime._base.validation import thread_number
+from deadtime.roots._family import family_of
+from deadtime.stability._intervals import (
+    Floats,
+    Given,
+    Progress,
+    System,
+    Values,
+    ranges_of,
+    side,
+)
+from deadtime.stability._map_axes import map_axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["RobustMap", "robust_map"]
+
+#: Boxes that one cell of a robust map is divided into before it is undecided.
+_CELL_BOXES = 1000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustMap(ReadOnlyArrays):
+    """Stability over two parameters for all values of others; made by `robust_map`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The two parameters: first and second axis of the array.
+    axes : dict of str to ndarray
+        Their values, increasing.
+    over : dict of str to (low, high)
+        The intervals of the others.
+    unstable : ndarray of int32, shape (n0, n1)
+        0 where every value in the intervals is proved stable. Otherwise a number of unstable
+        roots that some member has, the largest that was met; -1 for infinitely many, -2 where
+        nothing could be proved.
+
+    Notes
+    -----
+    All arrays are read-only.
+    """
+
+    names: tuple[str, str]
+    axes: dict[str, Floats]
+    over: dict[str, Range]
+    unstable: NDArray[np.int32]
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where all members are proved stable, shape (n0, n1)."""
+        stable: NDArray[np.bool_] = self.unstable == 0
+        stable.flags.writeable = False
+        return stable
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw where all members are stable, some are not, and nothing is proved.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from deadtime.stability._box_plots import plot_robust_map, shown_axes
+
+        return plot_robust_map(shown_axes(ax), self)
+
+    def __repr__(self) -> str:
+        sides = ", ".join(
+            f"{name} {axis[0]:.6g} to {axis[-1]:.6g} ({len(axis)})"
+            for name, axis in self.axes.items()
+        )
+        held = ", ".join(side(name, *self.over[name]) for name in self.over)
+        return (
+            f"<RobustMap {sides} for all {held}: {int(self.stable.sum())} of {self.stable.size} "
+            "stable>"
+        )
+
+
+def robust_map(
+    family: System,
+    ranges: Mapping[str, Points],
+    over: Given,
+    shape: tuple[int, int] = (101, 101),
+    *,
+    at: Values | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> RobustMap:
+    """Stability over two parameters, proved for every value of others in intervals.
+
+    Parameters
+    ----------
+    family : ParametricQuasiPolynomial or ControlLoop
+        What to judge.
+    ranges : mapping of str to (low, high), (low, high, n) or ndarray
+        Exactly two names, as in `stability_map`: ranges or the points themselves.
+    over : mapping of str to (low, high)
+        Intervals of one to three other parameters, for example of the delay.
+    shape : tuple of int
+        Points along each range that does not say how many it has.
+    at : mapping of str to float, optional
+        Values of the other parameters; those of a loop have values, which these replace.
+    threads : int, optional
+        Number of threads; all cores by default. Results have the same bits for any number.
+    progress : callable, optional
+        Called now and then with the number of finished cells, and at the end with all.
+
+    Returns
+    -------
+    RobustMap
+
+    Raises
+    ------
+    ValueError, TypeError
+        As in `stability_map` and `proved_boxes`.
+
+    Examples
+    --------
+    An integrator whose delay is known to lie between 0.3 s and 0.4 s:
+
+    >>> import deadtime as dtm
+    >>> Kp, Kv, T = dtm.parameters("Kp Kv T")
+    >>> h = dtm.s + (Kp + Kv * dtm.s) * dtm.delay(T)
+    >>> chart = dtm.robust_map(
+    ...     h, {"Kp": (0.1, 5.9), "Kv": (-0.9, 0.9)}, over={"T": (0.3, 0.4)}, shape=(30, 19)
+    ... )
+    >>> chart
+    <RobustMap Kp 0.1 to 5.9 (30), Kv -0.9 to 0.9 (19) for all T 0.3 to 0.4: 305 of 570 stable>
+    """
+    axis_names, axes = map_axes(ranges, shape)
+    held = ranges_of(over)
+    twice = [name for name in held if name in axes]
+    if twice:
+        raise ValueError(f"{twice[0]} is an axis and has an interval: give it one of the two")
+    unstable = _deadtime.robust_map(
+        family_of(family, (*axis_names, *held), at)._family,
+        axes,
+        held,
+        max_boxes=_CELL_BOXES,
+        threads=thread_number(threads),
+        progress=progress,
+    )
+    if progress is not None:
+        progress(unstable.size)
+    return RobustMap(axis_names, axes, held, unstable)

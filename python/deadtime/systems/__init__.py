@@ -1,0 +1,13 @@
+"""Linear systems with delays: transfer functions, systems of matrices, and their responses.
+
+`_transfer` and `_delay_system` are the systems, `_poles` and `_responses` what both are asked;
+`_margins` holds the margins of a loop; `_interchange` converts from and to
+other packages; `_realisation`, `_signals` and `_run` simulate; `_response` is the result.
+"""
+
+from deadtime.systems._delay_system import DelaySystem
+from deadtime.systems._margins import Margins
+from deadtime.systems._response import Response
+from deadtime.systems._transfer import TransferFunction, feedback
+
+__all__ = ["DelaySystem", "Margins", "Response", "TransferFunction", "feedback"]

@@ -1,0 +1,651 @@
+r"""Linear systems with delays in state, input and output, of any order.
+
+    E x'(t) + sum_j N_j x'(t - tau_j) = sum_j A_j x(t - tau_j) + sum_j B_j u(t - tau_j),
+    y(t) = sum_j C_j x(t - tau_j) + sum_j D_j u(t - tau_j).
+
+With the characteristic matrix M(s) = s E + sum (s N_j - A_j) e^{-s tau_j}, the poles are the
+roots of det M, and C M^{-1} B + D = det [[M, B], [-C, D]] / det M. Values are taken from the
+matrices, for any order; roots from the expanded determinant while that is safe, and otherwise
+from factorisations of M along contours. One class, kept whole: most of the file is its
+documentation.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.frozen import equal
+from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import non_negative, real_array, unmasked
+from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, RootSet
+from deadtime.roots._crossings import margin_of_family
+from deadtime.roots._determinant import NotExpandedError, expanded
+from deadtime.roots._family import family_of
+from deadtime.roots._matrix_roots import MatrixDeterminant
+from deadtime.systems._margins import Margins
+from deadtime.systems._poles import HasPoles
+from deadtime.systems._realisation import Realisable, Realisation, of_matrices
+from deadtime.systems._responses import HasResponses
+from deadtime.systems._scaled_delays import scaled_family, smallest_delay
+from deadtime.systems._transfer import TransferFunction
+
+__all__ = ["DelaySystem"]
+
+Matrix = NDArray[np.float64]
+#: One matrix, without delay, or matrices by their delays in s.
+Matrices: TypeAlias = ArrayLike | Mapping[float, ArrayLike]
+
+
+class DelaySystem(HasPoles, HasResponses):
+    """A linear system with delays: any order, any number of inputs and outputs. Immutable.
+
+    Every matrix is given as an array, which acts without delay, or as a dict of arrays by their
+    delays in s; a number is a matrix with one entry.
+
+    Parameters
+    ----------
+    A : array_like or dict, shape (n, n)
+        What the state, now and earlier, does to its derivative.
+    B : array_like or dict, shape (n, p), optional
+        What the p inputs do; none by default.
+    C : array_like or dict, shape (q, n), optional
+        The q outputs from the state; all of it by default.
+    D : array_like or dict, shape (q, p), optional
+        The outputs from the inputs directly; zero by default.
+    E : array_like, shape (n, n), optional
+        Factor on the derivative; the identity by default. May be singular.
+    N : dict, shape (n, n), optional
+        Factors on earlier derivatives, by their delays, which are above zero; none by default.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a number is not finite or a delay negative.
+    TypeError
+        If the numbers are not real.
+
+    Examples
+    --------
+    An integrator under proportional control, its input 0.36 s late, closed in the state:
+
+    >>> import deadtime as dtm
+    >>> system = dtm.DelaySystem(A={0.36: -2.0}, B={0.36: 2.0})
+    >>> system.characteristic()
+    s + 2 exp(-0.36 s)
+    >>> system.transfer_function()
+    2 exp(-0.36 s) / (s + 2 exp(-0.36 s))
+
+    An oscillator with delayed feedback of its position:
+
+    >>> system = dtm.DelaySystem({0.0: [[0, 1], [-4, -0.4]], 0.5: [[0, 0], [1.5, 0]]})
+    >>> system
+    <DelaySystem: 2 states, 0 inputs, 2 outputs, delays 0.5 s>
+    >>> system.is_stable()
+    True
+
+    Twenty cars on a ring road, each driver reacting 0.4 s late to the gap ahead:
+
+    >>> import numpy as np
+    >>> ahead = np.roll(np.eye(20), 1, axis=1)
+    >>> zero, one = np.zeros((20, 20)), np.eye(20)
+    >>> cars = dtm.DelaySystem(
+    ...     {
+    ...         0.0: np.block([[zero, ahead - one], [zero, -0.9 * one]]),
+    ...         0.4: np.block([[zero, zero], [0.2 * one, zero]]),
+    ...     }
+    ... )
+    >>> cars.count(re=(-1, 0.5), im=(0.01, 1))
+    19
+    """
+
+    __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N", "_expansion", "_realisation")
+
+    _A: dict[float, Matrix]
+    _B: dict[float, Matrix]
+    _C: dict[float, Matrix]
+    _D: dict[float, Matrix]
+    _E: Matrix
+    _N: dict[float, Matrix]
+    #: The expanded determinant, or why there is none; None until asked for.
+    _expansion: QuasiPolynomial | ValueError | None
+    #: The form that is simulated; None until asked for.
+    _realisation: Realisation | None
+
+    def __init__(
+        self,
+        A: Matrices,
+        B: Matrices | None = None,
+        C: Matrices | None = None,
+        D: Matrices | None = None,
+        *,
+        E: ArrayLike | None = None,
+        N: Mapping[float, ArrayLike] | None = None,
+    ) -> None:
+        state = _by_delay("A", A)
+        n = len(next(iter(state.values()))) if state else 0
+        if n == 0:
+            raise ValueError("A is empty: give at least one matrix, with at least one row")
+        inputs = {} if B is None else _by_delay("B", B)
+        outputs = _by_delay("C", np.eye(n) if C is None else C)
+        direct = {} if D is None else _by_delay("D", D)
+        p = next(iter(inputs.values())).shape[1] if inputs else 0
+        if direct and not inputs:
+            p = next(iter(direct.values())).shape[1]
+        q = len(next(iter(outputs.values()))) if outputs else 0
+        derivative = _matrix("E", np.eye(n) if E is None else E)
+        if N is not None and not isinstance(N, Mapping):
+            raise TypeError("N: give a dict of matrices by their delays, which are above zero")
+        late = {} if N is None else _by_delay("N", N)
+        if any(tau == 0.0 for tau in late):
+            raise ValueError("N has a matrix with delay 0: that one is E")
+        for name, group, shape in (
+            ("A", state, (n, n)),
+            ("B", inputs, (n, p)),
+            ("C", outputs, (q, n)),
+            ("D", direct, (q, p)),
+            ("E", {0.0: derivative}, (n, n)),
+            ("N", late, (n, n)),
+        ):
+            for tau, matrix in group.items():
+                if matrix.shape != shape:
+                    raise ValueError(
+                        f"{name} with delay {tau:g} s has shape {matrix.shape}, not {shape}: A "
+                        f"has {n} rows, which is the number of states, and there are {p} inputs "
+                        f"and {q} outputs"
+                    )
+        put = object.__setattr__
+        values = (state, inputs, outputs, direct, derivative, late, None, None)
+        for name, value in zip(self.__slots__, values, strict=True):
+            put(self, name, value)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a DelaySystem does not change: cannot set {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a DelaySystem does not change: cannot delete {name!r}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._A, self._B, self._C, self._D, self._E, self._N)
+
+    # What it is
+
+    @property
+    def A(self) -> dict[float, Matrix]:
+        """Matrices on the state by their delays in s; read-only arrays."""
+        return dict(self._A)
+
+    @property
+    def B(self) -> dict[float, Matrix]:
+        """Matrices on the input by their delays in s."""
+        return dict(self._B)
+
+    @property
+    def C(self) -> dict[float, Matrix]:
+        """Matrices from state to output by their delays in s."""
+        return dict(self._C)
+
+    @property
+    def D(self) -> dict[float, Matrix]:
+        """Matrices from input to output by their delays in s."""
+        return dict(self._D)
+
+    @property
+    def E(self) -> Matrix:
+        """Factor on the derivative of the state, shape (n, n)."""
+        return self._E
+
+    @property
+    def N(self) -> dict[float, Matrix]:
+        """Factors on earlier derivatives by their delays in s."""
+        return dict(self._N)
+
+    @property
+    def n_states(self) -> int:
+        """Number of components of the state."""
+        return len(self._E)
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        group = self._B or self._D
+        return next(iter(group.values())).shape[1] if group else 0
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return len(next(iter(self._C.values()))) if self._C else 0
+
+    @property
+    def delays(self) -> NDArray[np.float64]:
+        """Every delay above zero, in s, ascending."""
+        groups = (self._A, self._B, self._C, self._D, self._N)
+        return np.array(sorted({tau for group in groups for tau in group} - {0.0}))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DelaySystem):
+            return NotImplemented
+        return equal(self._matrices(), other._matrices())
+
+    def __hash__(self) -> int:
+        return hash((self.n_states, self.n_inputs, self.n_outputs, tuple(self.delays.tolist())))
+
+    def _matrices(self) -> list[Any]:
+        return [getattr(self, name) for name in ("_A", "_B", "_C", "_D", "_E", "_N")]
+
+    def __repr__(self) -> str:
+        listed = ", ".join(f"{tau:g}" for tau in self.delays)
+        delays = f", delays {listed} s" if listed else ""
+        return (
+            f"<DelaySystem: {self.n_states} states, {self.n_inputs} inputs, "
+            f"{self.n_outputs} outputs{delays}>"
+        )
+
+    # Values
+
+    def characteristic_matrix(self, s: ArrayLike) -> NDArray[np.complex128]:
+        """Value of M(s) = s E + sum (s N_j - A_j) exp(-s tau_j).
+
+        Parameters
+        ----------
+        s : array_like of complex
+            In 1/s.
+
+        Returns
+        -------
+        ndarray of complex, shape ``(*s.shape, n, n)``
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> print(dtm.DelaySystem({0.0: [[0, 1], [-4, -0.4]]}).characteristic_matrix(1j).round(1))
+        [[ 0. +1.j -1. +0.j]
+         [ 4. +0.j  0.4+1.j]]
+        """
+        points = np.asarray(unmasked("s", s), dtype=np.complex128)
+        shape = (*points.shape, self.n_states, self.n_states)
+        late = _sum_at(self._N, points, shape) + self._E
+        return points[..., None, None] * late - _sum_at(self._A, points, shape)
+
+    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """Response to sinusoidal inputs, C M^{-1} B + D at s = j omega.
+
+        Solved with the matrices as they are, for any number of states.
+
+        Parameters
+        ----------
+        omega : array_like of float
+            Frequencies in rad/s.
+
+        Returns
+        -------
+        ndarray of complex, shape (n_outputs, n_inputs, *omega.shape)
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If one of the frequencies is exactly a pole.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> system = dtm.DelaySystem(A={0.36: -2.0}, B={0.36: 2.0})
+        >>> print(system.frequency_response([0.0, 2.0])[0, 0].round(4))
+        [1. +0.j     0.5-1.1036j]
+        """
+        points = np.asarray(1j * real_array("omega", omega), dtype=np.complex128)
+        n, p, q = self.n_states, self.n_inputs, self.n_outputs
+        inputs = _sum_at(self._B, points, (*points.shape, n, p))
+        outputs = _sum_at(self._C, points, (*points.shape, q, n))
+        direct = _sum_at(self._D, points, (*points.shape, q, p))
+        values = outputs @ np.linalg.solve(self.characteristic_matrix(points), inputs) + direct
+        return np.moveaxis(values, (-2, -1), (0, 1))
+
+    # Through the expanded determinant
+
+    def _smallest_delay(self) -> float:
+        return smallest_delay((*self.A, *self.N))
+
+    def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
+        """Characteristic function in which all delays grow in proportion to `delay`."""
+        return family_of(scaled_family(self.characteristic(), self._smallest_delay()), names)
+
+    def _delay_margin(self) -> float:
+        """Further delay that the stable system bears, as growth of its least delay, s."""
+        least = self._smallest_delay()
+        family = scaled_family(self.characteristic(), least)
+        return margin_of_family(family, {"delay": least})
+
+    def characteristic(self) -> QuasiPolynomial:
+        """Expand det M(s), while that is numerically safe.
+
+        Returns
+        -------
+        QuasiPolynomial
+            Every coefficient is the exact one, rounded once.
+
+        Raises
+        ------
+        ValueError
+            If there are more than 10 states or 1000 terms, if rounding the coefficients could
+            move the determinant more than 10 000 times as far as rounding the entries of the
+            matrices does, or if the determinant is zero for every s.
+
+        Notes
+        -----
+        The last limit is measured on the imaginary axis, as the largest ratio of the sum of the
+        moduli of all terms to sum_ij abs(M_ij) abs(cofactor_ij). Within it, and to first order, a
+        root near the axis is one of a matrix whose entries differ by a relative 1e-12 at most.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.DelaySystem({0.0: [[0, 1], [-4, -0.4]], 0.5: [[0, 0], [1.5, 0]]}).characteristic()
+        4 + 0.4 s + s^2 - 1.5 exp(-0.5 s)
+        """
+        if self._expansion is None:
+            try:
+                found: QuasiPolynomial | ValueError = expanded(
+                    [[self._entry(i, j) for j in self._states] for i in self._states]
+                )
+            except ValueError as error:
+                found = error.with_traceback(None)
+            object.__setattr__(self, "_expansion", found)
+        if isinstance(self._expansion, QuasiPolynomial):
+            return self._expansion
+        assert self._expansion is not None
+        raise type(self._expansion)(*self._expansion.args)
+
+    def transfer_function(self, output: int = 0, input: int = 0) -> TransferFunction:  # noqa: A002
+        """Transfer function from one input to one output, while that is numerically safe.
+
+        Parameters
+        ----------
+        output, input : int, default 0
+            Which ones, from zero.
+
+        Returns
+        -------
+        TransferFunction
+            Over `characteristic`; modes that do not show between these two are in the numerator
+            as well.
+
+        Raises
+        ------
+        ValueError
+            As in `characteristic`.
+        IndexError
+            If there is no such input or output.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> A, B, C = [[0, 1], [-4, -0.4]], [[0], [1]], [[1, 0]]
+        >>> dtm.DelaySystem(A, {0.1: B}, C).transfer_function()
+        exp(-0.1 s) / (4 + 0.4 s + s^2)
+        """
+        i, j = self._pair(output, input)
+        states = self._states
+        bordered = [
+            *([*(self._entry(k, m) for m in states), _part(self._B, k, j)] for k in states),
+            [*(_part(self._C, i, m, -1.0) for m in states), _part(self._D, i, j)],
+        ]
+        return TransferFunction(expanded(bordered, bordered=True), self.characteristic())
+
+    def margin(self, output: int = 0, input: int = 0) -> Margins:  # noqa: A002
+        """Gain, phase and delay margin of the loop closed from one output to one input.
+
+        Parameters
+        ----------
+        output, input : int, default 0
+            Which ones, from zero.
+
+        Returns
+        -------
+        Margins
+            As of `TransferFunction.margin`.
+
+        Raises
+        ------
+        ValueError
+            As in `characteristic` and in `TransferFunction.margin`.
+        IndexError
+            If there is no such input or output.
+        """
+        return self.transfer_function(output, input).margin()
+
+    def zeros(
+        self,
+        re: OpenRange | None = None,
+        im: OpenRange | None = None,
+        *,
+        output: int = 0,
+        input: int = 0,  # noqa: A002
+    ) -> RootSet:
+        """Locate the zeros from one input to one output in a region with four closed sides.
+
+        Parameters
+        ----------
+        re, im : tuple of (float, float)
+            Ranges of the real part (1/s) and of the imaginary part (rad/s).
+        output, input : int, default 0
+            Which ones, from zero.
+
+        Returns
+        -------
+        RootSet
+            Roots of det [[M, B], [-C, D]]; modes that do not show between these two are among
+            them, and among the poles.
+
+        Raises
+        ------
+        ValueError, ContourError, CountMismatchError
+            As in `poles`.
+        IndexError
+            If there is no such input or output.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> system = dtm.DelaySystem([[0, 1], [-4, -1]], [[0], [1]], [[3, 1]])
+        >>> system.zeros(re=(-9, 9), im=(-9, 9)).roots.round(6).tolist()
+        [(-3+0j)]
+        """
+        i, j = self._pair(output, input)
+        n = self.n_states
+
+        def bordered(corner: Matrix | None, groups: Any, tau: float) -> Matrix:
+            matrix = np.zeros((n + 1, n + 1))
+            if corner is not None:
+                matrix[:n, :n] = corner
+            inputs, outputs, direct = groups
+            if tau in inputs:
+                matrix[:n, n] = -inputs[tau][:, j]
+            if tau in outputs:
+                matrix[n, :n] = outputs[tau][i]
+            if tau in direct:
+                matrix[n, n] = -direct[tau][i, j]
+            return matrix
+
+        ports = (self._B, self._C, self._D)
+        state = {
+            tau: bordered(self._A.get(tau), ports, tau)
+            for tau in sorted({0.0, *self._A, *self._B, *self._C, *self._D})
+        }
+        none: Any = ({}, {}, {})
+        late = {tau: bordered(matrix, none, tau) for tau, matrix in self._N.items()}
+        return MatrixDeterminant(bordered(self._E, none, 0.0), late, state).roots(re, im)
+
+    def chain_enclosure(self) -> tuple[float, float]:
+        r"""Enclose the real part that the chains of a neutral system can come to.
+
+        The sigma at which the largest spectral radius of
+        :math:`\sum_j E^{-1} N_j e^{-\sigma \tau_j + i \theta_j}` over all angles
+        :math:`\theta_j` is one: the supremum over arbitrarily small changes of the delays [1]_.
+
+        Returns
+        -------
+        low, high : float
+            In 1/s, both proved; -inf for a system without delayed derivatives. With more than four
+            different delays of derivatives `high` is only what norms say.
+
+        Raises
+        ------
+        ValueError
+            If E cannot be inverted.
+
+        References
+        ----------
+        .. [1] J. K. Hale and S. M. Verduyn Lunel, "Strong stabilization of neutral functional
+           differential equations", IMA Journal of Mathematical Control and Information 19 (2002).
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> system = dtm.DelaySystem(-1.0, N={0.5: 0.25})
+        >>> low, high = system.chain_enclosure()
+        >>> round(low, 6), round(high, 6)
+        (-2.772589, -2.772589)
+        """
+        return self._matrix().chain_enclosure()
+
+    # Responses
+
+    def _realised(self) -> Realisation:
+        if self._realisation is None:
+            object.__setattr__(self, "_realisation", self._realise())
+        assert self._realisation is not None
+        return self._realisation
+
+    def _realise(self, differentiated: bool = False) -> Realisation:
+        return of_matrices(
+            self._E,
+            self._A,
+            self._N,
+            self._B,
+            self._C,
+            self._D,
+            self.n_inputs,
+            self.n_outputs,
+            differentiated=differentiated,
+        )
+
+    def _differentiated(self) -> Realisable:
+        if any(matrix.any() for matrix in self._D.values()):
+            raise ValueError(
+                "D is not zero: the response to an impulse holds an impulse itself; leave D out "
+                "and add its part"
+            )
+        return _Differentiated(self)
+
+    def _gains_at_rest(self) -> Matrix | None:
+        try:
+            return self.frequency_response(0.0).real
+        except np.linalg.LinAlgError:
+            return None
+
+    def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
+        """Give det M, expanded if that is safe."""
+        try:
+            return self.characteristic()
+        except NotExpandedError:
+            return self._matrix()
+
+    def _robust_determinant(self) -> QuasiPolynomial | MatrixDeterminant:
+        """Give det M in the form that knows better where the chains of a neutral system end.
+
+        The coefficients of an expansion do not tell that tau_1 + tau_2 is no delay of its own.
+        """
+        determinant = self._determinant()
+        if isinstance(determinant, MatrixDeterminant) or not self._N or self.n_states == 1:
+            return determinant
+        matrix = self._matrix()
+        return matrix if matrix.is_invertible else determinant
+
+    def _matrix(self) -> MatrixDeterminant:
+        return MatrixDeterminant(self._E, self._N, self._A)
+
+    def _pair(self, output: int, input: int) -> tuple[int, int]:  # noqa: A002
+        """Check an output and an input."""
+        i, j = operator.index(output), operator.index(input)
+        for name, index, size in (("output", i, self.n_outputs), ("input", j, self.n_inputs)):
+            if not 0 <= index < size:
+                raise IndexError(f"{name}={index}: the system has {size} of them, from 0")
+        return i, j
+
+    @property
+    def _states(self) -> range:
+        return range(self.n_states)
+
+    def _entry(self, i: int, j: int) -> dict[tuple[int, float], float]:
+        """One entry of M by power of s and delay."""
+        entry = {(0, tau): -float(matrix[i, j]) for tau, matrix in self._A.items()}
+        entry |= {(1, tau): float(matrix[i, j]) for tau, matrix in self._N.items()}
+        entry[1, 0.0] = float(self._E[i, j])
+        return {key: value for key, value in entry.items() if value != 0.0}
+
+
+@dataclass(frozen=True, eq=False)
+class _Differentiated:
+    """A system with the derivatives of its outputs in their place."""
+
+    system: DelaySystem
+
+    def _realised(self) -> Realisation:
+        return self.system._realise(differentiated=True)
+
+    def _differentiated(self) -> Realisable:
+        raise NotImplementedError
+
+    def _gains_at_rest(self) -> Matrix | None:
+        """Zero where the system comes to rest."""
+        gains = self.system._gains_at_rest()
+        return None if gains is None else 0.0 * gains
+
+
+def _restored(*parts: Any) -> DelaySystem:
+    A, B, C, D, E, N = parts
+    return DelaySystem(A, B or None, C, D or None, E=E, N=N or None)
+
+
+def _by_delay(name: str, given: Matrices) -> dict[float, Matrix]:
+    """Matrices sorted by delay, frozen."""
+    pairs = given.items() if isinstance(given, Mapping) else [(0.0, given)]
+    found: dict[float, Matrix] = {}
+    for tau, matrix in pairs:
+        time = non_negative(f"delay of {name}", tau) + 0.0
+        found[time] = _matrix(name, matrix)
+    return dict(sorted(found.items()))
+
+
+def _matrix(name: str, given: ArrayLike) -> Matrix:
+    matrix = real_array(name, given)
+    if matrix.ndim == 0:
+        matrix = matrix.reshape(1, 1)
+    if matrix.ndim != 2:
+        raise ValueError(f"{name} has shape {matrix.shape}: give a matrix, one row for each row")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} holds {matrix[~np.isfinite(matrix)][0]}: give finite numbers")
+    matrix = matrix.copy()
+    matrix.flags.writeable = False
+    return matrix
+
+
+def _part(
+    group: Mapping[float, Matrix], i: int, j: int, sign: float = 1.0
+) -> dict[tuple[int, float], float]:
+    return {(0, t): sign * float(m[i, j]) for t, m in group.items() if m[i, j] != 0.0}
+
+
+def _sum_at(
+    group: Mapping[float, Matrix], points: NDArray[np.complex128], shape: tuple[int, ...]
+) -> NDArray[np.complex128]:
+    total = np.zeros(shape, dtype=np.complex128)
+    for tau, matrix in group.items():
+        total += np.exp(-points * tau)[..., None, None] * matrix
+    return total

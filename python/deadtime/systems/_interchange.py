@@ -1,0 +1,152 @@
+"""Transfer functions of python-control and scipy.signal, read and written; Padé where asked for.
+
+Neither package knows delays in continuous time. Reading, a delay is given beside the system;
+writing, a delay is either absent or replaced, on request, by the diagonal Padé approximant
+
+    e^(-s T) = p(-s T) / p(s T),   p(x) = sum_k c_k x^k,
+    c_k = (2n - k)! n! / ((2n)! k! (n - k)!),
+
+which is all-pass and wrong in phase from about omega T = 2n on.
+"""
+
+from __future__ import annotations
+
+import importlib
+import operator
+from math import factorial
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.roots import QuasiPolynomial
+from deadtime.roots._determinant import expanded
+
+__all__ = ["control_package", "polynomials_of_control", "polynomials_of_scipy", "rational"]
+
+Vector = NDArray[np.float64]
+
+_HIGHEST_ORDER = 20
+
+
+def control_package() -> Any:
+    """Return the module of python-control, or say how to install it."""
+    try:
+        return importlib.import_module("control")
+    except ImportError as error:
+        raise ImportError("this needs python-control: pip install control") from error
+
+
+def polynomials_of_control(system: Any) -> tuple[Vector, Vector]:
+    """Numerator and denominator, descending, of a continuous system with one input and output."""
+    control = control_package()
+    if not isinstance(system, (control.TransferFunction, control.StateSpace)):
+        raise TypeError(
+            f"{type(system).__name__}: give a TransferFunction or StateSpace of python-control"
+        )
+    if system.dt not in (None, 0):
+        raise ValueError(
+            f"the system has the time step dt={system.dt}: only continuous systems are read, a "
+            "sampled loop is a ControlLoop with sample_time"
+        )
+    if (system.ninputs, system.noutputs) != (1, 1):
+        raise ValueError(
+            f"the system has {system.ninputs} inputs and {system.noutputs} outputs: pick one of "
+            "each first, for example system[0, 0]"
+        )
+    if isinstance(system, control.StateSpace):
+        return _of_state_space(system.A, system.B, system.C, system.D)
+    return _numbers(system.num[0][0]), _numbers(system.den[0][0])
+
+
+def polynomials_of_scipy(system: Any) -> tuple[Vector, Vector]:
+    """Numerator and denominator, descending, of an `lti` or a tuple that makes one."""
+    from scipy import signal
+
+    if isinstance(system, tuple):
+        system = cast(Any, signal.lti)(*system)
+    if isinstance(system, signal.dlti):
+        raise ValueError(
+            f"the system has the time step dt={system.dt}: only continuous systems are read, a "
+            "sampled loop is a ControlLoop with sample_time"
+        )
+    if not isinstance(system, signal.lti):
+        raise TypeError(
+            f"{type(system).__name__}: give an lti system of scipy.signal, or a tuple as for lti"
+        )
+    if isinstance(system, signal.StateSpace):
+        if system.D.shape != (1, 1):
+            raise ValueError(
+                f"the system has {system.D.shape[1]} inputs and {system.D.shape[0]} outputs: pick "
+                "one of each first"
+            )
+        return _of_state_space(system.A, system.B, system.C, system.D)
+    transfer = system.to_tf()
+    if np.ndim(transfer.num) > 1 and len(transfer.num) > 1:
+        raise ValueError(f"the system has {len(transfer.num)} outputs: pick one first")
+    return _numbers(np.ravel(transfer.num)), _numbers(transfer.den)
+
+
+def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Vector, Vector]:
+    """Expand both determinants exactly: differences of rounded polynomials leave a wrong degree."""
+    a, b, c, d = (_numbers(matrix) for matrix in (A, B, C, D))
+    n = len(a)
+    entries = [[{(0, 0.0): -float(v)} if v else {} for v in row] for row in a]
+    for i in range(n):
+        entries[i][i] = {(1, 0.0): 1.0, **entries[i][i]}
+    den = expanded(entries) if n else QuasiPolynomial([[1.0]], [0.0])
+    bordered = [[*row, {(0, 0.0): float(b[i, 0])}] for i, row in enumerate(entries)]
+    bordered.append([*({(0, 0.0): -float(v)} for v in c[0]), {(0, 0.0): float(d[0, 0])}])
+    num = expanded(bordered, bordered=True)
+    return num.coefficients[0, ::-1].copy(), den.coefficients[0, ::-1].copy()
+
+
+def _numbers(coefficients: Any) -> Vector:
+    array = np.asarray(coefficients)
+    if np.iscomplexobj(array):
+        raise TypeError("the coefficients are complex: real ones are needed")
+    return array.astype(np.float64)
+
+
+def rational(
+    num: QuasiPolynomial, den: QuasiPolynomial, order: int | None
+) -> tuple[Vector, Vector]:
+    """Descending coefficients of num/den, its delays replaced by Padé approximants of `order`."""
+    delays = sorted({float(t) for h in (num, den) for t in h.delays} - {0.0})
+    if not delays:
+        return num.coefficients[0, ::-1].copy(), den.coefficients[0, ::-1].copy()
+    if order is None:
+        raise ValueError(
+            f"the system has a delay of {delays[-1]:g} s, and a rational transfer function has "
+            "none: pade=n replaces delays by Padé approximants of order n, wrong in phase from "
+            f"about {2.0 / delays[-1]:.3g} n rad/s on"
+        )
+    n = operator.index(order)
+    if not 1 <= n <= _HIGHEST_ORDER:
+        raise ValueError(
+            f"pade={n}: give an order from 1 to {_HIGHEST_ORDER}, higher ones cannot be written "
+            "as polynomials in double precision"
+        )
+    size = np.array(
+        [
+            factorial(2 * n - k)
+            * factorial(n)
+            / (factorial(2 * n) * factorial(k) * factorial(n - k))
+            for k in range(n, -1, -1)
+        ]
+    )
+    powers = np.arange(n, -1, -1)
+    below = {t: size * t**powers for t in delays}
+    above = {t: size * (-t) ** powers for t in delays}
+
+    def without_delays(h: QuasiPolynomial) -> Vector:
+        """Multiply h by the denominators of all approximants."""
+        total = np.zeros(1)
+        for row, own in zip(h.coefficients, h.delays, strict=True):
+            term = row[::-1]
+            for t in delays:
+                term = np.convolve(term, above[t] if t == own else below[t])
+            total = np.polyadd(total, term)
+        return total
+
+    return without_delays(num), without_delays(den)

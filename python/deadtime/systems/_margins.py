@@ -1,0 +1,110 @@
+"""Margins of a feedback loop, delay margin among them; the native core finds the crossings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._deadtime import loop_margins
+from deadtime.roots import QuasiPolynomial
+
+__all__ = ["Margins", "margins"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Margins(ReadOnlyArrays):
+    """How much a feedback loop stands before it becomes unstable, and every crossing behind it.
+
+    The loop is one with negative unit feedback around the loop gain L. The margins are NaN if it
+    is not stable as it is; the crossings are listed all the same.
+
+    Attributes
+    ----------
+    stable : bool
+        Is the closed loop stable, for a neutral one also under small changes of its delays?
+    gain_margin : float
+        Smallest factor above one on L that makes the loop unstable; inf if there is none.
+    gain_reduction : float
+        Largest factor below one that does so; 0 if there is none.
+    phase_margin : float
+        Smallest turn of L, either way, that does so, in degrees; inf if there is none.
+    delay_margin : float
+        Smallest further delay in the loop that does so, in s; inf if there is none, 0 if any does.
+    gain_margin_omega, gain_reduction_omega, phase_margin_omega, delay_margin_omega : float
+        Where they are found, in rad/s; NaN where there is no such place, inf where a neutral loop
+        loses strong stability.
+    gain_crossovers : ndarray, shape (n,)
+        Every frequency above zero at which abs(L) = 1, in rad/s.
+    phase_margins, delay_margins : ndarray, shape (n,)
+        What L stands at each of these: degrees in (-180, 180], and s.
+    phase_crossovers : ndarray, shape (m,)
+        Frequencies from zero up at which L is real and negative, in rad/s.
+    gain_margins : ndarray, shape (m,)
+        1/abs(L) there.
+    searched : tuple of float
+        Up to which frequencies, in rad/s, the gain crossovers and the phase crossovers are all
+        listed; inf if there are no more. In a stable loop abs(L) is smaller beyond the second one
+        than at any phase crossover that decides a margin; if it is finite and `gain_margin`
+        infinite, no crossing was found up to there, and none is expected beyond.
+
+    Examples
+    --------
+    >>> from deadtime import delay, s
+    >>> found = (2.0 / s * delay(0.36)).margin()
+    >>> found
+    <Margins: gain 2.182 at 4.363 rad/s, phase 48.75° at 2 rad/s, delay 0.4254 s at 2 rad/s>
+    >>> bool(abs(found.delay_margin - (3.141592653589793 / 4 - 0.36)) < 1e-15)
+    True
+    """
+
+    stable: bool
+    gain_margin: float
+    gain_reduction: float
+    phase_margin: float
+    delay_margin: float
+    gain_margin_omega: float
+    gain_reduction_omega: float
+    phase_margin_omega: float
+    delay_margin_omega: float
+    gain_crossovers: Vector
+    phase_margins: Vector
+    delay_margins: Vector
+    phase_crossovers: Vector
+    gain_margins: Vector
+    searched: tuple[float, float]
+
+    def _delay_margin(self) -> float:
+        """The delay margin of a loop that must be stable."""
+        if not self.stable:
+            raise ValueError("the loop is not stable as it is: it has no delay margin")
+        return self.delay_margin
+
+    def __repr__(self) -> str:
+        if not self.stable:
+            return "<Margins: none, the closed loop is not stable as it is>"
+        shown = (
+            ("gain", self.gain_margin, "", self.gain_margin_omega),
+            ("gain reduction", self.gain_reduction, "", self.gain_reduction_omega),
+            ("phase", self.phase_margin, "°", self.phase_margin_omega),
+            ("delay", self.delay_margin, " s", self.delay_margin_omega),
+        )
+        parts = []
+        for name, value, unit, omega in shown:
+            if name == "gain reduction" and value == 0.0:
+                continue
+            where = "" if math.isnan(omega) else f" at {omega:.4g} rad/s"
+            number = "any" if value == math.inf else f"{value:.4g}{unit}"
+            parts.append(f"{name} {number}{where}")
+        return f"<Margins: {', '.join(parts)}>"
+
+
+def margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins:
+    """Margins of the loop gain n/d."""
+    found = loop_margins(n._native, d._native)
+    return Margins(**{field.name: getattr(found, field.name) for field in fields(Margins)})

@@ -1,0 +1,241 @@
+"""The questions about poles that every system answers, passed on to its characteristic function."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import SupportsFloat
+
+from deadtime._base.ranges import OpenRange, Range
+from deadtime.roots import (
+    Certificate,
+    Crossings,
+    ParametricQuasiPolynomial,
+    QuasiPolynomial,
+    RootSet,
+    crossings,
+)
+from deadtime.roots._characteristic import Edge
+from deadtime.roots._matrix_roots import MatrixDeterminant
+
+__all__ = ["HasPoles"]
+
+
+class HasPoles:
+    """Base of systems; the poles are the roots of `_determinant`, hidden ones included."""
+
+    __slots__ = ()
+
+    def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
+        """Give the characteristic function."""
+        raise NotImplementedError
+
+    def _robust_determinant(self) -> QuasiPolynomial | MatrixDeterminant:
+        """Give it in the form in which strong stability is judged."""
+        return self._determinant()
+
+    def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
+        """Give the characteristic function with parameters."""
+        raise NotImplementedError
+
+    def count(
+        self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: Edge = "error"
+    ) -> int:
+        """Count the poles in a region, with multiplicity, and prove the number.
+
+        Parameters
+        ----------
+        re, im : tuple of (float or None, float or None), optional
+            Ranges of the real part (1/s) and of the imaginary part (rad/s); None is an open end.
+        edge : {"error", "inside", "outside"}
+            What becomes of poles on the edge, as in `QuasiPolynomial.count`.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ContourError
+            If a pole lies on the edge, or closer to it than the arithmetic can tell.
+        ValueError
+            If the region holds infinitely many poles, or as in `DelaySystem.characteristic`.
+
+        Notes
+        -----
+        Of a `DelaySystem` whose determinant cannot be expanded safely, the matrix is factorised at
+        points along the contour, so close to one another that bounds on its change and on all
+        rounding prove how far the argument of the determinant turns between them. Sides that are
+        open then need an E that can be inverted.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import deadtime as dtm
+        >>> dtm.DelaySystem({1.0: -np.eye(12)}).count(re=(-3, 1), im=(0, 20))
+        36
+        """
+        return self._determinant().count(re, im, edge=edge)
+
+    def poles(
+        self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: Edge = "error"
+    ) -> RootSet:
+        """Locate every pole in a region, each in a disc proved to hold it.
+
+        Parameters
+        ----------
+        re, im, edge
+            As in `count`.
+
+        Returns
+        -------
+        RootSet
+
+        Raises
+        ------
+        ContourError, ValueError
+            As in `count`.
+        CountMismatchError
+            If the arithmetic does not suffice to locate all poles that were counted.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> T = dtm.feedback(2.0 / dtm.s * dtm.delay(0.36))
+        >>> [complex(round(p.real, 4), round(p.imag, 4)) for p in T.poles(re=(-5, 0), im=(0, 10))]
+        [(-1.5154+3.1005j)]
+        """
+        return self._determinant().roots(re, im, edge=edge)
+
+    def certify(self, re: OpenRange | None = None, im: OpenRange | None = None) -> Certificate:
+        """Count the poles in a region and write the proof down.
+
+        Parameters
+        ----------
+        re, im : tuple of (float or None, float or None), optional
+            As in `count`.
+
+        Returns
+        -------
+        Certificate
+
+        Raises
+        ------
+        ContourError, ValueError
+            As in `count`; ValueError also where the determinant cannot be expanded safely.
+        """
+        return self._determinant().certify(re, im)
+
+    def rightmost(self, n: int = 1) -> RootSet:
+        """Locate the rightmost poles and prove that nothing else lies that far right.
+
+        Parameters
+        ----------
+        n : int, default 1
+            How many, not counting those with a negative imaginary part, which are listed as well.
+
+        Returns
+        -------
+        RootSet
+            As in `QuasiPolynomial.rightmost`.
+
+        Raises
+        ------
+        ValueError, CountMismatchError
+            As in `QuasiPolynomial.rightmost`.
+        """
+        return self._robust_determinant().rightmost(n)
+
+    def spectral_abscissa(self, strong: bool = True) -> float:
+        """Give the largest real part of a pole in 1/s, or `chain_abscissa` if that is larger.
+
+        Parameters
+        ----------
+        strong : bool, default True
+            Let the delays vary by arbitrarily little, as in `QuasiPolynomial.chain_abscissa`.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        ValueError
+            As in `rightmost`; for ``strong=False`` also where only an expanded determinant could
+            tell, and there is none.
+        """
+        found = self._robust_determinant().spectral_abscissa()
+        return found if strong else min(found, self._determinant().spectral_abscissa(strong=False))
+
+    def chain_abscissa(self, strong: bool = True) -> float:
+        """Give the real part that the chains of poles of a neutral system can come to, in 1/s.
+
+        Parameters
+        ----------
+        strong : bool, default True
+            As in `spectral_abscissa`.
+
+        Returns
+        -------
+        float
+            -inf for a system without delayed derivatives.
+
+        Raises
+        ------
+        ValueError
+            As in `spectral_abscissa`.
+        """
+        found = self._robust_determinant().chain_abscissa()
+        return found if strong else min(found, self._determinant().chain_abscissa(strong=False))
+
+    def is_stable(self, strong: bool = True) -> bool:
+        """Tell whether every pole is proved to lie left of the imaginary axis.
+
+        Parameters
+        ----------
+        strong : bool, default True
+            As in `QuasiPolynomial.is_stable`.
+
+        Returns
+        -------
+        bool
+
+        Raises
+        ------
+        ValueError
+            As in `spectral_abscissa`.
+        """
+        if not strong and self._determinant().is_stable(strong=False):
+            return True
+        return self._robust_determinant().is_stable()
+
+    def crossings(
+        self, ranges: Mapping[str, Range], *, at: Mapping[str, SupportsFloat] | None = None
+    ) -> Crossings:
+        """Every crossing of the imaginary axis as one number varies: `deadtime.crossings` of this.
+
+        Parameters
+        ----------
+        ranges : mapping of str to (low, high)
+            The one number that varies. Of a `TransferFunction`, taken as a loop gain, ``gain`` is a
+            factor on it and ``delay`` a further delay in s. Of a `DelaySystem`, ``delay`` is the
+            least delay of its states in s, to which the others keep their ratio.
+        at : mapping of str to float, optional
+            Values of the other numbers.
+
+        Returns
+        -------
+        Crossings
+
+        Raises
+        ------
+        ValueError, TypeError
+            As in `deadtime.crossings`.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> found = (1.0 / dtm.s * dtm.delay(0.36)).crossings({"gain": (0.1, 10.0)})
+        >>> found.values.round(4), found.direction
+        (array([4.3633]), array([2], dtype=int32))
+        """
+        return crossings(self, ranges, at=at)

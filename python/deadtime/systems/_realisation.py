@@ -1,0 +1,168 @@
+"""Systems in the form the native part simulates, whatever they were given as.
+
+    x'(t) + sum N_j x'(t - tau_j) = sum A_j x(t - tau_j) + sum B_j u(t - tau_j),
+    y(t) = sum C_j x(t - tau_j) + sum F_j x'(t - tau_j) + sum D_j u(t - tau_j).
+
+A transfer function num/den with den of degree n is y = num(s) w, den(s) w = u, with the states
+w, w', ..., w^(n-1): the terms s^n e^{-s tau_j} of den make it neutral, those of num are the F_j.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._deadtime import LinearSystem
+from deadtime.roots import QuasiPolynomial
+
+__all__ = ["Realisable", "Realisation", "of_matrices", "of_ratio"]
+
+Group = Mapping[float, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Realisation:
+    """The native system and what a run needs to know of it."""
+
+    native: LinearSystem
+    states: int
+    inputs: int
+    outputs: int
+    #: Delay-free matrix on the state.
+    A: NDArray[np.float64]
+    #: The longest delay there is, s.
+    longest: float
+    #: How far back the state is needed, s.
+    memory: float
+    #: Whether derivatives of the history are needed.
+    needs_slopes: bool
+    #: Whether the states mean something to the user.
+    has_states: bool
+    #: Where they do not: the state at rest under an input of one, None where there is no rest.
+    rest: NDArray[np.float64] | None = None
+
+
+class Realisable(Protocol):
+    """A system that can be simulated."""
+
+    def _realised(self) -> Realisation: ...
+
+    def _differentiated(self) -> Realisable:
+        """Give the system whose outputs are the derivatives of those of this one."""
+
+    def _gains_at_rest(self) -> NDArray[np.float64] | None:
+        """Outputs at rest per input, shape (n_outputs, n_inputs); None where there are none."""
+
+
+def _realised(
+    sizes: tuple[int, int, int],
+    *given: Group,
+    has_states: bool,
+    rest: NDArray[np.float64] | None = None,
+) -> Realisation:
+    """Give the native form of A, N, B, C, F and D."""
+    states = sizes[0]
+    groups = [[(tau, matrix) for tau, matrix in group.items() if matrix.any()] for group in given]
+    memory = max((tau for i in (0, 1, 3, 4) for tau, _ in groups[i]), default=0.0)
+    return Realisation(
+        LinearSystem(*sizes, *groups),
+        *sizes,
+        given[0].get(0.0, np.zeros((states, states))),
+        max((tau for group in groups for tau, _ in group), default=0.0),
+        memory,
+        bool(groups[1] or groups[4]),
+        has_states,
+        rest,
+    )
+
+
+def of_matrices(
+    E: NDArray[np.float64],
+    a: Group,
+    n: Group,
+    b: Group,
+    c: Group,
+    d: Group,
+    inputs: int,
+    outputs: int,
+    *,
+    differentiated: bool = False,
+) -> Realisation:
+    """Solve for the derivative, which takes an E that can be inverted.
+
+    Where the outputs are to be `differentiated`, their matrices stand before x' instead of x.
+    """
+    size = len(E)
+    if not np.array_equal(E, np.eye(size)):
+        rank = int(np.linalg.matrix_rank(E))
+        if rank < size:
+            raise ValueError(_singular(rank, size, bool(n)))
+        a, n, b = (
+            {tau: np.asarray(np.linalg.solve(E, m), np.float64) for tau, m in group.items()}
+            for group in (a, n, b)
+        )
+    on_state, on_derivative = ({}, c) if differentiated else (c, {})
+    return _realised((size, inputs, outputs), a, n, b, on_state, on_derivative, d, has_states=True)
+
+
+def _singular(rank: int, size: int, is_late: bool) -> str:
+    missing = size - rank
+    equations = "an algebraic equation" if missing == 1 else f"{missing} algebraic equations"
+    text = (
+        f"E has rank {rank} of {size}: the system holds {equations} besides differential ones, "
+        "which is not simulated"
+    )
+    if is_late:
+        text += (
+            "; with N, derivatives of the past would determine the state itself (an advanced "
+            "equation), and every break would come back rougher than before"
+        )
+    return text + ". Eliminate the states that have no derivative"
+
+
+@lru_cache(maxsize=64)
+def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
+    """Take the derivatives of one auxiliary signal as the states of a proper, causal num/den."""
+    n = den.degree
+    first = float(den.delays[0])
+    leading = float(den.coefficients[0, n]) if n < den.coefficients.shape[1] else 0.0
+    if n == 0 and len(den.delays) > 1:
+        raise ValueError(
+            f"1/({den!r}) is a difference equation without any derivative, which is not simulated"
+        )
+
+    def rows(h: QuasiPolynomial, power: slice, scale: float) -> dict[float, NDArray[np.float64]]:
+        coefficients = h.coefficients
+        padded = np.zeros((len(coefficients), n + 1))
+        width = min(n + 1, coefficients.shape[1])
+        padded[:, :width] = coefficients[:, :width]
+        delays = (float(tau) - first for tau in h.delays)
+        return {tau: scale * row[None, power] for tau, row in zip(delays, padded, strict=True)}
+
+    lower, highest = slice(0, n), slice(n, n + 1)
+    if n == 0:
+        direct = rows(num, highest, 1.0 / leading)
+        return _realised((0, 1, 1), {}, {}, {}, {}, {}, direct, has_states=False, rest=np.zeros(0))
+
+    def last_row(group: Group) -> dict[float, NDArray[np.float64]]:
+        return {tau: np.vstack([np.zeros((n - 1, n)), row]) for tau, row in group.items()}
+
+    def last_column(group: Group) -> dict[float, NDArray[np.float64]]:
+        return {tau: np.hstack([np.zeros((1, n - 1)), row]) for tau, row in group.items()}
+
+    a = last_row(rows(den, lower, -1.0 / leading))
+    a[0.0] = a[0.0] + np.diag(np.ones(n - 1), 1)
+    late = last_row(last_column(rows(den, highest, 1.0 / leading)))
+    late.pop(0.0)
+    b = np.zeros((n, 1))
+    b[-1] = 1.0 / leading
+    f = last_column(rows(num, highest, 1.0))
+    c = rows(num, lower, 1.0)
+    constant = float(den.coefficients[:, 0].sum())
+    rest = np.append(1.0 / constant, np.zeros(n - 1)) if constant else None
+    return _realised((n, 1, 1), a, late, {0.0: b}, c, f, {}, has_states=False, rest=rest)

@@ -1,0 +1,278 @@
+"""One run of a linear system: arguments to the native part's, its arrays to a response.
+
+Before the start the state follows the history and the inputs have the value given for that time.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import deadtime.systems._signals as signals
+from deadtime._base.validation import finite, increasing, positive, real_array
+from deadtime._deadtime import Signal
+from deadtime.systems._realisation import Realisable, Realisation
+from deadtime.systems._response import Response
+
+__all__ = ["Given", "impulse_response", "respond", "step_response"]
+
+Vector = NDArray[np.float64]
+Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
+
+# The default time of a step response: at first so many times the slowest constant or the longest
+# delay (at least so many seconds), doubled until the last quarter is settled or the response has
+# run away.
+_POINTS = 501
+_SHORTEST = 10.0
+_LEAST = 0.01
+_DOUBLINGS = 10
+_SETTLED = 0.005
+_LOST = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One run, to be made again for other times."""
+
+    system: Realisable
+    start: float
+    arguments: dict[str, Any]
+
+    def __call__(self, times: Vector) -> Vector:
+        inner = times[times > self.start]
+        again = respond(self.system, np.concatenate([[self.start], inner]), **self.arguments)
+        outputs = np.atleast_2d(again.outputs)
+        return outputs if len(inner) < len(times) else outputs[:, 1:]
+
+
+def _rest(system: Realisable, inputs: Vector | None) -> Vector | None:
+    """Outputs at rest under inputs that stay constant."""
+    gains = None if inputs is None else system._gains_at_rest()
+    if gains is None or inputs is None or not np.isfinite(gains).all():
+        return None
+    rest: Vector = gains @ inputs
+    return rest
+
+
+def respond(
+    system: Realisable,
+    time: ArrayLike,
+    inputs: Given = 1.0,
+    *,
+    interpolation: str = "hold",
+    input_time: ArrayLike | None = None,
+    input_before: ArrayLike = 0.0,
+    input_breaks: Iterable[float] = (),
+    history: Given = 0.0,
+    history_derivative: Callable[..., ArrayLike] | None = None,
+    history_breaks: Iterable[float] = (),
+    initial_state: ArrayLike | None = None,
+    vectorized: bool = False,
+    max_step: float | None = None,
+) -> Response:
+    """Check the arguments of `simulate` and run the system."""
+    input_breaks, history_breaks = tuple(input_breaks), tuple(history_breaks)
+    model = _realisation(system)
+    if not model.has_states and (callable(history) or np.any(history) or initial_state is not None):
+        raise TypeError(
+            "a transfer function says nothing of the state: give a DelaySystem to start from "
+            "another history than zero"
+        )
+    times = increasing("time", time)
+    if times.size == 0:
+        raise ValueError("time is empty: give at least one output time")
+    start = float(times[0])
+    before = _vector("input_before", input_before, model.inputs)
+    step = None if max_step is None else positive("max_step", max_step)
+    smooth: dict[str, Any] = {"start": start, "vectorized": vectorized, "max_step": step}
+    source, last = _input(
+        model, times, inputs, interpolation, input_time, before, input_breaks, smooth
+    )
+    past, slopes, state = _past(model, start, history, history_derivative, history_breaks, smooth)
+    if not model.has_states and before.any():
+        if model.rest is None:
+            raise ValueError(
+                f"input_before={before[0]}: {system!r} has a pole at zero and no rest but under an "
+                "input of zero; give a DelaySystem with its history"
+            )
+        state = model.rest * before
+        past = signals.constant(state)
+    if initial_state is not None:
+        state = _vector("initial_state", initial_state, model.states, "states")
+    y, x, u, breaks = model.native.simulate(times - start, state, past, slopes, source)
+    count = len(times)
+    outputs = y.reshape(count, model.outputs).T
+    shown = u.reshape(count, model.inputs).T
+    if (model.inputs, model.outputs) == (1, 1):
+        outputs, shown = outputs[0], shown[0]
+    arguments: dict[str, Any] = {
+        "inputs": inputs,
+        "interpolation": interpolation,
+        "input_time": times if input_time is None and _is_sampled(inputs, model) else input_time,
+        "input_before": input_before,
+        "input_breaks": input_breaks,
+        "history": history,
+        "history_derivative": history_derivative,
+        "history_breaks": history_breaks,
+        "initial_state": initial_state,
+        "vectorized": vectorized,
+        "max_step": max_step,
+    }
+    rest = _rest(system, last)
+    return Response(
+        time=times,
+        outputs=outputs,
+        inputs=shown,
+        breaks=breaks + start,
+        states=x.reshape(count, model.states).T,
+        steady_state=float(rest[0]) if rest is not None and outputs.ndim == 1 else rest,
+        _dense=_Run(system, start, arguments) if len(times) > 1 else None,
+    )
+
+
+def step_response(
+    system: Realisable,
+    time: ArrayLike | None,
+    amplitude: float,
+    input: int,  # noqa: A002
+) -> Response:
+    """Response to a step of one input from rest at zero; up to where it has settled by default."""
+    model = _realisation(system)
+    index = operator.index(input)
+    if not 0 <= index < model.inputs:
+        raise IndexError(f"input={index}: the system has {model.inputs} of them, from 0")
+    height = np.zeros(model.inputs)
+    height[index] = finite("amplitude", amplitude)
+    if time is not None:
+        return respond(system, time, height)
+    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(model.A) if abs(pole) > 0.0]
+    span = _SHORTEST * max([model.longest, *slowest, _LEAST])
+    for _ in range(_DOUBLINGS):
+        response = respond(system, np.linspace(0.0, span, _POINTS), height)
+        rest, outputs = response.steady_state, np.atleast_2d(response.outputs)
+        goal = outputs[:, -1] if rest is None else np.atleast_1d(rest)
+        away = np.abs(outputs - goal[:, None]).max(axis=0)
+        # A response that comes back to zero is measured by its peak.
+        size = float(np.abs(goal).max()) or float(away.max())
+        if away[-_POINTS // 4 :].max() <= _SETTLED * size or away.max() > _LOST * size:
+            break
+        span *= 2.0
+    return response
+
+
+def impulse_response(system: Realisable, time: ArrayLike | None, input: int) -> Response:  # noqa: A002
+    """Response to an impulse: the derivative of the response to a step."""
+    found = step_response(system._differentiated(), time, 1.0, input)
+    return replace(found, inputs=np.zeros_like(found.inputs), states=None)
+
+
+def _realisation(system: object) -> Realisation:
+    realised = getattr(system, "_realised", None)
+    if realised is not None:
+        model: Realisation = realised()
+        return model
+    raise TypeError(f"system={system!r}: give a DelaySystem or a TransferFunction")
+
+
+def _is_sampled(inputs: Given, model: Realisation) -> bool:
+    if callable(inputs):
+        return False
+    shape = np.shape(inputs)
+    return len(shape) == 2 or (len(shape) == 1 and model.inputs == 1 and shape != (1,))
+
+
+def _input(
+    model: Realisation,
+    times: Vector,
+    inputs: Given,
+    interpolation: str,
+    input_time: ArrayLike | None,
+    before: Vector,
+    breaks: tuple[float, ...],
+    smooth: dict[str, Any],
+) -> tuple[Signal, Vector | None]:
+    """Give the native inputs, and the values they end with, where they do."""
+    start, p = smooth["start"], model.inputs
+    if interpolation not in ("hold", "linear"):
+        raise ValueError(f"interpolation={interpolation!r}: give 'hold' or 'linear'")
+    if callable(inputs):
+        if input_time is not None:
+            raise ValueError("inputs is a callable, so input_time has no meaning: leave it out")
+        span = (start, float(times[-1]))
+        if span[0] == span[1]:
+            value = signals.sampled("input u(t)", inputs, times, p, smooth["vectorized"])[:, 0]
+            return signals.step(before, value), None
+        found = signals.fitted("input u(t)", inputs, span, breaks, p, **smooth)
+        return found.input_signal(before), None
+    if p == 0:
+        return signals.constant(before), np.zeros(0)
+    values = real_array("inputs", inputs)
+    if not (_is_sampled(inputs, model) or input_time is not None):
+        after = _vector("inputs", values, p)
+        return signals.step(before, after), after
+    where = times if input_time is None else increasing("input_time", input_time)
+    rows = values[None, :] if values.ndim == 1 and p == 1 else values
+    if rows.shape != (p, where.size) or where.size == 0:
+        wanted = f"({where.size},)" if p == 1 else f"({p}, {where.size})"
+        raise ValueError(
+            f"inputs has shape {values.shape}, not {wanted}: give one value for each input at each "
+            "of the times in input_time (or in time, without input_time)"
+        )
+    if not np.isfinite(rows).all():
+        at = int(np.argmin(np.isfinite(rows).all(axis=0)))
+        raise ValueError(
+            f"inputs at t = {where[at]} s is {rows[:, at][~np.isfinite(rows[:, at])][0]}: give "
+            "finite values"
+        )
+    make = signals.held if interpolation == "hold" else signals.lines
+    return make(where - start, rows, before), rows[:, -1]
+
+
+def _past(
+    model: Realisation,
+    start: float,
+    history: Given,
+    derivative: Callable[..., ArrayLike] | None,
+    breaks: tuple[float, ...],
+    smooth: dict[str, Any],
+) -> tuple[Signal, Signal | None, Vector]:
+    """Give the native history, its derivative where that is needed, and what it comes to."""
+    if not callable(history):
+        if derivative is not None:
+            raise ValueError("history_derivative goes with a callable history: leave it out")
+        state = _vector("history", history, model.states, "states")
+        return signals.constant(state), None, state
+    now = np.array([start])
+    state = signals.sampled("history x(t)", history, now, model.states, smooth["vectorized"])[:, 0]
+    if model.memory == 0.0:
+        return signals.constant(state), None, state
+    span = (start - model.memory, start)
+    found = signals.fitted("history x(t)", history, span, breaks, model.states, **smooth)
+    slopes = None
+    if model.needs_slopes:
+        slopes = found.derivative()
+        if derivative is not None:
+            slopes = signals.fitted(
+                "history derivative x'(t)", derivative, span, breaks, model.states, **smooth
+            )
+    return found.signal(), None if slopes is None else slopes.signal(), state
+
+
+def _vector(name: str, given: ArrayLike, width: int, what: str = "inputs") -> Vector:
+    """Check a constant: one number where there is one component or it is zero, else a vector."""
+    values = real_array(name, given)
+    if values.ndim == 0 and (width == 1 or not values):
+        values = np.full(width, float(values))
+    if values.shape != (width,):
+        raise ValueError(
+            f"{name} has shape {values.shape}, not ({width},): give one number for each of the "
+            f"{width} {what}"
+        )
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} holds {values[~np.isfinite(values)][0]}: give finite numbers")
+    return values

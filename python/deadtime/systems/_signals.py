@@ -1,0 +1,134 @@
+"""Functions of time as the native part takes them: Legendre series by pieces.
+
+Constants, held samples and straight lines between samples are exact; a callable is fitted to
+rounding. Times are counted from the start of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.validation import real_array
+from deadtime._deadtime import Signal
+from deadtime.systems._signals_fit import RESOLUTION, pieces
+
+__all__ = ["Fitted", "constant", "fitted", "held", "lines", "sampled", "step"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+_FOREVER = float("inf")
+
+
+class Fitted(NamedTuple):
+    """A callable by pieces: coefficient k of component i in piece j at ``series[j, i, k]``."""
+
+    edges: Vector
+    series: NDArray[np.float64]
+    breaks: list[int]
+
+    def derivative(self) -> Fitted:
+        """Series of the derivative."""
+        slopes = np.zeros_like(self.series)
+        slopes[:, :, :-1] = legendre.legder(self.series, axis=2)
+        slopes *= (2.0 / np.diff(self.edges))[:, None, None]
+        return self._replace(series=slopes)
+
+    def signal(self) -> Signal:
+        """Give the native form, without anything before or after."""
+        return Signal(self.edges, np.ascontiguousarray(self.series), self.breaks)
+
+    def input_signal(self, before: Vector) -> Signal:
+        """Give the native form, constant before and after."""
+        edges = np.concatenate([[-_FOREVER], self.edges, [_FOREVER]])
+        outer = np.zeros((2, *self.series.shape[1:]))
+        outer[0, :, 0] = before
+        outer[1, :, 0] = self.series[-1].sum(axis=1)
+        series = np.concatenate([outer[:1], self.series, outer[1:]])
+        return Signal(edges, series, [1, *(place + 1 for place in self.breaks)])
+
+
+def constant(values: Vector) -> Signal:
+    """Give `values`, shape (p,), at all times."""
+    return Signal(np.array([-_FOREVER, _FOREVER]), values.reshape(1, -1, 1), [])
+
+
+def step(before: Vector, after: Vector) -> Signal:
+    """Give a step at the start, both of shape (p,)."""
+    series = np.stack([before, after])[:, :, None]
+    return Signal(np.array([-_FOREVER, 0.0, _FOREVER]), series, [1])
+
+
+def held(times: Vector, values: Matrix, before: Vector) -> Signal:
+    """Give values, shape (p, m), that hold from `times` on."""
+    edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
+    series = np.concatenate([before[:, None], values], axis=1).T[:, :, None]
+    changed = np.any(series[1:] != series[:-1], axis=(1, 2))
+    changed[0] = True
+    keep = np.flatnonzero(np.append(True, changed))
+    return Signal(
+        np.append(edges[keep], _FOREVER),
+        np.ascontiguousarray(series[keep]),
+        list(range(1, len(keep))),
+    )
+
+
+def lines(times: Vector, values: Matrix, before: Vector) -> Signal:
+    """Join values, shape (p, m), at `times` by straight lines; the last one holds."""
+    edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
+    series = np.zeros((len(times) + 1, len(values), 2))
+    series[0, :, 0] = before
+    series[1:-1, :, 0] = (0.5 * (values[:, :-1] + values[:, 1:])).T
+    series[1:-1, :, 1] = (0.5 * (values[:, 1:] - values[:, :-1])).T
+    series[-1, :, 0] = values[:, -1]
+    return Signal(edges, series, list(range(1, len(times) + 1)))
+
+
+def sampled(
+    name: str, function: Callable[..., ArrayLike], times: Vector, width: int, vectorized: bool
+) -> Matrix:
+    """Values of a callable at `times`, shape (width, m), checked."""
+    found: Any = function(times) if vectorized else [function(float(t)) for t in times]
+    values = real_array(f"the value of {name}", found)
+    if not vectorized:
+        values = values.reshape(len(times), -1).T if values.ndim > 1 else values[None, :]
+    elif values.ndim == 1:
+        values = values[None, :]
+    if values.shape != (width, len(times)):
+        wanted = f"({width}, {len(times)})" if vectorized else f"({width},) at each time"
+        shape = values.shape if vectorized else values.shape[:1]
+        raise ValueError(f"{name} gives values of shape {shape}, not {wanted}")
+    sound = np.isfinite(values).all(axis=0)
+    if not sound.all():
+        at = int(np.argmin(sound))
+        raise ValueError(
+            f"{name} at t = {times[at]} s is {values[:, at][~np.isfinite(values[:, at])][0]}: give "
+            "finite values"
+        )
+    return values
+
+
+def fitted(
+    name: str,
+    function: Callable[..., ArrayLike],
+    span: tuple[float, float],
+    breaks: Iterable[float],
+    width: int,
+    *,
+    start: float,
+    vectorized: bool,
+    max_step: float | None,
+) -> Fitted:
+    """Fit a callable of the user's time over `span`, in time from `start` on, between breaks."""
+
+    def sample(times: Vector) -> Matrix:
+        return sampled(name, function, times, width, vectorized)
+
+    gap = RESOLUTION * (span[1] - span[0]) if max_step is None else max_step
+    found = pieces(name, sample, span, breaks, gap)
+    return Fitted(found.edges - start, found.series, found.breaks)

@@ -1,0 +1,787 @@
+"""Transfer functions with delays: ratios of two quasi-polynomials, nothing approximated.
+
+One class, kept whole: most of the file is its documentation.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import non_negative, real_array, unmasked
+from deadtime._deadtime import ratio
+from deadtime.roots import (
+    Parameter,
+    ParametricQuasiPolynomial,
+    QuasiPolynomial,
+    RootSet,
+    delay,
+    s,
+)
+from deadtime.roots._quasipolynomial import is_number
+from deadtime.systems._interchange import (
+    control_package,
+    polynomials_of_control,
+    polynomials_of_scipy,
+    rational,
+)
+from deadtime.systems._margins import Margins, margins
+from deadtime.systems._poles import HasPoles
+from deadtime.systems._realisation import Realisable, Realisation, of_ratio
+from deadtime.systems._responses import HasResponses
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["TransferFunction", "feedback"]
+
+Polynomial: TypeAlias = QuasiPolynomial | float | Sequence[float] | NDArray[Any]
+
+
+class TransferFunction(HasPoles, HasResponses):
+    """A transfer function num(s)/den(s) of two quasi-polynomials.
+
+    Usually made by dividing: ``2.0 / s * delay(0.36)``. Immutable. A delay common to numerator
+    and denominator is cancelled; common roots are not, because a mode that cancels is still there
+    (see `hidden_modes`), with one exception: a sum takes equal denominators, and equal powers of
+    s in them, once.
+
+    Parameters
+    ----------
+    num, den : QuasiPolynomial, float or sequence of float
+        A sequence holds the coefficients of a polynomial in descending powers of s.
+    delay : float, default 0
+        A delay in series, in s, zero or more.
+
+    Raises
+    ------
+    ZeroDivisionError
+        If `den` is zero.
+    ValueError
+        If a coefficient is not finite, a sequence is empty, or the delay is negative.
+    TypeError
+        If the coefficients are not real numbers.
+
+    See Also
+    --------
+    feedback : Close a loop.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> from deadtime import delay, s
+    >>> G = 2.0 / s * delay(0.36)
+    >>> G
+    2 exp(-0.36 s) / s
+    >>> G == dtm.TransferFunction([2.0], [1.0, 0.0], delay=0.36)
+    True
+    >>> dtm.feedback(G)
+    2 exp(-0.36 s) / (s + 2 exp(-0.36 s))
+    >>> dtm.feedback(G).is_stable()
+    True
+    """
+
+    __slots__ = ("_den", "_num")
+
+    # NumPy leaves `array * G` and `number * G` to this class.
+    __array_ufunc__ = None
+
+    _num: QuasiPolynomial
+    _den: QuasiPolynomial
+
+    def __init__(self, num: Polynomial, den: Polynomial = 1.0, *, delay: float = 0.0) -> None:
+        n, d = _quasi_polynomial("num", num), _quasi_polynomial("den", den)
+        if not d.coefficients.any():
+            raise ZeroDivisionError("den is zero: a transfer function needs one that is not")
+        dead = non_negative("delay", delay)
+        if dead:
+            n = n * QuasiPolynomial([[1.0]], [dead])
+        n, d = _without_common_delay(n, d)
+        object.__setattr__(self, "_num", n)
+        object.__setattr__(self, "_den", d)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a TransferFunction does not change: cannot set {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a TransferFunction does not change: cannot delete {name!r}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (TransferFunction, (self._num, self._den))
+
+    # What it is
+
+    @property
+    def num(self) -> QuasiPolynomial:
+        """Numerator."""
+        return self._num
+
+    @property
+    def den(self) -> QuasiPolynomial:
+        """Denominator."""
+        return self._den
+
+    @property
+    def is_proper(self) -> bool:
+        """Whether the numerator has no higher power of s than the denominator."""
+        return self._num.degree <= self._den.degree
+
+    @property
+    def is_causal(self) -> bool:
+        """Whether the output never comes before its input.
+
+        So the numerator has no smaller delay than the denominator, and the denominator is not
+        'advanced'.
+        """
+        ahead = self._num.delays[0] < self._den.delays[0] and bool(self._num.coefficients.any())
+        return not ahead and self._den.kind != "advanced"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether numerator and denominator are the same; G and 2G/2 need not be."""
+        if not isinstance(other, TransferFunction):
+            return NotImplemented
+        return self._num == other._num and self._den == other._den
+
+    def __hash__(self) -> int:
+        return hash((self._num, self._den))
+
+    def __repr__(self) -> str:
+        num, den = repr(self._num), repr(self._den)
+        above = f"({num})" if _is_sum(num) else num
+        below = f"({den})" if _is_sum(den) or " " in den or "-" in den else den
+        return f"{above} / {below}" if den != "1" else num
+
+    # Algebra
+
+    def __pos__(self) -> TransferFunction:
+        return self
+
+    def __neg__(self) -> TransferFunction:
+        return TransferFunction(-self._num, self._den)
+
+    def __add__(self, other: object) -> TransferFunction:
+        second = _operand(other)
+        return NotImplemented if second is None else _sum(self, second)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: object) -> TransferFunction:
+        second = _operand(other)
+        return NotImplemented if second is None else _sum(self, -second)
+
+    def __rsub__(self, other: object) -> TransferFunction:
+        first = _operand(other)
+        return NotImplemented if first is None else _sum(first, -self)
+
+    def __mul__(self, other: object) -> TransferFunction:
+        second = _operand(other)
+        if second is None:
+            return NotImplemented
+        return TransferFunction(self._num * second._num, self._den * second._den)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: object) -> TransferFunction:
+        second = _operand(other)
+        return NotImplemented if second is None else self * _inverse(second)
+
+    def __rtruediv__(self, other: object) -> TransferFunction:
+        first = _operand(other)
+        return NotImplemented if first is None else first * _inverse(self)
+
+    def __pow__(self, exponent: object) -> TransferFunction:
+        try:
+            power = operator.index(cast(int, exponent))
+        except TypeError:
+            return NotImplemented
+        base = self if power >= 0 else _inverse(self)
+        return TransferFunction(base._num ** abs(power), base._den ** abs(power))
+
+    # Values
+
+    @overload
+    def __call__(self, s: complex) -> complex: ...
+    @overload
+    def __call__(self, s: NDArray[Any] | Sequence[Any]) -> NDArray[np.complex128]: ...
+    def __call__(self, s: Any) -> Any:
+        """Value at `s` (1/s): a complex number, or an array of the shape of `s`.
+
+        Finite also where numerator and denominator leave the range of doubles and their ratio
+        does not. Infinite where only the denominator is zero, NaN where both are.
+        """
+        points = np.asarray(unmasked("s", s))
+        if points.dtype.kind not in "biufc":
+            raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
+        flat = points.astype(np.complex128).ravel()
+        values = ratio(self._num._native, self._den._native, flat)
+        return values.reshape(points.shape) if points.ndim else complex(values[0])
+
+    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """Value on the imaginary axis, G(j omega).
+
+        Parameters
+        ----------
+        omega : array_like
+            Frequencies in rad/s.
+
+        Returns
+        -------
+        ndarray of complex, shape of `omega`
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> print((2.0 / (s + 1) * delay(0.5)).frequency_response([0.0, 1.0]).round(4))
+        [2.    +0.j     0.3982-1.357j]
+        """
+        frequencies = _frequencies(omega)
+        return np.asarray(self(1j * frequencies))
+
+    def phase(self, omega: ArrayLike) -> NDArray[np.float64]:
+        """Argument of G(j omega), continuous from zero frequency on.
+
+        A single delay of the numerator or denominator enters exactly, and intervals between the
+        frequencies asked for are halved until no turn can go unseen, so the phase is right also
+        where it turns many times from one of them to the next. Where one term outweighs all
+        others the intervals grow with the frequency, up to the largest one that a double holds.
+
+        Parameters
+        ----------
+        omega : array_like
+            Frequencies in rad/s; at zero the limit from above.
+
+        Returns
+        -------
+        ndarray of float, shape of `omega`
+            In rad. It starts from a quarter turn down for each pole at zero, up for each zero
+            there, with half a turn up where the rest of the numerator is negative, down where
+            that of the denominator is. At a pole on the axis it falls by half a turn, at a zero
+            it rises.
+
+        Raises
+        ------
+        ValueError
+            Where it cannot be followed so far: no term of a neutral function outweighs the
+            others, or the product of delay and frequency is beyond 1e308.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> print((2.0 / s * delay(0.36)).phase([1.0, 100.0]))
+        [ -1.93079633 -37.57079633]
+        """
+        frequencies = _frequencies(omega)
+        if not self._num.coefficients.any():
+            raise ValueError("the zero transfer function has no phase")
+        size = np.abs(frequencies).ravel()
+        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
+        start = np.pi * (int(a < 0.0) - int(b < 0.0) + 0.5 * (p - q))
+        phase = np.full(size.shape, start)
+        above = size > 0.0
+        phase[above] = self._num._native.argument(size[above])
+        phase[above] -= self._den._native.argument(size[above])
+        mirrored = np.where(frequencies.ravel() < 0.0, -phase, phase)
+        return np.asarray(mirrored.reshape(frequencies.shape))
+
+    def dcgain(self) -> float:
+        """Limit at zero frequency, as s comes to zero from the right.
+
+        Returns
+        -------
+        float
+            Infinite at a pole, with its sign.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> (2.0 / (dtm.s + 4.0)).dcgain(), ((1 - dtm.delay(0.5)) / dtm.s).dcgain()
+        (0.5, 0.5)
+        """
+        if not self._num.coefficients.any():
+            return 0.0
+        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
+        if p > q:
+            return 0.0
+        return a / b if p == q else math.copysign(math.inf, a * b)
+
+    # Poles and zeros
+
+    def zeros(self, re: OpenRange | None = None, im: OpenRange | None = None) -> RootSet:
+        """Locate every root of the numerator in a region, as `poles` does for the denominator.
+
+        Parameters
+        ----------
+        re, im : tuple of (float or None, float or None), optional
+            As in `poles`.
+
+        Returns
+        -------
+        RootSet
+
+        Raises
+        ------
+        ContourError, CountMismatchError, ValueError
+            As in `poles`; ValueError also for the zero transfer function.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.TransferFunction([1.0, 3.0], [1.0, 2.0, 5.0]).zeros().roots
+        array([-3.+0.j])
+        """
+        return self._num.roots(re, im)
+
+    def hidden_modes(
+        self, re: OpenRange | None = None, im: OpenRange | None = None
+    ) -> NDArray[np.complex128]:
+        """List the poles in a region that are zeros as well, as far as can be told.
+
+        What cancels does not show between input and output, but it is there: an unstable hidden
+        mode makes a system useless whose response looks well.
+
+        Parameters
+        ----------
+        re, im : tuple of (float or None, float or None), optional
+            As in `poles`.
+
+        Returns
+        -------
+        ndarray of complex, shape (n,)
+            Poles whose disc meets that of a zero.
+
+        Examples
+        --------
+        >>> from deadtime import s
+        >>> G = (s - 1.0) / (s + 2.0) * (3.0 / (s - 1.0))
+        >>> G.hidden_modes()
+        array([1.+0.j])
+        """
+        poles, zeros = self.poles(re, im), self.zeros(re, im)
+        apart = np.abs(poles.roots[:, None] - zeros.roots[None, :])
+        meet = apart <= poles.radii[:, None] + zeros.radii[None, :]
+        return poles.roots[meet.any(axis=1)]
+
+    def minreal(self) -> TransferFunction:
+        """Cancel what cancels exactly: common powers of s.
+
+        Other common roots of quasi-polynomials cannot be divided out without error; `hidden_modes`
+        lists them.
+
+        Returns
+        -------
+        TransferFunction
+
+        Examples
+        --------
+        >>> from deadtime import s
+        >>> (s / (s * (s + 1.0))).minreal()
+        1 / (1 + s)
+        """
+        if not self._num.coefficients.any():
+            return TransferFunction(0.0)
+        return TransferFunction(*_without_common_powers(self._num, self._den))
+
+    def _determinant(self) -> QuasiPolynomial:
+        return self._den
+
+    def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
+        """Characteristic function of the loop closed around this one."""
+        unknown = [name for name in names if name not in ("gain", "delay")]
+        if unknown:
+            raise ValueError(
+                f"{unknown[0]}: a loop gain has the numbers 'gain', a factor on it, and 'delay', a "
+                "further delay"
+            )
+        gain: Any = Parameter("gain") if "gain" in names else 1.0
+        late: Any = delay(Parameter("delay")) if "delay" in names else 1.0
+        found: ParametricQuasiPolynomial = self._den + gain * self._num * late
+        return found
+
+    # In time
+
+    def _realised(self) -> Realisation:
+        num, den = self.num, self.den
+        if not self.is_proper:
+            raise ValueError(
+                f"the numerator has degree {num.degree}, the denominator {den.degree}: an "
+                "improper transfer function differentiates its input and has no response to a step"
+            )
+        if not self.is_causal:
+            raise ValueError(
+                f"{self!r} is not causal: its output would depend on later inputs (or its equation "
+                "is advanced)"
+            )
+        return of_ratio(num, den)
+
+    def _differentiated(self) -> Realisable:
+        if self._num.degree >= self._den.degree and self._num.coefficients.any():
+            raise ValueError(
+                f"the numerator has degree {self._num.degree}, the denominator "
+                f"{self._den.degree}: the response to an impulse holds an impulse itself"
+            )
+        return self * s
+
+    def _gains_at_rest(self) -> NDArray[np.float64]:
+        return np.array([[self.dcgain()]])
+
+    # As a loop gain
+
+    def _delay_margin(self) -> float:
+        return self.margin()._delay_margin()
+
+    def margin(self) -> Margins:
+        """Gain, phase and delay margin of the loop closed around this one by ``feedback(G)``.
+
+        Returns
+        -------
+        Margins
+            With every frequency at which the gain is one, or the phase 180 degrees, behind it.
+
+        Raises
+        ------
+        ValueError
+            If the gain grows with frequency, the loop gain is not causal, or its gain is one (its
+            phase 180 degrees) on a whole range of frequencies.
+
+        Notes
+        -----
+        All crossings are found, by a bound on the curvature of abs(num)^2 - abs(den)^2 and of
+        Im(num conj(den)) between the points at which they are evaluated, and a bound on the
+        frequencies that matter. Stability of the closed loop, as it is, is decided by a proved
+        count of roots.
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> (1.5 * (s + 1) / (s * (s**2 + 0.5 * s + 9)) * delay(0.05)).margin()
+        <Margins: gain 2.616 at 3.559 rad/s, phase 49.19° at 3.063 rad/s, delay 0.2803 s at ...>
+        >>> (9.0 / s * delay(0.36)).margin()
+        <Margins: none, the closed loop is not stable as it is>
+        """
+        return margins(self._num, self._den)
+
+    def bode(
+        self,
+        omega: ArrayLike | None = None,
+        *,
+        margins: bool = False,
+        axes: Sequence[Axes] | None = None,
+    ) -> Sequence[Axes]:
+        """Draw gain and phase over frequency.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Frequencies in rad/s, above zero and increasing; by default from a decade below the
+            lowest corner to a decade above the highest.
+        margins : bool, default False
+            Take this as a loop gain and mark its margins.
+        axes : sequence of two matplotlib.axes.Axes, optional
+            Where to draw gain and phase; a new figure by default.
+
+        Returns
+        -------
+        sequence of two matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            If the frequencies are no increasing ones above zero; with `margins` as in `margin`.
+        """
+        from deadtime._base.drawing import shown_rows
+        from deadtime.systems._plots import plot_bode
+
+        places = self._plotted(omega, 0.1, 10.0)
+        found = self.margin() if margins else None
+        drawn = shown_rows(axes, 2)
+        plot_bode(drawn, self, places, found)
+        return drawn
+
+    def nyquist(
+        self,
+        omega: ArrayLike | None = None,
+        *,
+        margins: bool = False,
+        ax: Axes | None = None,
+    ) -> Axes:
+        """Draw the frequency response in the complex plane, with the critical point -1.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Frequencies in rad/s, above zero and increasing; by default far enough both ways for
+            the curve to end. The mirror image for negative ones is drawn dashed.
+        margins : bool, default False
+            Take this as a loop gain and mark its margins.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            As in `bode`.
+        """
+        from deadtime._base.drawing import shown_axes
+        from deadtime.systems._plots import plot_nyquist
+
+        places = self._plotted(omega, 1e-3, 100.0)
+        found = self.margin() if margins else None
+        ax = shown_axes(ax)
+        plot_nyquist(ax, self, places, found)
+        return ax
+
+    def _plotted(self, omega: ArrayLike | None, below: float, beyond: float) -> NDArray[np.float64]:
+        """Frequencies to draw at: those given, checked, or these factors from the corners."""
+        if omega is not None:
+            given = _frequencies(omega)
+            rising = given.ndim == 1 and given.size > 1 and bool(np.all(np.diff(given) > 0.0))
+            if not rising or given[0] <= 0.0:
+                raise ValueError("omega: give at least two increasing frequencies above zero")
+            return given
+        corners: list[float] = []
+        for h in (self._num, self._den):
+            for row, tau in zip(h.coefficients, h.delays, strict=True):
+                roots = np.abs(np.roots(row[::-1]))
+                corners += roots[roots > 0.0].tolist()
+                if tau > 0.0:
+                    corners.append(1.0 / float(tau))
+        low, high = (min(corners), max(corners)) if corners else (1.0, 1.0)
+        return np.geomspace(below * low, beyond * high, 2001)
+
+    # Other packages
+
+    @classmethod
+    def from_control(cls, system: Any, delay: float = 0.0) -> TransferFunction:
+        """Read a system of python-control and put a delay in series.
+
+        Parameters
+        ----------
+        system : control.TransferFunction or control.StateSpace
+            Continuous, with one input and one output.
+        delay : float, default 0
+            In s, zero or more.
+
+        Returns
+        -------
+        TransferFunction
+
+        Raises
+        ------
+        ImportError
+            If python-control is not installed.
+        ValueError
+            If the system is sampled or has several inputs or outputs, or the delay is negative.
+        TypeError
+            If it is no such system.
+        """
+        return cls(*polynomials_of_control(system), delay=delay)
+
+    def to_control(self, pade: int | None = None) -> Any:
+        """Write as a transfer function of python-control, which knows no delays.
+
+        Parameters
+        ----------
+        pade : int, optional
+            Replace every delay by a Padé approximant of this order; by default a system with
+            delays is refused.
+
+        Returns
+        -------
+        control.TransferFunction
+
+        Raises
+        ------
+        ImportError
+            If python-control is not installed.
+        ValueError
+            If there are delays and `pade` is None or out of its range.
+        """
+        package = control_package()
+        return package.TransferFunction(*rational(self._num, self._den, pade))
+
+    @classmethod
+    def from_scipy(cls, system: Any, delay: float = 0.0) -> TransferFunction:
+        """Read a system of scipy.signal and put a delay in series.
+
+        Parameters
+        ----------
+        system : scipy.signal.lti or tuple
+            Continuous, with one input and one output; a tuple as `scipy.signal.lti` takes it.
+        delay : float, default 0
+            In s, zero or more.
+
+        Returns
+        -------
+        TransferFunction
+
+        Raises
+        ------
+        ValueError
+            If the system is sampled or has several outputs, or the delay is negative.
+        TypeError
+            If it is no such system.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> dtm.TransferFunction.from_scipy(([2.0], [1.0, 0.0]), delay=0.36)
+        2 exp(-0.36 s) / s
+        """
+        return cls(*polynomials_of_scipy(system), delay=delay)
+
+    def to_scipy(self, pade: int | None = None) -> Any:
+        """Write as a transfer function of scipy.signal, which knows no delays.
+
+        Parameters
+        ----------
+        pade : int, optional
+            As in `to_control`.
+
+        Returns
+        -------
+        scipy.signal.TransferFunction
+
+        Raises
+        ------
+        ValueError
+            As in `to_control`.
+        """
+        from scipy import signal
+
+        return signal.TransferFunction(*rational(self._num, self._den, pade))
+
+
+def feedback(G: Any, H: Any = 1.0, sign: int = -1) -> TransferFunction:
+    """Close a loop: G / (1 - sign G H), with G forward and H back.
+
+    The denominator is the characteristic function of the closed loop: with G = n/d and H = p/q
+    the result is n q / (d q - sign n p), in which neither denominator appears twice.
+
+    Parameters
+    ----------
+    G, H : TransferFunction, QuasiPolynomial or float
+        Forward and return path.
+    sign : {-1, 1}, default -1
+        -1 for negative, 1 for positive feedback.
+
+    Returns
+    -------
+    TransferFunction
+
+    Raises
+    ------
+    ValueError
+        If `sign` is neither, or the loop has no solution: G H is 1/sign everywhere.
+    TypeError
+        If `G` or `H` is no transfer function.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> from deadtime import delay, s
+    >>> T = dtm.feedback(2.0 / s * delay(0.36))
+    >>> T.den.kind, T.dcgain()
+    ('retarded', 1.0)
+    >>> round(T.spectral_abscissa(), 6)
+    -1.515362
+    """
+    forward, back = _operand(G), _operand(H)
+    for name, one, given in (("G", forward, G), ("H", back, H)):
+        if one is None:
+            raise TypeError(f"{name}={given!r}: give a TransferFunction, for example 2.0 / s")
+    if sign not in (-1, 1):
+        raise ValueError(f"sign={sign!r}: give -1 for negative or 1 for positive feedback")
+    n, d = cast(TransferFunction, forward)._num, cast(TransferFunction, forward)._den
+    p, q = cast(TransferFunction, back)._num, cast(TransferFunction, back)._den
+    closed = d * q - float(sign) * (n * p)
+    if not closed.coefficients.any():
+        raise ValueError("the loop has no solution: what comes back is exactly what goes in")
+    return TransferFunction(n * q, closed)
+
+
+def _operand(value: object) -> TransferFunction | None:
+    """Turn a number or a quasi-polynomial into a transfer function; None for foreign types."""
+    if isinstance(value, TransferFunction):
+        return value
+    if isinstance(value, QuasiPolynomial) or is_number(value):
+        return TransferFunction(cast(Any, value))
+    return None
+
+
+def _inverse(G: TransferFunction) -> TransferFunction:
+    if not G._num.coefficients.any():
+        raise ZeroDivisionError("division by the zero transfer function")
+    return TransferFunction(G._den, G._num)
+
+
+def _sum(first: TransferFunction, second: TransferFunction) -> TransferFunction:
+    """Over the common denominator as far as it is seen exactly: all of it, or its powers of s."""
+    if first._den == second._den:
+        return TransferFunction(first._num + second._num, first._den)
+    d, q = _without_common_powers(first._den, second._den)
+    return TransferFunction(first._num * q + second._num * d, first._den * q)
+
+
+def _without_common_powers(
+    one: QuasiPolynomial, other: QuasiPolynomial
+) -> tuple[QuasiPolynomial, QuasiPolynomial]:
+    """Both divided by the highest power of s that divides every row of both exactly."""
+    k = min(one._native.powers_of_s(), other._native.powers_of_s())
+    one, other = (QuasiPolynomial._wrap(h._native.without_powers(k)) for h in (one, other))
+    return one, other
+
+
+def _quasi_polynomial(name: str, given: Polynomial) -> QuasiPolynomial:
+    if isinstance(given, QuasiPolynomial):
+        return given
+    if is_number(given):
+        return QuasiPolynomial([[float(cast(float, given))]], [0.0])
+    descending = real_array(name, cast(ArrayLike, given))
+    if descending.ndim != 1 or descending.size == 0:
+        raise ValueError(
+            f"{name} of shape {descending.shape}: give a QuasiPolynomial, a number, or the "
+            "coefficients in descending powers of s"
+        )
+    return QuasiPolynomial(descending[None, ::-1], [0.0])
+
+
+def _without_common_delay(
+    n: QuasiPolynomial, d: QuasiPolynomial
+) -> tuple[QuasiPolynomial, QuasiPolynomial]:
+    """Cancel the smallest delay, unless rounding would change another one."""
+    both = [h for h in (n, d) if h.coefficients.any()]
+    smallest = float(min(h.delays[0] for h in both))
+    times = [float(tau) for h in both for tau in h.delays]
+    if smallest == 0.0 or any(math.fsum((t, -smallest, -(t - smallest))) for t in times):
+        return n, d
+    n, d = (
+        QuasiPolynomial(h.coefficients, h.delays - smallest) if h.coefficients.any() else h
+        for h in (n, d)
+    )
+    return n, d
+
+
+def _frequencies(omega: ArrayLike) -> NDArray[np.float64]:
+    frequencies = real_array("omega", omega)
+    if not np.isfinite(frequencies).all():
+        raise ValueError("omega: give finite frequencies in rad/s")
+    return frequencies
+
+
+def _is_sum(text: str) -> bool:
+    """Whether the text of a quasi-polynomial needs brackets before a division."""
+    inner = text
+    while "(" in inner:  # sums inside brackets do not count
+        start, end = inner.index("("), inner.index(")")
+        inner = inner[:start] + inner[end + 1 :]
+    return " + " in inner or " - " in inner

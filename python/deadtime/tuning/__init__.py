@@ -1,0 +1,23 @@
+"""Choose the gains of a loop whose delay is known up to an interval.
+
+`_problem` says what is free and what is not known, `_stabilising` where to look for it,
+`_objectives` what is made best, `_demands` what must hold, `_survey` maps the gains, `_search`
+finds the best of them, `_worst` looks for the delay at which they are worst, and `_design`
+repeats that until it finds none that is worse. `_filter_choice` chooses the filter of the
+derivative.
+"""
+
+from deadtime.tuning._design import design
+from deadtime.tuning._filter_choice import design_filter
+from deadtime.tuning._result import Design, FilterChoice, LeastMargins, Trade
+from deadtime.tuning._stabilising import critical_gain
+
+__all__ = [
+    "Design",
+    "FilterChoice",
+    "LeastMargins",
+    "Trade",
+    "critical_gain",
+    "design",
+    "design_filter",
+]

@@ -1,0 +1,249 @@
+"""What a design makes best, as a cost: the smaller the better, the worst scenario counts.
+
+abscissa       Re of the rightmost pole.
+damping        the smallest damping ratio -Re s/abs(s) of the dominant poles, those that decay at
+               most three times as fast as the slowest (a delay always leaves fast poles with little
+               damping, which nobody sees). It is 1 over whole ranges of gains, so the abscissa
+               decides where it is equal.
+settling_time  of the step of the reference, with hold and limit, simulated exactly; the longest
+               for the gains themselves and for gains half a percent beside them. The settling
+               time jumps where a peak leaves the band, and the best one is had next to such a
+               jump: gains that are rounded to three digits would fall over it.
+overshoot      of the same steps; up to a tenth of a percent counts as none, and the settling time
+               decides where it is equal.
+"""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from deadtime.loops import ControlLoop, sweep
+from deadtime.loops._model import rest_of
+from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._settling import BAND, proved_step
+
+__all__ = ["NEVER", "Objective", "ObjectiveName", "dominant_damping", "objective_named"]
+
+ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
+
+#: What a loop costs that is unstable or does not settle, so that the search turns away from it.
+NEVER = 1e6
+
+#: Gains so far beside those that are judged are judged with them: what rounding to three digits
+#: may do.
+_ROUNDING = 0.005
+
+#: The band the search for the settling time keeps to: a little narrower than the 2 % that are
+#: reported, for what lies between the gains and the delays that are tried.
+SEARCH_BAND = 0.0195
+
+#: Poles that decay at most so many times as fast as the slowest are dominant; of a continuous loop
+#: so many are looked at.
+DOMINANT = 3.0
+_POLES = 8
+
+#: Weight of the abscissa, in units of the loop's delay and lag, where the damping decides.
+_TIE = 1e-3
+
+#: Overshoot that counts as none, %, and what more of it costs in settling times of a second.
+NO_OVERSHOOT = 0.1
+_OVERSHOOT_WEIGHT = 10.0
+
+
+class Objective(ABC):
+    """A cost of a loop, and the figure it stands for."""
+
+    name: ObjectiveName
+    #: Whether loops are simulated: many at once then cost little more than one.
+    simulated = False
+    #: How far costs may differ and be the same, relatively.
+    tolerance = 1e-6
+
+    @abstractmethod
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        """Cost of every row of gains in every scenario."""
+
+    @abstractmethod
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        """The figure itself, at its worst over the scenarios."""
+
+    def coarse(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        """The costs of the gains alone, where their neighbours count as well and make it dear."""
+        return self.costs(problem, points, scenarios)
+
+    def proved(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        """The figure, where it is simulated with a proof of what follows the simulated time."""
+        return self.value(problem, gains, scenarios)
+
+    def worst(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        """Cost of one set of gains in its worst scenario."""
+        return float(self.costs(problem, gains[None, :], scenarios).max())
+
+    def lost(self, value: float, reference: float) -> float:
+        """How much worse a figure is than a reference, as a part of that."""
+        return (value - reference) / max(abs(reference), 1e-300)
+
+
+class _Abscissa(Objective):
+    name: ObjectiveName = "abscissa"
+
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        # A loop need not be made for every number.
+        numbers = problem.loop.parameters
+        abscissa_at = problem.loop.specification.abscissa_at
+        return np.array(
+            [
+                [abscissa_at(numbers | problem.named(gains) | one) for one in scenarios]
+                for gains in points
+            ]
+        )
+
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        return self.worst(problem, gains, scenarios)
+
+
+class _Damping(Objective):
+    name: ObjectiveName = "damping"
+    tolerance = 1e-4
+
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        return np.array(
+            [[self._cost(problem.at(gains, one)) for one in scenarios] for gains in points]
+        )
+
+    def _cost(self, loop: ControlLoop) -> float:
+        ratio, abscissa = dominant_damping(loop)
+        if not abscissa < 0.0:
+            return NEVER + abscissa
+        time = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0) + (loop.sample_time or 0.0)
+        return -ratio + _TIE * abscissa * (time or 1.0)
+
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        return min(dominant_damping(problem.at(gains, one))[0] for one in scenarios)
+
+    def lost(self, value: float, reference: float) -> float:
+        return super().lost(-value, -reference)
+
+
+class _ByStep(Objective):
+    simulated = True
+    tolerance = 1e-3
+
+    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        around = _rounded(points)
+        costs = self.coarse(problem, around.reshape(-1, points.shape[-1]), scenarios)
+        return np.asarray(costs.reshape(*around.shape[:2], -1).max(axis=1))
+
+    def coarse(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+        settling, overshoot = _figures(problem, points, scenarios, SEARCH_BAND)
+        lost = ~np.isfinite(settling)
+        return np.where(lost, NEVER, self._cost(np.where(lost, 0.0, settling), overshoot))
+
+    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        settling, overshoot = _figures(problem, _rounded(gains[None, :])[0], scenarios, BAND)
+        return self._figure(settling, overshoot)
+
+    def proved(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+        worst = self.value(problem, gains, scenarios)
+        for one in scenarios:
+            step = proved_step(problem.at(gains, one), problem.amplitude)
+            if step is None:
+                told = ", ".join(f"{name} = {number:.6g}" for name, number in one.items())
+                raise ValueError(
+                    f"a step of {problem.amplitude:g} settles in simulation with "
+                    f"{problem.named(gains)}, but for {told} it is not proved to stay in the "
+                    "band: ask for margins, or for another objective"
+                )
+            worst = max(worst, self._figure(*np.array(step)))
+        return worst
+
+    @abstractmethod
+    def _cost(self, settling: Vector, overshoot: Vector) -> Vector: ...
+
+    @abstractmethod
+    def _figure(self, settling: Vector, overshoot: Vector) -> float: ...
+
+
+class _SettlingTime(_ByStep):
+    name: ObjectiveName = "settling_time"
+
+    def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
+        return settling
+
+    def _figure(self, settling: Vector, overshoot: Vector) -> float:
+        return float(settling.max())
+
+
+class _Overshoot(_ByStep):
+    name: ObjectiveName = "overshoot"
+
+    def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
+        return settling + _OVERSHOOT_WEIGHT * np.maximum(overshoot - NO_OVERSHOOT, 0.0)
+
+    def _figure(self, settling: Vector, overshoot: Vector) -> float:
+        return float(overshoot.max())
+
+
+_OBJECTIVES = {one.name: one for one in (_Abscissa(), _Damping(), _SettlingTime(), _Overshoot())}
+
+
+def objective_named(name: str) -> Objective:
+    """The objective of that name."""
+    if name not in _OBJECTIVES:
+        raise ValueError(
+            f"objective={name!r}: give one of {', '.join(map(repr, get_args(ObjectiveName)))}"
+        )
+    return _OBJECTIVES[name]
+
+
+def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
+    """Smallest damping ratio of the dominant poles, and the spectral abscissa in 1/s.
+
+    The chains of a neutral loop oscillate without end: where they are dominant the ratio is zero.
+    """
+    poles = np.asarray(
+        loop.specification.native.poles() if loop.is_sampled else loop.rightmost(_POLES).roots
+    )
+    chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
+    abscissa = max(float(poles.real.max(initial=-np.inf)), chain)
+    if not abscissa < 0.0:
+        return float("nan"), abscissa
+    horizon = DOMINANT * abscissa
+    if chain >= horizon:
+        return 0.0, abscissa
+    near = poles[poles.real >= horizon]
+    return float((-near.real / np.abs(near)).min()), abscissa
+
+
+def _rounded(points: Vector) -> Vector:
+    """Each row of gains and its neighbours, shape (rows, 1 + neighbours, gains)."""
+    signs = np.array([*itertools.product((-1.0, 1.0), repeat=points.shape[-1])])
+    factors = 1.0 + _ROUNDING * np.vstack([np.zeros(points.shape[-1]), signs])
+    return np.asarray(points[:, None, :] * factors)
+
+
+def _figures(
+    problem: Problem, points: Vector, scenarios: Sequence[Scenario], band: float
+) -> tuple[Vector, Vector]:
+    """Settling time in s, NaN where a loop does not settle, and overshoot in %."""
+    values = {name: points[:, [i]] for i, name in enumerate(problem.free)}
+    for name in problem.intervals:
+        values[name] = np.array([[one[name] for one in scenarios]])
+    found = sweep(
+        problem.loop,
+        values,
+        amplitude=problem.amplitude,
+        settling=band,
+        threads=problem.threads,
+    )
+    # An output that the limit keeps from its rest is not settled, though it may stand still.
+    loop = problem.loop
+    limit = np.inf if loop.limit is None else loop.limit
+    _, command = rest_of(loop.plant, loop.controller, loop.parameters | values)
+    short = np.abs(command * problem.amplitude) > limit
+    return np.where(short, np.nan, found["settling_time"]), found["overshoot"]

@@ -1,0 +1,223 @@
+"""What a design may choose, and what it does not know: free gains, intervals of delay and gain."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.ranges import Range, interval
+from deadtime._base.validation import finite, non_negative
+from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
+from deadtime.tuning._stabilising import candidate_ranges
+
+__all__ = [
+    "Problem",
+    "Scenario",
+    "Vector",
+    "controller_template",
+    "pose",
+    "with_filter",
+]
+
+Vector: TypeAlias = NDArray[np.float64]
+
+#: Values of the numbers of the loop that are not known.
+Scenario: TypeAlias = dict[str, float]
+
+#: More free gains than a controller here has would need a search that knows no map.
+_MOST_FREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A loop whose controller is a template: its free gains are replaced throughout.
+
+    Attributes
+    ----------
+    loop : ControlLoop
+        With the numbers in `intervals` at their middles.
+    free : tuple of str
+        Gains to be found.
+    spans : tuple of dict of str to (float, float)
+        Where they are looked for, one after the other until some gains are stable.
+    intervals : dict of str to (float, float)
+        ``delay`` and, where it is not known either, ``gain`` of the plant.
+    amplitude : float
+        Height of the step, where steps are judged.
+    threads : int or None
+    """
+
+    loop: ControlLoop
+    free: tuple[str, ...]
+    spans: tuple[dict[str, Range], ...]
+    intervals: dict[str, Range]
+    amplitude: float
+    threads: int | None
+
+    def named(self, gains: Sequence[float] | Vector) -> dict[str, float]:
+        """The free gains by name."""
+        return {name: float(value) for name, value in zip(self.free, gains, strict=True)}
+
+    def at(self, gains: Sequence[float] | Vector, scenario: Scenario | None = None) -> ControlLoop:
+        """The loop with these gains, in one scenario or in the middle."""
+        return self.loop.replace(**self.named(gains), **(scenario or {}))
+
+    def scenarios(self, points: int) -> tuple[Scenario, ...]:
+        """Every combination of so many values of each number that is not known."""
+        values = [
+            np.linspace(low, high, points) if low < high else [low]
+            for low, high in self.intervals.values()
+        ]
+        return tuple(
+            dict(zip(self.intervals, map(float, some), strict=True))
+            for some in itertools.product(*values)
+        )
+
+    @property
+    def corners(self) -> tuple[Scenario, ...]:
+        """Ends and middle of each interval."""
+        return self.scenarios(3)
+
+    @property
+    def middle(self) -> Scenario:
+        """All numbers in the middles of their intervals."""
+        return {name: 0.5 * (low + high) for name, (low, high) in self.intervals.items()}
+
+    @property
+    def delays(self) -> tuple[float, ...]:
+        """Ends and middle of the delay's interval."""
+        low, high = self.intervals["delay"]
+        return (low, 0.5 * (low + high), high) if low < high else (low,)
+
+
+def pose(
+    loop: object,
+    controller: type[Controller] | Controller,
+    delay: float | Range | None,
+    gain: float | Range | None,
+    fixed: Mapping[str, float] | None,
+    ranges: Mapping[str, Range] | None,
+    amplitude: float,
+    threads: int | None,
+) -> Problem:
+    """Check what a design was asked for."""
+    template = controller_template(controller)
+    if not isinstance(loop, ControlLoop):
+        loop, delay = _around(loop, template, delay)
+    held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
+    unknown = [name for name in held if name not in template.gains]
+    if unknown:
+        raise ValueError(
+            f"fixed={dict(held)}: {type(template).__name__} has no gain {unknown[0]!r}, only "
+            f"{', '.join(template.gains)}"
+        )
+    free = tuple(name for name in template.gains if name not in held)
+    if not free:
+        raise ValueError(
+            f"fixed names every gain of {type(template).__name__} ({', '.join(held)}): leave one "
+            "free, or ask the loop itself for its margins"
+        )
+    if len(free) > _MOST_FREE:
+        raise ValueError(
+            f"{len(free)} free gains ({', '.join(free)}): fix some, {_MOST_FREE} are searched at "
+            "most"
+        )
+    intervals = {"delay": _delay_interval(loop, delay)}
+    if gain is not None:
+        intervals["gain"] = _gain_interval(gain)
+    middle = {name: 0.5 * (low + high) for name, (low, high) in intervals.items()}
+    whole = loop.replace(controller=template, **middle)
+    if held:
+        whole = whole.replace(**held)
+    if ranges is None and not whole.plant.is_rational:
+        raise ValueError(
+            "ranges: where to look for gains is known for plants that are rational but for one "
+            "delay in series; give ranges= for this one"
+        )
+    if ranges is None:
+        spans = candidate_ranges(whole, free)
+    else:
+        given = _mapping("ranges", ranges)
+        if set(given) != set(free):
+            raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
+        spans = ({name: interval(f"the range of {name}", given[name]) for name in free},)
+    height = finite("amplitude", amplitude)
+    if height == 0.0:
+        raise ValueError("amplitude=0: there is no step, give a number other than zero")
+    return Problem(whole, free, spans, intervals, height, threads)
+
+
+def _around(
+    plant: object, template: Controller, delay: float | Range | None
+) -> tuple[ControlLoop, float | Range | None]:
+    """A loop around a plant, and its delay: the plant's own and what comes on top of it."""
+    loop = ControlLoop(plant, template)
+    if delay is None or loop.delay is None:
+        return loop, delay
+    more = _interval("delay", delay)
+    return loop, (loop.delay + more[0], loop.delay + more[1])
+
+
+def controller_template(controller: type[Controller] | Controller) -> Controller:
+    """A controller of the wanted class; its gains are replaced throughout."""
+    if isinstance(controller, Controller):
+        return controller
+    if isinstance(controller, type) and issubclass(controller, Controller):
+        names = inspect.signature(controller).parameters
+        return controller(**{name: 1.0 for name in names if name.startswith("K")})
+    raise TypeError(
+        f"controller={controller!r} is no controller: give P, PV, PD, PI or PID, or one of them"
+    )
+
+
+def with_filter(controller: Controller, filter: DerivativeFilter | None) -> Controller:  # noqa: A002
+    """The same gains with another filter of the derivative, or none."""
+    if not isinstance(controller, (PV, PD, PID)):
+        raise ValueError(
+            f"{type(controller).__name__} has no derivative to filter: take PV, PD or PID, or "
+            "leave filter out"
+        )
+    return type(controller)(**controller.gains, filter=filter)
+
+
+def _mapping(name: str, given: Any) -> dict[str, Any]:
+    """What was given by name, as a dict of its own."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        value = "(0.0, 5.0)" if name == "ranges" else "2.0"
+        raise TypeError(f"{name}={given!r}: give a dict such as {{'Kp': {value}}}")
+    return dict(given)
+
+
+def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
+    if delay is None:
+        if loop.delay is None:
+            raise ValueError("the delay of the loop is not known: give delay=, or estimate it")
+        return loop.delay, loop.delay
+    return _interval("delay", delay)
+
+
+def _interval(name: str, given: float | Range) -> Range:
+    """One time or an interval of times, s."""
+    if not isinstance(given, (tuple, list, np.ndarray)):
+        return non_negative(name, given), float(given)
+    low, high = interval(name, given, may_be_point=True)
+    if low < 0.0:
+        raise ValueError(f"{name}={given!r} is not an interval (low, high) of times >= 0")
+    return low, high
+
+
+def _gain_interval(gain: float | Range) -> Range:
+    if not isinstance(gain, (tuple, list, np.ndarray)):
+        gain = (gain, gain)
+    low, high = interval("gain", gain, may_be_point=True)
+    if low * high <= 0.0:
+        raise ValueError(f"gain={gain!r} is not an interval (low, high) on one side of zero")
+    return low, high

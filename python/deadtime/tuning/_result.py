@@ -1,0 +1,288 @@
+"""What a design comes to: gains, what they are worth, and what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
+
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime.loops import ControlLoop
+from deadtime.stability import StabilityMap
+from deadtime.tuning._objectives import ObjectiveName
+from deadtime.tuning._problem import Scenario, Vector
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Design", "FilterChoice", "LeastMargins", "Trade", "figure_in_words"]
+
+
+class LeastMargins(NamedTuple):
+    """Margins at their least over all that is not known; each may have its own worst scenario."""
+
+    gain: float
+    """Factor on the loop gain."""
+    phase: float
+    """Degrees."""
+    delay: float
+    """Further delay, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trade(ReadOnlyArrays):
+    """What one demand costs.
+
+    Attributes
+    ----------
+    demand : str
+        ``"gain margin"``, ``"phase margin"``, ``"delay margin"``, ``"all margins"``,
+        ``"interval"`` (of delay and gain), ``"fixed"`` (gains) or ``"filter"``.
+    asked, had : float
+        What was asked for and what the design has; NaN where that is no number.
+    active : bool
+        Whether the design is held back by it.
+    without : float
+        The objective's value of the best gains without it.
+    words : str
+        The same as a sentence.
+    """
+
+    demand: str
+    asked: float
+    had: float
+    active: bool
+    without: float
+    words: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(ReadOnlyArrays):
+    """Gains, and the loop that has them; made by `design`.
+
+    Attributes
+    ----------
+    loop : ControlLoop
+        The loop with the gains, delay and gain of the plant at the middles of their intervals.
+    gains : dict of str to float
+        All gains of the controller, fixed ones included.
+    fixed : tuple of str
+        Names of those that were given.
+    abscissa : float
+        Spectral abscissa with these gains, 1/s, the largest over the intervals; negative: stable.
+    damping : float
+        Smallest damping ratio of the dominant poles (those that decay at most three times as fast
+        as the slowest) over the intervals.
+    margins : LeastMargins
+        Exact margins, hold and delay included, each at its least over the intervals.
+    delays : tuple of float
+        Ends and middle of the delay's interval, s.
+    gain : (float, float) or None
+        Interval of the plant's gain, if one was given.
+    objective : {"abscissa", "damping", "settling_time", "overshoot"}
+        What was made best.
+    value : float
+        What it came out at in the worst scenario: 1/s, a ratio, s or %. Of a settling time or an
+        overshoot the worst for gains half a percent beside these as well, so that they may be
+        rounded to three digits.
+    step_info : dict of str to float
+        The step of `amplitude` in `loop`, hold and limit included: `Response.info`, and
+        ``peak_command`` and ``time_at_limit`` (s, 0 without a limit). The settling time is proved
+        for all times, NaN where it is not.
+    amplitude : float
+        Height of the step.
+    worst : dict of str to float
+        The scenario in which the objective is worst.
+    checked : int
+        How many scenarios the objective was checked in after the search.
+    proved : tuple of str
+        What of ``"stable"``, ``"gain margin"`` and ``"delay margin"`` is proved for every value
+        in the intervals; empty for sampled loops, which are checked on the scenarios.
+    traded : tuple of Trade
+        What each demand cost.
+    charts : tuple of StabilityMap
+        Maps of the gains: for each of `delays`; of one free gain a single one, over gain and
+        delay.
+    filter_choice : FilterChoice or None
+        Where the filter's corner was chosen, how.
+    """
+
+    loop: ControlLoop
+    gains: dict[str, float]
+    fixed: tuple[str, ...]
+    abscissa: float
+    damping: float
+    margins: LeastMargins
+    delays: tuple[float, ...]
+    gain: tuple[float, float] | None
+    objective: ObjectiveName
+    value: float
+    step_info: dict[str, float]
+    amplitude: float
+    worst: Scenario
+    checked: int
+    proved: tuple[str, ...]
+    traded: tuple[Trade, ...]
+    charts: tuple[StabilityMap, ...]
+    filter_choice: FilterChoice | None = None
+
+    def __repr__(self) -> str:
+        kind = type(self.loop.controller).__name__
+        gains = ", ".join(f"{name} = {gain:.4g}" for name, gain in self.gains.items())
+        return (
+            f"<Design {kind}, {gains}: spectral abscissa {self.abscissa:.4g} 1/s at a delay of "
+            f"{self._late()} s>"
+        )
+
+    def _late(self) -> str:
+        ends = dict.fromkeys((self.delays[0], self.delays[-1]))
+        return " to ".join(f"{end:g}" for end in ends)
+
+    def summary(self) -> str:
+        """Gains, what they are worth and what they cost, in a few lines.
+
+        Returns
+        -------
+        str
+        """
+        gains = ", ".join(
+            f"{name} = {value:.4g}{' (given)' if name in self.fixed else ''}"
+            for name, value in self.gains.items()
+        )
+        over = f"over a delay of {self._late()} s"
+        if self.gain is not None:
+            over += f" and a gain of {self.gain[0]:g} to {self.gain[1]:g}"
+        info, least = self.step_info, self.margins
+        proof = f"; proved: {', '.join(self.proved)}" if self.proved else ""
+        settled = info["settling_time"]
+        step = f"settles in {settled:.3g} s" if isfinite(settled) else "not proved to settle"
+        step += f", overshoot {info['overshoot']:.2g} %, peak command {info['peak_command']:.3g}"
+        if self.loop.limit is not None:
+            step += f", {info['time_at_limit']:.2g} s at the limit of {self.loop.limit:g}"
+        lines = [
+            f"{type(self.loop.controller).__name__}: {gains}",
+            f"worst {over}: {figure_in_words(self.objective, self.value)}; spectral abscissa "
+            f"{self.abscissa:.4g} 1/s, damping ratio {self.damping:.3g}",
+            f"least margins: gain {least.gain:.4g}, phase {least.phase:.4g}°, delay "
+            f"{least.delay:.4g} s ({self.checked} scenarios checked{proof})",
+            f"step of {self.amplitude:g}: {step}",
+        ]
+        lines += [trade.words for trade in self.traded]
+        return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Draw map, step response, and the Bode plot of the loop with its margins.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed.
+        """
+        from deadtime.tuning._plots import plot_design
+
+        return plot_design(self)
+
+
+def figure_in_words(objective: ObjectiveName, value: float) -> str:
+    """The value of an objective with its name and unit."""
+    return {
+        "abscissa": f"abscissa {value:.5g} 1/s",
+        "damping": f"damping ratio {value:.3g}",
+        "settling_time": f"settling time {value:.4g} s",
+        "overshoot": f"overshoot {value:.3g} %",
+    }[objective]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FilterChoice(ReadOnlyArrays):
+    """How the corner of a filter was chosen; made by `design_filter`.
+
+    Attributes
+    ----------
+    omega : float
+        The corner that was chosen, rad/s.
+    rule : str
+        Why that one.
+    design : Design
+        The design with it.
+    ideal : Design
+        The design without a filter.
+    omegas : ndarray, shape (n,)
+        Corners that were tried, rad/s.
+    values : ndarray, shape (n,)
+        The objective at each, with the best gains for it; NaN where none meet the demands.
+    noise_gains : ndarray, shape (n,)
+        Standard deviation of the command over that of the measurement noise, at each.
+    value, noise_gain : float
+        The same of the chosen one.
+    ideal_noise_gain : float
+        The same without a filter.
+    bandwidth : float
+        Up to where the noise is white, rad/s.
+    noise : float or None
+        Standard deviation of the measurement noise, where it was given.
+    """
+
+    omega: float
+    rule: str
+    design: Design
+    ideal: Design
+    omegas: Vector
+    values: Vector
+    noise_gains: Vector
+    value: float
+    noise_gain: float
+    ideal_noise_gain: float
+    bandwidth: float
+    noise: float | None
+
+    def __repr__(self) -> str:
+        return (
+            f"<FilterChoice {self.omega:.4g} rad/s: "
+            f"{figure_in_words(self.design.objective, self.value)}, noise gain "
+            f"{self.noise_gain:.3g}>"
+        )
+
+    @property
+    def trade(self) -> Trade:
+        """The choice as what was traded."""
+        return Trade("filter", self.omega, self.omega, True, self.ideal.value, self.summary())
+
+    def summary(self) -> str:
+        """The choice in a sentence.
+
+        Returns
+        -------
+        str
+        """
+        name = self.design.objective
+        words = (
+            f"filter at {self.omega:.4g} rad/s, {self.rule}: "
+            f"{figure_in_words(name, self.value)} against "
+            f"{figure_in_words(name, self.ideal.value)} without a filter; the command has "
+            f"{self.noise_gain:.3g} times the noise of the measurement (white to "
+            f"{self.bandwidth:.4g} rad/s) against {self.ideal_noise_gain:.3g}"
+        )
+        if self.noise is not None:
+            words += f", a standard deviation of {self.noise * self.noise_gain:.3g}"
+        return words
+
+    def plot(self) -> Figure:
+        """Draw the trade, the controller with and without the filter, the loop with its margins.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed.
+        """
+        from deadtime.tuning._plots import plot_filter_choice
+
+        return plot_filter_choice(self)

@@ -1,0 +1,314 @@
+"""The best gains for given scenarios: the best cells of the map, made good by a local search.
+
+Every cost here has kinks, where two poles are equally far right or two delays equally bad, and the
+best gains lie on them; simulated ones also jump, where a peak leaves the settling band. So nothing
+is differentiated:
+
+one gain   golden section and parabolas (Brent 1973) between the neighbours of the cell: the cost
+           has one minimum there, kinked or not, if it does not jump;
+more       grids around the best point, each narrower than the one before (a map or a sweep of
+           hundreds of loops costs little more than one), and then, where nothing jumps, the
+           simplices of Nelder and Mead (1965), begun again around what they found, smaller and
+           turned: a simplex that has collapsed on a kink is so freed.
+
+What is simulated is searched for the gains alone first, and in the last grids with gains half a
+percent beside them. There a gain whose axis begins at zero stays a quarter of a cell off it.
+
+Margins are demands, not costs: a shortfall costs many times as much as any gain in the objective,
+and becomes zero where the demands can be met. None of this proves a global minimum: the map sees
+to it, as far as its cells are close enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize, minimize_scalar
+
+from deadtime.tuning._demands import Demands, MarginEstimate
+from deadtime.tuning._objectives import NEVER, Objective
+from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
+
+__all__ = ["Search"]
+
+#: What a whole shortfall of a margin costs, in units of the objective.
+_PENALTY = 50.0
+
+#: Cells whose cost is computed where the map does not hold it, with poles or by simulation.
+_CELLS_BY_POLES = 150
+_CELLS_SIMULATED = 450
+
+#: Cells the local search starts from, fewer where it is dear.
+_STARTS = 3
+_STARTS_SIMULATED = 2
+_MOST_STARTS = 6
+
+#: Gains whose neighbours make them so much dearer than the best cell alone send the search on.
+_MUCH = 1.15
+
+#: Simplices one after the other: how many at most, how much smaller each is, evaluations of each,
+#: to which part of its range a gain is to be known, and which part of the cost is no gain. Where
+#: roots meet, the abscissa has cusps, so that gains known to 1e-7 leave it known to 1e-3.
+_SIMPLICES = 6
+_SMALLER = 0.35
+_EVALUATIONS = 150
+_GAINS_KNOWN = 3e-7
+_IDLE = 1e-4
+
+#: Points along each side of a grid, half its width at first in cells of the map, how many grids
+#: (of what is simulated for the gains alone, and then with their neighbours), how much narrower
+#: each is, and how near to its middle the best point has to be for that.
+_SIDE = {1: 21, 2: 9, 3: 5}
+_REACH = 1.5
+_GRIDS = 3
+_GRIDS_SIMULATED = 8
+_GRIDS_ROUNDED = 4
+_NARROWER = 0.5
+_ARRIVED = 0.5
+
+#: How far beside the best gains alone the best ones with their neighbours are looked for at first,
+#: as a part of them.
+_NEAR = 0.03
+
+#: Every so-manyeth frequency is looked at on the map.
+_COARSE = 3
+
+#: A shortfall of margins that is none.
+_MET = 1e-6
+
+#: What an unstable loop falls short by: more than every margin together.
+_UNSTABLE = 3.0
+
+#: Costs of rows of gains in scenarios.
+Judge: TypeAlias = Callable[[Problem, Vector, Sequence[Scenario]], Vector]
+
+Pair: TypeAlias = tuple[Vector, Vector]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Everything a search for the best gains needs."""
+
+    problem: Problem
+    objective: Objective
+    survey: Survey
+    estimate: MarginEstimate
+
+    def globally(self, scenarios: Sequence[Scenario], demands: Demands) -> Vector:
+        """The best gains, from the map."""
+        points, stable = self.survey.points, np.flatnonzero(self.survey.stable)
+        costs = np.full(len(points), np.inf)
+        short = np.zeros(len(stable))
+        if demands.asked:
+            short = demands.shortfall(self.estimate.of(points[stable], scenarios, _COARSE))
+        met = stable[short <= _MET]
+        if met.size:
+            costs[met] = self._map_costs(met, scenarios)
+            if self.objective.simulated:
+                return self._firmest(points, costs, scenarios, demands)
+            starts = self.survey.chosen(points, costs, _STARTS)
+        else:
+            # Perhaps the demands are met between the cells.
+            costs[stable] = short
+            starts = self.survey.chosen(points, costs, 1)
+        found = [self._by_grids(start, scenarios, demands) for start in starts]
+        best = min(found, key=lambda one: self._total(one[0], scenarios, demands))
+        return self._polished(*best, scenarios, demands)
+
+    def _firmest(
+        self, points: Vector, costs: Vector, scenarios: Sequence[Scenario], demands: Demands
+    ) -> Vector:
+        """The best gains with their neighbours, from more starts where those lose much by them."""
+        for axes in self.survey.fringes:
+            points = np.vstack([points, grid_points(axes)])
+            found = self._totals(axes, scenarios, demands, self.objective.coarse)
+            costs = np.append(costs, found)
+        starts = self.survey.chosen(points, costs, _MOST_STARTS)
+        best, least = starts[0], np.inf
+        for i, start in enumerate(starts):
+            if i >= _STARTS_SIMULATED and least <= _MUCH * costs.min():
+                break
+            gains = self._by_grids(start, scenarios, demands)[0]
+            cost = self._total(gains, scenarios, demands)
+            if cost < least:
+                best, least = gains, cost
+        return np.asarray(best, dtype=np.float64)
+
+    def locally(self, start: Vector, scenarios: Sequence[Scenario], demands: Demands) -> Vector:
+        """The best gains around some."""
+        return self._polished(*self._by_grids(start, scenarios, demands), scenarios, demands)
+
+    def _by_grids(
+        self, start: Vector, scenarios: Sequence[Scenario], demands: Demands
+    ) -> tuple[Vector, Vector]:
+        """A better point, and how far around it a better one may still be."""
+        reach = _REACH * self.survey.spacing
+        low, high = np.array(self.survey.bounds).T
+
+        def narrowed(judge: Judge, around: Vector, reach: Vector, grids: int) -> Pair:
+            def costs(axes: list[Vector]) -> Vector:
+                return self._totals(axes, scenarios, demands, judge)
+
+            return _by_grids(costs, around, reach, low, high, grids)
+
+        if self.objective.simulated:
+            # Neighbours count many times as much as the gains themselves, and decide little.
+            low, high = self.survey.off_zero(start)
+            start, _ = narrowed(self.objective.coarse, start, reach, _GRIDS_SIMULATED)
+            reach = np.array(
+                [min(_NEAR * abs(one), side) for one, side in zip(start, reach, strict=True)]
+            )
+            return narrowed(self.objective.costs, start, reach, _GRIDS_ROUNDED)
+        if len(start) == 1 or self.objective.name == "damping":
+            return start, reach
+        return narrowed(self.objective.costs, start, reach, _GRIDS)
+
+    def _polished(
+        self, start: Vector, reach: Vector, scenarios: Sequence[Scenario], demands: Demands
+    ) -> Vector:
+        """The best point within reach, where costs are continuous."""
+        low, high = np.array(self.survey.bounds).T
+
+        def cost(gains: Vector) -> float:
+            return self._total(gains, scenarios, demands)
+
+        if self.objective.simulated:
+            return start
+        if len(start) == 1:
+            return _between_neighbours(cost, start, reach, low, high)
+        return _by_simplices(cost, start, 0.5 * reach, low, high)
+
+    def short(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:
+        """By how much gains fall short of the demands, by the estimate."""
+        return float(demands.shortfall(self.estimate.of(gains[None, :], scenarios))[0])
+
+    def _total(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:
+        """Cost of gains, shortfalls of margins included."""
+        cost = self.objective.worst(self.problem, gains, scenarios)
+        if not demands.asked:
+            return cost
+        # An unstable loop has crossings, which are no margins.
+        stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
+        short = self.short(gains, scenarios, demands) if stable else _UNSTABLE
+        return cost + _PENALTY * self._scale * short
+
+    def _totals(
+        self,
+        axes: list[Vector],
+        scenarios: Sequence[Scenario],
+        demands: Demands,
+        judge: Judge,
+    ) -> Vector:
+        """The same of every point of a grid."""
+        points = grid_points(axes)
+        late = worst_abscissa(self.problem, axes, scenarios).ravel()
+        stable = np.isfinite(late)
+        short = np.where(stable, 0.0, _UNSTABLE)
+        if demands.asked and stable.any():
+            estimated = self.estimate.of(points[stable], scenarios, _COARSE)
+            short[stable] = demands.shortfall(estimated)
+        if self.objective.name == "abscissa":
+            costs = np.where(stable, late, 0.0)
+            return np.asarray(costs + _PENALTY * self._scale * short)
+        # Only what may be taken is simulated.
+        costs = NEVER * (1.0 + short)
+        good = short <= _MET
+        if good.any():
+            found = judge(self.problem, points[good], scenarios)
+            costs[good] = found.max(axis=1)
+        return costs
+
+    @property
+    def _scale(self) -> float:
+        """The size of the objective."""
+        if self.objective.name == "abscissa":
+            return abs(float(self.survey.abscissa.min()))
+        return 1.0
+
+    def _map_costs(self, cells: NDArray[np.intp], scenarios: Sequence[Scenario]) -> Vector:
+        """Costs of cells of the map; of some of them, infinite for the others, where dear."""
+        abscissa = self.survey.abscissa.ravel()[cells]
+        if self.objective.name == "abscissa":
+            return np.asarray(abscissa)
+        most = _CELLS_SIMULATED if self.objective.simulated else _CELLS_BY_POLES
+        # A third of them the most stable ones, the others thinly.
+        order = np.argsort(abscissa, kind="stable")
+        rest = order[most // 3 :]
+        taken = np.append(order[: most // 3], rest[:: max(1, -(-rest.size * 3 // (2 * most)))])
+        costs = np.full(len(cells), np.inf)
+        points = self.survey.points[cells[taken]]
+        costs[taken] = self.objective.coarse(self.problem, points, scenarios).max(axis=1)
+        return costs
+
+
+def _between_neighbours(
+    cost: Callable[[Vector], float], start: Vector, reach: Vector, low: Vector, high: Vector
+) -> Vector:
+    ends = (float(max(start[0] - reach[0], low[0])), float(min(start[0] + reach[0], high[0])))
+    found = minimize_scalar(
+        lambda gain: cost(np.array([gain])),
+        bounds=ends,
+        method="bounded",
+        options={"xatol": 1e-9 * (high[0] - low[0]), "maxiter": 200},
+    )
+    return np.array([found.x]) if found.fun <= cost(start) else start
+
+
+def _by_grids(
+    costs: Callable[[list[Vector]], Vector],
+    start: Vector,
+    reach: Vector,
+    low: Vector,
+    high: Vector,
+    grids: int,
+) -> tuple[Vector, Vector]:
+    """The best point, and half the width of the next grid."""
+    best, least = start, np.inf
+    offsets = np.linspace(-1.0, 1.0, _SIDE[len(start)])
+    for _ in range(grids):
+        axes = [
+            np.unique(np.clip(middle + offsets * side, first, last))
+            for middle, side, first, last in zip(best, reach, low, high, strict=True)
+        ]
+        found = costs(axes)
+        place = int(np.argmin(found))
+        moved = grid_points(axes)[place] - best
+        if found[place] < least:
+            best, least = best + moved, float(found[place])
+        # Along a kink the best point walks: the grid narrows where it has arrived.
+        if np.all(np.abs(moved) <= _ARRIVED * reach):
+            reach = _NARROWER * reach
+    return best, reach
+
+
+def _by_simplices(
+    cost: Callable[[Vector], float], start: Vector, size: Vector, low: Vector, high: Vector
+) -> Vector:
+    best, least, turn, idle = start, cost(start), 1.0, 0
+    for _ in range(_SIMPLICES):
+        corners = best + np.vstack([np.zeros(len(best)), turn * np.diag(size)])
+        found = minimize(
+            cost,
+            best,
+            method="Nelder-Mead",
+            bounds=list(zip(low, high, strict=True)),
+            options={
+                "initial_simplex": np.clip(corners, low, high),
+                "xatol": _GAINS_KNOWN * float((high - low).min()),
+                "fatol": np.inf,
+                "maxfev": _EVALUATIONS,
+            },
+        )
+        gained = least - float(found.fun)
+        if gained > 0.0:
+            best, least = np.asarray(found.x, dtype=np.float64), float(found.fun)
+        idle = idle + 1 if gained < _IDLE * abs(least) else 0
+        if idle == 2:
+            break
+        size, turn = _SMALLER * size, -turn
+    return best

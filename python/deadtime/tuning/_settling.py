@@ -1,0 +1,51 @@
+"""The settling time of one step, with a proof that the output stays in the band for ever after."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from deadtime.loops import ControlLoop, sweep
+from deadtime.tuning._tail import tail_bound
+
+__all__ = ["BAND", "ProvedStep", "proved_step"]
+
+#: Half width of the band, as a part of the step.
+BAND = 0.02
+
+#: What may still happen after the simulated time, as a part of the step: half of the overshoot
+#: that counts as none.
+_STILL = 5e-4
+
+#: How often the time is doubled for that.
+_DOUBLINGS = 6
+
+
+class ProvedStep(NamedTuple):
+    """Figures of a step for all times."""
+
+    settling_time: float
+    """s."""
+    overshoot: float
+    """%, to 0.05."""
+
+
+def proved_step(loop: ControlLoop, amplitude: float) -> ProvedStep | None:
+    """Simulate a step until its tail is proved to stay at rest; None where that fails."""
+    if not loop.plant.is_rational:
+        return None
+    late = {"delay": loop.specification.known_delay}
+    found = sweep(loop, late, amplitude=amplitude, settling=BAND)
+    rest, end = loop.specification.steady_state(amplitude), float(found.time[-1])
+    if rest is None or not np.isfinite(found["settling_time"]):
+        return None
+    for _ in range(_DOUBLINGS):
+        if tail_bound(loop, amplitude, end) <= _STILL * abs(rest):
+            break
+        end *= 2.0
+    else:
+        return None
+    found = sweep(loop, late, end, amplitude=amplitude, settling=BAND)
+    settled = float(found["settling_time"])
+    return ProvedStep(settled, float(found["overshoot"])) if np.isfinite(settled) else None

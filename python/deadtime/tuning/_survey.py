@@ -1,0 +1,190 @@
+"""The map that a search begins from: which gains are stable in every scenario, and how much."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.stability import StabilityMap, stability_map
+from deadtime.tuning._problem import Problem, Scenario, Vector
+
+__all__ = ["Survey", "charts_at", "grid_points", "surveyed", "worst_abscissa"]
+
+#: Points along each free gain, for one, two and three of them.
+_SHAPES = {1: (401,), 2: (61, 61), 3: (21, 21, 9)}
+
+#: A chart over one gain has the delay as its second axis: so many values, this far beyond its ends.
+_CHART_DELAYS = 41
+_BEYOND = 0.5
+
+#: Between zero and the first cell of a gain, at these parts of it, and for so many values of each
+#: of the other gains: an integral so small makes steps that no cell shows. Smaller ones are as good
+#: as none, and their loops take hundreds of settling times to come to rest.
+_FRINGE = np.array([0.5, 0.25])
+_FRINGE_SIDES = {1: 1, 2: 31, 3: 7}
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Gains on a grid, and their worst abscissa over the corners of what is not known.
+
+    Attributes
+    ----------
+    axes : tuple of ndarray
+        Values of each free gain.
+    abscissa : ndarray, shape of the grid
+        Worst spectral abscissa, 1/s; inf where a scenario is not stable.
+    """
+
+    axes: tuple[Vector, ...]
+    abscissa: Vector
+
+    @property
+    def points(self) -> Vector:
+        """Every point of the grid, one a row."""
+        return grid_points(self.axes)
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Points that are stable in every scenario, those with gains of zero left out."""
+        found = np.isfinite(self.abscissa.ravel()) & np.any(self.points != 0.0, axis=1)
+        return np.asarray(found)
+
+    @property
+    def fringes(self) -> list[list[Vector]]:
+        """Grids with one gain between zero and its first cell, where an axis begins at zero."""
+        found = []
+        sides = _FRINGE_SIDES[len(self.axes)]
+        for i, (axis, side) in enumerate(zip(self.axes, self.spacing, strict=True)):
+            if axis[0] * axis[-1] == 0.0:
+                grid = [other[:: -(-len(other) // sides)] for other in self.axes]
+                grid[i] = np.sort(np.sign(axis[0] + axis[-1]) * side * _FRINGE)
+                found.append(grid)
+        return found
+
+    def off_zero(self, start: Vector) -> Vector:
+        """Lower and upper bounds of a search by simulation, rows: gains stay off zero."""
+        bounds = np.array(self.bounds).T
+        off = _FRINGE.min() * self.spacing
+        away = (bounds == 0.0) & (start != 0.0)
+        return np.asarray(np.where(away, np.array([off, -off]), bounds))
+
+    @property
+    def spacing(self) -> Vector:
+        return np.array([(axis[-1] - axis[0]) / (len(axis) - 1) for axis in self.axes])
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        return [(float(axis[0]), float(axis[-1])) for axis in self.axes]
+
+    def chosen(self, points: Vector, costs: Vector, most: int) -> Vector:
+        """The points with the least finite costs that are no neighbours of one another."""
+        found: list[Vector] = []
+        for place in np.argsort(costs, kind="stable"):
+            if not np.isfinite(costs[place]) or len(found) == most:
+                break
+            far = [np.any(np.abs(points[place] - one) > 3.5 * self.spacing) for one in found]
+            if all(far):
+                found.append(points[place])
+        return np.array(found)
+
+
+def grid_points(axes: Sequence[Vector]) -> Vector:
+    """Every point of a grid, one a row."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+
+def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
+    """Map the free gains of a problem in each of its corners."""
+    free = problem.free
+    counts = _SHAPES[len(free)] if shape is None else tuple(shape)
+    if len(counts) != len(free) or min(counts) < 2:
+        raise ValueError(
+            f"shape={counts}: give {len(free)} numbers of points, 2 or more, for {', '.join(free)}"
+        )
+    for spans in problem.spans:
+        axes = tuple(
+            np.linspace(*spans[name], count) for name, count in zip(free, counts, strict=True)
+        )
+        survey = Survey(axes, worst_abscissa(problem, axes, problem.corners))
+        if survey.stable.any():
+            return survey
+    tried = ", nor in ".join(
+        " and ".join(f"{name} from {low:.4g} to {high:.4g}" for name, (low, high) in spans.items())
+        for spans in problem.spans
+    )
+    late = " or ".join(f"{delay:g}" for delay in problem.delays)
+    raise ValueError(
+        f"no gains of {'x'.join(map(str, counts))} tried in {tried} are stable for a delay of "
+        f"{late} s, which proves nothing about the others: give other ranges="
+    )
+
+
+def worst_abscissa(
+    problem: Problem, axes: Sequence[Vector], scenarios: Sequence[Scenario]
+) -> Vector:
+    """Worst spectral abscissa on a grid of the free gains, infinite where one is not stable.
+
+    Maps are much cheaper than loops one by one: they follow the roots from cell to cell.
+    """
+    free = problem.free
+    worst = np.full([len(axis) for axis in axes], -np.inf)
+    if len(free) == 1:
+        # The delays of all scenarios are columns of one map.
+        for rest, delays in _by_the_rest(scenarios).items():
+            chart = _mapped(problem, dict(rest), {free[0]: axes[0], "delay": np.unique(delays)})
+            worst = np.maximum(worst, _judged(chart).max(axis=1))
+        return worst
+    plane = dict(zip(free[:2], axes[:2], strict=True))
+    for layer in itertools.product(*(range(len(axis)) for axis in axes[2:])):
+        held = {
+            name: float(axis[i]) for name, axis, i in zip(free[2:], axes[2:], layer, strict=True)
+        }
+        place: Any = (..., *layer)
+        for one in scenarios:
+            worst[place] = np.maximum(worst[place], _judged(_mapped(problem, one | held, plane)))
+    return worst
+
+
+def charts_at(problem: Problem, survey: Survey, gains: Vector) -> tuple[StabilityMap, ...]:
+    """Maps to look at: over two gains, one for each delay; over one gain and the delay, one.
+
+    A third gain has the value that was found, the gain of the plant its middle.
+    """
+    free, middle = problem.free, problem.middle
+    if len(free) == 1:
+        low, high = problem.intervals["delay"]
+        top = (1.0 + _BEYOND) * high or problem.loop.sample_time or 1.0  # a chart has a height
+        wide = np.linspace((1.0 - _BEYOND) * low, top, _CHART_DELAYS)
+        delays = np.unique(np.append(wide, problem.delays))
+        return (_mapped(problem, middle, {free[0]: survey.axes[0], "delay": delays}),)
+    held = problem.named(gains)
+    axes = {name: survey.axes[i] for i, name in enumerate(free[:2])}
+    held = {name: held[name] for name in free[2:]}
+    return tuple(_mapped(problem, middle | {"delay": late} | held, axes) for late in problem.delays)
+
+
+def _by_the_rest(
+    scenarios: Sequence[Scenario],
+) -> dict[tuple[tuple[str, float], ...], list[float]]:
+    """Delays of the scenarios that agree in everything else."""
+    found: dict[tuple[tuple[str, float], ...], list[float]] = {}
+    for one in scenarios:
+        rest = tuple((name, value) for name, value in one.items() if name != "delay")
+        found.setdefault(rest, []).append(one["delay"])
+    return found
+
+
+def _mapped(problem: Problem, numbers: dict[str, float], axes: dict[str, Vector]) -> StabilityMap:
+    held = {name: value for name, value in numbers.items() if name not in axes}
+    return stability_map(problem.loop.replace(**held), axes, threads=problem.threads)
+
+
+def _judged(chart: StabilityMap) -> Vector:
+    """Abscissa where a cell is stable, else infinite."""
+    return np.where(chart.stable, chart.abscissa, np.inf)

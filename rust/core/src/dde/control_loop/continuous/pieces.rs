@@ -1,0 +1,182 @@
+//! The delayed command as a queue of pieces, and the order of the breaks between them.
+//!
+//! Every break returns one delay later, one order smoother (in a neutral loop, with the same
+//! order), so that the number of pieces in one delay grows with every jump. Two neighbours whose
+//! polynomials are the same function to rounding are merged into one piece, so that a break that
+//! has become smaller than rounding errors costs nothing.
+
+use std::collections::VecDeque;
+
+use crate::Error;
+use crate::dde::limits::slack;
+use crate::dde::scalar::{Scalar, is_reached, part_ways};
+use crate::memory::push_back;
+
+use crate::dde::control_loop::series::Series;
+
+/// Upper limit on the pieces in the queue (bounds memory and time).
+const MOST_PIECES: usize = 1_000_000;
+
+/// The lowest derivative that jumps at a breaking point; [`SMOOTH`] where none does.
+pub(super) type Order = u8;
+
+/// No break.
+pub(super) const SMOOTH: Order = u8::MAX;
+
+/// Highest order of a break that is reported; breaks of higher order are too small to be seen in a
+/// plot or a fit.
+pub(super) const REPORTED: Order = 10;
+
+/// Two polynomials are merged if the sum of the differences of their coefficients is below this
+/// share of the largest one.
+const SAME: f64 = 4.0 * f64::EPSILON;
+
+/// The same for slopes, which have rounding errors of products with values. Slopes are derivatives
+/// with respect to a parameter in units of its own size, so that both are comparable.
+const SAME_SLOPE: f64 = 256.0 * f64::EPSILON;
+
+/// Factor by which the recorded longest length shrinks with each piece.
+const FORGET: f64 = 0.998;
+
+/// w(t) = series((t − origin)/scale) from `start` to `end`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece<S = f64> {
+    pub(super) start: S,
+    pub(super) end: S,
+    pub(super) origin: S,
+    pub(super) scale: S,
+    pub(super) series: Series<S>,
+    /// Order of the break at the start of the piece.
+    pub(super) order: Order,
+}
+
+impl<S: Scalar> Piece<S> {
+    pub(super) fn constant(value: S, end: S) -> Self {
+        Self {
+            start: S::default(),
+            end,
+            origin: S::default(),
+            scale: S::from(1.0),
+            series: Series::constant(value),
+            order: SMOOTH,
+        }
+    }
+
+    /// w over [t, t + h] as a polynomial in σ ∈ [0, 1].
+    pub(super) fn local(&self, t: S, h: S) -> Series<S> {
+        if self.series.degree == 0 {
+            return self.series;
+        }
+        let offset = (t - self.origin) / self.scale;
+        let offset = if offset.value().abs() <= f64::EPSILON {
+            offset.pinned(0.0)
+        } else {
+            offset
+        };
+        self.series.shifted(offset, h / self.scale)
+    }
+
+    /// Is the other piece a continuation of this one?
+    fn continues_as(&self, other: &Self) -> bool {
+        let length = other.end - other.start;
+        let mine = self.local(other.start, length);
+        let theirs = other.local(other.start, length);
+        let (mut difference, mut largest) = (0.0, 0.0_f64);
+        let (mut apart, mut steepest) = (0.0, 0.0_f64);
+        for (&mine, &theirs) in mine.coefficients.iter().zip(&theirs.coefficients) {
+            difference += (mine - theirs).value().abs();
+            largest = largest.max(theirs.value().abs());
+            apart += (mine - theirs).slope().abs();
+            steepest = steepest.max(theirs.slope().abs());
+        }
+        difference <= SAME * largest && apart <= SAME_SLOPE * (steepest + largest)
+    }
+}
+
+/// The remaining pieces in order; never empty.
+#[derive(Debug)]
+pub(super) struct Pieces<S = f64> {
+    front: Piece<S>,
+    rest: VecDeque<Piece<S>>,
+    end: S,
+    delay: S,
+    /// Length of the longest of the latest pieces. Two pieces that are longer together are not
+    /// merged, because they would be cut again.
+    longest: f64,
+    /// Order of a break inside a piece too short to be stored.
+    dropped: Order,
+}
+
+impl<S: Scalar> Pieces<S> {
+    /// The constant `command` until the first command of the run arrives.
+    pub(super) fn new(command: S, delay: S) -> Self {
+        Self {
+            front: Piece::constant(command, delay),
+            rest: VecDeque::new(),
+            end: delay,
+            delay,
+            longest: 0.0,
+            dropped: SMOOTH,
+        }
+    }
+
+    pub(super) fn front(&self) -> &Piece<S> {
+        &self.front
+    }
+
+    /// Remove what ends at `t`; returns the order of the break that is passed.
+    pub(super) fn reach(&mut self, t: S) -> Order {
+        let mut order = SMOOTH;
+        while is_reached(self.front.end, t, slack(t, self.delay)) {
+            let Some(next) = self.rest.pop_front() else {
+                break;
+            };
+            self.front = next;
+            order = order.min(next.order);
+        }
+        order
+    }
+
+    /// Append a piece. A piece shorter than rounding errors is given to its neighbour, and equal
+    /// constants are merged.
+    pub(super) fn push(&mut self, mut piece: Piece<S>) -> Result<(), Error> {
+        self.longest = (FORGET * self.longest).max((piece.end - piece.start).value());
+        piece.order = piece.order.min(self.dropped);
+        let is_dust = (piece.end - self.end).value() <= slack(piece.end, self.delay)
+            && !part_ways(piece.end, self.end);
+        let last = self.rest.back_mut().unwrap_or(&mut self.front);
+        let is_same = last.series.degree == 0 && last.series == piece.series;
+        self.end = piece.end;
+        if is_dust {
+            self.dropped = piece.order;
+            last.end = piece.end;
+            return Ok(());
+        }
+        self.dropped = SMOOTH;
+        let is_faded = piece.order > REPORTED && (piece.end - last.start).value() <= self.longest;
+        if is_same || (is_faded && last.continues_as(&piece)) {
+            last.end = piece.end;
+            return Ok(());
+        }
+        if is_faded && piece.continues_as(last) {
+            *last = Piece {
+                start: last.start,
+                order: last.order,
+                ..piece
+            };
+            return Ok(());
+        }
+        if self.rest.len() >= MOST_PIECES {
+            return Err(Error::TooMuch {
+                what: "the continuous response",
+                limit: MOST_PIECES as u64,
+                unit: "pieces of the command in one delay",
+                advice:
+                    "shorten the time simulated or the list of reference jumps, and set a lag of \
+                         almost nothing to zero"
+                        .to_owned(),
+            });
+        }
+        push_back("the command in one delay", &mut self.rest, piece)
+    }
+}

@@ -1,0 +1,28 @@
+//! The response, with or without a delay.
+
+use super::effort::{MOST_ELEMENTS, endless};
+use super::{delayed, direct};
+use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
+use crate::dde::control_loop::reference::Reference;
+use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
+use crate::dde::scalar::Scalar;
+use crate::{Error, Task};
+
+pub(crate) fn run<S: Scalar>(
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
+    reference: &Reference,
+    requested: RequestedOutput<'_, S>,
+    task: &Task,
+) -> Result<Trajectory<S>, Error> {
+    if plant.delay().value() > 0.0 {
+        // No element is longer than the delay, so that a run that would exceed the limit on
+        // elements is refused before it starts.
+        if requested.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
+            return Err(endless());
+        }
+        delayed::run(plant, start, reference, requested, task)
+    } else {
+        direct::run(plant, start, reference, requested, task)
+    }
+}

@@ -1,0 +1,204 @@
+//! Where a polynomial on [0, 1] lies within ±limit, and where beyond.
+//!
+//! The zeros of p ∓ limit are isolated in the Bernstein basis: the number of sign changes of the
+//! coefficients bounds the number of zeros and equals it when it is 0 or 1 (Descartes' rule), so an
+//! interval with more is halved (de Casteljau) and one with a single change is bisected to the last
+//! bit. No crossing is missed. A contact that leaves the limit for less than 2⁻⁴⁰ of the interval
+//! is no crossing, and neither are rounding errors around the limit. Crossings are those of the
+//! values and have no slope: the limited command is continuous there, so that a shift of a crossing
+//! changes the response in second order only.
+
+use crate::dde::scalar::Scalar;
+
+use crate::dde::control_loop::level_crossings::{crossings, value_at};
+use crate::dde::control_loop::series::Series;
+
+/// Where the command is relative to its limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// |u| ≤ limit.
+    Free,
+    /// u > limit.
+    High,
+    /// u < −limit.
+    Low,
+}
+
+impl Mode {
+    pub(super) fn of(u: f64, limit: f64) -> Self {
+        if u > limit {
+            Self::High
+        } else if u < -limit {
+            Self::Low
+        } else {
+            Self::Free
+        }
+    }
+}
+
+/// An interval of [0, 1] in one mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stretch {
+    pub(super) mode: Mode,
+    pub(super) start: f64,
+    pub(super) end: f64,
+}
+
+/// The intervals of `u` on [0, 1], in order; neighbours differ in mode.
+pub(super) fn stretches<S: Scalar>(u: &Series<S>, limit: f64, out: &mut Vec<Stretch>) {
+    out.clear();
+    let whole = |mode| Stretch {
+        mode,
+        start: 0.0,
+        end: 1.0,
+    };
+    let (mut low, mut high) = (u.coefficients[0].value(), u.coefficients[0].value());
+    for c in u.terms()[1..].iter().map(|c| c.value()) {
+        if c > 0.0 {
+            high += c;
+        } else {
+            low += c;
+        }
+    }
+    if high <= limit && low >= -limit {
+        return out.push(whole(Mode::Free));
+    }
+    if low > limit {
+        return out.push(whole(Mode::High));
+    }
+    if high < -limit {
+        return out.push(whole(Mode::Low));
+    }
+    let mut zeros = Vec::new();
+    crossings(u, limit, &mut zeros);
+    crossings(u, -limit, &mut zeros);
+    zeros.sort_by(f64::total_cmp);
+    zeros.push(1.0);
+    let mut start = 0.0;
+    for end in zeros {
+        if end <= start {
+            continue;
+        }
+        let mode = Mode::of(value_at(u, 0.5 * (start + end)), limit);
+        match out.last_mut() {
+            Some(last) if last.mode == mode => last.end = end,
+            _ => out.push(Stretch { mode, start, end }),
+        }
+        start = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn series(coefficients: &[f64]) -> Series {
+        let mut out = Series::constant(0.0);
+        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
+        out.degree = coefficients.len() - 1;
+        out
+    }
+
+    /// Π (σ − root).
+    fn with_roots(roots: &[f64]) -> Series {
+        let mut out = vec![1.0];
+        for root in roots {
+            out.push(0.0);
+            for i in (0..out.len()).rev() {
+                out[i] = if i > 0 { out[i - 1] } else { 0.0 } - root * out[i];
+            }
+        }
+        series(&out)
+    }
+
+    fn found(u: &Series, limit: f64) -> Vec<Stretch> {
+        let mut out = Vec::new();
+        stretches(u, limit, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_line_through_both_limits_is_cut_at_both() {
+        let modes = found(&series(&[-4.0, 8.0]), 1.0);
+        let expected = [
+            (Mode::Low, 0.0, 0.375),
+            (Mode::Free, 0.375, 0.625),
+            (Mode::High, 0.625, 1.0),
+        ];
+        assert_eq!(modes.len(), 3);
+        for (stretch, (mode, start, end)) in modes.iter().zip(expected) {
+            assert_eq!(stretch.mode, mode);
+            assert!((stretch.start - start).abs() < 1e-16 && (stretch.end - end).abs() < 1e-16);
+        }
+    }
+
+    #[test]
+    fn touching_the_limit_is_no_crossing() {
+        // 1 − (σ − 1/3)², up to rounding.
+        let modes = found(&series(&[1.0 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        assert!(
+            modes
+                .iter()
+                .all(|stretch| stretch.mode == Mode::Free || stretch.end - stretch.start < 1e-7)
+        );
+    }
+
+    #[test]
+    fn a_peak_just_over_the_limit_is_found() {
+        // 1 + 1e-12 − (σ − 1/3)² is over the limit for 2e-6 around 1/3.
+        let modes = found(&series(&[1.0 + 1e-12 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        assert_eq!(modes.len(), 3);
+        assert!((modes[1].end - modes[1].start - 2e-6).abs() < 1e-9);
+    }
+
+    #[test]
+    fn standing_on_the_limit_is_free() {
+        assert_eq!(found(&series(&[1.0]), 1.0).len(), 1);
+        assert_eq!(found(&series(&[1.0, 1e-17, -1e-17]), 1.0).len(), 1);
+        assert_eq!(found(&series(&[1.0, -0.5]), 1.0)[0].mode, Mode::Free);
+    }
+
+    proptest! {
+        /// Every root at some distance from its neighbours is found, to its conditioning.
+        #[test]
+        fn all_roots_are_cuts(mut roots in prop::collection::vec(0.0_f64..1.0, 1..9)) {
+            roots.sort_by(f64::total_cmp);
+            prop_assume!(roots.windows(2).all(|pair| pair[1] - pair[0] > 0.02));
+            prop_assume!(roots[0] > 1e-3 && roots[roots.len() - 1] < 0.999);
+            let u = with_roots(&roots);
+            let mut shifted = u;
+            shifted.coefficients[0] += 1e3;
+            let modes = found(&shifted, 1e3);
+            prop_assert_eq!(modes.len(), roots.len() + 1);
+            for (stretch, root) in modes[1..].iter().zip(&roots) {
+                let slope: f64 = roots
+                    .iter()
+                    .filter(|other| *other != root)
+                    .map(|other| (root - other).abs())
+                    .product();
+                // The rounding error of the shift by 1000 over the slope at the root.
+                prop_assert!((stretch.start - root).abs() < 1e-11 / slope);
+            }
+        }
+
+        /// On either side of every crossing the mode is that of the polynomial.
+        #[test]
+        fn modes_are_those_of_the_values(
+            coefficients in prop::collection::vec(-3.0..3.0, 1..12),
+            sigmas in prop::collection::vec(0.0_f64..1.0, 40),
+        ) {
+            let u = series(&coefficients);
+            let modes = found(&u, 1.0);
+            prop_assert_eq!(modes[0].start, 0.0);
+            prop_assert_eq!(modes[modes.len() - 1].end, 1.0);
+            prop_assert!(modes.windows(2).all(|p| p[0].end == p[1].start && p[0].mode != p[1].mode));
+            for sigma in sigmas {
+                let value = u.at(sigma);
+                prop_assume!((value.abs() - 1.0).abs() > 1e-9);
+                let here = modes.iter().find(|m| sigma <= m.end).map(|m| m.mode);
+                prop_assert_eq!(here, Some(Mode::of(value, 1.0)));
+            }
+        }
+    }
+}

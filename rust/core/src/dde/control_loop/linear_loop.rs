@@ -1,0 +1,226 @@
+//! The linear loop with one delay, an optional limit and an optional hold.
+//!
+//!   x′ = A x + B w + E r,   u = K x + L w + M r,   y = C x + D w,   w(t) = sat(u(t − Td)).
+//!
+//! x holds the states of plant and controller, u is the command, w the command that reaches the
+//! plant, r the reference, y the output. L = 0 is the retarded loop; L ≠ 0 (an ideal derivative of
+//! y, or direct feedthrough) the neutral one, whose jumps do not become smoother. With a sample
+//! time Ts the command is u_k = sat(K x(t_k) + L w(t_k−) + M r(t_k)) and w = u_k on [t_k + Td,
+//! t_{k+1} + Td); controller states see the reference held in the same way. An ideal derivative of
+//! r is zero except for an impulse at each jump of r, which arrives at the plant like the rest of
+//! the command and, where L ≠ 0, returns with weight L. Time counts from the start of the run;
+//! every signal is scalar, x has any length.
+
+use super::reference::finite;
+use crate::Error;
+use crate::dde::scalar::Scalar;
+
+/// The matrices of the loop, row-major; n is the length of `b`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Equations<S = f64> {
+    /// State matrix A, n × n.
+    pub a: Vec<S>,
+    /// Input column B, n.
+    pub b: Vec<S>,
+    /// Reference column E, n.
+    pub e: Vec<S>,
+    /// Feedback row K, n.
+    pub k: Vec<S>,
+    /// Feedback L of the delayed command.
+    pub l: S,
+    /// Gain M of the reference.
+    pub m: S,
+    /// Output row C, n.
+    pub c: Vec<S>,
+    /// Feedthrough D.
+    pub d: S,
+    /// Weight of the impulse in u per unit jump of the reference: the gain of an ideal derivative
+    /// of r. A limited or sampled command has none.
+    pub impulse: S,
+}
+
+impl<S: Scalar> Equations<S> {
+    /// Number of states.
+    pub fn states(&self) -> usize {
+        self.b.len()
+    }
+
+    /// u before the limit.
+    pub(crate) fn command(&self, x: &[S], w: S, r: f64) -> S {
+        dot(&self.k, x) + self.l * w + self.m * S::from(r)
+    }
+
+    /// y.
+    pub(crate) fn output(&self, x: &[S], w: S) -> S {
+        dot(&self.c, x) + self.d * w
+    }
+}
+
+/// Change of the states at a sample, after the command is computed: x becomes J x + G w + H r.
+///
+/// The states of a controller that runs in samples, such as a discretised filter, change in this
+/// way and are constant in between; the rows of J of all other states are those of the identity.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Update {
+    /// J, n × n.
+    pub states: Vec<f64>,
+    /// G, n.
+    pub command: Vec<f64>,
+    /// H, n.
+    pub reference: Vec<f64>,
+}
+
+/// A validated loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearLoop<S = f64> {
+    equations: Equations<S>,
+    delay: S,
+    sample_time: Option<S>,
+    limit: Option<S>,
+    update: Option<Update>,
+}
+
+/// Initial values of a run, at time 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Start<S = f64> {
+    /// x(0), n.
+    pub state: Vec<S>,
+    /// The command before time 0, constant.
+    pub command: S,
+    /// Sampled loops: commands issued at the samples before time 0, latest last; `command`
+    /// stands for all earlier ones.
+    pub command_history: Vec<f64>,
+    /// Sampled loops: time of the first sample, in [0, Ts).
+    pub sample_phase: f64,
+}
+
+impl<S: Scalar> LinearLoop<S> {
+    /// Check the arguments.
+    pub fn new(
+        equations: Equations<S>,
+        delay: S,
+        sample_time: Option<S>,
+        limit: Option<S>,
+    ) -> Result<Self, Error> {
+        let n = equations.states();
+        let lengths = [
+            ("A", equations.a.len(), n * n),
+            ("E", equations.e.len(), n),
+            ("K", equations.k.len(), n),
+            ("C", equations.c.len(), n),
+        ];
+        for (name, found, wanted) in lengths {
+            if found != wanted {
+                return Err(Error::argument(format!(
+                    "{name} has {found} elements, {wanted} are needed for {n} states"
+                )));
+            }
+        }
+        finite("A", &equations.a)?;
+        finite("B", &equations.b)?;
+        finite("E", &equations.e)?;
+        finite("K", &equations.k)?;
+        finite("C", &equations.c)?;
+        finite(
+            "L, M, D, impulse",
+            &[equations.l, equations.m, equations.d, equations.impulse],
+        )?;
+        if !(delay.is_finite() && delay.value() >= 0.0) {
+            return Err(Error::argument(format!(
+                "delay={}: give a finite number of seconds, zero or more",
+                delay.value()
+            )));
+        }
+        if let Some(ts) = sample_time
+            && !(ts.is_finite() && ts.value() > 0.0)
+        {
+            return Err(Error::argument(format!(
+                "sample_time={}: give a positive number of seconds, or none for continuous time",
+                ts.value()
+            )));
+        }
+        if let Some(limit) = limit
+            && (limit.value().is_nan() || limit.value() <= 0.0)
+        {
+            return Err(Error::argument(format!(
+                "limit={}: give a positive bound of the command, or none for no limit",
+                limit.value()
+            )));
+        }
+        Ok(Self {
+            equations,
+            delay,
+            sample_time,
+            limit: limit.filter(|limit| limit.is_finite()),
+            update: None,
+        })
+    }
+
+    /// The same loop with states that change at samples.
+    pub fn with_update(mut self, update: Update) -> Result<Self, Error> {
+        let n = self.equations.states();
+        let lengths = (
+            update.states.len(),
+            update.command.len(),
+            update.reference.len(),
+        );
+        if lengths != (n * n, n, n) {
+            return Err(Error::argument(format!(
+                "the update of a sample has {lengths:?} elements, {:?} are needed for {n} states",
+                (n * n, n, n)
+            )));
+        }
+        if self.sample_time.is_none() {
+            return Err(Error::argument(
+                "states that move at samples need a sample_time",
+            ));
+        }
+        finite("the update of a sample", &update.states)?;
+        finite("the update of a sample", &update.command)?;
+        finite("the update of a sample", &update.reference)?;
+        self.update = Some(update);
+        Ok(self)
+    }
+
+    /// The change of the states at a sample; none where there is none.
+    pub fn update(&self) -> Option<&Update> {
+        self.update.as_ref()
+    }
+
+    /// The matrices.
+    pub fn equations(&self) -> &Equations<S> {
+        &self.equations
+    }
+
+    /// Td, s.
+    pub fn delay(&self) -> S {
+        self.delay
+    }
+
+    /// Ts, s; none in continuous time.
+    pub fn sample_time(&self) -> Option<S> {
+        self.sample_time
+    }
+
+    /// Bound of |u|; none where there is no bound.
+    pub fn limit(&self) -> Option<S> {
+        self.limit
+    }
+}
+
+/// Clip to [−limit, limit].
+pub(crate) fn saturate<S: Scalar>(u: S, limit: Option<S>) -> S {
+    match limit {
+        Some(limit) if u.value() > limit.value() => limit,
+        Some(limit) if u.value() < -limit.value() => -limit,
+        _ => u,
+    }
+}
+
+/// Σ a_i b_i.
+pub(crate) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
+    let products = a.iter().zip(b).map(|(&a, &b)| a * b);
+    products
+        .reduce(|sum, product| sum + product)
+        .unwrap_or_default()
+}

@@ -1,0 +1,127 @@
+//! The requested output of a run: outputs and inputs at given times, breaking points, metrics.
+
+use super::series::Series;
+use super::step_metrics::StepMetrics;
+use crate::Error;
+use crate::dde::limits::RESPONSE;
+use crate::dde::scalar::Scalar;
+use crate::memory::{push, reserved};
+
+/// Result of a run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trajectory<S = f64> {
+    /// y at the output times.
+    pub outputs: Vec<S>,
+    /// The command after the limit at the input times.
+    pub inputs: Vec<S>,
+    /// Times at which y or a low derivative of it jumps.
+    pub output_breaks: Vec<f64>,
+    /// Times at which the command or a low derivative of it jumps.
+    pub input_breaks: Vec<f64>,
+}
+
+/// Output and input times of a run, and the values so far.
+#[derive(Debug)]
+pub(crate) struct RequestedOutput<'a, S = f64> {
+    output_times: &'a [f64],
+    input_times: &'a [f64],
+    /// Derivative of the output times with respect to the parameter.
+    ahead: S,
+    pub(crate) trajectory: Trajectory<S>,
+    /// Measures the output during the run, if metrics are requested.
+    metrics: Option<&'a mut StepMetrics>,
+}
+
+impl<'a, S: Scalar> RequestedOutput<'a, S> {
+    /// The times at which values are requested; the output times have the slope of `ahead`.
+    pub(crate) fn new(
+        output_times: &'a [f64],
+        input_times: &'a [f64],
+        ahead: S,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            output_times,
+            input_times,
+            ahead,
+            trajectory: Trajectory {
+                outputs: reserved(RESPONSE, output_times.len())?,
+                inputs: reserved(RESPONSE, input_times.len())?,
+                ..Trajectory::default()
+            },
+            metrics: None,
+        })
+    }
+
+    /// Measure the output as well, at least up to the last of the times.
+    pub(crate) fn measured_by(mut self, metrics: &'a mut StepMetrics) -> Self {
+        self.metrics = Some(metrics);
+        self
+    }
+
+    /// Is the output measured?
+    pub(crate) fn is_measured(&self) -> bool {
+        self.metrics.is_some()
+    }
+
+    /// The output is `y` of (t − `start`)/`length`, from 0 to `end`.
+    pub(crate) fn measure(&mut self, start: f64, length: f64, end: f64, y: &Series) {
+        if let Some(metrics) = &mut self.metrics {
+            metrics.segment(start, length, end, y);
+        }
+    }
+
+    /// Output and input times.
+    pub(crate) fn times(&self) -> [&'a [f64]; 2] {
+        [self.output_times, self.input_times]
+    }
+
+    /// The last requested time, 0 if there is none.
+    pub(crate) fn last(&self) -> f64 {
+        let last = |times: &[f64]| times.last().copied().unwrap_or(0.0);
+        last(self.output_times).max(last(self.input_times))
+    }
+
+    /// Store the outputs at all times before `end`.
+    pub(crate) fn outputs_before(&mut self, end: f64, mut value: impl FnMut(S) -> S) {
+        while let Some(&t) = self.output_times.get(self.trajectory.outputs.len()) {
+            if t >= end {
+                break;
+            }
+            self.trajectory.outputs.push(value(self.ahead.pinned(t)));
+        }
+    }
+
+    /// Store the inputs at all times before `end`.
+    pub(crate) fn inputs_before(&mut self, end: f64, mut value: impl FnMut(S) -> S) {
+        while let Some(&t) = self.input_times.get(self.trajectory.inputs.len()) {
+            if t >= end {
+                break;
+            }
+            self.trajectory.inputs.push(value(S::from(t)));
+        }
+    }
+
+    /// Store a break of y at `t` unless it lies after the last output time.
+    pub(crate) fn output_break(&mut self, t: S) -> Result<(), Error> {
+        let t = t.value();
+        if self.output_times.last().is_some_and(|&last| t <= last) {
+            push(RESPONSE, &mut self.trajectory.output_breaks, t)?;
+        }
+        Ok(())
+    }
+
+    /// Store a break of the command at `t` unless it lies after the last input time.
+    pub(crate) fn input_break(&mut self, t: S) -> Result<(), Error> {
+        let t = t.value();
+        if self.input_times.last().is_some_and(|&last| t <= last) {
+            push(RESPONSE, &mut self.trajectory.input_breaks, t)?;
+        }
+        Ok(())
+    }
+
+    /// Are all values stored?
+    pub(crate) fn is_done(&self) -> bool {
+        self.trajectory.outputs.len() == self.output_times.len()
+            && self.trajectory.inputs.len() == self.input_times.len()
+    }
+}

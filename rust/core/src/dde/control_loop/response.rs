@@ -1,0 +1,164 @@
+//! The response of a loop in the caller's clock.
+//!
+//! The run starts at the first of the times. Times and jumps of the reference that differ from a
+//! sample only by rounding errors of that clock are moved onto the sample. Breaking points of
+//! output and command are merged into one list, in which points that differ only by rounding errors
+//! are one.
+
+use crate::memory::{append, collected, copied};
+use crate::{Error, Task};
+
+use super::linear_loop::{LinearLoop, Start};
+use super::reference::Reference;
+use crate::dde::limits::RESPONSE;
+
+/// Rounding error of a time of the clock, relative to the time.
+const CLOCK: f64 = 4.0 * f64::EPSILON;
+
+/// Breaking points closer than this share of their time are merged.
+const ONE_BREAK: f64 = 64.0 * f64::EPSILON;
+
+/// A request, in the caller's clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// Output times, increasing; the first is the start of the run.
+    pub times: &'a [f64],
+    /// How much later the output is read, s: the delay, where it is in the measurement.
+    pub ahead: f64,
+    /// The reference before its first jump.
+    pub before: f64,
+    /// Times of its jumps, increasing.
+    pub reference_times: &'a [f64],
+    /// Its values from those times on.
+    pub reference_values: &'a [f64],
+}
+
+/// The response at the requested times.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Response {
+    /// y.
+    pub outputs: Vec<f64>,
+    /// The command after the limit.
+    pub inputs: Vec<f64>,
+    /// Breaking points of both, in the caller's clock.
+    pub breaks: Vec<f64>,
+    /// r.
+    pub reference: Vec<f64>,
+}
+
+impl LinearLoop {
+    /// The response to `request` from `start`.
+    pub fn respond(
+        &self,
+        start: &Start,
+        request: &Request<'_>,
+        task: &Task,
+    ) -> Result<Response, Error> {
+        increasing("time", request.times)?;
+        let Some(&first) = request.times.first() else {
+            return Ok(Response::default());
+        };
+        let since = |times: &[f64]| {
+            let sample = self.sample_time().map(|ts| (ts, start.sample_phase));
+            let moved = times
+                .iter()
+                .map(|time| on_sample(time - first, first, sample));
+            collected(RESPONSE, moved)
+        };
+        let jumps = since(request.reference_times)?;
+        let values = copied(RESPONSE, request.reference_values)?;
+        let reference = Reference::new(request.before, jumps, values)?;
+        let input_times = since(request.times)?;
+        let later: Vec<f64>;
+        let output_times = if request.ahead == 0.0 {
+            &input_times
+        } else {
+            later = collected(RESPONSE, input_times.iter().map(|t| t + request.ahead))?;
+            &later
+        };
+        let found = self.simulate(start, &reference, output_times, &input_times, task)?;
+
+        let mut breaks = found.output_breaks;
+        for t in &mut breaks {
+            *t -= request.ahead;
+        }
+        append(RESPONSE, &mut breaks, &found.input_breaks)?;
+        breaks.retain(|&t| t >= 0.0);
+        breaks.sort_unstable_by(f64::total_cmp);
+        let delay = self.delay();
+        let mut last = f64::NEG_INFINITY;
+        breaks.retain(|&t| t - std::mem::replace(&mut last, t) > ONE_BREAK * (t + delay));
+        for t in &mut breaks {
+            *t += first;
+        }
+        let absolute = Reference::new(
+            request.before,
+            copied(RESPONSE, request.reference_times)?,
+            copied(RESPONSE, request.reference_values)?,
+        )?;
+        let reference = request.times.iter().map(|&t| absolute.at(t));
+        Ok(Response {
+            outputs: found.outputs,
+            inputs: found.inputs,
+            breaks,
+            reference: collected(RESPONSE, reference)?,
+        })
+    }
+}
+
+/// `since` the start of a run at `start` of the clock, moved onto a sample if it differs from it
+/// only by rounding errors. `sample` holds the sample time and the time of the first sample.
+pub fn on_sample(since: f64, start: f64, sample: Option<(f64, f64)>) -> f64 {
+    let Some((sample_time, phase)) = sample else {
+        return since;
+    };
+    let nearest = phase + ((since - phase) / sample_time).round_ties_even() * sample_time;
+    if (since - nearest).abs() <= CLOCK * (start.abs() + since.abs()) {
+        nearest
+    } else {
+        since
+    }
+}
+
+/// Refuse times that are not finite or do not increase.
+fn increasing(name: &str, times: &[f64]) -> Result<(), Error> {
+    let previous = [f64::NEG_INFINITY];
+    let pairs = previous.iter().chain(times).zip(times);
+    match pairs
+        .enumerate()
+        .find(|(_, (before, time))| !(time > before && time.is_finite()))
+    {
+        None => Ok(()),
+        Some((_, (_, time))) if !time.is_finite() => Err(Error::argument(format!(
+            "{name} holds {time}: give finite times"
+        ))),
+        Some((at, (before, time))) => Err(Error::argument(format!(
+            "{name}[{at}]={time:?} does not come after {name}[{}]={before:?}: give increasing \
+             times",
+            at - 1
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_that_do_not_increase_are_named() {
+        let message = |times: &[f64]| increasing("time", times).unwrap_err().to_string();
+        assert!(message(&[0.0, 1.0, 1.0]).starts_with("time[2]=1.0 does not come after time[1]"));
+        assert!(message(&[f64::NAN]).contains("holds NaN"));
+        assert!(message(&[0.0, f64::INFINITY]).contains("finite"));
+        assert!(increasing("time", &[]).is_ok());
+    }
+
+    #[test]
+    fn a_time_a_rounding_beside_a_sample_is_that_sample() {
+        let sample = Some((0.065, 0.0));
+        let t = 100.0 + 3.0 * 0.065;
+        assert_eq!(on_sample(t - 100.0, 100.0, sample), 3.0 * 0.065);
+        assert_eq!(on_sample(0.1951, 100.0, sample), 0.1951);
+        assert_eq!(on_sample(t - 100.0, 100.0, None), t - 100.0);
+    }
+}

@@ -1,0 +1,130 @@
+//! Polynomials in a local coordinate σ ∈ [0, 1].
+
+use crate::dde::scalar::Scalar;
+
+/// A last coefficient below this share of the largest one is smaller than rounding errors, and so
+/// is the remainder of the series.
+pub(crate) const NEGLIGIBLE: f64 = 1e-17;
+
+/// Degree of the polynomials. With elements as long as [`NEGLIGIBLE`] allows, about 1.9 over the
+/// fastest rate of the loop, 24 terms cost least for each unit of time.
+pub(crate) const DEGREE: usize = 24;
+
+/// Σ c_j σ^j, with c_j at `offset` + `stride` j of `terms`. Even and odd powers are summed
+/// separately, because each step of one sum waits for the step before.
+#[inline]
+pub(crate) fn horner<S: Scalar>(
+    terms: &[S],
+    offset: usize,
+    stride: usize,
+    degree: usize,
+    sigma: S,
+) -> S {
+    let square = sigma * sigma;
+    let (mut even, mut odd) = (S::default(), S::default());
+    for j in (0..=degree / 2).rev() {
+        let place = offset + 2 * j * stride;
+        even = even * square + terms[place];
+        if 2 * j < degree {
+            odd = odd * square + terms[place + stride];
+        }
+    }
+    even + odd * sigma
+}
+
+/// Coefficients of σ^j; those above `degree` are zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Series<S = f64> {
+    pub(crate) coefficients: [S; DEGREE + 1],
+    pub(crate) degree: usize,
+}
+
+impl<S: Scalar> Series<S> {
+    pub(crate) fn constant(value: S) -> Self {
+        let mut coefficients = [S::default(); DEGREE + 1];
+        coefficients[0] = value;
+        Self {
+            coefficients,
+            degree: 0,
+        }
+    }
+
+    pub(crate) fn terms(&self) -> &[S] {
+        &self.coefficients[..=self.degree]
+    }
+
+    /// Value at σ.
+    pub(crate) fn at(&self, sigma: S) -> S {
+        horner(&self.coefficients, 0, 1, self.degree, sigma)
+    }
+
+    /// The polynomial's values alone.
+    pub(crate) fn values(&self) -> Series {
+        Series {
+            coefficients: self.coefficients.map(S::value),
+            degree: self.degree,
+        }
+    }
+
+    /// d/dσ.
+    pub(crate) fn derivative(&self) -> Self {
+        let mut out = Self::constant(S::default());
+        out.degree = self.degree.saturating_sub(1);
+        for j in 1..=self.degree {
+            out.coefficients[j - 1] = S::from(j as f64) * self.coefficients[j];
+        }
+        out
+    }
+
+    /// Set `degree` to the last coefficient that is not negligible.
+    pub(crate) fn trim(&mut self) {
+        // Slopes have rounding errors of products with values.
+        let value = 1e-3 * NEGLIGIBLE * largest(self.terms(), S::value);
+        let slope = if S::MOVES {
+            (1e-3 * NEGLIGIBLE * largest(self.terms(), S::slope)).max(1e4 * value)
+        } else {
+            0.0
+        };
+        while self.degree > 0
+            && self.coefficients[self.degree].value().abs() <= value
+            && self.coefficients[self.degree].slope().abs() <= slope
+        {
+            self.coefficients[self.degree] = S::default();
+            self.degree -= 1;
+        }
+    }
+
+    /// The polynomial in σ′ with σ = `offset` + `ratio` σ′.
+    pub(crate) fn shifted(&self, offset: S, ratio: S) -> Self {
+        let mut out = *self;
+        if !offset.is_nothing() {
+            // Repeated synthetic division by σ − offset.
+            let terms = &mut out.coefficients[..=self.degree];
+            for first in 0..self.degree {
+                for j in (first..self.degree).rev() {
+                    let above = terms[j + 1];
+                    terms[j] += offset * above;
+                }
+            }
+        }
+        out.stretch(ratio);
+        out
+    }
+
+    fn stretch(&mut self, ratio: S) {
+        let mut power = S::from(1.0);
+        for c in &mut self.coefficients[..=self.degree] {
+            *c *= power;
+            power *= ratio;
+        }
+    }
+}
+
+/// The largest modulus of the numbers that `read` returns.
+fn largest<S: Scalar>(terms: &[S], read: impl Fn(S) -> f64) -> f64 {
+    // Not `f64::max`, whose rule for NaN costs more than the rest of the loop.
+    terms.iter().fold(0.0, |m, &c| {
+        let size = read(c).abs();
+        if size > m { size } else { m }
+    })
+}

@@ -1,0 +1,28 @@
+//! Limits of a run: divergence, and the least difference of two times.
+
+use super::scalar::Scalar;
+use crate::Error;
+
+/// Magnitude of a state above which a run counts as diverging.
+pub(crate) const DIVERGED: f64 = 1e150;
+
+/// What memory is requested for, in errors.
+pub(crate) const RESPONSE: &str = "the response";
+
+/// Return an error if a state or the command exceeds [`DIVERGED`].
+pub(crate) fn check_growth<S: Scalar>(x: &[S], u: S, t: S) -> Result<(), Error> {
+    let sound = |v: &S| v.value().abs() <= DIVERGED;
+    if x.iter().all(sound) && sound(&u) {
+        Ok(())
+    } else {
+        Err(Error::Diverges {
+            bound: DIVERGED,
+            time: t.value(),
+        })
+    }
+}
+
+/// Two times closer than this are equal: rounding errors of sums of delays and samples.
+pub(crate) fn slack<S: Scalar>(t: S, delay: S) -> f64 {
+    16.0 * f64::EPSILON * (t.value().abs() + delay.value())
+}

@@ -1,0 +1,85 @@
+//! Kernels applied to arrays: a block of elements as columns of doubles.
+//!
+//! A block is padded to whole vectors with a harmless element, so that the end of an array is
+//! processed like its middle.
+
+use pulp::WithSimd;
+
+use pulp::Simd;
+
+use super::dispatch::Instructions;
+use super::real::Real;
+
+/// Elements in two vectors of the widest instruction set: the shortest block.
+pub(crate) const SHORT: usize = 16;
+
+/// A function of `IN` doubles with `OUT` doubles as its value.
+pub(crate) trait Kernel<const IN: usize, const OUT: usize>: Sync {
+    fn lanes<S: Simd>(&self, arguments: [Real<S>; IN]) -> [Real<S>; OUT];
+}
+
+/// Columns of one block.
+pub(crate) type Columns<const N: usize, const W: usize> = [[f64; W]; N];
+
+struct Sweep<'a, K, const IN: usize, const OUT: usize, const W: usize> {
+    kernel: &'a K,
+    arguments: &'a Columns<IN, W>,
+    values: &'a mut Columns<OUT, W>,
+    length: usize,
+}
+
+impl<K, const IN: usize, const OUT: usize, const W: usize> WithSimd for Sweep<'_, K, IN, OUT, W>
+where
+    K: Kernel<IN, OUT>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut lanes = [Real::splat(simd, 0.0); IN];
+        for pair in 0..self.length.div_ceil(2 * S::F64_LANES) {
+            for (lane, column) in lanes.iter_mut().zip(self.arguments) {
+                if let Some([a, b]) = S::as_simd_f64s(column).0.as_chunks().0.get(pair) {
+                    *lane = Real::new(simd, [*a, *b]);
+                }
+            }
+            let results = self.kernel.lanes(lanes);
+            for (result, column) in results.iter().zip(self.values.iter_mut()) {
+                let places = S::as_mut_simd_f64s(column).0.as_chunks_mut().0;
+                if let Some(place) = places.get_mut(pair) {
+                    *place = result.lanes();
+                }
+            }
+        }
+    }
+}
+
+/// Fill `values` for the first `length` elements and for those that complete their last vector.
+pub(crate) fn sweep<K, const IN: usize, const OUT: usize, const W: usize>(
+    kernel: &K,
+    arguments: &Columns<IN, W>,
+    values: &mut Columns<OUT, W>,
+    length: usize,
+) where
+    K: Kernel<IN, OUT>,
+{
+    sweep_on(Instructions::chosen(), kernel, arguments, values, length);
+}
+
+/// [`sweep`] with these instructions.
+pub(crate) fn sweep_on<K, const IN: usize, const OUT: usize, const W: usize>(
+    instructions: Instructions,
+    kernel: &K,
+    arguments: &Columns<IN, W>,
+    values: &mut Columns<OUT, W>,
+    length: usize,
+) where
+    K: Kernel<IN, OUT>,
+{
+    instructions.run(Sweep {
+        kernel,
+        arguments,
+        values,
+        length,
+    });
+}

@@ -1,0 +1,90 @@
+//! Choice of the instruction set: the widest one of the machine, unless an environment variable
+//! limits it.
+
+use std::sync::LazyLock;
+
+use pulp::{Arch, Scalar128b, Simd, WithSimd};
+
+/// Environment variable that limits the instruction set: `avx512`, `avx2`, `neon` or `plain`.
+/// Results do not depend on it; it is used for comparisons.
+const VARIABLE: &str = "DEADTIME_INSTRUCTIONS";
+
+/// Instruction sets the kernels are compiled for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Instructions {
+    #[cfg(target_arch = "x86_64")]
+    Avx512(pulp::x86::V4),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
+    #[cfg(target_arch = "aarch64")]
+    Neon(pulp::aarch64::Neon),
+    /// Plain arithmetic; the fused multiply-add in software where the machine has none.
+    Plain,
+}
+
+static CHOSEN: LazyLock<Instructions> = LazyLock::new(|| {
+    let wanted = std::env::var(VARIABLE).unwrap_or_default();
+    let available = Instructions::available();
+    let named = available.iter().find(|set| set.name() == wanted);
+    *named.or(available.first()).unwrap_or(&Instructions::Plain)
+});
+
+impl Instructions {
+    /// The instruction sets of this machine, the widest first.
+    pub(crate) fn available() -> Vec<Self> {
+        let mut sets = Vec::new();
+        match Arch::new() {
+            #[cfg(target_arch = "x86_64")]
+            Arch::V4(simd) => {
+                sets.push(Self::Avx512(simd));
+                sets.push(Self::Avx2(*simd));
+            }
+            #[cfg(target_arch = "x86_64")]
+            Arch::V3(simd) => sets.push(Self::Avx2(simd)),
+            #[cfg(target_arch = "aarch64")]
+            Arch::Neon(simd) => sets.push(Self::Neon(simd)),
+            _ => {}
+        }
+        sets.push(Self::Plain);
+        sets
+    }
+
+    /// The instruction set on which kernels run.
+    pub(crate) fn chosen() -> Self {
+        *CHOSEN
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "avx512",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "avx2",
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(_) => "neon",
+            Self::Plain => "plain",
+        }
+    }
+
+    #[inline]
+    pub(crate) fn run<Op: WithSimd>(self, op: Op) -> Op::Output {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(simd) => Simd::vectorize(simd, op),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(simd) => Simd::vectorize(simd, op),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(simd) => Simd::vectorize(simd, op),
+            Self::Plain => Simd::vectorize(Scalar128b, op),
+        }
+    }
+}
+
+/// The instruction set that kernels run on: `avx512`, `avx2`, `neon` or `plain`.
+///
+/// ```
+/// assert!(["avx512", "avx2", "neon", "plain"].contains(&deadtime::instructions()));
+/// ```
+pub fn instructions() -> &'static str {
+    Instructions::chosen().name()
+}

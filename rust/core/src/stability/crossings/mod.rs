@@ -1,0 +1,15 @@
+//! Where roots cross the edge of a specification as one gain varies.
+//!
+//! `pencil` is the family A + k B along one gain, `crossing` isolates its crossings, `row` counts
+//! the cells between them, and `one_gain` lists the crossings for a single gain.
+
+mod crossing;
+mod one_gain;
+mod pencil;
+mod row;
+
+pub(crate) use crossing::Crossing;
+pub(crate) use one_gain::radius_of_members;
+pub use one_gain::{Place, crossings_along};
+pub(crate) use pencil::{sizes, united};
+pub(crate) use row::{Members, Row};

@@ -1,0 +1,230 @@
+//! Stability over two parameters of a family.
+//!
+//! Counts: if the family is affine in one of the two, every value of the other makes a row, whose
+//! crossings of the edge give all its cells (`row`); the cost grows with the number of rows and of
+//! crossings, not of cells. Otherwise blocks of cells are divided along the boundaries (`blocks`).
+//! With `Proof::Cells`, and for the abscissa of a family that is affine in neither, every cell is
+//! judged alone. In each case a cell equals [`judge`] of the family's member there, and results
+//! have the same bits for any number of threads. A member that cannot be formed, because a
+//! coefficient overflows, is an undecided cell; delays that become negative are refused before any
+//! work is done.
+
+use rayon::prelude::*;
+
+use super::axes::{Axis, Map, Proof, Question, put};
+use super::blocks;
+use super::chart::Chart;
+use super::curves::{Vertex, join};
+use super::rows::Rows;
+use crate::roots::chain_abscissa;
+use crate::stability::cell::{Cell, judge};
+use crate::stability::family::Family;
+use crate::stability::specification::Specification;
+use crate::{Error, Task, memory};
+
+/// Upper limit on the number of cells (bounds memory and time).
+const MAX_CELLS: usize = 50_000_000;
+
+/// Judge the members of `family` over two of its parameters; `values` holds the others.
+///
+/// # Errors
+/// [`Error::Argument`] where the axes do not name two parameters, a value is not finite or a delay
+/// becomes negative; [`Error::TooMuch`] beyond 50 million cells; [`Error::Interrupted`].
+pub fn map(
+    family: &Family,
+    values: &[f64],
+    axes: [Axis<'_>; 2],
+    question: Question,
+    task: &Task,
+) -> Result<Chart, Error> {
+    question.specification.check()?;
+    let cells = check(family, values, axes)?;
+    let map = Map {
+        family,
+        values,
+        axes,
+        question,
+        task,
+    };
+    if cells == 0 {
+        return Ok(Chart::default());
+    }
+    // The memory is reserved before the work: a count and a status for each cell, and an abscissa.
+    memory::room::<[u8; 5]>("the map", cells)?;
+    memory::room::<f64>("the map", if question.abscissa { cells } else { 0 })?;
+    if question.proof == Proof::Cells {
+        return map.cell_by_cell();
+    }
+    match Rows::of(&map) {
+        Some(rows) => rows.chart(),
+        None => match blocks::grid(&map).filter(|_| !question.abscissa) {
+            Some(grid) => grid.chart(task),
+            None => map.cell_by_cell(),
+        },
+    }
+}
+
+/// The boundaries of a map: see [`Vertex`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Boundaries {
+    /// Which of the two axes runs along the rows, whose values are the gains of the vertices.
+    pub along: usize,
+    /// Each curve with its points in order.
+    pub curves: Vec<Vec<Vertex>>,
+}
+
+/// The curves on which roots lie on the edge of the specification. `None` where the family is
+/// affine in neither parameter and a root of all members stays at 0, or where points are not in
+/// order.
+///
+/// # Errors
+/// As for [`map`].
+pub fn boundaries(
+    family: &Family,
+    values: &[f64],
+    axes: [Axis<'_>; 2],
+    specification: Specification,
+    task: &Task,
+) -> Result<Option<Boundaries>, Error> {
+    specification.check()?;
+    check(family, values, axes)?;
+    let map = Map {
+        family,
+        values,
+        axes,
+        question: Question {
+            specification,
+            ..Question::default()
+        },
+        task,
+    };
+    let (along, crossings) = match Rows::of(&map) {
+        Some(rows) => (rows.along, rows.crossings()?),
+        None => match blocks::crossings(&map)? {
+            Some(found) => found,
+            None => return Ok(None),
+        },
+    };
+    let points = axes.get(along).map_or(&[][..], |axis| axis.points);
+    let (Some(low), Some(high)) = (points.first(), points.last()) else {
+        return Ok(None);
+    };
+    Ok(Some(Boundaries {
+        along,
+        curves: join(&crossings, (*low, *high)),
+    }))
+}
+
+/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it cannot be formed.
+///
+/// # Errors
+/// As for [`map`].
+pub fn chains(
+    family: &Family,
+    values: &[f64],
+    axes: [Axis<'_>; 2],
+    task: &Task,
+) -> Result<Vec<f64>, Error> {
+    let cells = check(family, values, axes)?;
+    let [first, second] = axes;
+    let width = second.points.len();
+    let cell = |values: &mut Vec<f64>, index: usize| {
+        task.check()?;
+        put(values, first, index / width);
+        put(values, second, index % width);
+        Ok(family.at(values).map_or(f64::NAN, |h| chain_abscissa(&h)))
+    };
+    memory::in_parallel("the map", cells, || values.to_vec(), cell)
+}
+
+impl Map<'_> {
+    fn cell_by_cell(&self) -> Result<Chart, Error> {
+        let Question {
+            specification,
+            abscissa,
+            ..
+        } = self.question;
+        let [first, second] = self.axes;
+        let width = second.points.len();
+        let cells = first.points.len() * width;
+        let mut chart = Chart::stable(cells)?;
+        chart.abscissa = memory::filled("the map", f64::NAN, if abscissa { cells } else { 0 })?;
+        let judged = |values: &mut Vec<f64>, index: usize| {
+            self.task.check()?;
+            put(values, first, index / width);
+            put(values, second, index % width);
+            let cell = match self.family.at(values) {
+                Ok(h) => judge(&h, specification, abscissa, self.task)?,
+                Err(_) => Cell::UNDECIDED,
+            };
+            self.task.advance(1);
+            Ok(cell)
+        };
+        let start = || self.values.to_vec();
+        let both = chart
+            .unstable
+            .par_iter_mut()
+            .zip(&mut chart.status)
+            .enumerate();
+        if abscissa {
+            both.zip(&mut chart.abscissa).try_for_each_init(
+                start,
+                |values, ((index, (unstable, status)), alpha)| {
+                    let cell = judged(values, index)?;
+                    (*unstable, *alpha, *status) = (cell.unstable, cell.abscissa, cell.status);
+                    Ok(())
+                },
+            )?;
+        } else {
+            both.try_for_each_init(start, |values, (index, (unstable, status))| {
+                let cell = judged(values, index)?;
+                (*unstable, *status) = (cell.unstable, cell.status);
+                Ok(())
+            })?;
+        }
+        Ok(chart)
+    }
+}
+
+/// The number of cells, after a check of the arguments.
+fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, Error> {
+    let count = family.names().len();
+    let [first, second] = axes;
+    if first.parameter == second.parameter || first.parameter.max(second.parameter) >= count {
+        return Err(Error::argument(format!(
+            "axes along parameters {} and {} of {count}: a map needs two different ones",
+            first.parameter, second.parameter
+        )));
+    }
+    let cells = first.points.len().saturating_mul(second.points.len());
+    if cells > MAX_CELLS {
+        return Err(Error::TooMuch {
+            what: "the map",
+            limit: MAX_CELLS as u64,
+            unit: "cells",
+            advice: format!(
+                "{} by {} is more than a picture holds: take fewer points, or several maps of \
+                 smaller ranges",
+                first.points.len(),
+                second.points.len()
+            ),
+        });
+    }
+    let mut ranges: Vec<(f64, f64)> = values.iter().map(|value| (*value, *value)).collect();
+    for Axis { parameter, points } in axes {
+        if let Some(point) = points.iter().find(|point| !point.is_finite()) {
+            return Err(Error::argument(format!(
+                "{point} on an axis: its points must be finite"
+            )));
+        }
+        let low = points.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if let (false, Some(range)) = (points.is_empty(), ranges.get_mut(parameter)) {
+            *range = (low, high);
+        }
+    }
+    if cells > 0 {
+        family.check_delays(&ranges)?;
+    }
+    Ok(cells)
+}

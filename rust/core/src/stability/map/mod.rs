@@ -1,0 +1,22 @@
+//! Stability over two parameters.
+//!
+//! `axes` holds what is asked. `grid` chooses the method: `rows`, where one parameter enters as a
+//! gain, or `blocks`, which `block` divides by the proofs of boxes and whose crossings `row_search`
+//! finds. `chart` holds the arrays, `curves` joins crossings to boundaries, and `robust` maps what
+//! holds over an interval of a third parameter.
+
+mod axes;
+mod block;
+mod blocks;
+mod chart;
+mod curves;
+mod grid;
+mod robust;
+mod row_search;
+mod rows;
+
+pub use axes::{Axis, Proof, Question};
+pub use chart::Chart;
+pub use curves::Vertex;
+pub use grid::{Boundaries, boundaries, chains, map};
+pub use robust::robust_map;

@@ -1,0 +1,89 @@
+"""What the command loads before it does anything: help, version and completion come at once."""
+
+import importlib
+import importlib.metadata
+import inspect
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+import typer
+from deadtime._cli.app import COMMANDS
+
+DEADTIME = [sys.executable, "-c", "import sys; sys.argv[0] = 'deadtime'\n"
+            "from deadtime._cli import main; main()"]  # fmt: skip
+
+
+def run(*arguments, python=(), **environment):
+    return subprocess.run(
+        [DEADTIME[0], *python, *DEADTIME[1:], *arguments],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={**os.environ, "COLUMNS": "160", "NO_COLOR": "1", **environment},
+    )
+
+
+def loaded(*arguments):
+    """Top-level packages, and modules of this one, that a command imports."""
+    result = run(*arguments, python=("-X", "importtime"))
+    assert result.returncode == 0, result.stderr
+    names = re.findall(r"^import time:[\d |]+\|\s+([\w.]+)$", result.stderr, flags=re.MULTILINE)
+    return {name.split(".")[0] for name in names}, {n for n in names if n.startswith("deadtime")}
+
+
+@pytest.mark.parametrize("argument", ["--help", "--version"])
+def test_help_and_version_load_neither_numerics_nor_drawing(argument):
+    packages, own = loaded(argument)
+    costly = {"numpy", "scipy", "matplotlib", "rich", "pydantic", "control", "asyncio"}
+    assert not packages & costly
+    assert "typer" in packages
+    assert own == {
+        "deadtime",
+        "deadtime._base",
+        "deadtime._base.errors",
+        "deadtime._cli",
+        "deadtime._cli.app",
+        "deadtime._cli.readable",
+    }
+
+
+def test_a_command_loads_no_other():
+    _, own = loaded("roots", "--help")
+    commands = {f"deadtime._cli.{command.file}" for command in COMMANDS.values()}
+    assert own & commands == {"deadtime._cli.roots"}
+    assert "deadtime.estimation.methods._waveform" not in own
+
+
+def test_the_version_is_that_of_the_package():
+    assert run("--version").stdout == f"deadtime {importlib.metadata.version('deadtime')}\n"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_shown_without_loading_is_that_of_the_command(name):
+    command = COMMANDS[name]
+    found = getattr(importlib.import_module(f"deadtime._cli.{command.file}"), command.function)
+    told = found.info.help if isinstance(found, typer.Typer) else inspect.getdoc(found)
+    assert told.splitlines()[0] == command.help
+
+
+def test_the_shell_completes_commands_and_options():
+    def completed(words, place):
+        result = run(_DEADTIME_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=str(place))
+        return result.stdout.split()
+
+    assert completed("deadtime ro", 1) == ["roots"]
+    assert completed("deadtime re", 1) == ["reproduce", "report"]
+    assert "--rightmost" in completed("deadtime roots --r", 2)
+    assert "source" in run("--show-completion", SHELL="/bin/bash").stdout or (
+        "_DEADTIME_COMPLETE" in run("--show-completion", SHELL="/bin/bash").stdout
+    )
+
+
+def test_a_mistyped_command_is_answered_with_the_nearest():
+    result = run("rots")
+    assert result.returncode == 2
+    assert "'roots'" in result.stderr

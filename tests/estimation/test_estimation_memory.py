@@ -1,0 +1,69 @@
+"""Estimation takes memory in proportion to the rows of a recording, by every method."""
+
+import tracemalloc
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation import Frequency
+from deadtime.estimation._estimate import METHODS
+from deadtime.estimation.data._input_output import InputOutput
+from deadtime.estimation.methods import _arx_scan as arx_scan
+from flown import fly
+
+KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
+
+#: Bytes a row, some 250 doubles: one matrix of rows by rows would be 12 kB a row.
+MOST = 2000
+
+
+def flown(method, rows):
+    """A flight of so many rows that suits a method, and the method with its options."""
+    truth = KNOWN.replace(delay=0.36)
+    if method == "relay":
+        return dtm.Experiment.relay(0.065 * rows, 0.5).run(truth, noise=0.005), KNOWN, method
+    if method == "frequency":
+        experiment = dtm.Experiment.multisine(0.3, 6.5, lines=8, periods=rows // 100)
+        return experiment.run(truth, noise=0.005), KNOWN, Frequency(period=6.5)
+    special = {
+        "cta": {"Kp": 2.0, "ts": None, "limit": None, "noise_in_loop": False, "dt": 8.0 / rows},
+        "decay": {"Kp": 0.6},
+        "decrement": {"Kp": 3.0, "limit": None},
+    }.get(method, {})
+    duration = 7.0 if "dt" in special else 0.065 * rows - 1.0
+    flight, known = fly(noise=0.005, rest=1.0, duration=duration, **special)
+    return flight, known, method
+
+
+def peak(method, rows):
+    flight, known, method = flown(method, rows)
+    tracemalloc.start()
+    dtm.estimate_delay(flight, known, method=method)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return most
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_memory_grows_with_the_rows_not_with_their_square(method):
+    # The full factor of a singular value decomposition took 20 GB for 50 000 rows, and the ARX
+    # scan kept the command once for every delay.
+    peak(method, 400)  # what is imported on the way counts once
+    assert (peak(method, 1600) - peak(method, 400)) / 1200 < MOST
+
+
+def test_the_losses_of_an_arx_scan_are_those_of_least_squares_at_every_delay():
+    random = np.random.default_rng(3)
+    command = random.normal(size=400)
+    output = np.cumsum(np.concatenate([np.zeros(7), command])[:401]) * 0.1
+    output += random.normal(0.0, 0.2, output.size)
+    read = InputOutput(command, np.diff(output), 0.1, 0.0, "", "")
+    losses, best, none = arx_scan._scan(output, read, 2, 2, 0)
+    assert losses.size == read.longest > 200
+    late = arx_scan._Delayed(command, output.size)
+    past = [np.concatenate([np.zeros(lag), output])[: output.size] for lag in (1, 2)]
+    for place in range(0, losses.size, 7):
+        columns = np.stack([*past, late.at(place + 1), late.at(place + 2)], axis=1)
+        left = output - columns @ np.linalg.lstsq(columns, output, rcond=None)[0]
+        assert losses[place] == pytest.approx(float(left @ left), rel=1e-7)
+    assert best < none

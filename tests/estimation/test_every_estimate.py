@@ -1,0 +1,86 @@
+"""What the result of every method can do: be read, written, drawn, sent to another process."""
+
+import json
+import math
+import pickle
+
+import deadtime as dtm
+import matplotlib.pyplot
+import numpy as np
+import pytest
+from deadtime.estimation import Frequency
+from deadtime.estimation._estimate import METHODS
+from flown import fly
+
+KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
+
+
+def flown(method):
+    """A flight that suits a method, and the method with its options."""
+    truth = KNOWN.replace(delay=0.36)
+    if method == "relay":
+        return dtm.Experiment.relay(15.0, 0.5).run(truth, noise=0.005), KNOWN, method
+    if method == "frequency":
+        experiment = dtm.Experiment.multisine(0.3, 6.5, lines=8, periods=4)
+        return experiment.run(truth, noise=0.005), KNOWN, Frequency(period=6.5)
+    special = {
+        "cta": {"Kp": 2.0, "ts": None, "dt": 0.05, "limit": None, "noise_in_loop": False},
+        "decay": {"Kp": 0.6, "duration": 12.0},
+        "decrement": {"Kp": 3.0, "limit": None, "duration": 8.0},
+    }
+    flight, known = fly(noise=0.005, rest=1.0, **special.get(method, {}))
+    return flight, known, method
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_result_is_whole(method):
+    # A relay's could not be drawn, one of the frequency method not be sent to another process.
+    flight, known, method = flown(method)
+    fit = dtm.estimate_delay(flight, known, method=method)
+    assert "nan" not in fit.summary().lower().replace("dominant", "")
+    assert math.isfinite(json.loads(json.dumps(fit.to_dict(), allow_nan=False))["delay"])
+    axes = fit.plot()
+    axes[0].figure.canvas.draw()
+    assert fit.plot(axes) == axes
+    with pytest.raises(ValueError, match=f"give {len(axes)}"):
+        fit.plot(axes[1:])
+    matplotlib.pyplot.close()
+    again = pickle.loads(pickle.dumps(fit))
+    assert again.delay == fit.delay
+    if fit.calibrated:
+        low, high = again.ci(0.95)
+        assert low < 0.36 < high
+        assert np.isfinite(again.profile()[1]).all()
+    else:
+        with pytest.raises(ValueError, match=r"use method='(output_error|waveform)'"):
+            fit.ci(0.95)
+
+
+@pytest.mark.parametrize("method", ["output_error", "waveform", "grid"])
+def test_a_lag_that_is_not_there_leaves_the_other_numbers_exact(method):
+    # The profile of an exact fit had no sign change, and the grid could not part delay and lag.
+    flight, known = fly(rest=1.0)
+    fit = dtm.estimate_delay(flight, known, method=method, free=("delay", "gain", "lag"))
+    assert fit.delay == pytest.approx(0.36, abs=1e-8)
+    assert fit.lag == pytest.approx(0.0, abs=1e-8)
+    if fit.calibrated:
+        assert fit.ci() == pytest.approx((0.36, 0.36), abs=1e-8)
+
+
+def test_the_profile_of_a_fit_without_lag_holds_the_best_delay():
+    # Profiles of continuous loops knew lags from the shortest on only, none at all was left out.
+    flight, known = fly(
+        Kp=2.0, ts=None, dt=0.05, limit=None, noise=0.005, rest=1.0, noise_in_loop=False
+    )
+    fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "gain", "lag"))
+    assert fit.lag == 0.0
+    low, high = fit.ci()
+    assert low < fit.delay < high
+    assert fit.profile("delay", [fit.delay])[1] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("window", [3, (1.0,), "1 to 3"])
+def test_a_window_that_is_none_is_shown(window):
+    flight, known = fly(rest=1.0)
+    with pytest.raises(TypeError, match=r"give \(low, high\) in s"):
+        dtm.estimate_delay(flight, known, window=window)

@@ -1,0 +1,388 @@
+"""The experiment: steps on a vehicle, what ends them, and what is learnt; all in virtual time."""
+
+import math
+import os
+import threading
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime import FlightAbortedError, NotIdentifiableError
+from deadtime._cli.fly import _print_study
+from deadtime.flights import FlightPlan, FlownSteps, fly_experiment
+from deadtime.flights import _learn as learn_module
+from deadtime.flights._fly import fly_all
+from deadtime.flights._height_control import HeightControl, Velocity
+from deadtime.flights._learn import learn
+from deadtime.flights._runs import telemetry_of
+from deadtime.flights._split import split_delay
+from deadtime.flights._step_test import ROW, StepProgramme, check_gain
+from deadtime.links import Limits, run
+from deadtime.links import journal as journal_module
+from deadtime.links.journal import _Writer
+from deadtime.loops._derivative_filter import PAPER_FILTER
+from emulated import connecting
+from simulated_vehicle import KIT, SimulatedVehicle
+
+TS = 0.065
+
+
+def columns_of(path):
+    """The numbers of a recording, by the names in its first line."""
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
+# What is commanded
+
+
+def test_the_filtered_speed_is_that_of_the_exact_loop():
+    # The loop of the library, simulated with the same rule, gives the same command at each sample.
+    smooth = dtm.DerivativeFilter(38.0, discretisation="tustin")
+    loop = dtm.ControlLoop(
+        dtm.Integrator(0.9, 0.1), dtm.PV(2.0, 0.4, smooth), delay=0.3, sample_time=TS
+    )
+    time = np.arange(80) * TS
+    flown = loop.simulate(time, np.where(time < 0.5, 0.0, 1.0), reference_time=time)
+    control = HeightControl(dtm.PV(2.0, 0.4), TS)
+    made = [
+        control.command(reference, height, None)
+        for reference, height in zip(flown.reference, flown.outputs, strict=True)
+    ]
+    np.testing.assert_allclose(made, flown.inputs, atol=1e-9)
+
+
+def test_a_reported_speed_takes_the_place_of_the_filtered_one():
+    control = HeightControl(dtm.PV(2.0, 0.5), TS)
+    control.command(1.0, 0.5, None)
+    assert control.command(1.0, 0.9, 0.2) == pytest.approx(2.0 * 0.1 - 0.5 * 0.2)
+    with pytest.raises(TypeError, match="P or PV"):
+        HeightControl(dtm.PI(1.0, 0.1), TS)
+
+
+def test_a_speed_begins_at_rest():
+    speed = Velocity(PAPER_FILTER, TS)
+    assert [speed.next(1.3) for _ in range(5)] == pytest.approx([0.0] * 5, abs=1e-9)
+
+
+def test_a_programme_says_what_to_hold_when():
+    programme = StepProgramme((1.0, 1.25, 1.0), (0.5, 0.2, 0.2), 0.1)
+    told = [programme.reference(k * 0.1) for k in range(programme.samples)]
+    assert told == [1.0] * 5 + [1.25] * 2 + [1.0] * 2
+    with pytest.raises(ValueError, match=r"may come to 1\.5 m, outside"):
+        programme.check(Limits(max_height=1.4))
+    with pytest.raises(ValueError, match="command more often"):
+        StepProgramme((1.0, 1.2), (3.0, 3.0), 0.25).check(Limits())
+    with pytest.raises(ValueError, match="one hold for each"):
+        StepProgramme((1.0, 1.2), (3.0,))
+
+
+@pytest.mark.parametrize(
+    ("Kp", "allowed"), [(2.4, True), (2.5, False), (0.0, False), (math.nan, False)]
+)
+def test_gains_are_bounded_before_the_delay_is_known(Kp, allowed):
+    if allowed:
+        check_gain(Kp, 0.36, 0.885)
+    else:
+        with pytest.raises(ValueError, match="Kp"):
+            check_gain(Kp, 0.36, 0.885)
+
+
+# What ends a flight
+
+
+def troubled(change, after=3.0):
+    """A vehicle whose states are changed from a time after the take-off on."""
+
+    def trouble(state, since):
+        return state if since < after else change(state)
+
+    return SimulatedVehicle(trouble=trouble)
+
+
+ABORTS = {
+    "tilted": lambda state: replace(state, roll=math.radians(16.0)),
+    "pitch is no number": lambda state: replace(state, pitch=math.nan),
+    "battery is at 19 %": lambda state: replace(state, battery=19.0),
+    "reports that its ultrasound is deaf": lambda state: replace(
+        state, fault="its ultrasound is deaf"
+    ),
+    "s old, more than 0.3 s": lambda state: None,
+    "messages in a row were lost": lambda state: replace(state, missing=21),
+    "reports an emergency": lambda state: replace(state, emergency=True),
+    "no longer flies": lambda state: replace(state, flying=False),
+    "the height jumps": lambda state: replace(state, height=state.height + 0.45),
+    "more than 0.475 m apart": lambda state: replace(state, height=state.height + 0.6),
+    "outside 0.2 to 3 m": lambda state: replace(state, height=0.1),
+}
+
+
+@pytest.mark.parametrize("reason", ABORTS)
+def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
+    vehicle = troubled(ABORTS[reason])
+    said = "tilted" if reason == "pitch is no number" else reason
+    if reason == "more than 0.475 m apart":  # drifts there, so that nothing jumps
+        began = []
+
+        def drift(state, since):
+            if since < 3.0:
+                return state
+            began.append(since)
+            return replace(state, height=state.height + 0.5 * (since - began[0]))
+
+        vehicle = SimulatedVehicle(trouble=drift)
+    if reason == "outside 0.2 to 3 m":
+        began = []
+
+        def sink(state, since):
+            return state if since < 3.0 else replace(state, height=1.0 - 0.9 * (since - 3.0))
+
+        vehicle = SimulatedVehicle(trouble=sink)
+        said = "m apart|outside 0.2"
+    with pytest.raises(FlightAbortedError, match=said):
+        fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert vehicle.log == ["connected", "took off", "hovers", "landed", "closed"]
+    rows = columns_of(tmp_path / "flight-1-P.csv")
+    assert 2.8 < rows["time_s"][-1] < 4.5
+    assert rows.dtype.names == ROW
+
+
+def test_a_height_that_freezes_does_not_make_the_vehicle_climb_for_long(tmp_path):
+    # At the base; the first step is at 5 s, and would be held until 11.5 s.
+    vehicle = troubled(lambda state: replace(state, height=1.0))
+    with pytest.raises(FlightAbortedError, match=r"has read 1\.000 m"):
+        fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert columns_of(tmp_path / "flight-1-P.csv")["time_s"][-1] < 6.1
+    assert vehicle.log[-2:] == ["landed", "closed"]
+
+
+def test_an_error_that_grows_ends_the_flight(tmp_path):
+    # More delay than was believed, and the prior says nothing of it: the loop is unstable.
+    vehicle = SimulatedVehicle(delay=0.75)
+    with pytest.raises(FlightAbortedError, match=r"more than 0\.475 m apart"):
+        fly_experiment(lambda: vehicle, FlightPlan(gains=(2.4,)), tmp_path, run=run)
+    assert vehicle.log[-2:] == ["landed", "closed"]
+
+
+def test_a_base_too_far_from_where_it_hovers_is_said_before_it_is_commanded(tmp_path):
+    vehicle = SimulatedVehicle()
+    plan = FlightPlan(base=2.0)
+    with pytest.raises(FlightAbortedError, match=r"hovers at 0\.75 m: .* 2 m, .* begin closer"):
+        fly_experiment(lambda: vehicle, plan, tmp_path, run=run)
+    assert vehicle.log == ["connected", "took off", "landed", "closed"]
+
+
+def test_a_gain_beyond_the_bound_is_refused_before_anything_is_connected(tmp_path):
+    vehicle = SimulatedVehicle()
+    with pytest.raises(ValueError, match=r"Kp = 2\.6 is above 2\.47"):
+        fly_experiment(lambda: vehicle, FlightPlan(gains=(1.2, 2.6)), tmp_path, run=run)
+    assert vehicle.log == []
+
+
+def test_a_folder_that_takes_no_file_is_refused_before_anything_is_connected(tmp_path):
+    taken = tmp_path / "taken"
+    taken.touch()
+    for folder in (taken, taken / "below"):
+        vehicle = SimulatedVehicle()
+        with pytest.raises(OSError, match=str(folder)):
+            fly_experiment(lambda vehicle=vehicle: vehicle, FlightPlan(), folder, run=run)
+        assert vehicle.log == []
+
+
+def test_a_disk_that_fills_up_in_flight_lands_the_vehicle(tmp_path, monkeypatch):
+    write, synced = _Writer._write, []
+
+    def full(self, waiting):
+        if "messages" not in self._path and self._file.tell() > 2000:
+            synced.append(self)
+            raise OSError(28, "No space left on device")
+        time.sleep(0.001)  # virtual time runs ahead of the disk
+        return write(self, waiting)
+
+    monkeypatch.setattr(_Writer, "_write", full)
+    vehicle = SimulatedVehicle()
+    with pytest.raises(OSError, match="No space left") as ended:
+        fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert synced
+    assert ended.value.filename.endswith("flight-1-P.csv")
+    assert vehicle.log[-2:] == ["landed", "closed"]
+    assert columns_of(tmp_path / "flight-1-P.csv").size > 5
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
+    # Journals were put on the disk before the landing: one that took 3 s left it to the watchdog.
+    ashore, waited = threading.Event(), []
+
+    def slow(call):
+        def waits(*given):
+            waited.append(ashore.wait(20.0))
+            return call(*given)
+
+        return waits
+
+    monkeypatch.setattr(_Writer, "_write", slow(_Writer._write))
+    monkeypatch.setattr(journal_module.os, "fsync", slow(os.fsync))
+
+    def trouble(state, since):
+        return replace(state, roll=1.0) if fails and since > 3.0 else state
+
+    class Closing(SimulatedVehicle):
+        async def close(self):
+            await super().close()
+            ashore.set()
+
+    vehicle = Closing(trouble=trouble)
+    flight = fly_all(lambda: vehicle, [dtm.P(1.2)], FlightPlan(), 6.5, tmp_path, 1)
+    if fails:
+        with pytest.raises(FlightAbortedError, match="tilted"):
+            run(flight)
+    else:
+        run(flight)
+    assert waited
+    assert all(waited)  # nothing was written before the vehicle was down and its link closed
+    assert vehicle.log[-2:] == ["landed", "closed"]
+    rows = columns_of(tmp_path / "flight-1-P.csv")
+    assert np.diff(rows["time_s"]) == pytest.approx(TS, abs=1e-6)
+    assert rows["time_s"][-1] > (2.8 if fails else 17.8)
+
+
+# What is learnt
+
+
+@pytest.mark.survey
+@pytest.mark.parametrize("seed", range(3))
+def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
+    stages = []
+    plan = FlightPlan()
+    found = fly_experiment(connecting(seed=seed), plan, tmp_path, stages.append, run)
+    assert len(stages) == plan.flights + 2
+    learned = found.learned
+    slow, fast = learned.flights
+    assert 30.0 < fast.overshoot < 37.0
+    assert 0.33 < learned.overshoot[1].delay < 0.38
+    # Link and navdata: 0.26 s and up to 5 ms; the lag 0.172 s, the lead of the plant's zero 0.030.
+    fit = learned.fit
+    assert fit.free == ("delay", "gain", "lag")
+    assert fit.delay == pytest.approx(0.233, abs=0.02)
+    assert fit.lag == pytest.approx(0.172, abs=0.02)
+    assert fit.gain == pytest.approx(0.885, abs=0.005)
+    assert fit.delay_plus_lag == pytest.approx(0.405, abs=0.006)
+    low, high = fit.ci(0.95)
+    assert 0.0 < high - low < 0.03
+    assert learned.split.transport.delay == pytest.approx(0.26, abs=0.006)
+    assert learned.split.vehicle_delay == pytest.approx(0.142, abs=0.015)
+    assert f"between {fit.ci(0.95, 'delay+lag')[0]:.3f}" in found.verdict()
+    best, after = found.checked
+    assert isinstance(after.controller, dtm.PV)
+    assert after.overshoot < 5.0
+    for before in (slow, fast, best):
+        assert after.settling_time < before.settling_time
+    # Everything was saved, and reads as any recording.
+    again = dtm.read_recording(
+        fast.path, time="time_s", reference="reference_m", output="height_m", command="command_m_s"
+    )
+    np.testing.assert_array_equal(again.output, fast.recording.output)
+    assert fast.timing.missed == 0
+    assert fast.timing.jitter < 1e-9
+
+
+@pytest.mark.survey
+def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
+    vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), tells_climb=False)
+    found = fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
+    assert found.learned.split is None
+    assert "does not tell" in found.learned.unsplit
+    assert found.learned.designed.loop.controller.filter == PAPER_FILTER
+    assert found.after.overshoot < 5.0
+    assert found.after.settling_time < found.before.settling_time
+    assert found.learned.fit.delay_plus_lag == pytest.approx(0.40, abs=0.01)
+
+
+def test_a_fit_that_is_not_adequate_is_said_before_its_gains_are_flown(
+    tmp_path, capsys, monkeypatch
+):
+    # `fly` designed for such intervals and flew the gains, and said nothing of it.
+    def undesigned(loop, *, controller, **how):  # what is flown does not matter here
+        return SimpleNamespace(loop=loop.replace(controller=controller))
+
+    monkeypatch.setattr(learn_module, "design", undesigned)
+
+    def gusts(state, since):
+        return replace(state, height=state.height + 0.004 * math.sin(2.5 * max(since, 0.0)))
+
+    def warn(doubt):
+        said.append(doubt)
+        flights.append(len(list(tmp_path.glob("flight-?-*P.csv"))))
+
+    said, flights = [], []
+    random = np.random.default_rng(2)
+    vehicle = SimulatedVehicle(noise=0.001, random=random, trouble=gusts)
+    plan = FlightPlan(gains=(2.4,), settle=2.5, hold=3.5, checked_hold=2.0)
+    found = fly_experiment(lambda: vehicle, plan, tmp_path, run=run, warn=warn)
+    assert found.learned.fit.adequate is False
+    assert flights == [1]
+    assert "margin is not assured" in said[0]
+    _print_study(found, tmp_path / "report.html")
+    assert "not adequate (adequate=False)" in " ".join(capsys.readouterr().out.split())
+    fine = replace(found.learned, fit=replace(found.learned.fit, adequate=True))
+    assert "adequate" not in replace(found, learned=fine).verdict()
+
+
+def test_flights_without_a_vehicle_in_them_are_refused(tmp_path):
+    time = np.arange(200) * TS
+    reference = np.where(time < 5.0, 1.0, 1.25)
+    noise = np.random.default_rng(0).normal(0.0, 0.002, time.size)
+    asleep = dtm.Recording(time, reference, 1.0 + noise, np.clip(reference - 1.0, -1, 1))
+    flight = FlownSteps(dtm.P(2.0), asleep, tmp_path / "none.csv", None, TS, 5.0)
+    with pytest.raises(NotIdentifiableError):
+        learn([flight], 1.0, 0.25, 2.5)
+
+
+def test_both_parts_are_found_from_what_is_told():
+    # A command in steps; the setpoint follows it 0.1234 s later, the climb that with a lag of 0.15
+    # s.
+    random = np.random.default_rng(3)
+    command_time = np.arange(200) * TS
+    command = np.repeat(random.uniform(-0.5, 0.5, 40), 5)
+    time = np.arange(0.0, command_time[-1] - 0.005, 0.005)
+    time += random.uniform(0.0, 0.002, time.size)
+    rows = np.searchsorted(command_time, time - 0.1234, side="right") - 1
+    setpoint = np.where(rows >= 0, command[np.maximum(rows, 0)], 0.0)
+    fine = np.arange(0.0, command_time[-1], 1e-4)
+    at = np.searchsorted(command_time, fine - 0.1234, side="right") - 1
+    driven = np.where(at >= 0, command[np.maximum(at, 0)], 0.0)
+    speed, speeds = 0.0, np.empty(fine.size)
+    for k, value in enumerate(driven):
+        speeds[k] = speed
+        speed += 1e-4 * (0.8 * value - speed) / 0.15
+    climb = np.interp(time, fine, speeds) + random.normal(0.0, 0.01, time.size)
+    split = split_delay([telemetry_of((time, setpoint, climb, climb), command_time, command)])
+    # The echo is seen at the first message after it: half of 5 ms later on average.
+    assert split.transport.delay == pytest.approx(0.1234 + 0.0025, abs=0.002)
+    assert split.transport.gain == pytest.approx(1.0, abs=0.01)
+    assert split.vehicle_delay == pytest.approx(0.15, abs=0.01)
+    assert split.vehicle.gain == pytest.approx(0.8, abs=0.01)
+
+
+def test_the_test_vehicle_is_the_kit():
+    plant = dtm.kit_plant()
+    assert (*plant.num, plant.den[1]) == KIT
+
+
+def test_steps_are_measured_as_flown(tmp_path):
+    time = np.arange(300) * 0.1
+    reference = np.where(time < 10.0, 1.0, np.where(time < 20.0, 1.5, 1.0))
+    height = np.where(time < 10.0, 1.0, np.where(time < 20.0, 1.5, 1.0))
+    height[100:103] = (1.2, 1.6, 1.55)  # 20 % over, within 5 % from the fourth sample on
+    height[200:205] = (1.3, 1.1, 0.95, 0.97, 1.03)
+    recording = dtm.Recording(time, reference, height)
+    flight = FlownSteps(dtm.P(1.0), recording, tmp_path / "none.csv", None, 0.1, 10.0)
+    up, down = flight.steps
+    assert (up.overshoot, down.overshoot) == pytest.approx((20.0, 10.0))
+    assert (up.settling_time, down.settling_time) == pytest.approx((0.3, 0.5))
+    assert flight.first_step() == pytest.approx((5.0, 19.9))
+    late = dtm.Recording(np.delete(time, 50), np.delete(reference, 50), np.delete(height, 50))
+    assert FlownSteps(dtm.P(1.0), late, tmp_path, None, 0.1, 10.0).timing.missed == 1

@@ -1,0 +1,280 @@
+"""``deadtime fly`` as it is run: on an emulator of its own, and what signals do to it."""
+
+import asyncio
+import contextlib
+import csv
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from command_line import run
+from deadtime._cli.fly import _free_folder
+from deadtime._cli.landing import run_landing, terminated_like_interrupted
+from deadtime.flights._step_test import ROW
+from deadtime.links.ardrone2.emulator import Phase
+from emulated import emulator, skip_if_too_busy
+
+FLY = [sys.executable, "-m", "deadtime", "fly"]
+
+
+def flown(*options):
+    return run("fly", *options)
+
+
+def running(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_the_whole_experiment_in_virtual_time(tmp_path):
+    folder = tmp_path / "new" / "flight"
+    done = flown("--virtual-time", "--folder", folder, "--seed", 3, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
+    assert 0.33 < told["overshoot_method"][1] < 0.38
+    assert told["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
+    assert told["transport"]["delay"] == pytest.approx(0.26, abs=0.01)
+    assert told["vehicle_delay"] == pytest.approx(0.142, abs=0.015)
+    low, high = told["vehicle"]["interval_95"]["time_constant"]
+    assert low < told["vehicle_delay"] < high
+    last = told["flights"][-1]
+    assert last["overshoot"] < 5.0
+    assert last["settling_time"] < min(one["settling_time"] for one in told["flights"][:-1])
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 3
+    assert told["verdict"].split(".")[0] in page
+    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == told
+    again = flown("--virtual-time", "--folder", folder)
+    assert again.returncode == 1
+    assert "holds recordings already" in again.stderr
+
+
+def test_a_real_host_needs_consent_and_shows_the_limits():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
+        drone.bind(("127.0.0.1", 0))
+        drone.settimeout(0.3)
+        port = drone.getsockname()[1]
+        done = flown("--host", "127.0.0.1", "--navdata-port", port, "--command-port", port)
+        with pytest.raises(TimeoutError):
+            drone.recvfrom(1)
+    assert done.returncode == 1
+    assert "--i-have-a-safe-area" in done.stderr
+    assert "nothing was sent" in done.stderr
+    # A real drone climbs at half a metre a second unless told otherwise.
+    assert "no more than 0.5 m/s" in done.stderr
+    assert "4 flights" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--gains", "1.2,3"), "Kp = 3 is above 2.47"),
+        (("--gains", "fast"), "numbers with commas"),
+        (("--gains", ""), "no gains to fly"),
+        (("--max-height", "1.2"), "outside 0.2 to 1.2 m"),
+        (("--host", "127.0.0.1", "--virtual-time"), "take one"),
+        (("--max-climb", "nan"), "max_climb"),
+        (("--step", "-0.2"), "step"),
+        (("--step", "1e-5"), "lost in the noise"),
+        (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),
+    ],
+)
+def test_what_is_not_safe_or_makes_no_sense_is_refused(options, said, tmp_path):
+    done = flown("--folder", tmp_path, *options)
+    assert done.returncode == 1
+    assert said in " ".join(done.stderr.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_without_a_flight_in_it_is_taken(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert str(_free_folder()) == "flight"
+    (tmp_path / "flight").mkdir()
+    assert str(_free_folder()) == "flight"
+    (tmp_path / "flight" / "flight-1-P.csv").touch()
+    assert str(_free_folder()) == "flight-2"
+    (tmp_path / "flight-2").touch()
+    assert str(_free_folder()) == "flight-3"
+
+
+def read_rows(path):
+    """The rows of a recording; every one has to be whole."""
+    with path.open(newline="") as stream:
+        head, *rows = csv.reader(stream)
+    assert tuple(head) == ROW
+    assert all(len(row) == len(head) for row in rows)
+    return rows
+
+
+# These tests may run under `nohup`, which the command would respect; this takes its place first.
+HEEDING_SIGHUP = [
+    sys.executable,
+    "-c",
+    "import os, signal, sys\n"
+    "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"
+    "os.execv(sys.argv[1], sys.argv[1:])",
+]
+
+ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+
+
+@pytest.fixture
+def handlers():
+    """What signals do without anybody's word, also where a shell has had Ctrl-C ignored."""
+    before = {number: signal.getsignal(number) for number in ENDING}
+    for number in ENDING:
+        plain = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+        signal.signal(number, plain)
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_each_signal_cancels_and_is_heeded_again_afterwards(number, handlers):
+    async def fly():
+        for _ in range(3):  # something on the way has taken the first ones for its own
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.sleep(5.0)
+                raise AssertionError("nothing came")
+            os.kill(os.getpid(), number)
+        await asyncio.sleep(5.0)
+
+    async def begin():
+        os.kill(os.getpid(), number)
+        await fly()
+
+    with terminated_like_interrupted():
+        with pytest.raises(KeyboardInterrupt):
+            run_landing(begin())
+        # Between two flights, while gains are designed.
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+
+
+def test_what_nohup_has_had_ignored_stays_so(handlers):
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    async def fly():
+        os.kill(os.getpid(), signal.SIGHUP)
+        await asyncio.sleep(0.01)
+        return "landed"
+
+    with terminated_like_interrupted():
+        assert run_landing(fly()) == "landed"
+
+
+class LoopWithoutSignals(asyncio.SelectorEventLoop):
+    """As the event loops of Windows are."""
+
+    def add_signal_handler(self, *given):
+        raise NotImplementedError
+
+    def remove_signal_handler(self, *given):
+        raise NotImplementedError
+
+
+def test_where_the_event_loop_takes_no_signals_the_interpreter_does(handlers, monkeypatch, capsys):
+    # `deadtime fly` could not run on Windows: its first call was one that is not there.
+    monkeypatch.delattr(signal, "SIGHUP")
+    monkeypatch.setattr(asyncio.events, "new_event_loop", LoopWithoutSignals)
+    landed = []
+
+    async def fly():
+        assert isinstance(asyncio.get_running_loop(), LoopWithoutSignals)
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            await asyncio.sleep(10.0)
+        except asyncio.CancelledError:
+            landed.append(True)
+            raise
+
+    before = signal.getsignal(signal.SIGINT)
+    with terminated_like_interrupted(), pytest.raises(KeyboardInterrupt):
+        run_landing(fly())
+    assert landed
+    assert "landing first" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
+    async def fly():
+        async with emulator(host="127.0.0.1") as emulated:
+            ports = ("navdata_port", "command_port", "control_port")
+            options = [f"--{name.replace('_', '-')}={getattr(emulated, name)}" for name in ports]
+            process = await asyncio.create_subprocess_exec(
+                *HEEDING_SIGHUP,
+                *FLY,
+                *("--host", "127.0.0.1", "--i-have-a-safe-area", "--folder", str(tmp_path)),
+                *options,
+                stderr=asyncio.subprocess.PIPE,
+            )
+            recording = tmp_path / "flight-1-P.csv"
+            try:
+                for _ in range(600):
+                    await asyncio.sleep(0.05)
+                    if recording.exists() and len(recording.read_text().splitlines()) > 15:
+                        break
+                if process.returncode is not None:
+                    skip_if_too_busy((await process.communicate())[1].decode())
+                assert emulated.truth().phase is Phase.FLYING
+                process.send_signal(number)
+                await asyncio.sleep(0.5)
+                assert emulated.truth().phase is Phase.LANDING
+                process.send_signal(number)  # impatience does not end the landing
+                _, error = await asyncio.wait_for(process.communicate(), 20.0)
+                assert emulated.truth().phase is Phase.LANDED
+                assert process.returncode == 130
+                assert "landing first" in error.decode()
+                assert "kept in" in error.decode()
+                assert len(read_rows(recording)) > 14
+            finally:
+                if process.returncode is None:
+                    process.kill()
+                    await process.communicate()
+
+    asyncio.run(fly())
+
+
+def own_emulators(parent):
+    """Processes that a process has started."""
+    found = []
+    for entry in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            with open(f"/proc/{entry}/stat", encoding="utf-8") as stat:
+                fields = stat.read().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[1]) == parent:
+            found.append(int(entry))
+    return found
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_its_own_emulator_ends_with_it(number, tmp_path):
+    process = subprocess.Popen([*FLY, "--folder", str(tmp_path)], stderr=subprocess.DEVNULL)
+    children = []
+    for _ in range(200):
+        children = own_emulators(process.pid)
+        if children and list(tmp_path.glob("flight-1-P.csv")):
+            break
+        time.sleep(0.1)
+    assert children
+    process.send_signal(number)
+    process.wait(20.0)
+    for _ in range(100):
+        if not any(map(running, children)):
+            break
+        time.sleep(0.1)
+    assert not any(map(running, children))

@@ -1,0 +1,49 @@
+"""The experiment over real UDP, shortened: one flight to learn from, one under the PV gains."""
+
+import asyncio
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+import deadtime as dtm
+import pytest
+from deadtime import FlightAbortedError
+from deadtime.flights import FlightPlan
+from deadtime.flights._fly import fly_all
+from deadtime.flights._learn import learn
+from emulated import client_of, emulator, skip_if_too_busy
+
+PLAN = FlightPlan(gains=(2.4,), settle=3.5, hold=4.0)
+
+
+@pytest.mark.survey
+def test_the_paper_s_gain_and_what_is_designed_for_it(tmp_path):
+    async def fly():
+        async with emulator(seed=5) as emulated:
+
+            @asynccontextmanager
+            async def connect():
+                async with client_of(emulated, PLAN.limits) as drone:
+                    yield drone
+
+            (slow,) = await fly_all(connect, [dtm.P(2.4)], PLAN, PLAN.hold, tmp_path, 1)
+            learned = await asyncio.to_thread(learn, [slow], 1.0, PLAN.step, PLAN.gain_margin)
+            brief = replace(PLAN, settle=2.5)
+            designed = [learned.designed.loop.controller]
+            (fast,) = await fly_all(connect, designed, brief, 2.5, tmp_path, 2)
+            return slow, learned, fast
+
+    try:
+        slow, learned, fast = asyncio.run(fly())
+    except FlightAbortedError as ended:
+        skip_if_too_busy(ended)
+        raise
+    assert 30.0 < slow.overshoot < 37.0
+    assert 0.33 < learned.overshoot[0].delay < 0.38
+    assert learned.fit.delay == pytest.approx(0.233, abs=0.04)
+    assert learned.fit.lag == pytest.approx(0.172, abs=0.04)
+    assert learned.fit.delay_plus_lag == pytest.approx(0.405, abs=0.015)
+    low, high = learned.fit.ci(0.95)
+    assert 0.0 < high - low < 0.08
+    assert learned.split.transport.delay == pytest.approx(0.265, abs=0.02)
+    assert fast.overshoot < 5.0
+    assert fast.settling_time < slow.settling_time

@@ -1,0 +1,137 @@
+"""Data flows one way: an import from a later room fails."""
+
+import ast
+from pathlib import Path
+
+import deadtime
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "python" / "deadtime"
+
+# Rooms of the Python package, in order: a file imports from its own room and from those above it in
+# this list, for types, late and in any other way.
+ROOMS = [
+    "_base",
+    "special",
+    "dde",
+    "roots",
+    "systems",
+    "loops",
+    "stability",
+    "recordings",
+    "experiments",
+    "gallery",
+    "links",
+    "estimation",
+    "tuning",
+    "reports",
+    "flights",
+    "internet",
+    "paper",
+    "_cli",
+]
+
+#: The rooms that may import the native module.
+NUMERICS = {"special", "dde", "roots", "systems", "loops", "stability"}
+#: The one file after the numerics that may import the native module: its wire formats.
+WIRE = "links._wire"
+
+#: Imports for types that run back, with the reason.
+BACKWARDS = {
+    # A quotient of two quasi-polynomials is a transfer function: its type says so.
+    ("roots._quasipolynomial", "systems"),
+}
+
+
+def modules():
+    """Dotted name within the package, and path, of every file of a room."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        if len(parts) > 1:
+            yield ".".join(parts), path
+
+
+NAMES = {name for name, _ in modules()}
+
+
+def imports(path):
+    """What a file imports from the package, wherever in the file: (module, name)."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path.name}: import by the full name of the room"
+            first, _, rest = (node.module or "").partition(".")
+            if first == "deadtime":
+                yield from ((rest, alias.name) for alias in node.names)
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                first, _, rest = alias.name.partition(".")
+                if first == "deadtime":
+                    yield rest, ""
+
+
+def room(module):
+    return module.split(".")[0]
+
+
+def test_the_package_has_the_rooms_of_the_list():
+    assert {room(name) for name in NAMES} == set(ROOMS)
+
+
+def test_no_import_runs_back():
+    for name, path in modules():
+        allowed = ROOMS[: ROOMS.index(room(name)) + 1]
+        for module, imported in imports(path):
+            if module == "":
+                # The paper's reproduction is written as a user would write it.
+                assert imported == "_deadtime" or room(name) == "paper", f"{name}: {imported}"
+            elif module != "_deadtime" and (name, room(module)) not in BACKWARDS:
+                assert room(module) in allowed, f"{name} imports {module}"
+
+
+def test_a_room_does_not_import_from_its_own_init():
+    for name, path in modules():
+        for module, _ in imports(path):
+            assert module != room(name) or module in ("paper", "_cli"), f"{name} imports {module}"
+
+
+def files_used(name, path):
+    """The files of its own room that a file imports."""
+    for module, imported in imports(path):
+        if room(module) != room(name) or module.endswith("_plots"):
+            continue  # A result draws itself by a late import of the drawing, which knows it.
+        for target in (f"{module}.{imported}", module, f"{module}.__init__"):
+            if target in NAMES and target != name:
+                yield target
+                break
+
+
+@pytest.mark.parametrize("which", ROOMS)
+def test_no_files_of_a_room_import_in_a_circle(which):
+    arrows = {n: set(files_used(n, p)) for n, p in modules() if room(n) == which}
+    while arrows:
+        last = [name for name, used in arrows.items() if not used]
+        assert last, f"in a circle, or below one: {sorted(arrows)}"
+        for name in last:
+            del arrows[name]
+        for used in arrows.values():
+            used -= set(last)
+
+
+def test_only_numerics_import_the_native_module():
+    for name, path in modules():
+        for module, imported in imports(path):
+            if module == "_deadtime" or (module == "" and imported == "_deadtime"):
+                assert room(name) in NUMERICS or name == WIRE, f"{name} imports _deadtime"
+
+
+def test_public_names_are_those_of_the_rooms():
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    shown = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("deadtime."):
+            shown |= {alias.name: node.module.removeprefix("deadtime.") for alias in node.names}
+    assert shown == deadtime._ROOM_OF
+    assert sorted(shown) == sorted(deadtime.__all__)
+    for name in deadtime.__all__:
+        assert getattr(deadtime, name) is not None

@@ -1,0 +1,253 @@
+"""The Rust crates depend one way: `use` lines are read, and an arrow that runs back fails."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "rust").is_dir())
+CORE = ROOT / "rust" / "core" / "src"
+WIRE_FORMATS = ROOT / "rust" / "wire"
+BINDINGS = ROOT / "rust" / "bindings" / "src"
+
+# What each room of the core may use besides itself; every room may use the foundation.
+FOUNDATION = {"error", "memory", "simd", "status", "task"}
+CORE_ARROWS = {
+    "lambertw": set(),
+    "elementary": set(),
+    "quasipoly": {"elementary"},
+    "roots": {"elementary", "lambertw", "quasipoly"},
+    "stability": {"elementary", "lambertw", "quasipoly", "roots"},
+    "frequency": {"elementary", "quasipoly", "roots", "stability"},
+    "dde": {"elementary", "quasipoly"},
+}
+
+# Files and folders of a room in order: each uses only those before it.
+ORDER = {
+    "roots": ["region", "disc", "root_set", "chains", "counting", "locating", "matrix"],
+    "stability": [
+        "family",
+        "specification",
+        "cell",
+        "crossings",
+        "branches",
+        "boxes",
+        "map",
+    ],
+    "frequency": [
+        "two_sided",
+        "bounds",
+        "polynomial",
+        "zeros",
+        "waves",
+        "squares",
+        "ratio",
+        "argument",
+        "chains",
+        "margins",
+        "equation",
+        "passage",
+        "multiples",
+        "delays",
+        "crossings",
+        "ranges",
+    ],
+    "dde": ["scalar", "limits", "propagator", "control_loop", "system", "spectral"],
+}
+
+
+def rust_sources(folder):
+    return sorted(folder.rglob("*.rs"))
+
+
+def room_of(path):
+    return path.relative_to(CORE).parts[0].removesuffix(".rs")
+
+
+def code(path):
+    """The text of a file without comments and without its tests."""
+    text = re.sub(r"//.*", "", path.read_text(encoding="utf-8"))
+    return re.split(r"#\[cfg\(test\)\]\s*mod \w+ \{", text)[0]
+
+
+def module_of(path):
+    parts = path.relative_to(CORE).with_suffix("").parts
+    return parts[:-1] if parts[-1] in ("mod", "lib") else parts
+
+
+MODULES = {module_of(path): path for path in rust_sources(CORE)}
+
+
+def paths_in(tree, prefix=()):
+    """The paths that a `use` tree names."""
+    tree = tree.strip()
+    head, brace, rest = tree.partition("{")
+    names = tuple(name.strip() for name in head.split("::") if name.strip())
+    if not brace:
+        yield prefix + names[:-1] + (names[-1].split(" as ")[0],) if names else prefix
+        return
+    depth, part = 0, ""
+    for letter in rest[: rest.rindex("}")] + ",":
+        depth += (letter == "{") - (letter == "}")
+        if letter == "," and depth == 0:
+            if part.strip():
+                yield from paths_in(part, prefix + names)
+            part = ""
+        else:
+            part += letter
+
+
+def resolved(module, path):
+    """The file or folder of the core that a path leads to, as far as the path names one."""
+    here = list(module)
+    first, rest = path[0], list(path)
+    if first == "crate":
+        here, rest = [], rest[1:]
+    elif first in ("super", "self"):
+        while rest and rest[0] in ("super", "self"):
+            if rest.pop(0) == "super":
+                here.pop()
+    else:
+        return None
+    full = (*here, *(name for name in rest if name != "self"))
+    return next((full[:k] for k in range(len(full), -1, -1) if full[:k] in MODULES), None)
+
+
+def uses(module, path):
+    """Modules of the core that a file uses, in `use` lines and in paths within the code."""
+    text = code(path)
+    found = [p for tree in re.findall(r"\buse\s+([^;]+);", text) for p in paths_in(tree)]
+    rest = re.sub(r"\buse\s+[^;]+;", "", text)
+    found += [tuple(p.split("::")) for p in re.findall(r"\b(?:crate|super)(?:::\w+)+", rest)]
+    targets = {resolved(module, names) for names in found}
+    return targets - {None, module, ()}
+
+
+USES = {
+    module: uses(module, path)
+    for module, path in MODULES.items()
+    if path.stem not in ("mod", "lib", "tests")
+}
+FOLDERS = sorted({module[:-1] for module in USES})
+
+
+def arrows(folder):
+    """Which files and folders in `folder` use which others of them, with one example each."""
+    depth = len(folder)
+    found = {}
+    for module, used in USES.items():
+        if module[:depth] != folder:
+            continue
+        for target in used:
+            if len(target) > depth and target[:depth] == folder and target[depth] != module[depth]:
+                example = f"{'::'.join(module)} uses {'::'.join(target)}"
+                found.setdefault((module[depth], target[depth]), example)
+    return found
+
+
+def circle(pairs):
+    """A circle among pairs (user, used) as a list of names; empty where there is none."""
+    users = {user for user, _ in pairs}
+    left = {pair for pair in pairs if pair[1] in users}
+    while len(left) < len(pairs):
+        pairs = left
+        users = {user for user, _ in pairs}
+        left = {pair for pair in pairs if pair[1] in users}
+    return sorted(users)
+
+
+def test_paths_of_use_trees_are_read():
+    assert list(paths_in("super::{a::B, c::{D, self as e}}")) == [
+        ("super", "a", "B"),
+        ("super", "c", "D"),
+        ("super", "c", "self"),
+    ]
+    assert resolved(("roots", "counting", "cell"), ("super", "turn", "Turn")) == (
+        "roots",
+        "counting",
+        "turn",
+    )
+    assert circle({("a", "b"), ("b", "c"), ("c", "b")}) == ["a", "b", "c"]
+    assert circle({("a", "b"), ("b", "c"), ("a", "c")}) == []
+
+
+def test_the_core_has_the_rooms_the_table_names():
+    rooms = {room_of(path) for path in rust_sources(CORE)} - {"lib"}
+    assert rooms == set(CORE_ARROWS) | FOUNDATION
+
+
+@pytest.mark.parametrize("room", sorted(CORE_ARROWS))
+def test_a_room_of_the_core_uses_only_what_stands_before_it(room):
+    allowed = CORE_ARROWS[room] | FOUNDATION | {room}
+    for module, used in USES.items():
+        if module[0] == room:
+            rooms = {target[0] for target in used}
+            assert rooms <= allowed, f"{'::'.join(module)} uses {rooms - allowed}"
+
+
+def test_the_foundation_of_the_core_stands_alone():
+    for module, used in USES.items():
+        if module[0] in FOUNDATION:
+            assert {target[0] for target in used} <= FOUNDATION, "::".join(module)
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids="::".join)
+def test_no_circle_among_the_files_and_folders_of_a_folder(folder):
+    found = arrows(folder)
+    names = circle(set(found))
+    examples = [text for pair, text in found.items() if set(pair) <= set(names)]
+    assert not names, "\n".join(examples)
+
+
+@pytest.mark.parametrize("room", sorted(ORDER))
+def test_files_and_folders_of_a_room_use_only_those_before_them(room):
+    order = ORDER[room]
+    inside = {module[1] for module in MODULES if module[:1] == (room,) and len(module) > 1}
+    assert inside - {"tests"} == set(order)
+    for (user, used), example in arrows((room,)).items():
+        assert order.index(used) < order.index(user), example
+
+
+def test_files_use_what_defines_a_name_not_the_table_of_contents_above_it():
+    for module, used in USES.items():
+        above = {target for target in used if target == module[: len(target)]}
+        assert not above, f"{'::'.join(module)} uses {above}"
+
+
+def test_tables_of_contents_define_nothing():
+    for path in CORE.rglob("mod.rs"):
+        items = re.findall(
+            r"^(?:pub(?:\(\w+\))? )?(?:fn|struct|enum|trait|impl|const) .*", code(path), re.M
+        )
+        assert not items, f"{path.relative_to(CORE)} defines {items}"
+
+
+def test_the_core_knows_nothing_of_python():
+    for path in rust_sources(CORE):
+        assert not re.search(r"\b(pyo3|numpy::)", path.read_text(encoding="utf-8")), path.name
+
+
+def test_the_wire_formats_stand_alone():
+    # What reads bytes from a network has nothing around it that could be unsafe or panic.
+    manifest = tomllib.loads((WIRE_FORMATS / "Cargo.toml").read_text(encoding="utf-8"))
+    assert manifest["dependencies"] == {}
+    table_of_contents = (WIRE_FORMATS / "src" / "lib.rs").read_text(encoding="utf-8")
+    assert "#![forbid(unsafe_code)]" in table_of_contents
+    assert "#![deny(clippy::indexing_slicing)]" in table_of_contents
+
+
+def test_only_one_file_of_the_seam_knows_the_wire_formats():
+    users = [
+        path.relative_to(ROOT).as_posix()
+        for path in rust_sources(CORE) + rust_sources(BINDINGS)
+        if "deadtime_wire" in path.read_text(encoding="utf-8")
+    ]
+    assert users == ["rust/bindings/src/wire.rs"]
+
+
+def test_the_seam_holds_no_formula():
+    # Converting needs no transcendental function; whoever needs one belongs in the core.
+    for path in rust_sources(BINDINGS):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"\.(exp|ln|sin|cos|sqrt|powi|powf)\(", text), path.name

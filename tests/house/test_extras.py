@@ -1,0 +1,116 @@
+"""Without an extra, functions that need it name the line that installs it; the others work."""
+
+import json
+import subprocess
+import sys
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime import Experiment
+from flown import fly
+
+LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
+TIME = np.linspace(0.0, 5.0, 60)
+
+
+def estimated():
+    return dtm.estimate_delay(*fly(rest=1.0), free=("delay",))
+
+
+def planned():
+    return dtm.identifiability(LOOP, Experiment.step(1.0, 5.0), noise=0.01)
+
+
+def designed():
+    return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
+
+
+def filtered():
+    return dtm.design_filter(LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9)
+
+
+SYSTEM = dtm.DelaySystem(A={0.0: -1.0, 0.3: -0.5}, B=1.0)
+Kp, T = dtm.parameters("Kp T")
+FAMILY = dtm.s + Kp * dtm.delay(T)
+RANGES = {"Kp": (0.5, 3.0), "T": (0.1, 0.5)}
+CONTINUOUS = LOOP.continuous()
+
+#: Every drawing method of a public type.
+DRAWN = {
+    "Certificate.plot": lambda: (dtm.s + dtm.delay(1.0)).certify((-1, 1), (0, 9)).plot(),
+    "ControlLoop.bode": CONTINUOUS.bode,
+    "DelayEstimate.plot": lambda: estimated().plot(),
+    "Design.plot": lambda: designed().plot(),
+    "FilterChoice.plot": lambda: filtered().plot(),
+    "Identifiability.plot": lambda: planned().plot(),
+    "ProvedBoxes.plot": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3).plot(),
+    "Response.plot": lambda: LOOP.step_response().plot(),
+    "RobustMap.plot": lambda: dtm.robust_map(
+        LOOP.continuous(), {"Kp": (0.5, 3), "Kv": (0, 0.5)}, {"delay": (0.3, 0.4)}, shape=(3, 3)
+    ).plot(),
+    "RootSet.plot": lambda: LOOP.rightmost().plot(),
+    "StabilityMap.plot": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)).plot(),
+    "TransferFunction.bode": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)).bode(),
+    "TransferFunction.nyquist": lambda: (2.0 / dtm.s * dtm.delay(0.36)).nyquist(),
+}
+
+
+def drawing_methods():
+    """Every method of a public type that takes axes or is named for a drawing."""
+    for kind in (getattr(dtm, name) for name in dtm.__all__):
+        if isinstance(kind, type):
+            for name in ("plot", "bode", "nyquist"):
+                if callable(getattr(kind, name, None)):
+                    yield f"{kind.__name__}.{name}"
+
+
+def test_the_list_of_drawings_is_complete():
+    assert set(drawing_methods()) == DRAWN.keys()
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_drawing_without_matplotlib_says_which_line_installs_it(name, monkeypatch):
+    # All but one raised a bare ModuleNotFoundError.
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(dtm.MissingExtraError, match=r"pip install 'deadtime\[plot\]'") as raised:
+        DRAWN[name]()
+    assert isinstance(raised.value, ImportError)
+
+
+def without(missing, *arguments, cwd=None):
+    """A command where these packages are not installed."""
+    code = (
+        "import sys\n"
+        f"for name in {missing!r}: sys.modules[name] = None\n"
+        f"sys.argv[1:] = {list(arguments)!r}\n"
+        "from deadtime._cli import main; main()"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True, text=True, timeout=120, check=False, cwd=cwd,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "roots --kp 2 --delay 0.36 --json",
+        "simulate --kp 2 --delay 0.36 --points 11 --json",
+        "map --delay 0.36 --shape 3 3 --json",
+    ],
+)
+def test_commands_that_draw_nothing_need_no_matplotlib(arguments):
+    # The command once asked for matplotlib before it looked at what it was to do.
+    done = without(["matplotlib"], *arguments.split())
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("arguments", ["roots --kp 2 --delay 0.36 --plot a.png", "demo"])
+def test_commands_that_draw_ask_for_it_before_they_work(arguments, tmp_path):
+    done = without(["matplotlib"], *arguments.split(), cwd=tmp_path)
+    assert done.returncode == 1
+    assert "pip install 'deadtime[plot]'" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())

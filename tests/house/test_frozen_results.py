@@ -1,0 +1,202 @@
+"""Every result survives pickle and copy, can be compared, and is read-only."""
+
+import copy
+import dataclasses
+import json
+import pickle
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from flown import fly
+
+LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
+CONTINUOUS = LOOP.continuous()
+SYSTEM = dtm.DelaySystem(A={0.36: -2.0}, B={0.36: 2.0})
+Kp, T = dtm.parameters("Kp T")
+FAMILY = dtm.s + Kp * dtm.delay(T)
+RANGES = {"Kp": (0.5, 3.0), "T": (0.1, 0.5)}
+h = dtm.s + (2.0 + 0.3 * dtm.s) * dtm.delay(0.36)
+
+
+def solved(**more):
+    events = [lambda t, y: y[0]]
+    return dtm.solve_dde(
+        lambda t, y, z: -z[0], (0.0, 3.0), 1.0, 1.0, events=events, dense_output=True, **more
+    )
+
+
+def designed():
+    return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
+
+
+def planned(**more):
+    return dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01, **more)
+
+
+#: One of every public type that is not an error or a plain number, and how it is made.
+MADE = {
+    "Certificate": lambda: h.certify((-1, 1), (0, 9)),
+    "Chain": lambda: h.chains()[0],
+    "ControlLoop": lambda: LOOP,
+    "CramerRaoBound": lambda: dtm.estimation.CramerRaoBound(**bound_fields()),
+    "Crossings": lambda: dtm.crossings(FAMILY, {"Kp": (0.1, 9.0)}, at={"T": 0.3}),
+    "DelayEstimate": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)),
+    "DelayResult": solved,
+    "DelaySolution": lambda: solved().sol,
+    "DelaySystem": lambda: SYSTEM,
+    "DerivativeFilter": lambda: dtm.DerivativeFilter(30.0),
+    "Design": designed,
+    "Expansion": lambda: h.expansion(0.5j, 3),
+    "Experiment": lambda: dtm.Experiment.step(1.0, 5.0),
+    "FilterChoice": lambda: dtm.design_filter(
+        LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9
+    ),
+    "FirstOrder": lambda: dtm.FirstOrder(1.0, 0.3),
+    "FittedRun": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)).runs[0],
+    "Identifiability": planned,
+    "Integrator": dtm.Integrator,
+    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
+    "Margins": CONTINUOUS.margin,
+    "MonteCarlo": lambda: planned().monte_carlo(3, processes=1, noise_in_loop=False),
+    "P": lambda: dtm.P(2.0),
+    "PD": lambda: dtm.PD(2.0, 0.1),
+    "PI": lambda: dtm.PI(2.0, 0.1),
+    "PID": lambda: dtm.PID(2.0, 0.1, 0.1),
+    "PV": lambda: dtm.PV(2.0, 0.1),
+    "Parameter": lambda: Kp,
+    "ParametricQuasiPolynomial": lambda: FAMILY,
+    "PlannedBound": lambda: planned().bound,
+    "ProvedBoxes": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3),
+    "QuasiPolynomial": lambda: h,
+    "RationalPlant": lambda: dtm.RationalPlant([1.0], [1.0, 1.0]),
+    "Recording": lambda: dtm.Recording(
+        np.arange(9.0), np.zeros(9), np.zeros(9), units={"output": "m"}
+    ),
+    "Response": LOOP.step_response,
+    "RobustMap": lambda: dtm.robust_map(
+        CONTINUOUS, {"Kp": (0.5, 3), "Kv": (0, 0.5)}, {"delay": (0.3, 0.4)}, shape=(3, 3)
+    ),
+    "RootSet": LOOP.rightmost,
+    "RootSensitivity": lambda: h.root_sensitivity(h.rightmost()[0]),
+    "StabilityMap": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)),
+    "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
+    "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
+    "Sweep": lambda: dtm.sweep(LOOP, {"Kp": np.array([1.0, 2.0])}),
+    "Response of a system": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
+    "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
+    "TransferFunction": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)),
+    "Whiteness": lambda: dtm.estimation.Whiteness(1.0, 0.5, 3, 0.1),
+}
+WAYS = {
+    "pickle": lambda one: pickle.loads(pickle.dumps(one)),
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+}
+
+
+def bound_fields():
+    bound = planned().bound
+    return {
+        field.name: getattr(bound, field.name)
+        for field in dataclasses.fields(dtm.estimation.CramerRaoBound)
+    }
+
+
+def public_types():
+    kinds = (getattr(dtm, name) for name in dtm.__all__)
+    for kind in kinds:
+        if isinstance(kind, type) and not issubclass(kind, (BaseException, int)):
+            yield kind
+
+
+def test_the_list_of_types_is_complete():
+    # Bases that are never made, and tuples of arrays.
+    assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
+        "Controller", "Plant", "OffsetW",
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=MADE)
+def one(request):
+    return MADE[request.param]()
+
+
+def values_of(one):
+    if dataclasses.is_dataclass(one):
+        for field in dataclasses.fields(one):
+            value = getattr(one, field.name)
+            yield field.name, value
+            if isinstance(value, dict):
+                yield from ((f"{field.name}[{key}]", part) for key, part in value.items())
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_public_object_survives_copying_equal_to_itself(one, way):
+    # Solutions of delay equations did neither; a copied result was another than its origin.
+    other = WAYS[way](one)
+    assert type(other) is type(one)
+    assert repr(other) == repr(one)
+    assert other == one
+
+
+def test_no_comparison_raises(one):
+    # `RootSet == array` raised where the lengths differ.
+    if isinstance(one, tuple):
+        return  # a tuple is compared as one
+    for foreign in (None, 1, "a", np.zeros(2), np.zeros((3, 1)), [1.0], object()):
+        assert not np.any(one == foreign)
+    if isinstance(one, dtm.roots.RootSet):
+        assert (np.zeros(7) == one) is False
+        assert (np.zeros(7) != one) is True
+    hash(one)
+
+
+def test_nothing_in_a_result_can_be_changed(one):
+    # The dicts of a fit could be written to, and the fit said something else from then on.
+    if not (dataclasses.is_dataclass(one) and hasattr(one, "_freeze")):
+        return
+    for way in (lambda it: it, *WAYS.values()):
+        for name, value in values_of(way(one)):
+            if isinstance(value, np.ndarray):
+                assert not value.flags.writeable, name
+            elif isinstance(value, dict):
+                for change in ("clear", "popitem", "update", "setdefault"):
+                    with pytest.raises(TypeError, match="does not change"):
+                        getattr(value, change)()
+                with pytest.raises(TypeError, match="does not change"):
+                    value["a"] = 1
+                assert dict(value) == value
+                assert json.loads(json.dumps(dict.fromkeys(value, 1))).keys() == value.keys()
+
+
+def test_results_that_differ_are_not_equal():
+    one, other = LOOP.step_response(), LOOP.replace(delay=0.3).step_response()
+    assert one != other
+    assert one == LOOP.step_response()
+    assert len({one, LOOP.step_response(), other}) == 2
+    assert solved() == solved()
+    assert solved().sol != solved(rtol=1e-3).sol
+
+
+def test_a_copied_solution_gives_the_same_values():
+    found = solved()
+    times = np.linspace(-1.0, 3.0, 101)
+    for way in WAYS.values():
+        other = way(found)
+        for nu in (0, 1):
+            assert np.array_equal(other.sol(times, nu=nu), found.sol(times, nu=nu))
+
+
+def test_parts_that_are_no_solution_are_refused():
+    kind, parts = solved().sol._pieces.__reduce__()
+    dim, end, starts, ends, terms, coefficients = parts
+    for wrong in (
+        (dim, end, starts[1:], ends, terms, coefficients),
+        (dim, end, starts, ends, terms + np.uint64(1), coefficients),
+        (dim, end, starts, ends, terms, coefficients[:-1]),
+        (2**60, end, starts, ends, terms, coefficients),
+        (0, end, starts, ends, terms, coefficients),
+    ):
+        with pytest.raises(ValueError, match="no pieces of a solution"):
+            kind(*wrong)

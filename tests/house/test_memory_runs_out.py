@@ -1,0 +1,95 @@
+"""A failed allocation is a `MemoryError` with the size, and the interpreter continues."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits the address space")
+
+#: What asks for more than there is, the room it is given beside what is in use, MiB, and the words.
+CASES = {
+    "a map": (
+        "dtm.stability_map(dtm.s + Kp * dtm.delay(T), RANGES, shape=(7000, 7000))",
+        120, "the map needs 233.650 MiB",
+    ),
+    "proved boxes": (
+        "dtm.proved_boxes(dtm.s**2 + (Kp + Kv * dtm.s) * dtm.delay(T), WIDE, tol=1e-9, "
+        "max_boxes=10**8)",
+        70, "the list of boxes needs",
+    ),
+    "a robust map": (
+        "dtm.robust_map(dtm.s + (Kp + Kv * dtm.s) * dtm.delay(T), {'Kp': (0.1, 3), 'Kv': (0, 1)}, "
+        "{'T': (0.1, 0.2)}, shape=(7000, 7000))",
+        120, "the map needs 186.920 MiB",
+    ),
+    "output times": ("LOOP.simulate(np.arange(10_000_000) * 1e-6)", 300, "the response needs"),
+    "samples": (
+        "LOOP.replace(sample_time=1e-6).simulate([0.0, 90.0])", 100, "the response needs",
+    ),
+    "a sweep": (
+        "dtm.sweep(LOOP, {'Kp': np.linspace(0.1, 3, 300)}, np.linspace(0, 10, 100_000), "
+        "responses=True)",
+        300, "the sweep needs 228.882 MiB",
+    ),
+    "values of a function": (
+        "(dtm.s + dtm.delay(1.0))(ONES)", 200, "MiB",
+    ),
+    "Lambert W": ("dtm.lambertw(ONES)", 100, "MiB"),
+    "a dense solution": (
+        "dtm.solve_dde(lambda t, y, z: -z[0], (0, 1e6), np.ones(300), 1.0, dense_output=True, "
+        "max_step=0.5)",
+        80, "MiB",
+    ),
+    "values of a solution": (
+        "dtm.solve_dde(lambda t, y, z: -z[0], (0, 3), np.ones(50), 1.0, dense_output=True)"
+        ".sol(np.linspace(0, 3, 1_000_000))",
+        120, "the array of values of the solution needs 381.470 MiB",
+    ),
+    "a strided array": ("LOOP.simulate(STRIDED)", 100, "needs 76.294 MiB"),
+}  # fmt: skip
+
+PROGRAM = """
+import re
+import resource
+import sys
+import numpy as np
+import deadtime as dtm
+
+Kp, Kv, T = dtm.parameters("Kp Kv T")
+RANGES = {{"Kp": (0.1, 3.0), "T": (0.1, 0.5)}}
+WIDE = {{"Kp": (0.1, 30.0), "Kv": (-1, 30), "T": (0.1, 5)}}
+LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.8), delay=0.36, sample_time=0.065)
+ONES = np.ones(10_000_000, dtype=complex)
+STRIDED = np.linspace(0.0, 10.0, 20_000_001)[::2]
+dtm.lambertw(np.ones(100_000))  # the threads are there
+LOOP.simulate([0.0, 1.0])
+used = re.search(r"VmSize:\\s+(\\d+)", open("/proc/self/status").read())[1]
+most = int(used) * 1024 + {room} * 2**20
+resource.setrlimit(resource.RLIMIT_AS, (most, most))
+try:
+    {call}
+    print("it had enough")
+except MemoryError as error:
+    print(error)
+print(dtm.lambertw(1.0).real, LOOP.simulate([0.0, 1.0]).outputs.size)
+"""
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_memory_that_runs_out_ends_the_call_alone(case):
+    # A failed allocation of Rust ended the whole process with SIGABRT.
+    call, room, words = CASES[case]
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(room=room, call=call)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={**os.environ, "DEADTIME_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "1"},
+    )
+    assert done.returncode == 0, done.stderr
+    said, alive = done.stdout.splitlines()
+    assert words in said
+    assert alive == "0.5671432904097838 2"

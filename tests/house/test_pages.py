@@ -1,0 +1,79 @@
+"""The pages: their Python gives the printed results, every public name is listed."""
+
+import doctest
+import inspect
+import re
+from pathlib import Path
+
+import deadtime as dtm
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+
+
+PAGES = [
+    "start/five-minutes.md",
+    "start/from-python-control.md",
+    "start/from-qpmr-and-dde-biftool.md",
+    "guide/emulator.md",
+    # A design for intervals takes as long as all other pages together.
+    pytest.param("guide/from-recording-to-gains.md", marks=pytest.mark.survey),
+    "guide/internet-loop.md",
+    "guide/planning-an-experiment.md",
+    "guide/what-a-ground-log-cannot-tell.md",
+]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_python_of_a_page_runs(page):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, page, page, 0)
+    told = []
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
+    runner.run(examples, out=told.append)
+    assert runner.summarize(verbose=False).attempted > 3
+    assert not told, "".join(told)
+
+
+ROOMS = sorted(room for room in dtm._ROOMS if room != "_base.errors")
+
+
+def test_the_reference_has_a_page_for_each_room():
+    pages = {path.stem for path in (DOCS / "reference").glob("*.md")}
+    assert pages == {*ROOMS, "index", "errors"}
+    index = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
+    for room in ROOMS:
+        page = (DOCS / "reference" / f"{room}.md").read_text(encoding="utf-8")
+        assert f"automodule:: deadtime.{room}\n" in page
+        (row,) = re.findall(rf"^\| \[`{room}`\].*$", index, re.MULTILINE)
+        assert re.findall(r"`(\w+)`", row.split("|")[3]) == dtm._ROOMS[room].split()
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_public_name_and_method_of_a_room_is_described(room):
+    module = getattr(dtm, room)
+    for name in module.__all__:
+        thing = getattr(module, name)
+        if inspect.isclass(thing):
+            for method, body in vars(thing).items():
+                if not method.startswith("_") and inspect.isfunction(body):
+                    assert inspect.getdoc(getattr(thing, method)), f"{name}.{method}"
+        if callable(thing):
+            assert inspect.getdoc(thing), name
+
+
+def test_each_promise_names_a_test_or_survey_that_exists():
+    text = (DOCS / "theory/promises.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    promises = [row for row in rows if not row.startswith("| promise ")]
+    assert len(promises) > 30
+    for row in promises:
+        named = re.findall(r"`([\w/]+\.(?:py|rs))::(\w+)`", row)
+        assert named, f"no test holds the promise {row!r}"
+        for path, name in named:
+            source = (ROOT / path).read_text(encoding="utf-8")
+            assert re.search(rf"\b(?:def|fn) {name}\b", source), f"{path} has no {name}"
+    for path in re.findall(r"`python ([\w/]+\.py)\b", text):
+        assert (ROOT / path).is_file(), f"no survey {path}"

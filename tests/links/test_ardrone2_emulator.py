@@ -1,0 +1,619 @@
+"""The emulated AR.Drone 2.0 without sockets: links, states, watchdogs, configuration."""
+
+import asyncio
+import math
+
+import numpy as np
+import pytest
+from deadtime import links
+from deadtime.links.ardrone2.commands import (
+    Config,
+    ConfigIds,
+    Control,
+    FlatTrim,
+    Move,
+    Other,
+    Ref,
+    Watchdog,
+    encode,
+)
+from deadtime.links.ardrone2.configuration import parse_configuration
+from deadtime.links.ardrone2.emulator import (
+    Drone,
+    Emulator,
+    EmulatorOptions,
+    Phase,
+)
+from deadtime.links.ardrone2.emulator.motion import GRAVITY
+from deadtime.links.ardrone2.navdata import parse_navdata
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pilot import COMMANDS, DOWN, NAVDATA, UP, WAKE, Pilot, configured
+
+#: The keys of the developer guide of the SDK 2.0.
+DOCUMENTED = [
+    f"{section}:{name}"
+    for section, names in {
+        "general": "num_version_config num_version_mb num_version_soft drone_serial "
+        "soft_build_date motor1_soft motor1_hard motor1_supplier motor2_soft motor2_hard "
+        "motor2_supplier motor3_soft motor3_hard motor3_supplier motor4_soft motor4_hard "
+        "motor4_supplier ardrone_name flying_time navdata_demo navdata_options com_watchdog "
+        "video_enable vision_enable vbat_min",
+        "control": "accs_offset accs_gains gyros_offset gyros_gains gyros110_offset gyros110_gains "
+        "magneto_offset magneto_radius gyro_offset_thr_x gyro_offset_thr_y gyro_offset_thr_z "
+        "pwm_ref_gyros osctun_value osctun_test altitude_max altitude_min control_level "
+        "euler_angle_max control_iphone_tilt control_vz_max control_yaw outdoor "
+        "flight_without_shell autonomous_flight manual_trim indoor_euler_angle_max "
+        "indoor_control_vz_max indoor_control_yaw outdoor_euler_angle_max outdoor_control_vz_max "
+        "outdoor_control_yaw flying_mode hovering_range flight_anim",
+        "network": "ssid_single_player ssid_multi_player wifi_mode wifi_rate owner_mac",
+        "pic": "ultrasound_freq ultrasound_watchdog pic_version",
+        "video": "camif_fps codec_fps camif_buffers num_trackers video_codec video_slices "
+        "video_live_socket video_storage_space bitrate max_bitrate bitrate_ctrl_mode "
+        "bitrate_storage video_channel video_on_usb video_file_index",
+        "leds": "leds_anim",
+        "detect": "enemy_colors groundstripe_colors enemy_without_shell detect_type "
+        "detections_select_h detections_select_v_hsync detections_select_v",
+        "syslog": "output max_size nb_files",
+        "userbox": "userbox_cmd",
+        "gps": "latitude longitude altitude",
+        "custom": "application_id application_desc profile_id profile_desc session_id session_desc",
+    }.items()
+    for name in names.split()
+]
+
+# --- the link --------------------------------------------------------------------------------
+
+
+def test_the_handshake_leads_from_24_bytes_to_navdata():
+    pilot = Pilot()
+    (packet,) = pilot.wake()
+    assert len(packet) == 24
+    assert packet[:4] == bytes.fromhex("88776655")
+    first = parse_navdata(packet)
+    assert first.bootstrap
+    assert first.com_watchdog
+    assert first.sequence == 1
+    pilot.wait(1.0)
+    assert len(pilot.sent) == 1  # nothing of its own accord before the handshake
+    pilot.send(Config("general:navdata_demo", "TRUE"))
+    pilot.wait(0.1, Watchdog())
+    assert not pilot.last.bootstrap
+    assert pilot.last.command_acknowledged
+    assert pilot.last.demo_mode
+    pilot.wait(0.1, Control(5))
+    assert not pilot.last.command_acknowledged
+    assert not pilot.last.com_watchdog
+    numbers = [parse_navdata(packet).sequence for packet in pilot.sent]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+@pytest.mark.parametrize("wake", [b"\x01", b"\x01\x0d", b"\x01\x00\x00\x00"])
+def test_wake_ups_of_one_two_and_four_bytes_are_answered(wake):
+    assert len(Pilot().wake(wake)) == 1
+
+
+@pytest.mark.parametrize(
+    "wake", [b"", b"\x00", b"\x02\x00\x00\x00", b"\x01\x00\x00", b"\x01" * 500]
+)
+def test_other_datagrams_are_not(wake):
+    assert Pilot().wake(wake) == []
+
+
+def test_a_flood_of_wake_ups_is_answered_twenty_times_a_second():
+    pilot = Pilot()
+    for _ in range(1000):
+        pilot.time = round(pilot.time + 0.001, 6)
+        pilot.wake(b"\x01")
+    assert len(pilot.sent) == 20
+    assert sum(map(len, pilot.sent)) <= 24 * 1000
+
+
+def test_navdata_go_to_where_the_host_of_the_commands_asked_last():
+    """A client that asks again from another socket was left without navdata as long as it spoke."""
+    pilot, other = Pilot().connect(), ("127.0.0.1", 50000)
+    pilot.wait(0.5, Watchdog())
+    pilot.wake(b"\x01", ("10.0.0.9", 50000))  # of another host than the commands: never
+    listeners = []
+    for source in (NAVDATA, other, NAVDATA):
+        pilot.drone.woken(b"\x01", source, pilot.time)
+        for _ in range(25):
+            pilot.send(Watchdog())
+            pilot.time = round(pilot.time + 0.02, 6)
+            pilot.drone.advance(pilot.time)
+            listeners += [address for _, address in pilot.drone.packets(pilot.time)]
+    changes = [
+        one for one, before in zip(listeners, [None, *listeners], strict=False) if one != before
+    ]
+    assert changes == [NAVDATA, other, NAVDATA]
+    pilot.time += 3.0  # nobody says anything
+    pilot.drone.advance(pilot.time)
+    pilot.take()
+    pilot.drone.woken(b"\x01", other, pilot.time)
+    assert [address for _, address in pilot.drone.packets(pilot.time)] == [other]
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_navdata_go_to_the_host_of_the_commands(waits):
+    pilot, elsewhere = Pilot(), ("127.0.0.2", 40001)
+    pilot.wake(source=elsewhere)
+    if waits:
+        pilot.wake()
+    pilot.send(Config("general:navdata_demo", "FALSE"))
+    if not waits:
+        pilot.wake()
+    assert len(pilot.sent) == 1  # the answer to the wake-up from elsewhere
+    told = []
+    for _ in range(50):
+        pilot.drone.commanded(encode([Watchdog()], pilot.number), COMMANDS, pilot.time)
+        pilot.number += 1
+        pilot.time = round(pilot.time + 0.02, 6)
+        pilot.drone.advance(pilot.time)
+        told += pilot.take()
+    assert {address for _, address in told} == {NAVDATA}
+    numbers = [parse_navdata(packet).sequence for packet, _ in told]
+    assert numbers == list(range(1, 201))
+
+
+def test_navdata_stop_two_seconds_after_the_last_sign_of_life():
+    pilot = Pilot().connect(demo=False)
+    pilot.wait(1.0, Watchdog())
+    silent = pilot.time
+    pilot.wait(5.0)
+    # The last command was at 1 s; the packet at 3 s does not leave any more.
+    assert parse_navdata(pilot.sent[-1]).clock == pytest.approx(silent + 1.995, abs=1e-9)
+    assert len(pilot.wake()[-1]) == 24  # back to the beginning
+
+
+def test_sequence_numbers():
+    def ups(numbers):
+        drone = Drone(EmulatorOptions())
+        for number, command in numbers:
+            drone.commanded(encode([command], number), COMMANDS, 0.0)
+        return drone.truth(0.0).phase is Phase.TAKING_OFF
+
+    assert ups([(0, UP)])  # some begin at 0
+    assert ups([(1, DOWN), (2, UP)])
+    assert not ups([(5, DOWN), (5, UP)])  # not above the last
+    assert not ups([(5, DOWN), (4, UP)])
+    assert not ups([(1, DOWN), (0, UP)])
+    assert ups([(500, DOWN), (1, UP)])  # 1 begins anew
+    assert ups([(5, DOWN), (900, UP)])  # gaps are losses, no more
+
+
+def test_after_two_seconds_of_silence_any_number_is_the_first():
+    drone = Drone(EmulatorOptions())
+    drone.commanded(encode([DOWN], 100), COMMANDS, 0.0)
+    drone.commanded(encode([UP], 7), COMMANDS, 1.999999)
+    assert drone.truth(1.999999).phase is Phase.LANDED
+    drone.commanded(encode([UP], 7), COMMANDS, 2.0)
+    assert drone.truth(2.0).phase is Phase.TAKING_OFF
+
+
+def test_commands_that_mean_nothing_here_are_taken_politely():
+    pilot = Pilot().connect()
+    pilot.send(Other("PMODE", ("1", "2")), Other("MISC", ("2", "2", "20", "2000", "3000")))
+    pilot.send(FlatTrim(), Other("LED", ("1", "0", "1")), Other("ANIM", ("16", "5")))
+    before = pilot.number
+    pilot.drone.commanded(b"AT*REF=nonsense\rAT*PCMD=1\r\xff\x00", COMMANDS, pilot.time)
+    assert pilot.truth.phase is Phase.LANDED
+    pilot.send(UP)
+    assert pilot.number == before + 1
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+# --- states ----------------------------------------------------------------------------------
+
+
+def test_take_off_and_landing_as_the_vehicle_does_them():
+    pilot = Pilot().connect(demo=False)
+    pilot.wait(4.5, UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF  # since the first of them, at 0.02 s
+    pilot.wait(0.02, UP)
+    assert pilot.truth.phase is Phase.FLYING
+    assert pilot.truth.height == pytest.approx(0.75, abs=0.02)
+    pilot.wait(3.0, UP)
+    assert pilot.last.flying
+    assert pilot.truth.height == pytest.approx(0.75, abs=0.02)
+    assert pilot.truth.climb == pytest.approx(0.0, abs=1e-6)
+    pilot.wait(4.0, DOWN)
+    assert pilot.truth.phase is Phase.LANDED
+    assert pilot.truth.height == 0.0
+    assert not pilot.last.flying
+    states = [parse_navdata(packet).demo for packet in pilot.sent if len(packet) > 24]
+    majors = [demo.major for demo in states]
+    assert [m for m, n in zip(majors, [*majors[1:], None], strict=True) if m != n] == [
+        2, 6, 7, 4, 8, 2,
+    ]  # fmt: skip
+    assert all(demo.vz == 0.0 for demo in states)
+
+
+def test_bits_eight_and_nine_of_a_bare_ref_are_enough():
+    drone = Drone(EmulatorOptions())
+    drone.commanded(b"AT*REF=0,512\r", COMMANDS, 0.0)
+    assert drone.truth(0.0).phase is Phase.TAKING_OFF
+    drone.commanded(b"AT*REF=1,256\r", COMMANDS, 0.1)
+    assert drone.truth(0.1).emergency
+
+
+def test_a_released_take_off_lands():
+    pilot = Pilot()
+    pilot.wait(2.0, UP)
+    pilot.send(DOWN)
+    assert pilot.truth.phase is Phase.LANDING
+
+
+def test_an_emergency_cuts_the_motors_and_toggles_on_the_rising_edge():
+    pilot = Pilot().connect(demo=False).fly()
+    begun = pilot.truth.height
+    pilot.wait(0.2, Ref(take_off=True, emergency=True))  # held: one edge
+    truth = pilot.truth
+    assert truth.emergency
+    assert truth.phase is Phase.FALLING
+    fallen = 0.2 - 0.02  # since the first of those commands
+    assert truth.height == pytest.approx(begun - 0.5 * GRAVITY * fallen**2, abs=1e-9)
+    assert truth.climb == pytest.approx(-GRAVITY * fallen, abs=1e-9)
+    pilot.wait(1.0, UP)  # nothing helps
+    assert pilot.truth.phase is Phase.LANDED
+    assert pilot.last.emergency
+    assert pilot.last.demo.major == 2
+    pilot.send(Ref(emergency=True))
+    pilot.send(DOWN)
+    assert not pilot.truth.emergency
+    pilot.send(UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+@pytest.mark.parametrize("worst_case", [True, False])
+def test_a_drone_that_landed_by_itself_may_obey_who_only_repeats_himself(worst_case):
+    pilot = Pilot(worst_case=worst_case).fly()
+    pilot.wait(9.0)
+    assert pilot.truth.phase is Phase.LANDED
+    pilot.wait(1.0, UP)  # back, and still holding take-off
+    assert pilot.truth.phase is (Phase.TAKING_OFF if worst_case else Phase.LANDED)
+    pilot.wait(6.0, DOWN)
+    pilot.send(UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+def test_a_new_client_may_begin_with_take_off():
+    pilot = Pilot().fly()
+    pilot.wait(9.0)
+    pilot.number = 1
+    pilot.send(UP)
+    assert pilot.truth.phase is Phase.TAKING_OFF
+
+
+def test_what_another_client_wished_for_is_forgotten_with_its_numbers():
+    pilot = Pilot().connect().fly()
+    pilot.wait(20.0)
+    assert pilot.truth.phase is Phase.LANDED
+    pilot.number = 1
+    pilot.send(FlatTrim())  # its first command is no REF
+    assert pilot.wait(6.0, UP).phase is Phase.FLYING
+
+
+def test_numbers_from_0_on_are_those_of_one_client():
+    pilot = Pilot().connect().fly()
+    pilot.number = 0
+    pilot.drone.commanded(b"AT*REF=0,256\rAT*REF=1,256\r", COMMANDS, pilot.time + 3.0)
+    assert pilot.drone.truth(pilot.time + 3.0).emergency
+
+
+def test_a_low_battery_is_told_forbids_to_take_off_and_ends_a_flight():
+    low = Pilot(battery=19.9).connect(demo=False)
+    low.wait(1.0, UP)
+    assert low.last.battery_low
+    assert low.truth.phase is Phase.LANDED
+    pilot = Pilot(battery=20.5).connect(demo=False)
+    pilot.wait(130.0, UP, every=0.04)
+    assert pilot.truth.phase in (Phase.LANDING, Phase.LANDED)
+    assert pilot.last.battery_low
+    assert pilot.truth.battery < 4.0
+
+
+def test_a_deaf_ultrasound_is_told():
+    pilot = Pilot().connect(demo=False)
+    pilot.drone.deaf = True
+    pilot.wait(0.1, Watchdog())
+    assert pilot.last.ultrasound_deaf
+
+
+# --- watchdogs, to the microsecond -----------------------------------------------------------
+
+
+def test_a_forgiving_drone_hovers_a_quarter_of_a_second_after_its_last_motion_command():
+    pilot = Pilot(delay=0.1, worst_case=False).fly()
+    pilot.wait(1.0, UP, Move(gaz=0.5))
+    last = pilot.time
+    assert pilot.truth.setpoint == pytest.approx(0.35)
+    # A thread that keeps the link alive does not keep the motion alive.
+    pilot.wait(0.249, Watchdog(), every=0.01)
+    assert pilot.truth.setpoint == pytest.approx(0.35)
+    pilot.wait(0.000999)
+    assert pilot.drone.truth(last + 0.249999).setpoint != 0.0
+    assert pilot.drone.truth(last + 0.25).setpoint == 0.0
+    assert pilot.drone.truth(last + 0.25).phase is Phase.FLYING
+
+
+def test_commands_under_way_are_forgotten_with_the_motion():
+    pilot = Pilot(plant="paper", worst_case=False).fly()  # 0.36 s under way
+    pilot.send(UP, Move(gaz=1.0))
+    for _ in range(100):
+        pilot.wait(0.01)
+        assert pilot.truth.setpoint == 0.0
+
+
+@pytest.mark.parametrize("kept_alive", [False, True])
+def test_in_the_worst_case_a_motion_holds_until_the_link_is_lost(kept_alive):
+    """One command moved the drone by 4 mm; clients of the public fly for seconds on one."""
+    pilot = Pilot(delay=0.1).fly()
+    pilot.wait(0.02, UP, Move(gaz=0.2))
+    last = pilot.time
+    if kept_alive:
+        pilot.wait(6.0, Watchdog(), every=0.1)
+        assert pilot.truth.setpoint == pytest.approx(0.14)
+        last = pilot.time
+    assert pilot.drone.truth(last + 1.999999).setpoint == pytest.approx(0.14)
+    truth = pilot.drone.truth(last + 2.0)
+    assert truth.phase is Phase.LANDING
+    assert truth.setpoint < 0.0
+
+
+def test_commands_under_way_are_forgotten_with_the_link():
+    pilot = Pilot(delay=9.0).fly()
+    pilot.send(UP, Move(gaz=1.0))
+    pilot.wait(5.0)
+    assert pilot.truth.phase is Phase.LANDED
+    for _ in range(300):
+        pilot.wait(0.02, UP)
+        assert pilot.truth.phase is not Phase.FLYING or pilot.truth.setpoint == 0.0
+    assert pilot.truth.phase is Phase.FLYING
+
+
+def test_landing_begins_two_seconds_after_the_last_command():
+    pilot = Pilot(delay=0.0).connect(demo=False).fly()
+    pilot.wait(1.0, UP, Move(gaz=1.0))
+    last = pilot.time
+    assert pilot.drone.truth(last + 1.999999).phase is Phase.FLYING
+    assert not pilot.drone.truth(last + 1.999999).link_lost
+    truth = pilot.drone.truth(last + 2.0)
+    assert truth.phase is Phase.LANDING
+    assert truth.link_lost
+    assert truth.setpoint < 0.0
+    assert pilot.drone.truth(last + 12.0).phase is Phase.LANDED
+
+
+def test_the_communication_watchdog_warns_after_fifty_milliseconds():
+    pilot = Pilot().connect(demo=False)
+    pilot.wait(0.1, Watchdog(), every=0.01)
+    warned = {}
+    for _ in range(20):
+        pilot.wait(0.005)
+        warned[round(pilot.last.clock - 0.1, 6)] = pilot.last.com_watchdog
+    assert {late for late, told in warned.items() if not told} == {
+        round(0.005 * k, 6) for k in range(1, 11)
+    }
+    pilot.wait(0.01, Watchdog(), every=0.005)
+    assert not pilot.last.com_watchdog
+
+
+def test_a_lost_link_is_told_to_who_still_listens():
+    pilot = Pilot().connect(demo=False)
+    for _ in range(30):
+        pilot.wait(0.1)
+        pilot.wake()
+    assert pilot.last.communication_lost
+
+
+# --- configuration ---------------------------------------------------------------------------
+
+
+def test_a_setting_is_acknowledged_and_read_back():
+    pilot = Pilot().connect(demo=False)
+    found = configured(pilot, "control:control_vz_max", "1000")
+    assert float(found["control:control_vz_max"]) == 1000.0
+    pilot.wait(0.01)
+    assert pilot.last.command_acknowledged
+    pilot.send(Control(5))
+    pilot.wait(0.01)
+    assert not pilot.last.command_acknowledged
+
+
+def test_a_setting_is_taken_though_the_last_one_is_still_acknowledged():
+    """Clients of the public send several without ever resetting the acknowledgement."""
+    pilot = Pilot()
+    pilot.send(Config("control:altitude_max", "2000"), Config("control:altitude_max", "2500"))
+    pilot.send(Control(4))
+    ((_, dump),) = pilot.drone.dumps()
+    assert parse_configuration(dump)["control:altitude_max"] == "2500"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "kept"),
+    [
+        ("control:control_vz_max", "9000", 2000.0),
+        ("control:control_vz_max", "1", 200.0),
+        ("control:altitude_max", "-3", 500.0),
+        ("control:euler_angle_max", "3.0", 0.52),
+    ],
+)
+def test_numbers_out_of_range_become_the_nearest(key, value, kept):
+    assert float(configured(Pilot(), key, value)[key]) == kept
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("control:control_vz_max", "nan"),
+        ("control:control_vz_max", "fast"),
+        ("control:control_vz_max", "1e3" + "0" * 90),
+        ("control:outdoor", "PERHAPS"),
+        ("general:num_version_soft", "9"),
+        ("custom:session_id", "xyz"),
+        ("general:ardrone_name", "x" * 128),
+        ("no:such_key", "1"),
+    ],
+)
+def test_what_is_no_value_changes_nothing_and_an_acknowledgement_promises_nothing(key, value):
+    pilot = Pilot().connect(demo=False)
+    before = dict(pilot.drone.settings.values)
+    assert configured(pilot, key, value) == before
+    pilot.wait(0.01)
+    assert pilot.last.command_acknowledged == (key in before)
+
+
+def test_every_documented_key_is_acknowledged_and_can_be_read():
+    """Each key that was not known cost clients that wait for it half a second and an error."""
+    pilot = Pilot().connect(demo=False)
+    for key in DOCUMENTED:
+        found = configured(pilot, key, pilot.drone.settings.values[key])
+        assert key in found
+        pilot.wait(0.01)
+        assert pilot.last.command_acknowledged, key
+
+
+def test_outdoors_has_limits_of_its_own():
+    pilot = Pilot()
+    found = configured(pilot, "control:outdoor", "TRUE")
+    assert float(found["control:control_vz_max"]) == 1000.0
+    configured(pilot, "control:control_vz_max", "1500")
+    found = configured(pilot, "control:outdoor", "FALSE")
+    assert float(found["control:control_vz_max"]) == 700.0
+    assert float(found["control:outdoor_control_vz_max"]) == 1500.0
+
+
+def test_with_a_session_a_setting_needs_its_identifiers_right_before_it():
+    pilot = Pilot()
+    configured(pilot, "custom:session_id", "0000abcd")
+    key = "control:altitude_max"
+    assert configured(pilot, key, "2000")[key] == "3000"
+    pilot.send(Control(5))
+    pilot.send(ConfigIds("0000abcd", "00000000", "00000000"), Watchdog(), Config(key, "2000"))
+    assert pilot.drone.settings.values[key] == "3000"
+    pilot.send(ConfigIds("11111111", "00000000", "00000000"), Config(key, "2000"))
+    assert pilot.drone.settings.values[key] == "3000"
+    pilot.send(ConfigIds("0000abcd", "00000000", "00000000"), Config(key, "2000"))
+    assert pilot.drone.settings.values[key] == "2000"
+    configured(pilot, "custom:session_id", "-all")
+    assert configured(pilot, key, "2500")[key] == "2500"
+
+
+def test_the_heights_of_the_configuration_hold():
+    pilot = Pilot(delay=0.0)
+    configured(pilot, "control:altitude_max", "1500")
+    configured(pilot, "control:control_vz_max", "2000")
+    pilot.fly()
+    highest = 0.0
+    for _ in range(300):
+        pilot.wait(0.02, UP, Move(gaz=1.0))
+        highest = max(highest, pilot.truth.height)
+    assert pilot.truth.height == pytest.approx(1.5, abs=1e-3)
+    assert highest < 1.55
+    for _ in range(300):
+        pilot.wait(0.02, UP, Move(gaz=-1.0))
+    assert pilot.truth.height == pytest.approx(0.05, abs=0.02)
+    assert pilot.truth.phase is Phase.FLYING
+
+
+# --- whoever means harm ----------------------------------------------------------------------
+
+TOKENS = st.sampled_from(
+    [
+        b"AT*REF=", b"AT*PCMD=", b"AT*CONFIG=", b"AT*CTRL=", b"AT*CONFIG_IDS=", b"AT*COMWDG=",
+        b"\r", b"\n", b",", b'"', b"1", b"2", b"512", b"256", b"2143289344", b"-1", b"1056964608",
+        b"99999999999999999999", b'"control:altitude_max"', b'"general:navdata_demo","FALSE"',
+        b"4,0", b"5,0", b"\x00", b"\xff",
+    ]
+)  # fmt: skip
+DATAGRAMS = st.one_of(st.binary(max_size=200), st.lists(TOKENS, max_size=40).map(b"".join))
+
+
+@settings(max_examples=150)
+@given(st.lists(st.tuples(st.booleans(), DATAGRAMS, st.floats(0.0, 0.3)), max_size=30))
+def test_no_datagrams_break_the_drone_or_make_it_talk(datagrams):
+    drone, now, received, sent = Drone(EmulatorOptions()), 0.0, 0, []
+    configured_at = None
+    for commands, datagram, later in datagrams:
+        now += later
+        if commands:
+            drone.commanded(datagram, COMMANDS, now)
+        else:
+            drone.woken(datagram, NAVDATA, now)
+        received += 1
+        sent += drone.packets(now)
+        if configured_at is None and any(len(packet) > 24 for packet, _ in sent):
+            configured_at = now
+        truth = drone.truth(now)
+        assert math.isfinite(truth.height)
+        assert abs(truth.setpoint) <= 2.0
+    if configured_at is None:  # nobody got through the handshake
+        assert len(sent) <= received
+    drone.advance(now + 30.0)
+    sent += drone.packets(now + 30.0)
+    # The last sign of life is worth two seconds, no more.
+    assert all(address == NAVDATA for _, address in sent)
+    drone.advance(now + 60.0)
+    assert drone.packets(now + 60.0) == []
+    assert drone.truth(now + 60.0).phase is Phase.LANDED
+
+
+def test_a_flood_of_motions_does_not_pile_up():
+    pilot = Pilot(delay=100.0).fly()
+    for _ in range(3000):
+        pilot.send(Move(gaz=0.1))
+    assert len(pilot.drone._under_way) <= 1024
+
+
+def test_where_others_can_reach_it_the_clients_have_to_be_named():
+    with pytest.raises(ValueError, match="name the clients"):
+        EmulatorOptions(host="0.0.0.0")
+    with pytest.raises(ValueError, match="'anybody' is no IP address"):
+        EmulatorOptions(host="0.0.0.0", clients=("anybody",))
+    assert EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)).answers("192.168.1.2")
+    assert EmulatorOptions(host="::", clients=("fd00:0::2",)).answers("fd00::2")
+    assert EmulatorOptions(host="::", clients=("192.168.1.2",)).answers("::ffff:192.168.1.2")
+
+
+def test_a_name_that_looks_like_the_loopback_is_not_taken_for_it():
+    for host in ("127.0.0.1.example.org", "127.evil"):
+        with pytest.raises(ValueError, match="reached by others"):
+            EmulatorOptions(host=host)
+    for host in ("localhost", "127.0.0.2", "::1"):
+        assert EmulatorOptions(host=host).only_here
+
+
+@pytest.mark.parametrize("plant", ["kit", "thrust"])
+def test_the_largest_noise_has_a_place_in_navdata(plant):
+    pilot = Pilot(plant=plant, noise=10.0, downlink=20.0).connect(demo=False).fly()
+    pilot.wait(20.0, UP)
+    heights = [parse_navdata(packet).height for packet in pilot.sent]
+    assert len(heights) > 2000
+    assert np.std(heights[1:]) == pytest.approx(10.0, rel=0.1)
+
+
+def test_hosts_that_are_not_named_are_neither_heard_nor_answered():
+    heard = []
+
+    class Ear(asyncio.DatagramProtocol):
+        def datagram_received(self, data, address):
+            heard.append(data)
+
+    async def call(host):
+        loop = asyncio.get_running_loop()
+        async with Emulator(EmulatorOptions(clients=("127.0.0.1",))) as emulator:
+            for port, said in (
+                (5554, WAKE),
+                (5556, encode([Config("general:navdata_demo", "TRUE"), UP], 1)),
+            ):
+                ear, _ = await loop.create_datagram_endpoint(
+                    Ear, local_addr=(host, 0), remote_addr=("127.0.0.1", port)
+                )
+                ear.sendto(said)
+            await asyncio.sleep(0.5)
+            return emulator.truth()
+
+    assert links.run(call("127.0.0.2")).phase is Phase.LANDED
+    assert not heard
+    assert links.run(call("127.0.0.1")).phase is Phase.TAKING_OFF
+    assert heard

@@ -1,0 +1,177 @@
+"""Margins of sampled loops, held against the eigenvalues of their transition matrices."""
+
+import math
+from dataclasses import replace
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+SMOOTH = dtm.DerivativeFilter(38.0)
+TUSTIN = dtm.DerivativeFilter(38.0, discretisation="tustin")
+PERIOD = 0.065
+
+
+def sampled(plant, controller, delay, period=PERIOD):
+    return dtm.ControlLoop(plant, controller, delay=delay, sample_time=period)
+
+
+LOOPS = [
+    sampled(dtm.Integrator(), dtm.P(0.6), 0.0),
+    sampled(dtm.Integrator(), dtm.P(0.6), 0.02),
+    sampled(dtm.Integrator(), dtm.P(0.6), 0.065),
+    sampled(dtm.Integrator(), dtm.P(0.6), 1.3),
+    sampled(dtm.Integrator(), dtm.PV(2.0, 0.2), 0.36),
+    sampled(dtm.Integrator(0.85, 0.1), dtm.PV(2.0, 0.2, SMOOTH), 0.36),
+    sampled(dtm.Integrator(), dtm.PV(2.0, 0.2, TUSTIN), 0.36),
+    sampled(dtm.Integrator(0.85, 0.1), dtm.PID(2.0, 0.2, 0.1, SMOOTH), 0.3),
+    sampled(dtm.FirstOrder(2.0, -1.0), dtm.P(-1.2), 0.2),
+    sampled(dtm.FirstOrder(2.0, 0.5), dtm.PI(0.4, 0.8), 0.2),
+    sampled(dtm.RationalPlant([4.0], [1.0, 0.4, 4.0]), dtm.PI(0.05, 0.2), 0.36, 0.02),
+]
+
+
+def cut(loop):
+    """Transition matrix with the loop opened at the command, and its input and output vectors."""
+    model = loop.specification.model
+    matrices = [
+        replace(model, K=np.zeros_like(model.K), L=direct)
+        .native(loop.delay, loop.sample_time)
+        .transition_matrix()
+        for direct in (0.0, 1.0)
+    ]
+    whole = loop.transition_matrix()
+    return matrices[0], (matrices[1] - matrices[0])[:, -1], whole[len(model.B)]
+
+
+def radius(loop, factor):
+    matrix, into, out = cut(loop)
+    return np.abs(np.linalg.eigvals(matrix + factor * np.outer(into, out))).max()
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_margins_are_where_an_eigenvalue_reaches_the_circle(loop):
+    found = loop.margin()
+    assert found.stable
+    for factor, inside in ((found.gain_margin, 1 - 1e-6), (found.gain_reduction, 1 + 1e-6)):
+        if 0.0 < factor < math.inf:
+            assert radius(loop, factor) == pytest.approx(1.0, abs=1e-9)
+            assert radius(loop, inside * factor) < 1.0
+    for factor in np.linspace(max(found.gain_reduction, 0.05), min(found.gain_margin, 9.0), 40)[
+        1:-1
+    ]:
+        assert radius(loop, factor) < 1.0
+    turn = math.radians(found.phase_margin)
+    assert radius(loop, np.exp(1j * turn)) == pytest.approx(1.0, abs=1e-9)
+    for part in np.linspace(-0.999, 0.999, 21):
+        assert radius(loop, np.exp(1j * part * turn)) < 1.0
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_the_delay_margin_is_where_the_loop_loses_stability(loop):
+    found = loop.margin()
+    lost = loop.delay + found.delay_margin
+    assert lost == pytest.approx(loop.stable_range("delay")[1], rel=1e-9)
+    for part in np.linspace(0.0, 0.999, 30):
+        assert loop.replace(delay=loop.delay + part * found.delay_margin).is_stable()
+    assert not loop.replace(delay=lost + 1e-4 * loop.sample_time).is_stable()
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_the_loop_gain_is_what_closes_to_the_poles(loop):
+    # 1 + L = det(z - closed) / det(z - open)
+    matrix, _, _ = cut(loop)
+    omega = np.linspace(0.2, np.pi / loop.sample_time, 9)
+    z = np.exp(1j * omega * loop.sample_time)
+    closed, opened = np.linalg.eigvals(loop.transition_matrix()), np.linalg.eigvals(matrix)
+    ratio = np.prod(z[:, None] - closed, axis=1) / np.prod(z[:, None] - opened, axis=1)
+    np.testing.assert_allclose(1.0 + loop.frequency_response(omega), ratio, rtol=1e-6, atol=1e-9)
+    turned = np.exp(1j * loop.phase(omega))
+    expected = loop.frequency_response(omega)
+    np.testing.assert_allclose(turned, expected / np.abs(expected), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    "controller", [dtm.P(1.5), dtm.PV(2.0, 0.2, SMOOTH), dtm.PI(1.0, 0.2), dtm.PV(2.0, 0.2)]
+)
+def test_fast_samples_have_the_margins_of_the_continuous_loop(controller):
+    loop = dtm.ControlLoop(dtm.Integrator(0.85, 0.1), controller, delay=0.3603)
+    exact, off = loop.margin(), []
+    for period in (0.004, 0.001):
+        found = loop.replace(sample_time=period).margin()
+        off.append(
+            [
+                found.gain_margin / exact.gain_margin - 1.0,
+                (found.phase_margin - exact.phase_margin) / exact.phase_margin,
+                (found.delay_margin - exact.delay_margin) / exact.delay_margin,
+            ]
+        )
+    # of first order in the sample time: the hold is late by half of it
+    np.testing.assert_allclose(np.array(off[1]) * 4.0, off[0], rtol=0.1)
+    assert np.abs(off[1]).max() < 5e-3
+    omega = np.geomspace(0.1, 20.0, 7)
+    np.testing.assert_allclose(
+        loop.replace(sample_time=1e-5).frequency_response(omega),
+        loop.frequency_response(omega),
+        rtol=2e-4,
+    )
+    np.testing.assert_allclose(
+        loop.replace(sample_time=1e-3).phase(omega), loop.phase(omega), atol=2e-2
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(0.1, 3.0),
+    st.floats(-0.1, 0.4),
+    st.floats(0.0, 0.5),
+    st.floats(0.02, 0.2),
+    st.floats(0.01, 0.3),
+)
+def test_no_gain_below_the_margin_is_unstable(Kp, Kv, delay, period, lag):
+    loop = sampled(dtm.Integrator(0.85, lag), dtm.PV(Kp, Kv, SMOOTH), delay, period)
+    assume(loop.spectral_abscissa() < -1e-3)
+    found = loop.margin()
+    assert radius(loop, found.gain_margin) == pytest.approx(1.0, abs=1e-7)
+    for factor in np.linspace(1.0, found.gain_margin, 15)[:-1]:
+        assert radius(loop, factor) < 1.0
+    for part in np.linspace(-0.99, 0.99, 9):
+        assert radius(loop, np.exp(1j * part * math.radians(found.phase_margin))) < 1.0
+
+
+def test_a_delay_margin_of_more_than_two_hundred_samples():
+    loop = sampled(dtm.Integrator(), dtm.P(1.5), 0.36, 0.005)
+    found = loop.margin().delay_margin
+    lost = loop.delay + found
+    assert loop.replace(delay=lost - 1e-4).is_stable()
+    assert not loop.replace(delay=lost + 1e-4).is_stable()
+
+
+def test_an_unstable_sampled_loop_has_no_margins_but_crossings():
+    found = sampled(dtm.Integrator(), dtm.P(9.0), 0.36).margin()
+    assert not found.stable
+    assert math.isnan(found.gain_margin)
+    assert math.isnan(found.phase_margin)
+    assert math.isnan(found.delay_margin)
+    assert found.gain_crossovers.size
+    assert "not stable" in repr(found)
+
+
+def test_frequencies_beyond_half_the_sampling_rate_are_refused():
+    with pytest.raises(ValueError, match=r"from 0 to 48\.3"):
+        LOOPS[0].frequency_response(50.0)
+    with pytest.raises(ValueError, match="None"):
+        LOOPS[0].replace(delay=None).margin()
+
+
+def test_a_bode_plot_of_a_sampled_loop():
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    upper, lower = LOOPS[5].bode()
+    assert "gain margin 2.17" in upper.get_title()
+    assert lower.get_xlim()[1] == pytest.approx(np.pi / PERIOD)
+    pyplot.close("all")
+    upper, _ = LOOPS[5].continuous().bode()
+    assert "gain margin" in upper.get_title()
+    pyplot.close("all")

@@ -1,0 +1,287 @@
+"""Sweeps against one simulation per set, and the status, shapes and bits of their results."""
+
+import doctest
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.loops._model import rest_of
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from loops import loops
+
+DRONE = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), delay=0.36, sample_time=0.065, limit=1.0)
+FINE = np.linspace(0.0, 10.0, 4001)
+
+
+def random_values(loop, count, seed=0):
+    """Numbers around those of a loop."""
+    rng = np.random.default_rng(seed)
+    return {
+        name: value * rng.uniform(0.7, 1.3, count)
+        for name, value in loop.parameters.items()
+        if value != 0.0
+    }
+
+
+def single(loop, values, i):
+    return loop.replace(**{name: float(array[i]) for name, array in values.items()})
+
+
+LOOPS = [
+    DRONE,
+    DRONE.replace(limit=None, delay=0.13, sample_time=0.1),
+    DRONE.replace(controller=dtm.PV(1.3, 0.2)),
+    DRONE.replace(controller=dtm.PV(1.3, 0.2, dtm.DerivativeFilter(38.0))),
+    DRONE.replace(controller=dtm.PI(0.8, 0.1), delay_path="measurement"),
+    DRONE.replace(controller=dtm.PID(0.8, 0.1, 0.1, dtm.DerivativeFilter(15.0)), delay=0.2),
+    DRONE.replace(plant=dtm.Integrator(1.0, 0.2), delay=0.1),
+    DRONE.replace(plant=dtm.FirstOrder(2.0, 0.5), controller=dtm.PI(0.4, 0.6)),
+    DRONE.replace(plant=dtm.RationalPlant([0.1, 1.0], [0.5, 1.0]), delay_path="measurement"),
+    dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), delay=0.36),
+    dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.3, 0.3), delay=0.36, delay_path="measurement"),
+    dtm.ControlLoop(
+        dtm.Integrator(), dtm.PV(1.3, 0.2, dtm.DerivativeFilter(38.0)), delay=0.3, limit=0.7
+    ),
+    dtm.ControlLoop(dtm.kit_plant(), dtm.PI(0.8, 0.1), delay=0.2),
+    dtm.ControlLoop(dtm.Integrator(1.0, 0.3), dtm.P(1.3), delay=0.0, limit=0.8),
+]
+
+
+@pytest.mark.parametrize("loop", LOOPS, ids=range(len(LOOPS)))
+def test_responses_are_those_of_single_simulations(loop):
+    values = random_values(loop, 37)
+    times = np.linspace(0.5, 6.5, 61)
+    found = dtm.sweep(loop, values, times, responses=True, amplitude=-0.8)
+    assert found.outputs.shape == (37, 61)
+    assert not found.status.any()
+    for i in range(0, 37, 5):
+        one = single(loop, values, i).step_response(times, amplitude=-0.8)
+        np.testing.assert_allclose(found.outputs[i], one.outputs, rtol=0, atol=2e-13)
+
+
+@pytest.mark.parametrize("loop", LOOPS, ids=range(len(LOOPS)))
+def test_metrics_are_those_of_single_responses(loop):
+    values = random_values(loop, 20, seed=1)
+    found = dtm.sweep(loop, values, 10.0, amplitude=-0.8)
+    for i in range(0, 20, 4):
+        response = single(loop, values, i).step_response(FINE, amplitude=-0.8)
+        info = response.info()
+        # `info` magnifies to 1e-8 of the output step; the range begins at its own output times.
+        for name in ("rise_time", "settling_time", "overshoot", "undershoot", "peak"):
+            np.testing.assert_allclose(
+                found[name][i], info[name], atol=1e-7, err_msg=f"{name} of set {i}"
+            )
+        assert found["steady_state"][i] == pytest.approx(info["steady_state"], abs=1e-12)
+        # On one side of it, where the output jumps.
+        around = found["peak_time"][i] + np.array([-1e-10, 0.0, 1e-10])
+        at_peak = np.abs(response._dense(np.clip(around, 0.0, 10.0))).max()
+        assert at_peak == pytest.approx(info["peak"], abs=1e-8)
+        for name in ("settling_min", "settling_max"):
+            np.testing.assert_allclose(found[name][i], info[name], atol=2e-2)
+
+
+def test_a_p_loop_has_the_overshoot_of_the_closed_form():
+    # kp delay - 1/2 from kp delay = 1 on.
+    gains, delays = np.ix_([2.5, 2.8, 3.0], [0.4, 0.45])
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
+    found = dtm.sweep(loop, {"Kp": gains, "delay": delays}, 4.0)
+    assert found.shape == (3, 2)
+    np.testing.assert_allclose(found["overshoot"], 100.0 * (gains * delays - 0.5), rtol=1e-13)
+    # y' = 0 where kp (t - delay) = 1, one delay earlier.
+    np.testing.assert_allclose(found["peak_time"], 1.0 / gains + 2.0 * delays, rtol=1e-13)
+
+
+def test_arrays_broadcast_and_keep_their_shape():
+    found = dtm.sweep(DRONE, {"Kp": [[1.0], [2.0]], "delay": np.array([0.1, 0.2, 0.3])}, 8.0)
+    assert found["overshoot"].shape == found.status.shape == (2, 3)
+    lone = dtm.sweep(DRONE, {"Kp": 2.0, "delay": 0.2}, 8.0)
+    assert lone.shape == ()
+    assert lone["overshoot"] == found["overshoot"][1, 1]
+    outputs = dtm.sweep(DRONE, {"Kp": [[1.0], [2.0]]}, [0.0, 1.0], responses=True).outputs
+    assert outputs.shape == (2, 1, 2)
+    grid = dtm.sweep(DRONE, {"Kp": (1, 2, 3), "delay": (0.1, 0.3, 5), "gain": [0.9]}, 8.0)
+    assert grid.shape == (3, 5, 1)
+    assert (
+        grid["overshoot"][2, 1, 0]
+        == dtm.sweep(DRONE, {"Kp": 2.0, "delay": 0.1 + 0.05, "gain": 0.9}, 8.0)["overshoot"]
+    )
+    nothing = dtm.sweep(DRONE, {"Kp": []}, 8.0)
+    assert nothing["overshoot"].shape == (0,)
+    with pytest.raises(ValueError, match="do not broadcast"):
+        dtm.sweep(DRONE, {"Kp": np.array([1.0, 2.0]), "delay": np.array([0.1, 0.2, 0.3])}, 8.0)
+
+
+def test_a_lag_of_none_among_others_makes_loops_of_another_order():
+    lags = np.array([0.0, 0.2, 0.0, 0.1])
+    found = dtm.sweep(
+        DRONE, {"lag": lags, "Kp": [1.0, 1.0, 2.0, 2.0]}, [0.0, 1.0, 2.0], responses=True
+    )
+    for i, (lag, kp) in enumerate(zip(lags, [1.0, 1.0, 2.0, 2.0], strict=True)):
+        plant = dtm.Integrator(1.0, lag)
+        one = DRONE.replace(plant=plant, Kp=kp).simulate([0.0, 1.0, 2.0])
+        np.testing.assert_allclose(found.outputs[i], one.outputs, atol=1e-14)
+
+
+def test_what_grows_without_bound_says_so():
+    free = DRONE.replace(limit=None)
+    found = dtm.sweep(free, {"Kp": np.array([1.0, 30.0, 1e3])}, 20.0)
+    assert found.status.tolist() == [
+        dtm.loops.SweepStatus.OK,
+        dtm.loops.SweepStatus.UNSETTLED,
+        dtm.loops.SweepStatus.UNSETTLED,
+    ]
+    found = dtm.sweep(free, {"Kp": np.array([1.0, 30.0, 1e3])}, 400.0)
+    assert found.status[2] == dtm.loops.SweepStatus.DIVERGED
+    assert all(np.isnan(column[2]) for column in found.metrics.values())
+    assert not any(np.isnan(column[0]) for column in found.metrics.values())
+    outputs = dtm.sweep(free, {"Kp": np.array([1.0, 1e3])}, [0.0, 400.0], responses=True)
+    assert np.isnan(outputs.outputs[1]).all()
+    assert outputs.status.tolist() == [0, dtm.loops.SweepStatus.DIVERGED]
+    # The same beyond the lanes.
+    lagging = free.replace(plant=dtm.Integrator(1.0, 0.1))
+    assert dtm.sweep(lagging, {"Kp": np.array([1.0, 1e3])}, 400.0).status.tolist() == [0, 2]
+
+
+def test_endless_work_is_refused_for_its_set_alone():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
+    found = dtm.sweep(loop, {"delay": np.array([0.3, 1e-8])}, 10.0)
+    assert found.status.tolist() == [0, dtm.loops.SweepStatus.REFUSED]
+    assert np.isnan(found["overshoot"][1])
+
+
+def bits(found):
+    return {name: column.tobytes() for name, column in found.metrics.items()}
+
+
+@pytest.mark.parametrize("loop", [LOOPS[0], LOOPS[5], LOOPS[6], LOOPS[11]], ids=range(4))
+def test_a_set_has_its_own_bits(loop):
+    values = random_values(loop, 50, seed=3)
+    whole = dtm.sweep(loop, values, 6.0, threads=1)
+    assert bits(whole) == bits(dtm.sweep(loop, values, 6.0, threads=3))
+    order = np.random.default_rng(0).permutation(50)[:13]
+    part = dtm.sweep(loop, {name: array[order] for name, array in values.items()}, 6.0)
+    for name, column in part.metrics.items():
+        assert column.tobytes() == whole[name][order].tobytes()
+
+
+SCRIPT = """
+import numpy as np, deadtime as dtm
+loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.3, 0.2, dtm.DerivativeFilter(8.0)),
+                       sample_time=0.065, limit=0.9)
+found = dtm.sweep(loop, {"Kp": np.linspace(0.5, 2.5, 40), "delay": np.linspace(0.1, 0.5, 40)}, 9.0)
+outputs = dtm.sweep(loop, {"delay": np.linspace(0.1, 0.5, 9)}, [0.0, 1.0, 3.3], responses=True)
+print([c.tobytes().hex() for c in found.metrics.values()], outputs.outputs.tobytes().hex())
+"""
+
+
+def test_instruction_sets_agree_to_the_bit():
+    def run(name):
+        return subprocess.run(
+            [sys.executable, "-c", SCRIPT],
+            env=os.environ | {"DEADTIME_INSTRUCTIONS": name},
+            capture_output=True,
+            check=True,
+        ).stdout
+
+    assert run("plain") == run("avx2") == run("avx512")
+
+
+@settings(max_examples=60, deadline=None)
+@given(loop=loops())
+def test_the_rest_of_many_loops_is_that_of_each(loop):
+    gains = loop.specification.model.rest_gains
+    output, command = rest_of(loop.plant, loop.controller, loop.parameters)
+    assume(gains is not None)
+    np.testing.assert_allclose([output, command], gains, atol=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(loop=loops(st.sampled_from([None, 0.7])))
+def test_random_loops_respond_as_alone(loop):
+    times = np.linspace(0.0, 3.0, 31)
+    try:
+        one = loop.simulate(times)
+    except ValueError:
+        assume(False)
+    found = dtm.sweep(loop, {"delay": [loop.delay]}, times, responses=True)
+    size = 1.0 + np.max(np.abs(one.outputs))
+    np.testing.assert_allclose(found.outputs[0] / size, one.outputs / size, atol=1e-13)
+
+
+def test_progress_counts_the_sets():
+    seen = []
+    dtm.sweep(LOOPS[11], {"Kp": np.linspace(1.0, 2.0, 300)}, 60.0, progress=seen.append)
+    assert seen == sorted(seen)
+    assert all(0 <= n <= 300 for n in seen)
+
+
+def test_the_best_set_is_named():
+    found = dtm.sweep(DRONE, {"Kp": np.array([0.5, 1.2, 2.9])}, 10.0)
+    assert found.best() == {"Kp": 1.2}
+    assert found.best("peak") == {"Kp": 0.5}
+    with pytest.raises(KeyError, match="holds rise_time"):
+        found["gain"]
+    with pytest.raises(ValueError, match="no set has a settling_time"):
+        dtm.sweep(DRONE, {"Kp": [0.5]}, 1.0).best()
+    assert not found["overshoot"].flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("values", "time", "words"),
+    [
+        ({"mass": [1.0]}, 5.0, "mass"),
+        ({"Kp": np.array([1.0, np.nan])}, 5.0, "nan"),
+        ({"delay": np.array([0.1, -0.2])}, 5.0, "delay=-0.2"),
+        ({"gain": np.array([1.0, 0.0])}, 5.0, "gain=0"),
+        ({"Kp": np.array([1.0, 0.0])}, 5.0, "loop is open"),
+        ({"Kp": [1.0]}, -5.0, "time=-5"),
+        ({"Kp": [1.0]}, [0.0, 2.0, 1.0], "does not come after"),
+    ],
+)
+def test_bad_arguments_are_named(values, time, words):
+    with pytest.raises(ValueError, match=words):
+        dtm.sweep(DRONE, values, time)
+
+
+def test_a_sweep_without_a_delay_is_refused():
+    with pytest.raises(ValueError, match="delay"):
+        dtm.sweep(DRONE.replace(delay=None), {"Kp": [1.0]}, 5.0)
+    with pytest.raises(TypeError, match="dict"):
+        dtm.sweep(DRONE, [1.0], 5.0)
+    with pytest.raises(ValueError, match="output times"):
+        dtm.sweep(DRONE, {"Kp": [1.0]}, 5.0, responses=True)
+
+
+def test_the_page_of_the_manual_runs():
+    page = Path(__file__).resolve().parents[2] / "docs" / "guide/sweeps-and-sensitivities.md"
+    blocks = re.findall(r"```pycon\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) == 5
+    examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "page", None, 0)
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    told = []
+    runner.run(examples, out=told.append)
+    assert runner.failures == 0, "".join(told)
+
+
+def test_without_a_time_sets_are_measured_until_they_settle():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
+    found = dtm.sweep(loop, {"Kp": np.array([0.1, 1.0, 3.0])})
+    # Kp = 0.1 takes 40 s to settle, ten delays are 3.6 s.
+    assert found.time[-1] >= 40.0
+    assert (found.status == dtm.loops.SweepStatus.OK).all()
+    for i, gain in enumerate((0.1, 1.0, 3.0)):
+        info = loop.replace(Kp=gain).step_response().info()
+        assert found["settling_time"][i] == pytest.approx(info["settling_time"], abs=1e-6)
+    grid = dtm.sweep(loop, {"Kp": [[0.1], [9.0]], "delay": [[0.1, 0.36]]})
+    assert grid.shape == (2, 2)
+    # 9 * 0.36 is beyond pi/2: that loop never settles.
+    assert grid.status.tolist()[0] == [0, 0]
+    assert grid.status[1, 1] != dtm.loops.SweepStatus.OK
+    with pytest.raises(ValueError, match="responses need output times"):
+        dtm.sweep(loop, {"Kp": [1.0]}, responses=True)

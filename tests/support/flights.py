@@ -1,0 +1,14 @@
+"""Recordings of real flights, read from where they lie; nothing of them is copied."""
+
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "flights"
+
+
+def flight_path(name):
+    path = FOLDER / name
+    if not path.exists():
+        pytest.skip(f"the recording {name} is not beside the project")
+    return path
