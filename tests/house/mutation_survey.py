@@ -14,19 +14,20 @@ from __future__ import annotations
 
 import argparse
 import ast
+import importlib
 import os
 import random
 import re
 import resource
 import shutil
-import subprocess
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path("python/deadtime")
@@ -48,6 +49,11 @@ ROOMS = {
     "links/ardrone2/limit_settings.py": "links",
     "links/udp/judgement.py": "links",
 }
+#: Exit code of a run that did not come to its tests.
+BROKEN = 99
+#: Imported once for all runs.
+LIBRARIES = ("hypothesis", "mpmath", "numpy", "scipy.linalg", "scipy.optimize", "scipy.signal")
+
 #: Files of these rooms that compute nothing.
 LEFT_OUT = re.compile(r"__init__|plots|_repr|_low_level")
 
@@ -198,8 +204,8 @@ def tests_of(path: Path) -> list[str]:
         elif test.parent.name == folder:
             others.append(test)
     smallest = sorted(others, key=lambda test: test.stat().st_size)
-    doctests = [str(path)]
-    return doctests + [str(test.relative_to(ROOT)) for test in (*naming, *smallest)]
+    # Doctests last: they import the module a second time, and its classes are then other ones.
+    return [*(str(test.relative_to(ROOT)) for test in (*naming, *smallest)), str(path)]
 
 
 def copied(to: Path) -> None:
@@ -208,35 +214,36 @@ def copied(to: Path) -> None:
     shutil.copytree(ROOT, to, ignore=skipped, symlinks=True)
 
 
-def passes(tree: Path, tests: list[str], seconds: int) -> bool | None:
-    """Whether these tests pass in the copy; None if they take more than so much processor time."""
+def verdict(tree: Path, tests: list[str], seconds: int) -> tuple[str, str]:
+    """What tests say of the copy: 'survived', 'killed' by which test, or 'out of time'.
 
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-
-    options = ["-n", "0", "-x", "-q", "-p", "no:cacheprovider"]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", *options, *tests],
-        cwd=tree,
-        # The package of the copy, not the one that is installed.
-        env={**os.environ, "PYTHONPATH": str(tree / "python")},
-        capture_output=True,
-        preexec_fn=limited,
-        check=False,
-    )
-    return None if done.returncode < 0 else done.returncode == 0
-
-
-def verdict(tree: Path, mutant: Mutant, seconds: int) -> str:
-    """'killed', 'survived' or 'out of time' after the tests of the mutant's room."""
-    file = tree / mutant.path
-    source = file.read_bytes()
-    file.write_bytes(mutant.apply(source))
-    try:
-        passed = passes(tree, tests_of(mutant.path), seconds)
-    finally:
-        file.write_bytes(source)
-    return {True: "survived", False: "killed", None: "out of time"}[passed]
+    They run in a fork of this process, which has imported the libraries and not the package.
+    """
+    told = tree.parent / "told.txt"
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        code = BROKEN
+        try:
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+            os.chdir(tree)
+            # The package of the copy, not the one that is installed.
+            os.environ["PYTHONPATH"] = str(tree / "python")
+            sys.path.insert(0, str(tree / "python"))
+            stream = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            os.dup2(stream, 1)
+            os.dup2(stream, 2)
+            code = int(pytest.main(["-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]))
+            sys.stdout.flush()
+        finally:
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code < 0:
+        return "out of time", ""
+    if code == BROKEN:
+        sys.exit(told.read_text(encoding="utf-8"))
+    by = re.search(r"^(?:FAILED|ERROR) (\S+)", told.read_text(encoding="utf-8"), re.MULTILINE)
+    return ("survived", "") if code == 0 else ("killed", by[1] if by else "")
 
 
 def main() -> None:
@@ -244,30 +251,36 @@ def main() -> None:
     parser.add_argument("--mutants", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=int, default=200, help="processor time for one mutant")
+    parser.add_argument("--only", metavar="ROOM", help="only files that begin so, as links/safety")
     parser.add_argument("--at", metavar="FILE:LINE", help="all mutants of one line instead")
     given = parser.parse_args()
+    for library in LIBRARIES:
+        importlib.import_module(library)
     every = [one for path in files() for one in Mutants(path, (ROOT / path).read_bytes()).found]
     if given.at:
         name, _, line = given.at.rpartition(":")
         chosen = [one for one in every if str(one.path).endswith(name) and one.line == int(line)]
     else:
-        chosen = random.Random(given.seed).sample(every, given.mutants)
+        every = [one for one in every if str(one.path).startswith(f"{PACKAGE}/{given.only or ''}")]
+        chosen = random.Random(given.seed).sample(every, min(given.mutants, len(every)))
     print(f"{len(chosen)} of {len(every)} mutants", flush=True)
     told: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
         copied(tree)
-        if not passes(tree, ["tests/links/test_links_safety.py"], given.seconds):
+        if verdict(tree, ["tests/links/test_links_safety.py"], given.seconds)[0] != "survived":
             sys.exit("the tests fail without any change: nothing can be learnt from them")
         for number, mutant in enumerate(chosen, 1):
-            begin = time.monotonic()
-            found = verdict(tree, mutant, given.seconds)
+            file = tree / mutant.path
+            source = file.read_bytes()
+            file.write_bytes(mutant.apply(source))
+            found, by = verdict(tree, tests_of(mutant.path), given.seconds)
+            file.write_bytes(source)
             told[found] += 1
-            spent = time.monotonic() - begin
-            print(f"{number:4} {found:<11} {spent:5.0f} s  {mutant.path}:{mutant.line}  "
-                  f"{mutant.kind}", flush=True)  # fmt: skip
+            print(f"{number:4} {found:<11} {mutant.path}:{mutant.line}  {mutant.kind}  {by}")
             if found != "killed":
-                print(f"      {mutant.shown((ROOT / mutant.path).read_bytes())}", flush=True)
+                print(f"      {mutant.shown(source)}")
+            sys.stdout.flush()
     decided = told["killed"] + told["survived"]
     print(f"{told['killed']} of {decided} killed, {told['out of time']} out of time")
 

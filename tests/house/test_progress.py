@@ -4,6 +4,7 @@ import sys
 
 import deadtime as dtm
 import pytest
+from deadtime import paper
 from deadtime._base.progress import reported
 
 Kp, Kv, T = dtm.parameters("Kp Kv T")
@@ -57,3 +58,15 @@ def test_a_bar_of_rich_is_on_stderr(capsys):
     with reported(True, 10) as report:
         report(10)
     assert capsys.readouterr().out == ""
+
+
+def test_stages_are_printed_or_given_to_a_function(capsys):
+    names = []
+    paper.reproduce(["gap"], progress=names.append)
+    assert len(names) == 1
+    paper.reproduce(["gap"], progress=True)
+    assert capsys.readouterr().err == f"{names[0]}\n"
+    paper.reproduce(["gap"])
+    assert capsys.readouterr().err == ""
+    with pytest.raises(TypeError, match="True to print the stages"):
+        paper.reproduce(["gap"], progress="loud")

@@ -195,7 +195,7 @@ def test_gains_for_an_interval_hold_on_all_of_it():
         alone = dtm.design(SAMPLED, delay=delay, controller=SMOOTH)
         assert alone.abscissa <= best.abscissa + 1e-6
     (trade,) = best.traded
-    assert trade.demand == "interval"
+    assert trade.requirement == "interval"
     assert trade.without == pytest.approx(without_requirements(SAMPLED).value, rel=2e-3)
 
 

@@ -1,4 +1,4 @@
-"""Independent work shared out among processes, in batches, with progress and a clean Ctrl-C."""
+"""Independent work distributed over processes in batches, with progress and interrupts."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ __all__ = ["shared_out"]
 
 T = TypeVar("T")
 
-#: Fewer items than this are done before other processes have started.
+#: Number of items below which starting other processes takes longer than the work.
 FEW = 100
 
-#: Items of one batch, at most: so often progress is reported, and so many an interrupt waits for.
+#: Largest number of items in a batch: larger ones cost less to hand over, smaller ones report
+#: progress more often and are interrupted sooner.
 BATCH = 10
 
 
@@ -55,7 +56,7 @@ def _here(task: Callable[[range], list[T]], batches: list[range], report: Report
 def _elsewhere(
     task: Callable[[range], list[T]], batches: list[range], report: Report | None, workers: int
 ) -> list[T]:
-    """Batches on other processes; an interrupt waits for those that are at work and no others."""
+    """Run batches in other processes; an interrupt waits for the running ones only."""
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _left_to_the_parent)
     try:
         with _interrupts_held_back():
@@ -79,10 +80,10 @@ def _elsewhere(
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C waits, and processes that start meanwhile never see one.
+    """Delay Ctrl-C, and hide it from processes that start meanwhile.
 
-    It goes to every process of a terminal, and only the one that asked is to answer. A process
-    that starts cannot say so in time, but takes over what its parent has blocked.
+    A terminal sends it to all its processes, and only the parent is to handle it. A new process
+    inherits the signals that its parent has blocked.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
@@ -95,5 +96,5 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 def _left_to_the_parent() -> None:
-    """Where nothing can be blocked, leave Ctrl-C to the parent from the first batch on."""
+    """Ignore Ctrl-C in a worker, where signals cannot be blocked; the parent handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

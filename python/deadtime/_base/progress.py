@@ -7,13 +7,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-__all__ = ["Progress", "Report", "reported"]
+__all__ = ["Progress", "Report", "Stages", "reported", "stage_report"]
 
 #: Called now and then with the number of items that are done.
 Report: TypeAlias = Callable[[int], object]
 
 #: A function to call, or whether to show a bar.
 Progress: TypeAlias = bool | Report
+
+#: A function that is called with the name of each stage as it begins, or whether to print the
+#: names.
+Stages: TypeAlias = bool | Callable[[str], object]
 
 #: Without a bar, a line is written each time this share of the items, or this factor where their
 #: number is not known, has been added: few enough for a log file.
@@ -22,7 +26,7 @@ _SHARE, _FACTOR = 0.1, 2.0
 
 @contextmanager
 def reported(progress: Progress, total: int | None = None) -> Iterator[Report | None]:
-    """Give the function to call with the number of items done, None where nobody asked.
+    """Give the function to call with the number of items done; None where `progress` is False.
 
     True is a bar of rich or tqdm, whichever is installed, otherwise lines on stderr.
     """
@@ -46,6 +50,21 @@ def reported(progress: Progress, total: int | None = None) -> Iterator[Report | 
     with bars.Progress(console=Console(stderr=True), transient=True) as shown:
         task = shown.add_task("done", total=total)
         yield lambda done: shown.update(task, completed=done)
+
+
+def stage_report(progress: Stages) -> Callable[[str], object]:
+    """The function to call with the name of each stage; True prints the names on stderr."""
+    if isinstance(progress, bool):
+        return _print_stage if progress else lambda stage: None
+    if not callable(progress):
+        raise TypeError(
+            f"progress={progress!r}: give True to print the stages, or a function of their names"
+        )
+    return progress
+
+
+def _print_stage(stage: str) -> None:
+    print(stage, file=sys.stderr, flush=True)
 
 
 @contextmanager

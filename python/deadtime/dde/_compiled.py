@@ -61,7 +61,7 @@ def _check_ctypes(function: Any) -> None:
         and types[0] is ctypes.c_double
         and all(kind in pointers for kind in types[1:-1])
         and (types[-1] is ctypes.c_void_p or issubclass(types[-1], ctypes._Pointer))
-        # What a library's function has unless it was told otherwise.
+        # The default of a function of a ctypes library.
         and result in (None, ctypes.c_int)
     )
     if not fits:

@@ -106,8 +106,8 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             return asyncio.TimerHandle(when, callback, args, self, context)
         return super().call_at(when, callback, *args, context=context)
 
-    def _free(self, wanted: Address, taken: dict[Address, Any]) -> Address:
-        host, port = wanted
+    def _free(self, requested: Address, taken: dict[Address, Any]) -> Address:
+        host, port = requested
         if port == 0:
             port = next(port for port in FREE_PORTS if (host, port) not in taken)
         elif (host, port) in taken:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from deadtime._base.progress import Stages, stage_report
 from deadtime.paper.comparison import Comparison, Verdict
 from deadtime.paper.figure2 import figure2
 from deadtime.paper.figure3 import figure3
@@ -141,17 +142,15 @@ class Reproduction:
         return {name: figure for name, part in self.parts.items() if (figure := draw(part))}
 
 
-def reproduce(
-    only: Iterable[str] | None = None, progress: Callable[[str], object] | None = None
-) -> Reproduction:
+def reproduce(only: Iterable[str] | None = None, progress: Stages = False) -> Reproduction:
     """Reproduce the tables and figures of the paper.
 
     Parameters
     ----------
     only : iterable of str, optional
         Names of parts; all by default.
-    progress : callable, optional
-        Called with the title of each part before it is computed.
+    progress : bool or callable
+        Called with the title of each part before it is computed; True prints it on stderr.
 
     Returns
     -------
@@ -169,16 +168,16 @@ def reproduce(
     >>> print(found.summary().split(".")[0])
     19 printed numbers: 19 reproduced to every digit, 0 to fewer digits, 0 not
     """
-    wanted = list(PARTS) if only is None else list(dict.fromkeys(only))
-    unknown = [name for name in wanted if name not in PARTS]
+    report = stage_report(progress)
+    names = list(PARTS) if only is None else list(dict.fromkeys(only))
+    unknown = [name for name in names if name not in PARTS]
     if unknown:
         raise ValueError(f"{', '.join(unknown)}: not one of {', '.join(PARTS)}")
-    if not wanted:
+    if not names:
         raise ValueError(f"only is empty: give one or more of {', '.join(PARTS)}")
     parts = {}
     for name in PARTS:
-        if name in wanted:
-            if progress is not None:
-                progress(TITLES[name])
+        if name in names:
+            report(TITLES[name])
             parts[name] = PARTS[name]()
     return Reproduction(parts)

@@ -28,12 +28,12 @@ System: TypeAlias = ParametricQuasiPolynomial | ControlLoop
 Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
 Values: TypeAlias = Mapping[str, SupportsFloat]
 
-#: Boxes are made of up to this many parameters.
+#: Largest number of parameters with a range: the number of boxes grows exponentially with it.
 MOST_MOVING = 3
 
 
 def side(name: str, low: float, high: float) -> str:
-    """One range, or value, as it is printed."""
+    """Give the text of a range or a value."""
     return f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}"
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays, read_only
+from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.ranges import Points, numbers_at
 from deadtime._base.validation import finite, thread_number
@@ -40,7 +41,8 @@ class MapStatus(IntEnum):
     BOUNDARY = 1
     """A root, or a chain of them, lies on the boundary to working precision."""
     CHAIN = 2
-    """The chains of roots of a neutral equation lead; told only where the abscissa is computed."""
+    """The chains of roots of a neutral equation determine the abscissa; set only where that is
+    computed."""
     INFINITE = 3
     """Infinitely many unstable roots."""
     UNDECIDED = 4
@@ -261,6 +263,15 @@ class StabilityMap(ReadOnlyArrays):
         )
         data["abscissa"].attrs["units"] = "1/s"
         return data
+
+    def _repr_html_(self) -> str:
+        numbers, cells = np.unique(self.unstable, return_counts=True)
+        names = {-1: "infinitely many", -2: "not known"}
+        rows = [
+            table_row((names.get(number, str(number)), str(count)), "td", 2)
+            for number, count in zip(numbers.tolist(), cells.tolist(), strict=True)
+        ]
+        return table(("unstable roots", "cells"), rows, repr(self).strip("<>"))
 
     def __repr__(self) -> str:
         sides = ", ".join(

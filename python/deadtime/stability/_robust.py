@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RobustMap", "robust_map"]
 
-#: Boxes that one cell of a robust map is divided into before it is undecided.
+#: Upper limit on the boxes of one cell of a robust map (bounds time); a cell that needs more is
+#: undecided.
 _CELL_BOXES = 1000
 
 

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.page import table, table_row
 from deadtime.roots import QuasiPolynomial
 from deadtime.roots._crossovers import end_or_corner, gain_crossovers, span
 from deadtime.roots._frequency import (
@@ -45,9 +46,9 @@ __all__ = ["Margins", "first_loss", "margins"]
 
 Vector = NDArray[np.float64]
 
-# Where delays stay in the phase but none of them turns it through 180 degrees, there is no bound on
-# the frequencies: the search ends where the gain is below the first number, or at the second one
-# times the crossover frequency or the turn of the longest delay.
+# Limits of the search for phase crossovers where no frequency bounds them, as when delays enter the
+# phase and none of them turns it through 180 degrees: a gain below _SMALLEST_GAIN, or _TURNS times
+# the crossover frequency or the frequency at which the longest delay turns the phase once.
 _SMALLEST_GAIN = 1e-8
 _TURNS = 1e3
 
@@ -120,17 +121,31 @@ class Margins(ReadOnlyArrays):
             raise ValueError("the loop is not stable as it is: it has no delay margin")
         return self.delay_margin
 
-    def __repr__(self) -> str:
+    def _repr_html_(self) -> str:
         if not self.stable:
-            return "<Margins: none, the closed loop is not stable as it is>"
-        shown = (
+            return table(("the closed loop is not stable as it is",), (), "Margins")
+        rows = [
+            table_row(
+                (name, f"{value:.6g}{unit}", "" if math.isnan(omega) else f"{omega:.6g}"), "td", 3
+            )
+            for name, value, unit, omega in self._four()
+        ]
+        return table(("margin", "value", "at rad/s"), rows, "Margins")
+
+    def _four(self) -> tuple[tuple[str, float, str, float], ...]:
+        """Name, value, unit and frequency of each margin."""
+        return (
             ("gain", self.gain_margin, "", self.gain_margin_omega),
             ("gain reduction", self.gain_reduction, "", self.gain_reduction_omega),
             ("phase", self.phase_margin, "°", self.phase_margin_omega),
             ("delay", self.delay_margin, " s", self.delay_margin_omega),
         )
+
+    def __repr__(self) -> str:
+        if not self.stable:
+            return "<Margins: none, the closed loop is not stable as it is>"
         parts = []
-        for name, value, unit, omega in shown:
+        for name, value, unit, omega in self._four():
             if name == "gain reduction" and value == 0.0:
                 continue
             where = "" if math.isnan(omega) else f" at {omega:.4g} rad/s"

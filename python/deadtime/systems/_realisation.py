@@ -1,4 +1,4 @@
-"""Systems in the form the native part simulates, whatever they were given as.
+"""Systems in the form that the native part simulates.
 
     x'(t) + sum N_j x'(t - tau_j) = sum A_j x(t - tau_j) + sum B_j u(t - tau_j),
     y(t) = sum C_j x(t - tau_j) + sum F_j x'(t - tau_j) + sum D_j u(t - tau_j).

@@ -22,7 +22,7 @@ __all__ = ["Response"]
 
 Vector = NDArray[np.float64]
 
-#: Sensitivities that nobody asked for.
+#: The sensitivities of a response for which none were requested.
 NONE = FrozenDict()
 
 
@@ -94,7 +94,7 @@ class Response(ReadOnlyArrays):
         steady_state: float | None,
         dense: Callable[[Vector], Vector],
     ) -> Response:
-        """Of arrays that nobody else holds: nothing is copied or converted."""
+        """Make a response of arrays that are used nowhere else: nothing is copied or converted."""
         response = object.__new__(cls)
         fields = response.__dict__
         fields["time"] = time

@@ -24,9 +24,10 @@ __all__ = ["Given", "impulse_response", "respond", "step_response"]
 Vector = NDArray[np.float64]
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
 
-# The default time of a step response: at first so many times the slowest constant or the longest
-# delay (at least so many seconds), doubled until the last quarter is settled or the response has
-# run away.
+# The default time of a step response is _SHORTEST times the longest of all time constants, delays
+# and _LEAST seconds. It is doubled, at most _DOUBLINGS times, until the last quarter of the _POINTS
+# outputs is within _SETTLED of the steady state, or one is farther from it than _LOST: a longer
+# first time and a smaller _SETTLED show more of a slow end and less of a fast beginning.
 _POINTS = 501
 _SHORTEST = 10.0
 _LEAST = 0.01

@@ -289,12 +289,12 @@ class ARDrone2:
             If the drone has not taken off, or if the flight has ended without `land`: without
             commands, by a pause of this program, by a landing, or by another client.
         """
-        wanted = finite("climb", climb)
+        requested = finite("climb", climb)
         if self._sender.expired is None and not self._sender.guarded:
             raise LinkError(f"{self.host} is not in the air: take off before commanding it")
         self._check_wish()
         most = min(self.limits.max_climb, self.vz_max)
-        share = UnitCommand.saturated(max(-most, min(most, wanted)) / self.vz_max)
+        share = UnitCommand.saturated(max(-most, min(most, requested)) / self.vz_max)
         sent = self._sender.climb(share, self._link.now)
         self._link.send()
         return float(sent) * self.vz_max
@@ -407,7 +407,7 @@ class ARDrone2:
                 f"{self.host} stays in emergency: check its motors and that it stands level"
             )
 
-    async def _toggled(self, wanted: Callable[[Navdata], bool]) -> bool:
+    async def _toggled(self, requested: Callable[[Navdata], bool]) -> bool:
         """Toggle between emergency and normal until the drone reports the requested state.
 
         The drone has one signal for both directions, so a second one too early would undo the
@@ -416,11 +416,11 @@ class ARDrone2:
         """
         link = self._link
         deadline = link.now + TOGGLING
-        while not await link.until(wanted, 0.0):
+        while not await link.until(requested, 0.0):
             self._sender.cut = True
             link.send(copies=COPIES)
             toggled = link.now
-            while not await link.until(wanted, LOOKING):
+            while not await link.until(requested, LOOKING):
                 if link.now > deadline:
                     return False
                 # Packets that waited in the socket during a pause of this program are old too.

@@ -109,7 +109,7 @@ class Handshake:
             writer.close()
 
 
-def check_configuration(name: str, held: Mapping[str, str], wanted: Mapping[str, str]) -> None:
+def check_configuration(name: str, held: Mapping[str, str], requested: Mapping[str, str]) -> None:
     """Refuse a drone that does not keep a setting.
 
     Raises
@@ -117,19 +117,19 @@ def check_configuration(name: str, held: Mapping[str, str], wanted: Mapping[str,
     LinkError
         With the key, and its value.
     """
-    for key, value in wanted.items():
+    for key, value in requested.items():
         found = held.get(key)
         if found is None or not _same(found, value):
             shown = "nothing" if found is None else found
             raise LinkError(
-                f"{name} was told {key} = {value} and reads back {shown}: it cannot be flown with "
-                "limits that it does not keep"
+                f"{name} was set to {key} = {value} and reads back {shown}: it cannot be flown "
+                "with limits that it does not keep"
             )
 
 
-def _same(found: str, wanted: str) -> bool:
+def _same(found: str, requested: str) -> bool:
     """Whether two values are the same number, or the same text."""
     try:
-        return abs(float(found) - float(wanted)) <= 1e-6 * abs(float(wanted))
+        return abs(float(found) - float(requested)) <= 1e-6 * abs(float(requested))
     except ValueError:
-        return found.strip().upper() == wanted.strip().upper()
+        return found.strip().upper() == requested.strip().upper()

@@ -55,16 +55,16 @@ class LimitSettings:
         before = await handshake.read_back(host, control_port)
         climb = math.ceil(1e3 * limits.max_climb - 1e-6)
         height = round(1e3 * limits.max_height)
-        wanted = {
+        requested = {
             "control:control_vz_max": str(min(max(climb, VZ_MAX[0]), VZ_MAX[1])),
             "control:altitude_max": str(min(max(height, ALTITUDE_MAX[0]), ALTITUDE_MAX[1])),
         }
-        for key, value in wanted.items():
+        for key, value in requested.items():
             if before.get(key, value) != value:
                 self._before[key] = before[key]
             await handshake.set(key, value)
         held = await handshake.read_back(host, control_port)
-        check_configuration(host, held, demo | wanted)
+        check_configuration(host, held, demo | requested)
         self.vz_max = 1e-3 * float(held["control:control_vz_max"])
 
     async def put_back(self, link: Connection) -> str | None:

@@ -142,13 +142,13 @@ class CommandSender:
         if self._uncertain and now - self.resumed > most:
             self.give_up(
                 f"no message sent after a pause of this program has been received for {most:g}"
-                " s: the vehicle was told to land"
+                " s: the vehicle was commanded to land"
             )
         age = now - self._given
         if self.guarded and age > self.limits.command_age:
             self._move = Hover
         if self.guarded and age > most:
-            self.give_up(f"no command for {age:.2f} s: the vehicle was told to land")
+            self.give_up(f"no command for {age:.2f} s: the vehicle was commanded to land")
 
     def _notice_pause(self, now: float) -> None:
         """Do not repeat a request from before a pause in which the vehicle may have landed."""
@@ -160,7 +160,7 @@ class CommandSender:
         if pause > WATCHDOG:
             self.give_up(
                 f"this program was paused for {pause:.2f} s, in which the vehicle's own watchdog "
-                f"lands it ({WATCHDOG:g} s): the vehicle was told to land"
+                f"lands it ({WATCHDOG:g} s): the vehicle was commanded to land"
             )
         else:
             self._uncertain = self.in_air

@@ -47,12 +47,12 @@ class HeldIntegrator:
 
     def advance(self, time: float, command: float) -> None:
         """Advance by a time, s, under this command."""
-        wanted = self.gain * command
+        requested = self.gain * command
         if self.lag == 0.0:
-            self.velocity = wanted
-            self.output += wanted * time
+            self.velocity = requested
+            self.output += requested * time
             return
-        missing = self.velocity - wanted
+        missing = self.velocity - requested
         decayed = -math.expm1(-time / self.lag)
-        self.output += wanted * time + missing * self.lag * decayed
-        self.velocity = wanted + missing * (1.0 - decayed)
+        self.output += requested * time + missing * self.lag * decayed
+        self.velocity = requested + missing * (1.0 - decayed)

@@ -12,8 +12,8 @@ use crate::simd::{Real, Simd};
 /// Largest argument for which the power of two needs no second factor.
 const LARGEST_EXPONENT: f64 = 700.0;
 
-/// The entry n + `ahead` of a table in each lane, modulo its length, a power of two; `carried` is n
-/// + [`ROUNDER`].
+/// The entry n + `ahead` of a table in each lane, modulo its length, a power of two; `carried` is
+/// n + [`ROUNDER`].
 #[inline(always)]
 fn fetched<S: Simd, const N: usize>(
     carried: Real<S>,

@@ -16,7 +16,7 @@ const MAX_POWER: u32 = 1000;
 /// Upper limit on the number of terms (bounds memory and time).
 const MAX_TERMS: usize = 100_000;
 
-/// constant + Σ `slopes`[i] · p_i.
+/// constant + Σ `slopes[i]` · p_i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Affine {
     /// Value where all parameters are zero.

@@ -17,7 +17,7 @@ mod specification;
 
 pub use boxes::{Boxes, Limits, Node, Radius, largest_stable_box, proved_boxes, stability_radius};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
-pub use crossings::{Place, crossings_along};
+pub use crossings::{AxisCrossing, crossings_along};
 pub use family::{Affine, Family, Term};
 pub use map::{
     Axis, Boundaries, Chart, Proof, Question, Vertex, boundaries, chains, map, robust_map,

@@ -181,10 +181,10 @@ class ThrustMotion(Motion):
         hover = model.hover_speed
         # Thrusts as accelerations, so that the mass cancels: T / m = g (Omega / Omega_hover)^2.
         asked = max(0.0, GRAVITY + model.speed_gain * (self._setpoint - climb))
-        wanted = hover * math.sqrt(asked / GRAVITY)
-        wanted = min(max(wanted, model.slowest), model.fastest)
+        requested = hover * math.sqrt(asked / GRAVITY)
+        requested = min(max(requested, model.slowest), model.fastest)
         thrust = GRAVITY * (speed / hover) ** 2
-        return climb, thrust * self._upright - GRAVITY, (wanted - speed) / model.motor_lag
+        return climb, thrust * self._upright - GRAVITY, (requested - speed) / model.motor_lag
 
 
 def _moved(state: State, rates: State, by: float) -> State:

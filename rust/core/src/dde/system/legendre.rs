@@ -23,7 +23,7 @@ pub(super) type Series = [f64; TERMS];
 
 struct Tables {
     nodes: Series,
-    /// (2k + 1)/2 w_i P_k(ξ_i) at [i][k].
+    /// (2k + 1)/2 w_i P_k(ξ_i) at `[i][k]`.
     transform: [Series; TERMS],
     /// (2k + 1)/(k + 1) and (k + 1)/(k + 2) of Clenshaw's recurrence.
     slope: Series,
@@ -118,7 +118,7 @@ pub(super) fn nodes() -> &'static Series {
     &TABLES.nodes
 }
 
-/// The transformation of values at the nodes to coefficients: the part of value i in c_k at [i][k].
+/// The transformation of values at the nodes to coefficients: the part of value i in c_k at `[i][k]`.
 pub(super) fn transform() -> &'static [Series; TERMS] {
     &TABLES.transform
 }

@@ -84,10 +84,10 @@ pub struct Certificate {
     pub real: Vec<RealPart>,
 }
 
-/// [`count`](super::count), with the proof.
+/// [`count`](crate::roots::count), with the proof.
 ///
 /// # Errors
-/// As [`count`](super::count).
+/// As [`count`](crate::roots::count).
 ///
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Region, certify}};

@@ -64,7 +64,7 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
 /// The number of roots right of the imaginary axis and the rightmost root, with one pass along the
 /// axis for both.
 ///
-/// The first is that of [`count_right_of`](super::count_right_of) at 0, the second that of
+/// The first is that of [`count_right_of`] at 0, the second that of
 /// [`rightmost`] for one root.
 ///
 /// # Errors

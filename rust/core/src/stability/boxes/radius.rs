@@ -215,7 +215,7 @@ impl Place<'_> {
     }
 
     /// The nearest point of a box, moved away from the point by a share of the tolerance.
-    fn beyond<const D: usize>(&self, range: &Range<D>) -> [f64; D] {
+    fn moved_outwards<const D: usize>(&self, range: &Range<D>) -> [f64; D] {
         let mut place = self.nearest(range).0;
         for (slot, index) in place.iter_mut().zip(self.varying) {
             let value = self.point.get(*index).copied().unwrap_or(0.0);
@@ -261,7 +261,7 @@ impl Place<'_> {
             task.advance(1);
             if bound > tried.0 * (1.0 + 0.25 * self.tol) || order >= tried.1 + TRY_EVERY {
                 tried = (bound, order);
-                let values = reduced.values_at(&self.beyond(&claim.range));
+                let values = reduced.values_at(&self.moved_outwards(&claim.range));
                 let known = family
                     .at(&values)
                     .map(|h| judge(&h, Specification::default(), false, task));

@@ -9,6 +9,6 @@ mod pencil;
 mod row;
 
 pub(crate) use crossing::Crossing;
-pub use one_gain::{Place, crossings_along};
+pub use one_gain::{AxisCrossing, crossings_along};
 pub(crate) use pencil::{sizes, united};
 pub(crate) use row::{Members, Row};

@@ -63,7 +63,7 @@ impl<S: Scalar> Piece<S> {
     }
 
     /// w over [t, t + h] as a polynomial in σ ∈ [0, 1].
-    pub(super) fn local(&self, t: S, h: S) -> Series<S> {
+    pub(super) fn in_local_time(&self, t: S, h: S) -> Series<S> {
         if self.series.degree == 0 {
             return self.series;
         }
@@ -79,8 +79,8 @@ impl<S: Scalar> Piece<S> {
     /// Is the other piece a continuation of this one?
     fn continues_as(&self, other: &Self) -> bool {
         let length = other.end - other.start;
-        let mine = self.local(other.start, length);
-        let theirs = other.local(other.start, length);
+        let mine = self.in_local_time(other.start, length);
+        let theirs = other.in_local_time(other.start, length);
         let (mut difference, mut largest) = (0.0, 0.0_f64);
         let (mut apart, mut steepest) = (0.0, 0.0_f64);
         for (&mine, &theirs) in mine.coefficients.iter().zip(&theirs.coefficients) {
