@@ -90,8 +90,11 @@ __all__ = [
 ]
 
 _Pair: TypeAlias = tuple[float, float]
+_Progress: TypeAlias = Callable[[int], object] | None
 _Axes: TypeAlias = dict[str, NDArray[np.float64]]
 _Region: TypeAlias = tuple[_Pair, _Pair]
+
+# --- roots ----------------------------------------------------------------------------
 
 @final
 class RootSet:
@@ -239,6 +242,8 @@ class QuasiPolynomial:
     def expansion(self, s: complex, order: int) -> Expansion: ...
     def logarithmic_derivatives(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
 
+# --- frequencies -----------------------------------------------------------------------
+
 @final
 class Margins:
     @property
@@ -295,6 +300,9 @@ def delay_range(family: Family, value: float) -> _Pair: ...
 def gain_range(family: Family, value: float, bounds: _Pair) -> _Pair: ...
 def damping_range(family: Family, value: float, highest: float) -> _Pair: ...
 def corner_range(family: Family, value: float, highest: float) -> _Pair: ...
+
+# --- special functions ----------------------------------------------------------------
+
 def limit_threads(threads: int | None) -> int | None: ...
 
 lambertw: np.ufunc
@@ -311,6 +319,8 @@ def lambertw_number(z: object, k: object) -> np.complex128 | None: ...
 def lambertw0_number(x: object) -> np.float64 | None: ...
 def lambertwm1_number(x: object) -> np.float64 | None: ...
 def dde_root_number(a0: object, a1: object, delay: object, k: object) -> np.complex128 | None: ...
+
+# --- families, maps and boxes ---------------------------------------------------------
 
 class _FamilyTerm(Protocol):
     @property
@@ -366,7 +376,7 @@ class Family:
         question: _MapQuestion,
         *,
         threads: int | None = None,
-        progress: Callable[[int], object] | None = None,
+        progress: _Progress = None,
     ) -> MapCells: ...
     def chains(self, axes: _Axes) -> NDArray[np.float64]: ...
     def boundaries(
@@ -406,7 +416,7 @@ def proved_boxes(
     tol: float,
     max_boxes: int,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> ProvedBoxes: ...
 def largest_stable_box(
     family: Family,
@@ -415,7 +425,7 @@ def largest_stable_box(
     around: dict[str, float] | None,
     tol: float,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> dict[str, _Pair] | None: ...
 def stability_radius(
     family: Family,
@@ -432,10 +442,12 @@ def robust_map(
     *,
     max_boxes: int,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> NDArray[np.int32]: ...
 
 _Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
+
+# --- loops ----------------------------------------------------------------------------
 
 class _SampleUpdate(Protocol):
     @property
@@ -549,7 +561,7 @@ def sampled_abscissa_grid(
     *,
     decay: float,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> SampledCells: ...
 
 class _StateSpace(Protocol):
@@ -670,15 +682,17 @@ def sweep_metrics(
     settling: float,
     rise: _Pair,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> SweepMetrics: ...
 def sweep_responses(
     sets: _LoopSets,
     time: NDArray[np.float64],
     *,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> SweepResponses: ...
+
+# --- systems --------------------------------------------------------------------------
 
 @final
 class LegendreTables:
@@ -737,6 +751,8 @@ class LinearSystem:
         history_derivative: Signal | None,
         inputs: Signal,
     ) -> LinearSystemResponse: ...
+
+# --- delay differential equations -----------------------------------------------------
 
 @final
 class DelayPieces:
@@ -838,6 +854,8 @@ class DelayRun:
     def pieces(self) -> DelayPieces: ...
 
 def solve_dde(problem: _DelayProblem) -> DelayRun: ...
+
+# --- wire formats ---------------------------------------------------------------------
 
 @final
 class AtCommand:

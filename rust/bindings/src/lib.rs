@@ -1,4 +1,4 @@
-//! The seam between the `deadtime` core and Python: it converts and nothing else.
+//! The bindings of the `deadtime` core to Python: they convert and do nothing else.
 
 mod arrays;
 mod boxes;
