@@ -40,7 +40,7 @@ def demo(tmp_path_factory):
 def test_the_demo_shows_the_truth_beside_the_estimates(demo):
     _, printed = demo
     assert "the truth" in printed
-    for method in ("paper", "exact", "as flown", "waveform with lag"):
+    for method in ("paper", "exact", "waveform with lag"):
         assert method in printed
     assert "The loop is 0.4" in printed
     # the limit of the true loop under proportional control is 5.0; half of it is called safe

@@ -108,7 +108,7 @@ def estimate_delays(
 
 
 def _chosen(method: str | None, number: int, options: dict[str, Any]) -> str:
-    """The method, once it is clear that so many files and these options are for it."""
+    """The method, checked against the number of files and the options."""
     if method is None:
         method = "all" if number == 1 else "auto"
     if method not in CHOICES:

@@ -98,7 +98,7 @@ def _bar() -> Progress:
 
 @contextmanager
 def counted(what: str, total: int, quiet: bool) -> Iterator[bool | Callable[[int], object]]:
-    """A progress bar over so many items; call it with the number that is done."""
+    """A progress bar over `total` items; call it with the number that is done."""
     if quiet or not ERRORS.is_terminal:
         yield False
         return

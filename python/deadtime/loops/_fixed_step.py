@@ -20,7 +20,7 @@ __all__ = ["simulate_fixed_step"]
 
 Vector = NDArray[np.float64]
 
-# A length of time within this part of a step of a whole number of steps is that number.
+#: Distance of a time to a whole number of steps, in steps, that counts as rounding.
 _WHOLE = 1e-9
 
 

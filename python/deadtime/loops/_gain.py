@@ -25,7 +25,7 @@ __all__ = ["LoopGain"]
 
 
 class LoopGain:
-    """The part of `ControlLoop` that cuts it at the command."""
+    """The loop gain of a `ControlLoop`, which is cut at the command."""
 
     specification: LoopSpecification
 
@@ -210,7 +210,7 @@ class LoopGain:
         return drawn
 
     def _delay_margin(self) -> float:
-        """Further delay that the stable loop bears, s."""
+        """Delay margin of a loop that must be stable, s."""
         loop = self.specification
         if loop.sample_time is None:
             return self.margin()._delay_margin()
@@ -224,6 +224,6 @@ class LoopGain:
         return SampledLoopGain.of(loop.model, loop.known_delay, cast(float, loop.sample_time))
 
     def _further_delay(self) -> tuple[float, float]:
-        """How much more delay a stable sampled loop bears, and the frequency it then swings at."""
+        """Delay margin in s of a stable sampled loop, and the frequency of its crossing."""
         loop = self.specification
         return further_delay(SampledNumber(loop.model_at, loop.parameters, "delay"))

@@ -19,7 +19,7 @@ __all__ = ["LoopInTime"]
 
 
 class LoopInTime:
-    """The part of `ControlLoop` that simulates it."""
+    """The simulations of a `ControlLoop`."""
 
     specification: LoopSpecification
 

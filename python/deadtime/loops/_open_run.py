@@ -1,4 +1,4 @@
-"""A plant alone, under a command that was logged: no controller closes the loop."""
+"""Response of a plant without a controller to a logged command."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def open_response(
     values : mapping of str to float
         Its numbers.
     times : ndarray, shape (n,)
-        Where the output is wanted, s, increasing.
+        Output times in s, increasing.
     command_time, command : ndarray, shape (m,)
         From when each command holds, s, increasing. A plant that comes to rest under a constant
         command rests under the first one; one that integrates is at zero until then.

@@ -24,18 +24,21 @@ __all__ = ["LEAST", "SHORTEST", "reference_jumps", "settled_step", "simulate_loo
 
 Vector = NDArray[np.float64]
 
-# The default time of a step response: at first so many times the slowest constant of the loop (at
-# least so many seconds), doubled until the last quarter is settled or the response has run away.
+#: Output times of a step response by default.
 _POINTS = 501
+#: Its first duration, as a multiple of the slowest time constant of the loop, at least LEAST,
+#: in s.
 SHORTEST = 10.0
 LEAST = 0.01
+#: The duration is doubled, at most this many times, until the last quarter stays within _SETTLED of
+#: the goal or the response is _LOST times as far away from it.
 _DOUBLINGS = 10
 _SETTLED = 0.005
 _LOST = 20.0
 
 
 class _Again:
-    """The output of one run at any times: the run is made again for them."""
+    """Output of a run at other times: the run is repeated for them."""
 
     __slots__ = ("loop", "run", "start")
 
@@ -95,7 +98,7 @@ def simulate_loop(
         history = one_dimensional("command_history", command_history)
     phase = finite("sample_phase", sample_phase)
     run = LoopRun(*loop.rest_at(initial, past), before, held, held_from, history, phase)
-    # The times are the caller's; what is kept must not change with them.
+    # The array belongs to the caller; the response must not change with it.
     kept = times.copy()
     found = loop.native.respond(kept, run, loop.output_lead)
     start = float(kept[0])

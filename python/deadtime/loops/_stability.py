@@ -37,15 +37,16 @@ __all__ = [
     "sampled_roots",
 ]
 
-# Numbers of a loop that cannot be negative, and those that keep their sign because the loop has no
-# meaning at zero; those of a filter.
+#: Numbers of a loop that cannot be negative.
 _NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"})
+#: Numbers that keep their sign, since the loop has no meaning at zero.
 _KEEPS_SIGN = frozenset({"time_constant"})
+#: Numbers of a filter.
 _OF_FILTER = frozenset({"omega", "damping"})
 
-# What counts as zero on the way down to it, and how far a sampled loop is followed where it may be
-# stable for ever, as parts of the value.
+#: Relative value below which a number counts as zero on the way down.
 _NEARLY_ZERO = 1e-6
+#: Relative value up to which a sampled loop is followed where it may be stable for any value.
 _FARTHEST = 1e6
 
 

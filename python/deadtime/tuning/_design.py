@@ -86,7 +86,7 @@ def design(
     ------
     ValueError
         When the delay is not known, no gains in the ranges are stable, or none of them meet the
-        margins; the message says what was searched, or what can be had.
+        margins; the message says what was searched, or which margins are possible.
     TypeError
         When `loop` is neither a `ControlLoop` nor a plant, or `fixed` or `ranges` no mapping.
 

@@ -44,7 +44,7 @@ _HOPELESS = 3e-3
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Gains, the scenarios they are the best for, and what they are worth in the worst."""
+    """Gains, the scenarios they are best for, and their cost in the worst of all scenarios."""
 
     gains: Vector
     scenarios: tuple[Scenario, ...]

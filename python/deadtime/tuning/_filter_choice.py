@@ -42,21 +42,24 @@ from deadtime.tuning._worst import fine
 
 __all__ = ["design_filter", "filter_choice", "noise_gain"]
 
-#: Corners that are tried, from and to in units of one over delay, lag and half a sample.
+#: Number of corners tried, and the slowest and fastest in units of 1/(delay + lag + half a sample).
+#: Each corner costs a design.
 _CORNERS = 11
 _SLOWEST, _FASTEST = 2.0, 200.0
 
-#: A continuous loop has no sampling rate: its noise reaches so far beyond the fastest corner.
+#: Bandwidth of the noise of a continuous loop, which has no sampling rate, as a multiple of the
+#: fastest corner.
 _BEYOND = 10.0
 
-#: Halvings of the interval between two corners in which the chosen one lies.
+#: Halvings of the interval between two corners: each costs a design and halves the error.
 _HALVINGS = 5
 
-#: Points of the integral over the noise, from this part of the bandwidth on.
+#: Points of the integral over the noise, and its lower end as a fraction of the bandwidth.
 _POINTS = 4000
 _LOWEST = 1e-5
 
-#: Points of the map along each gain: many maps are drawn.
+#: Points of the map along each gain, for one, two and three free gains: fewer than for one design,
+#: since many maps are computed.
 _SIDE = {1: 201, 2: 41, 3: 15}
 
 

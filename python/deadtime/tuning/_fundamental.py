@@ -23,12 +23,13 @@ __all__ = ["Fundamental", "states_at"]
 
 Vector = NDArray[np.float64]
 
-#: Cells in a delay at least, and in the fastest time constant of plant and controller.
+#: Least number of cells in a delay, cells in the fastest time constant, and most cells in a delay:
+#: more cells make the bounds tighter and cost time in proportion.
 _CELLS = 8
 _FASTEST = 6.0
 _MOST_CELLS = 512
 
-#: Grid points that are held at once.
+#: Upper limit on the number of grid points (bounds memory).
 _MOST_POINTS = 400_000
 
 
@@ -65,7 +66,7 @@ class Fundamental:
         return np.array([*np.abs(away[:, 0, -1]), late.sum() * self.h, late.max()])
 
     def bounds(self, delays: int) -> tuple[Vector, Vector, Vector] | None:
-        """Q, and the rows of R for output and command, of a period of so many delays."""
+        """Q, and the rows of R for output and command, of a period of `delays` delays."""
         model, cells = self.model, self.cells
         n, count = len(model.B), delays * cells
         if count > _MOST_POINTS // (n + 1):

@@ -124,7 +124,7 @@ def _margins(L: NDArray[np.complex128], omega: Vector, sampled: bool) -> Vector:
     part = -first[row, place] / np.where(slope == 0.0, 1.0, slope)
     factor = np.exp(-(size[row, place] + part * grown[row, place]))
     np.minimum.at(found[:, 0], row, np.where(factor > 1.0, factor, np.inf))
-    # At half the sampling rate L is real; the chains of a neutral loop end what gain it stands.
+    # At half the sampling rate L is real; chains of roots bound the gain of a neutral loop.
     ending = (L[:, -1].real < 0.0) if sampled else np.ones(len(L), dtype=bool)
     factor = np.exp(-size[:, -1])
     beyond = np.where(ending & (factor > 1.0), factor, np.inf)

@@ -28,10 +28,10 @@ __all__ = [
 
 Vector: TypeAlias = NDArray[np.float64]
 
-#: Values of the numbers of the loop that are not known.
+#: Values of the unknown numbers of a loop, by name.
 Scenario: TypeAlias = dict[str, float]
 
-#: More free gains than a controller here has would need a search that knows no map.
+#: Most free gains: those of PID. More would need a search without a map.
 _MOST_FREE = 3
 
 
@@ -70,7 +70,7 @@ class Problem:
         return self.loop.replace(**self.named(gains), **(scenario or {}))
 
     def scenarios(self, points: int) -> tuple[Scenario, ...]:
-        """Every combination of so many values of each number that is not known."""
+        """Every combination of `points` values of each unknown number."""
         values = [
             np.linspace(low, high, points) if low < high else [low]
             for low, high in self.intervals.values()
@@ -160,7 +160,7 @@ def _around(
 
 
 def controller_template(controller: type[Controller] | Controller) -> Controller:
-    """A controller of the wanted class; its gains are replaced throughout."""
+    """A controller of the given class, whose gains are placeholders."""
     if isinstance(controller, Controller):
         return controller
     if isinstance(controller, type) and issubclass(controller, Controller):

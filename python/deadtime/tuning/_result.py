@@ -1,4 +1,4 @@
-"""What a design comes to: gains, what they are worth, and what they cost."""
+"""Results of a design: gains, their properties, and what the requirements cost."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class Design(ReadOnlyArrays):
         return " to ".join(f"{end:g}" for end in ends)
 
     def summary(self) -> str:
-        """Gains, what they are worth and what they cost, in a few lines.
+        """Gains, their properties and what the requirements cost, in a few lines.
 
         Returns
         -------
@@ -250,7 +250,7 @@ class FilterChoice(ReadOnlyArrays):
 
     @property
     def trade(self) -> Trade:
-        """The choice as what was traded."""
+        """The cost of the filter, as a `Trade`."""
         return Trade("filter", self.omega, self.omega, True, self.ideal.value, self.summary())
 
     def summary(self) -> str:
@@ -273,7 +273,7 @@ class FilterChoice(ReadOnlyArrays):
         return words
 
     def plot(self) -> Figure:
-        """Draw the trade, the controller with and without the filter, the loop with its margins.
+        """Draw the costs of each corner, the controller with and without filter, and the margins.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""The best gains for given scenarios: the best cells of the map, made good by a local search.
+"""The best gains for given scenarios: the best cells of the map, improved by a local search.
 
 Every cost here has kinks, where two poles are equally far right or two delays equally bad, and the
 best gains lie on them; simulated ones also jump, where a peak leaves the settling band. So nothing
@@ -11,8 +11,8 @@ more       grids around the best point, each narrower than the one before (a map
            simplices of Nelder and Mead (1965), begun again around what they found, smaller and
            turned: a simplex that has collapsed on a kink is so freed.
 
-What is simulated is searched for the gains alone first, and in the last grids with gains half a
-percent beside them. There a gain whose axis begins at zero stays a quarter of a cell off it.
+Simulated objectives are searched for the gains alone first, and in the last grids with gains half a
+percent beside them. There a gain whose axis begins at zero stays a quarter of a cell away from it.
 
 Margins are requirements, not costs: a shortfall costs many times as much as any gain in the
 objective, and becomes zero where the requirements can be met. None of this proves a global minimum:
@@ -36,52 +36,59 @@ from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
 
 __all__ = ["Search"]
 
-#: What a whole shortfall of a margin costs, in units of the objective.
+#: Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
+#: gain in the objective pays for a shortfall.
 _PENALTY = 50.0
 
-#: Cells whose cost is computed where the map does not hold it, with poles or by simulation.
+#: Upper limits on the cells whose cost is computed where the map does not hold it, from poles or by
+#: simulation (bound time).
 _CELLS_BY_POLES = 150
 _CELLS_SIMULATED = 450
 
-#: Cells the local search starts from, fewer where it is dear.
+#: Cells from which the local search starts; fewer where loops are simulated, and up to the third
+#: number where the neighbours of the gains cost much more than these themselves.
 _STARTS = 3
 _STARTS_SIMULATED = 2
 _MOST_STARTS = 6
 
-#: Gains whose neighbours make them so much dearer than the best cell alone send the search on.
+#: Ratio of the cost with neighbouring gains to that of the best cell above which further starts are
+#: tried.
 _MUCH = 1.15
 
-#: Simplices one after the other: how many at most, how much smaller each is, evaluations of each,
-#: to which part of its range a gain is to be known, and which part of the cost is no gain. Where
-#: roots meet, the abscissa has cusps, so that gains known to 1e-7 leave it known to 1e-3.
+#: Most simplices in sequence, ratio of their sizes, and evaluations of each.
 _SIMPLICES = 6
 _SMALLER = 0.35
 _EVALUATIONS = 150
+#: Relative accuracy of the gains, as a fraction of their ranges, and relative improvement that
+#: counts as none. Where roots meet, the abscissa has cusps, so that gains known to 1e-7 leave it
+#: known to 1e-3.
 _GAINS_KNOWN = 3e-7
 _IDLE = 1e-4
 
-#: Points along each side of a grid, half its width at first in cells of the map, how many grids
-#: (of what is simulated for the gains alone, and then with their neighbours), how much narrower
-#: each is, and how near to its middle the best point has to be for that.
+#: Points along each side of a grid, for one, two and three free gains, and half the width of the
+#: first grid in cells of the map.
 _SIDE = {1: 21, 2: 9, 3: 5}
 _REACH = 1.5
+#: Number of grids; of simulated loops, for the gains alone and then with their neighbours.
 _GRIDS = 3
 _GRIDS_SIMULATED = 8
 _GRIDS_ROUNDED = 4
+#: Ratio of the widths of two grids, and the part of the half width within which the best point must
+#: lie for the grid to become narrower.
 _NARROWER = 0.5
 _ARRIVED = 0.5
 
-#: How far beside the best gains alone the best ones with their neighbours are looked for at first,
-#: as a part of them.
+#: Relative half width of the first grid around the best gains alone in which the best ones with
+#: their neighbours are sought.
 _NEAR = 0.03
 
-#: Every so-manyeth frequency is looked at on the map.
+#: Frequency stride of the coarse margin estimate.
 _COARSE = 3
 
-#: A shortfall of margins that is none.
+#: Shortfall of the margins that counts as none.
 _MET = 1e-6
 
-#: What an unstable loop falls short by: more than every margin together.
+#: Shortfall assigned to an unstable loop: that of all three margins together.
 _UNSTABLE = 3.0
 
 #: Costs of rows of gains in scenarios.
@@ -92,7 +99,7 @@ Pair: TypeAlias = tuple[Vector, Vector]
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Everything a search for the best gains needs."""
+    """A search for the best gains: problem, objective, map and estimate of the margins."""
 
     problem: Problem
     objective: Objective
@@ -146,7 +153,7 @@ class Search:
     def locally(
         self, start: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
     ) -> Vector:
-        """The best gains around some."""
+        """The best gains around a start."""
         return self._polished(*self._by_grids(start, scenarios, required), scenarios, required)
 
     def _by_grids(
@@ -241,12 +248,12 @@ class Search:
         return 1.0
 
     def _map_costs(self, cells: NDArray[np.intp], scenarios: Sequence[Scenario]) -> Vector:
-        """Costs of cells of the map; of some of them, infinite for the others, where dear."""
+        """Costs of cells of the map; infinite for those left out where a cost takes long."""
         abscissa = self.survey.abscissa.ravel()[cells]
         if self.objective.name == "abscissa":
             return np.asarray(abscissa)
         most = _CELLS_SIMULATED if self.objective.simulated else _CELLS_BY_POLES
-        # A third of them the most stable ones, the others thinly.
+        # A third of them the most stable ones, the others at equal strides.
         order = np.argsort(abscissa, kind="stable")
         rest = order[most // 3 :]
         taken = np.append(order[: most // 3], rest[:: max(1, -(-rest.size * 3 // (2 * most)))])

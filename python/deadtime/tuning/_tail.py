@@ -1,4 +1,4 @@
-"""What a response may still do after the end of a simulation: a bound on its tail, for all times.
+"""A bound on a response for all times after the end of a simulation.
 
 About its rest a loop is linear until its command meets the limit again. At the end of the
 simulation the deviation is a vector z of sizes (the states, and the commands under way), and
@@ -29,20 +29,21 @@ __all__ = ["tail_bound"]
 
 Vector = NDArray[np.float64]
 
-#: Periods are doubled until what is left of the deviation is this part of it; at most so often.
+#: Part of the deviation that may be left after a period; the period is doubled until it is, at most
+#: this many times.
 _CONTRACTED = 0.6
 _DOUBLINGS = 14
 
-#: Points in each part of a sample at which the output is looked at.
+#: Points in each part of a sample at which the output is bounded: more give a tighter bound.
 _WITHIN = 16
 
-#: Condition from which on a loop has no single rest.
+#: Condition number from which on a loop has no unique rest.
 _SINGULAR = 1e13
 
-#: A delay so close to whole samples, in samples, is that many.
+#: Distance of a delay to a whole number of samples, in samples, that counts as rounding.
 _ON_SAMPLE = 1e-9
 
-#: A step of a loop without delay, in units of its fastest time constant.
+#: Step of a loop without delay, in units of its fastest time constant.
 _STEP = 0.25
 
 

@@ -3,8 +3,8 @@
 A fine grid of scenarios, and between the neighbours of the worst of them a search along the delay.
 That is a search, not a proof. Stability itself, the gain margin and the delay margin of a
 continuous loop are proved for all of the intervals at once, by boxes: a gain margin of 2 is the
-stability of all plants up to twice as strong, a delay margin that of all delays up to so much
-longer.
+stability of all plants up to twice as strong, a delay margin that of all delays up to this
+margin longer.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from deadtime.tuning._required_margins import RequiredMargins
 
 __all__ = ["fine", "proved", "worst_scenario"]
 
-#: Values of each number that is not known, for objectives and for the dearer exact margins.
+#: Values of each unknown number in a check, for one and two of them: of the objective, and of the
+#: exact margins, which cost more.
 _FINE = {1: 33, 2: 9}
 _FINE_MARGINS = {1: 9, 2: 3}
 
-#: Boxes after which a proof is given up.
+#: Most boxes of a proof (bounds time).
 _BOXES = 20_000
 
 
