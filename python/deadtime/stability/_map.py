@@ -299,7 +299,8 @@ def stability_map(
     Parameters
     ----------
     family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
-        What to judge, with the names that `deadtime.crossings` knows. The limit of a loop plays no part in stability.
+        What to judge, with the names that `deadtime.crossings` knows. The limit of a loop plays no
+        part in stability.
     ranges : mapping of str to (low, high), (low, high, n) or ndarray
         Exactly two names. A range is sampled at n points, both ends included, or at as many as
         `shape` says; an array holds the points themselves, increasing. The first name is the first
