@@ -142,9 +142,10 @@ def crossings(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial, ControlLoop or DelaySystem
-        The equation; a continuous loop, whose limit plays no part; or a system, of which
-        ``delay`` varies: the least delay of its states, to which the others keep their ratio.
+    family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
+        The equation; a continuous loop, whose limit plays no part; a loop gain, on which ``gain``
+        is a factor and ``delay`` a further delay; or a system, of which ``delay`` varies: the
+        least delay of its states, to which the others keep their ratio.
     ranges : mapping of str to (low, high)
         The one number that varies, and between which ends.
     at : mapping of str to float, optional
@@ -216,9 +217,10 @@ def delay_margin(
 
     Parameters
     ----------
-    loop : ControlLoop, TransferFunction, ParametricQuasiPolynomial or DelaySystem
-        A loop; a loop gain, around which unit feedback is closed; an equation in which one
-        parameter is a delay; or a system, of whose states the delays grow in proportion.
+    loop : ControlLoop, TransferFunction, QuasiPolynomial, ParametricQuasiPolynomial or DelaySystem
+        A loop; a loop gain, around which unit feedback is closed; a characteristic function, whose
+        part with delays is delayed further; an equation in which one parameter is a delay; or a
+        system, of whose states the delays grow in proportion.
     at : mapping of str to float, optional
         For an equation: the values of all its parameters, the present delay among them.
 
