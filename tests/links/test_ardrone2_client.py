@@ -9,7 +9,7 @@ from deadtime import FlightAbortedError, LinkError
 from deadtime.links import Limits, run
 from deadtime.links.ardrone2 import ARDrone2, Navdata, build_navdata
 from deadtime.links.ardrone2.commands import Ref, decode
-from deadtime.links.ardrone2.connection import _Door
+from deadtime.links.ardrone2.connection import _PeerFilter
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.emulator.settings import Settings
 from emulated import LIMITS, client_of, connected, emulator
@@ -375,7 +375,7 @@ def test_it_is_noted_also_when_the_landing_itself_was_cancelled():
     "wrong", [{"navdata_port": 99999}, {"command_port": -1}, {"control_port": 0}]
 )
 def test_a_port_that_is_none_is_refused(wrong):
-    with pytest.raises(ValueError, match="is no port"):
+    with pytest.raises(ValueError, match="give a port"):
         ARDrone2("127.0.0.1", **wrong)
 
 
@@ -405,7 +405,7 @@ def test_what_a_socket_hands_on_from_elsewhere_is_counted_and_dropped():
     # A system that filters less than it should: the protocol checks address and port itself.
     async def fly():
         async with connected() as (_, drone):
-            door = _Door(drone._link.take, drone._link.reader.refuse)
+            door = _PeerFilter(drone._link.take, drone._link.reader.refuse)
             door._peer = ("127.0.0.1", 5554)
             before = (await drone.state()).sequence
             forged = build_navdata(Navdata(1 << 31, before + 1))
