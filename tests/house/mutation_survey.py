@@ -14,18 +14,20 @@ from __future__ import annotations
 
 import argparse
 import ast
+import importlib
 import os
 import random
 import re
 import resource
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path("python/deadtime")
@@ -47,6 +49,11 @@ ROOMS = {
     "links/ardrone2/limit_settings.py": "links",
     "links/udp/judgement.py": "links",
 }
+#: Exit code of a run that did not come to its tests.
+BROKEN = 99
+#: Imported once for all runs.
+LIBRARIES = ("hypothesis", "mpmath", "numpy", "scipy.linalg", "scipy.optimize", "scipy.signal")
+
 #: Files of these rooms that compute nothing.
 LEFT_OUT = re.compile(r"__init__|plots|_repr|_low_level")
 
@@ -208,26 +215,35 @@ def copied(to: Path) -> None:
 
 
 def verdict(tree: Path, tests: list[str], seconds: int) -> tuple[str, str]:
-    """What tests say of the copy: 'survived', 'killed' by which test, or 'out of time'."""
+    """What tests say of the copy: 'survived', 'killed' by which test, or 'out of time'.
 
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-
-    options = ["-n", "0", "-x", "-q", "-p", "no:cacheprovider"]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", *options, *tests],
-        cwd=tree,
-        # The package of the copy, not the one that is installed.
-        env={**os.environ, "PYTHONPATH": str(tree / "python")},
-        capture_output=True,
-        text=True,
-        preexec_fn=limited,
-        check=False,
-    )
-    if done.returncode < 0:
+    They run in a fork of this process, which has imported the libraries and not the package.
+    """
+    told = tree.parent / "told.txt"
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        code = BROKEN
+        try:
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+            os.chdir(tree)
+            # The package of the copy, not the one that is installed.
+            os.environ["PYTHONPATH"] = str(tree / "python")
+            sys.path.insert(0, str(tree / "python"))
+            stream = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            os.dup2(stream, 1)
+            os.dup2(stream, 2)
+            code = int(pytest.main(["-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]))
+            sys.stdout.flush()
+        finally:
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code < 0:
         return "out of time", ""
-    by = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
-    return ("survived", "") if done.returncode == 0 else ("killed", by[1] if by else "")
+    if code == BROKEN:
+        sys.exit(told.read_text(encoding="utf-8"))
+    by = re.search(r"^(?:FAILED|ERROR) (\S+)", told.read_text(encoding="utf-8"), re.MULTILINE)
+    return ("survived", "") if code == 0 else ("killed", by[1] if by else "")
 
 
 def main() -> None:
@@ -238,6 +254,8 @@ def main() -> None:
     parser.add_argument("--only", metavar="ROOM", help="only files that begin so, as links/safety")
     parser.add_argument("--at", metavar="FILE:LINE", help="all mutants of one line instead")
     given = parser.parse_args()
+    for library in LIBRARIES:
+        importlib.import_module(library)
     every = [one for path in files() for one in Mutants(path, (ROOT / path).read_bytes()).found]
     if given.at:
         name, _, line = given.at.rpartition(":")

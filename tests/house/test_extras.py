@@ -57,8 +57,9 @@ DRAWN = {
 
 
 def drawing_methods():
-    """Every method of a public type that takes axes or is named for a drawing."""
-    for kind in (getattr(dtm, name) for name in dtm.__all__):
+    """Every drawing method of the public types of all rooms."""
+    rooms = (getattr(dtm, room) for room in dtm._ROOMS if room != "_base.errors")
+    for kind in (getattr(room, name) for room in rooms for name in room.__all__):
         if isinstance(kind, type):
             for name in ("plot", "bode", "nyquist"):
                 if callable(getattr(kind, name, None)):
