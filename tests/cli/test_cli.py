@@ -40,9 +40,9 @@ def demo(tmp_path_factory):
 def test_the_demo_shows_the_truth_beside_the_estimates(demo):
     _, printed = demo
     assert "the truth" in printed
-    for method in ("paper", "exact", "waveform with lag"):
+    for method in ("paper", "exact", "with limit", "waveform with lag"):
         assert method in printed
-    assert "The loop is 0.4" in printed
+    assert "The delay of the loop is 0.4" in printed
     # the limit of the true loop under proportional control is 5.0; half of it is called safe
     assert "Kp above 2.5" in printed
     assert "inf" not in printed

@@ -46,7 +46,7 @@ class PlantWithDelays(Plant):
     >>> G = 1.0 / (dtm.s + 0.5 * dtm.delay(1.0))
     >>> loop = dtm.ControlLoop(G, dtm.P(0.5), delay=0.2)
     >>> loop.characteristic()
-    s + 0.5 exp(-0.2 s) + 0.5 exp(-s)
+    s + 0.5 exp(-0.2 s) + 0.5 exp(-1 s)
     >>> loop.is_stable()
     True
     """

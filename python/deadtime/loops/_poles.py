@@ -120,7 +120,7 @@ class LoopPoles:
         >>> import deadtime as dtm
         >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
         >>> print(loop.poles(re=(-5, 0), im=(0, 10)).roots.round(4))
-        [-1.2381+3.2114j]
+        [-1.2381+2.9974j]
         """
         loop = self.specification
         if loop.sample_time is None:
