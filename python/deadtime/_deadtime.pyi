@@ -11,6 +11,7 @@ __all__ = [
     "Certificate",
     "CharacteristicMatrix",
     "Contour",
+    "Crossings",
     "DelayPieces",
     "DelayRun",
     "Expansion",
@@ -25,6 +26,7 @@ __all__ = [
     "LoopSensitivities",
     "MapBoundary",
     "MapCells",
+    "Margins",
     "Monotone",
     "Navdata",
     "NavdataLayout",
@@ -43,11 +45,18 @@ __all__ = [
     "at_write",
     "configuration_read",
     "configuration_write",
+    "corner_range",
+    "crossings",
+    "damping_range",
     "dde_root_number",
     "dde_roots",
+    "delay_margin",
+    "delay_range",
     "doubles_read",
     "doubles_write",
+    "end_of_gain",
     "fixed_step_run",
+    "gain_range",
     "lambertw",
     "lambertw0",
     "lambertw0_number",
@@ -60,6 +69,7 @@ __all__ = [
     "largest_stable_box",
     "legendre_tables",
     "limit_threads",
+    "loop_margins",
     "loop_packet_read",
     "loop_packet_write",
     "loop_sensitivities",
@@ -69,6 +79,7 @@ __all__ = [
     "navdata_write",
     "on_samples",
     "proved_boxes",
+    "ratio",
     "robust_map",
     "sampled_abscissa_grid",
     "solve_dde",
@@ -79,8 +90,11 @@ __all__ = [
 ]
 
 _Pair: TypeAlias = tuple[float, float]
+_Progress: TypeAlias = Callable[[int], object] | None
 _Axes: TypeAlias = dict[str, NDArray[np.float64]]
 _Region: TypeAlias = tuple[_Pair, _Pair]
+
+# --- roots ----------------------------------------------------------------------------
 
 @final
 class RootSet:
@@ -210,6 +224,10 @@ class QuasiPolynomial:
     def scale(self, factor: float) -> QuasiPolynomial: ...
     def pow(self, exponent: int) -> QuasiPolynomial: ...
     def derivative(self, order: int) -> QuasiPolynomial: ...
+    def powers_of_s(self) -> int: ...
+    def without_powers(self, k: int) -> QuasiPolynomial: ...
+    def first_term(self) -> tuple[float, int]: ...
+    def argument(self, omega: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def values(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
     def count(self, re: tuple[float, float], im: tuple[float, float], edge: str) -> int: ...
     def certify(self, re: tuple[float, float], im: tuple[float, float]) -> Certificate: ...
@@ -223,6 +241,67 @@ class QuasiPolynomial:
     def base_delay(self) -> float | None: ...
     def expansion(self, s: complex, order: int) -> Expansion: ...
     def logarithmic_derivatives(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]: ...
+
+# --- frequencies -----------------------------------------------------------------------
+
+@final
+class Margins:
+    @property
+    def stable(self) -> bool: ...
+    @property
+    def gain_margin(self) -> float: ...
+    @property
+    def gain_reduction(self) -> float: ...
+    @property
+    def phase_margin(self) -> float: ...
+    @property
+    def delay_margin(self) -> float: ...
+    @property
+    def gain_margin_omega(self) -> float: ...
+    @property
+    def gain_reduction_omega(self) -> float: ...
+    @property
+    def phase_margin_omega(self) -> float: ...
+    @property
+    def delay_margin_omega(self) -> float: ...
+    @property
+    def gain_crossovers(self) -> NDArray[np.float64]: ...
+    @property
+    def phase_margins(self) -> NDArray[np.float64]: ...
+    @property
+    def delay_margins(self) -> NDArray[np.float64]: ...
+    @property
+    def phase_crossovers(self) -> NDArray[np.float64]: ...
+    @property
+    def gain_margins(self) -> NDArray[np.float64]: ...
+    @property
+    def searched(self) -> _Pair: ...
+
+def loop_margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins: ...
+def end_of_gain(n: QuasiPolynomial, d: QuasiPolynomial, level: float) -> float: ...
+def ratio(
+    n: QuasiPolynomial, d: QuasiPolynomial, points: NDArray[np.complex128]
+) -> NDArray[np.complex128]: ...
+
+@final
+class Crossings:
+    @property
+    def values(self) -> NDArray[np.float64]: ...
+    @property
+    def omega(self) -> NDArray[np.float64]: ...
+    @property
+    def direction(self) -> NDArray[np.int32]: ...
+    @property
+    def unlisted(self) -> list[_Pair]: ...
+
+def crossings(family: Family, ends: _Pair) -> Crossings: ...
+def delay_margin(family: Family, start: float) -> float: ...
+def delay_range(family: Family, value: float) -> _Pair: ...
+def gain_range(family: Family, value: float, bounds: _Pair) -> _Pair: ...
+def damping_range(family: Family, value: float, highest: float) -> _Pair: ...
+def corner_range(family: Family, value: float, highest: float) -> _Pair: ...
+
+# --- special functions ----------------------------------------------------------------
 
 def limit_threads(threads: int | None) -> int | None: ...
 
@@ -240,6 +319,8 @@ def lambertw_number(z: object, k: object) -> np.complex128 | None: ...
 def lambertw0_number(x: object) -> np.float64 | None: ...
 def lambertwm1_number(x: object) -> np.float64 | None: ...
 def dde_root_number(a0: object, a1: object, delay: object, k: object) -> np.complex128 | None: ...
+
+# --- families, maps and boxes ---------------------------------------------------------
 
 class _FamilyTerm(Protocol):
     @property
@@ -295,15 +376,12 @@ class Family:
         question: _MapQuestion,
         *,
         threads: int | None = None,
-        progress: Callable[[int], object] | None = None,
+        progress: _Progress = None,
     ) -> MapCells: ...
     def chains(self, axes: _Axes) -> NDArray[np.float64]: ...
     def boundaries(
         self, axes: _Axes, *, decay: float, damping: _Pair | None
     ) -> list[MapBoundary] | None: ...
-    def crossings(
-        self, values: list[float], parameter: int, ends: tuple[float, float]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]: ...
 
 @final
 class ProvedBoxes:
@@ -338,7 +416,7 @@ def proved_boxes(
     tol: float,
     max_boxes: int,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> ProvedBoxes: ...
 def largest_stable_box(
     family: Family,
@@ -347,7 +425,7 @@ def largest_stable_box(
     around: dict[str, float] | None,
     tol: float,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> dict[str, _Pair] | None: ...
 def stability_radius(
     family: Family,
@@ -364,10 +442,12 @@ def robust_map(
     *,
     max_boxes: int,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> NDArray[np.int32]: ...
 
 _Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
+
+# --- loops ----------------------------------------------------------------------------
 
 class _SampleUpdate(Protocol):
     @property
@@ -481,7 +561,7 @@ def sampled_abscissa_grid(
     *,
     decay: float,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> SampledCells: ...
 
 class _StateSpace(Protocol):
@@ -602,15 +682,17 @@ def sweep_metrics(
     settling: float,
     rise: _Pair,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> SweepMetrics: ...
 def sweep_responses(
     sets: _LoopSets,
     time: NDArray[np.float64],
     *,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: _Progress = None,
 ) -> SweepResponses: ...
+
+# --- systems --------------------------------------------------------------------------
 
 @final
 class LegendreTables:
@@ -669,6 +751,8 @@ class LinearSystem:
         history_derivative: Signal | None,
         inputs: Signal,
     ) -> LinearSystemResponse: ...
+
+# --- delay differential equations -----------------------------------------------------
 
 @final
 class DelayPieces:
@@ -770,6 +854,8 @@ class DelayRun:
     def pieces(self) -> DelayPieces: ...
 
 def solve_dde(problem: _DelayProblem) -> DelayRun: ...
+
+# --- wire formats ---------------------------------------------------------------------
 
 @final
 class AtCommand:

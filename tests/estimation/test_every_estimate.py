@@ -82,5 +82,5 @@ def test_the_profile_of_a_fit_without_lag_holds_the_best_delay():
 @pytest.mark.parametrize("window", [3, (1.0,), "1 to 3"])
 def test_a_window_that_is_none_is_shown(window):
     flight, known = fly(rest=1.0)
-    with pytest.raises(TypeError, match=r"give \(low, high\) in s"):
+    with pytest.raises(TypeError, match=r"give a range \(low, high\)"):
         dtm.estimate_delay(flight, known, window=window)

@@ -25,7 +25,7 @@ def test_the_grid_is_exact_where_the_model_is(ts):
     assert fit.adequate
 
 
-def test_the_curve_is_kept_and_its_valleys_are_named():
+def test_the_curve_is_kept_and_its_local_minima_are_named():
     # In a limit cycle a delay that is off by a period fits almost as well.
     flight, known = fly(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, noise_in_loop=False)
     fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
@@ -34,7 +34,7 @@ def test_the_curve_is_kept_and_its_valleys_are_named():
     assert fit.delay == pytest.approx(0.36, abs=0.01)
     lowest = delays[np.argmin(costs)]
     assert abs(lowest - fit.delay) < 0.15 * fit.delay
-    assert lowest in fit.details["valleys"]
+    assert lowest in fit.details["local_minima"]
 
 
 def test_a_grid_of_ones_own():

@@ -103,7 +103,7 @@ def test_intervals_cover_where_the_noise_circulates():
     [
         (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31)), "continuous controller"),
         (dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.31, 0.1), sample_time=TS), "only that of a P"),
-        (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.02), "did not see"),
+        (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.02), "are not its samples"),
     ],
 )
 def test_innovations_need_a_command_that_can_be_computed(loop, match):

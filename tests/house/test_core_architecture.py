@@ -19,6 +19,7 @@ CORE_ARROWS = {
     "quasipoly": {"elementary"},
     "roots": {"elementary", "lambertw", "quasipoly"},
     "stability": {"elementary", "lambertw", "quasipoly", "roots"},
+    "frequency": {"elementary", "quasipoly", "roots", "stability"},
     "dde": {"elementary", "quasipoly"},
 }
 
@@ -33,6 +34,24 @@ ORDER = {
         "branches",
         "boxes",
         "map",
+    ],
+    "frequency": [
+        "two_sided",
+        "bounds",
+        "polynomial",
+        "zeros",
+        "waves",
+        "squares",
+        "ratio",
+        "argument",
+        "chains",
+        "margins",
+        "equation",
+        "passage",
+        "multiples",
+        "delays",
+        "crossings",
+        "ranges",
     ],
     "dde": ["scalar", "limits", "propagator", "control_loop", "system", "spectral"],
 }

@@ -375,7 +375,7 @@ def test_it_is_noted_also_when_the_landing_itself_was_cancelled():
     "wrong", [{"navdata_port": 99999}, {"command_port": -1}, {"control_port": 0}]
 )
 def test_a_port_that_is_none_is_refused(wrong):
-    with pytest.raises(ValueError, match="is no port"):
+    with pytest.raises(ValueError, match="give a port"):
         ARDrone2("127.0.0.1", **wrong)
 
 

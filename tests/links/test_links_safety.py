@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from deadtime import FlightAbortedError
 from deadtime.links import Journal, Limits, UnitCommand, VehicleState, Watch, largest_gain
-from deadtime.links.safety import jumps
+from deadtime.links.safety import BUMP, jumps
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -157,6 +157,12 @@ def test_a_height_may_change_by_the_fastest_climb_and_a_bump(passed, most, sign)
         else:
             with pytest.raises(FlightAbortedError, match="jumps"):
                 watch.check(later, now=10.0 + passed)
+
+
+def test_a_jump_of_exactly_what_is_allowed_is_none():
+    assert not jumps(0.0, BUMP, 0.0, 5.0)
+    assert not jumps(0.0, 2.0 + BUMP, 0.5, 4.0)
+    assert jumps(1.0, math.nan, 1.0, 5.0)
 
 
 def test_a_clock_that_runs_backwards_allows_no_larger_jump():

@@ -123,6 +123,18 @@ def test_an_end_that_is_not_ruled_out_is_refused():
     assert lagging.stable_range("lag") == (0.0, math.inf)
 
 
+def test_a_time_constant_that_ends_next_to_zero():
+    """Refused for too many crossings: 1e-6 of the value was searched at once."""
+    gain, delay = 1.6, 0.1
+    loop = dtm.ControlLoop(dtm.FirstOrder(gain, 1.4), dtm.P(2.5), delay=delay)
+    low, high = loop.stable_range("time_constant")
+    # T s + 1 + k e^(-s delay): cos(omega delay) = -1/k and T omega = k sin(omega delay).
+    k = 2.5 * gain
+    turn = math.acos(-1.0 / k)
+    assert low == pytest.approx(k * math.sin(turn) * delay / turn, rel=1e-12)
+    assert high == math.inf
+
+
 plants = st.one_of(
     st.builds(dtm.Integrator, st.floats(0.3, 2.0), st.sampled_from([0.0, 0.1, 0.4])),
     st.builds(dtm.FirstOrder, st.floats(0.3, 2.0), st.floats(0.2, 2.0)),

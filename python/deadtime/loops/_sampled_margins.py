@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.systems import Margins
-from deadtime.systems._margins import first_loss
 
 __all__ = ["sampled_margins"]
 
@@ -52,9 +51,9 @@ def sampled_margins(
     places, factors = places[real < 0.0], -1.0 / real[real < 0.0]
 
     nan, omegas = math.nan, places / period
-    up, up_at = first_loss(factors, omegas, factors > 1.0, 1.0, math.inf)
-    down, down_at = first_loss(factors, omegas, factors < 1.0, -1.0, 0.0)
-    turned, turned_at = first_loss(
+    up, up_at = _first_loss(factors, omegas, factors > 1.0, 1.0, math.inf)
+    down, down_at = _first_loss(factors, omegas, factors < 1.0, -1.0, 0.0)
+    turned, turned_at = _first_loss(
         np.abs(degrees), crossovers / period, np.isfinite(degrees), 1.0, math.inf
     )
     late, late_at = further_delay() if stable else (nan, nan)
@@ -111,3 +110,14 @@ def _crossings(f: Callable[[Vector], Vector], angles: Vector) -> Vector:
     zeros = [brentq(one, low, high, xtol=1e-15, rtol=1e-14) for low, high in brackets]
     exact = angles[values == 0.0]
     return np.unique(np.append(np.array(zeros, dtype=np.float64), exact))
+
+
+def _first_loss(
+    values: Vector, places: Vector, allowed: NDArray[np.bool_], sign: float, none: float
+) -> tuple[float, float]:
+    """The smallest (or with sign -1 the largest) allowed value and its place."""
+    if not allowed.any():
+        return none, math.nan
+    chosen = np.flatnonzero(allowed)
+    best = chosen[np.argmin(sign * values[chosen])]
+    return float(values[best]), float(places[best])

@@ -15,18 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime import _deadtime
 from deadtime._deadtime import sampled_abscissa_grid
 from deadtime.loops._characteristic import characteristic
-from deadtime.loops._continuous_ranges import (
-    range_of_corner,
-    range_of_damping,
-    range_of_delay,
-    range_of_gain,
-)
 from deadtime.loops._controllers import Controller
 from deadtime.loops._model import LoopModel, refuse_discretised
 from deadtime.loops._plants import Plant
 from deadtime.loops._sampled_ranges import SampledNumber, further_delay
 from deadtime.roots import Parameter, QuasiPolynomial, RootSet
-from deadtime.roots._crossovers import end_of_gain
 
 __all__ = [
     "continuous_range",
@@ -146,17 +139,15 @@ def continuous_range(
     value = values[name]
     family = characteristic(plant, controller, {**values, name: Parameter(name)})
     if name == "delay":
-        return range_of_delay(family, value)
+        return _deadtime.delay_range(family._family, value)
     if name in _OF_FILTER:
-        seek = range_of_damping if name == "damping" else range_of_corner
-        return seek(family, value, _highest_crossing(plant, controller, values))
-    return range_of_gain(family, name, value, _bounds(name, value))
+        seek = _deadtime.damping_range if name == "damping" else _deadtime.corner_range
+        return seek(family._family, value, _highest_crossing(plant, controller, values))
+    return _deadtime.gain_range(family._family, value, _bounds(name, value))
 
 
-def _highest_crossing(
-    plant: Plant, controller: Controller, values: Mapping[str, float]
-) -> float | None:
-    """A frequency beyond which the loop gain is below one; None where there is none.
+def _highest_crossing(plant: Plant, controller: Controller, values: Mapping[str, float]) -> float:
+    """A frequency beyond which the loop gain is below one; infinite where there is none.
 
     Whatever the corner of its filter is, and for all dampings from the present one on.
     """
@@ -167,7 +158,9 @@ def _highest_crossing(
     feedback = [abs(terms.derivative) / least, abs(terms.proportional), abs(terms.integral)]
     gain = np.polymul(np.abs(b), feedback)[::-1]
     rest = np.append(0.0, np.asarray(a, dtype=np.float64)[::-1])
-    return end_of_gain(QuasiPolynomial([gain], [0.0]), QuasiPolynomial([rest], [0.0]), 1.0)
+    return _deadtime.end_of_gain(
+        QuasiPolynomial([gain], [0.0])._native, QuasiPolynomial([rest], [0.0])._native, 1.0
+    )
 
 
 def sampled_range(

@@ -2,8 +2,7 @@
 
 `_quasipolynomial` and `_parametric` are the functions, `_characteristic` the questions about
 their roots, `_root_set`, `_chains`, `_sensitivity` and `_expansion` the answers. `_crossings`
-varies one number; `_frequency`, `_crossovers`, `_multiples` and `_axis_crossings` find
-frequencies for it. `_determinant` and `_matrix_roots` serve systems of matrices, `_scalar_delay`
+varies one number. `_determinant` and `_matrix_roots` serve systems of matrices, `_scalar_delay`
 the scalar equation. `certificate` holds proofs of root counts and an independent program that
 checks them.
 """

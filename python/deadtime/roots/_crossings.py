@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,17 +11,10 @@ from typing import Any, Protocol, SupportsFloat, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime import _deadtime
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.ranges import Range, interval, numbers_at
-from deadtime.roots._axis_crossings import (
-    is_factor,
-    leading,
-    of_delay,
-    of_gain,
-    periods,
-    rows_of,
-)
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.roots._parametric import ParametricQuasiPolynomial
 from deadtime.roots._quasipolynomial import QuasiPolynomial
@@ -150,9 +142,10 @@ def crossings(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial, ControlLoop or DelaySystem
-        The equation; a continuous loop, whose limit plays no part; or a system, of which
-        ``delay`` varies: the least delay of its states, to which the others keep their ratio.
+    family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
+        The equation; a continuous loop, whose limit plays no part; a loop gain, on which ``gain``
+        is a factor and ``delay`` a further delay; or a system, of which ``delay`` varies: the
+        least delay of its states, to which the others keep their ratio.
     ranges : mapping of str to (low, high)
         The one number that varies, and between which ends.
     at : mapping of str to float, optional
@@ -203,16 +196,16 @@ def crossings(
     name, ends = _one_range(ranges)
     equation = family_of(family, (name,), at)
     equation.at(**{name: ends[0]}), equation.at(**{name: ends[1]})
-    unlisted: tuple[tuple[float, float], ...] = ()
-    if is_factor(equation, name):
-        (values, omega, direction), unlisted = of_gain(equation, name, ends)
-    else:
-        values, omega, direction = of_delay(equation, name, ends)
-    order = np.lexsort((omega, values))
-    arrays = (values[order] + 0.0, omega[order], direction[order].astype(np.int32))
-    for array in arrays:
-        read_only(array)
-    return Crossings(name, ends, *arrays, equation, unlisted)
+    found = _deadtime.crossings(equation._family, ends)
+    return Crossings(
+        parameter=name,
+        range=ends,
+        values=found.values,
+        omega=found.omega,
+        direction=found.direction,
+        family=equation,
+        unlisted=tuple(found.unlisted),
+    )
 
 
 def delay_margin(
@@ -224,9 +217,10 @@ def delay_margin(
 
     Parameters
     ----------
-    loop : ControlLoop, TransferFunction, ParametricQuasiPolynomial or DelaySystem
-        A loop; a loop gain, around which unit feedback is closed; an equation in which one
-        parameter is a delay; or a system, of whose states the delays grow in proportion.
+    loop : ControlLoop, TransferFunction, QuasiPolynomial, ParametricQuasiPolynomial or DelaySystem
+        A loop; a loop gain, around which unit feedback is closed; a characteristic function, whose
+        part with delays is delayed further; an equation in which one parameter is a delay; or a
+        system, of whose states the delays grow in proportion.
     at : mapping of str to float, optional
         For an equation: the values of all its parameters, the present delay among them.
 
@@ -278,7 +272,7 @@ def delay_margin(
 def margin_of_family(family: ParametricQuasiPolynomial, at: Mapping[str, float]) -> float:
     """Growth of the one delay of an equation until its members lose stability, s."""
     family._family_of(at)
-    member: QuasiPolynomial = family.at(**at)
+    family.at(**at)
     delays = {name for _, _, (_, slopes) in family._terms for name, _ in slopes}
     if len(delays) != 1:
         raise ValueError(
@@ -288,21 +282,7 @@ def margin_of_family(family: ParametricQuasiPolynomial, at: Mapping[str, float])
     (name,) = delays
     start = at[name]
     others = {other: value for other, value in at.items() if other != name}
-    rows = rows_of(family_of(family, (name,), others), name)
-    if any(slope < 0.0 for _, slope in rows):
-        raise ValueError(f"a delay of {family!r} falls as {name} grows: it has no delay margin")
-    if not member.is_stable():
-        raise ValueError(f"not stable at {name}={start}: it has no delay margin")
-    far = 2.0 * start + 2.0 * max(constant for constant, _ in rows) + 1.0
-    lead, rest = leading(rows, name, start, far)
-    if lead <= rest:
-        return 0.0
-    omega, first, period, _ = periods(rows, name)
-    if not omega.size:
-        return math.inf
-    later = first + period * np.ceil((start - first) / period)
-    later = np.where(later <= start, later + period, later)
-    return float(later.min()) - start
+    return _deadtime.delay_margin(family_of(family, (name,), others)._family, start)
 
 
 def _one_range(ranges: Any) -> tuple[str, Range]:

@@ -181,8 +181,8 @@ def proved_boxes(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial or ControlLoop
-        What to judge.
+    family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
+        What to judge, with the names that `deadtime.crossings` knows.
     ranges : mapping of str to (low, high)
         One to three ranges.
     tol : float
@@ -284,8 +284,8 @@ def largest_stable_box(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial or ControlLoop
-        What to judge.
+    family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
+        What to judge, with the names that `deadtime.crossings` knows.
     ranges : mapping of str to (low, high)
         As in `proved_boxes`. Volumes are measured relative to them.
     at : mapping of str to float, optional

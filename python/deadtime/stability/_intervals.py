@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.ranges import Range, interval
-from deadtime.loops import ControlLoop
-from deadtime.roots import ParametricQuasiPolynomial
+from deadtime.roots._family import HasFamily
 
 __all__ = [
     "MOST_MOVING",
@@ -24,7 +23,7 @@ __all__ = [
 ]
 
 Floats: TypeAlias = NDArray[np.float64]
-System: TypeAlias = ParametricQuasiPolynomial | ControlLoop
+System: TypeAlias = HasFamily
 Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
 Values: TypeAlias = Mapping[str, SupportsFloat]
 

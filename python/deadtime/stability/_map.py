@@ -21,7 +21,7 @@ from deadtime.loops import ControlLoop
 from deadtime.loops._family import numbers_of
 from deadtime.loops._stability import sampled_grid
 from deadtime.roots import ParametricQuasiPolynomial
-from deadtime.roots._family import family_of
+from deadtime.roots._family import HasFamily, family_of
 from deadtime.stability._boundaries import Boundary, boundaries_of, chains_of
 from deadtime.stability._map_axes import damping_demand, map_axes
 
@@ -282,7 +282,7 @@ class StabilityMap(ReadOnlyArrays):
 
 
 def stability_map(
-    family: ParametricQuasiPolynomial | ControlLoop,
+    family: HasFamily,
     ranges: Mapping[str, Points],
     shape: tuple[int, int] = (101, 101),
     *,
@@ -298,8 +298,9 @@ def stability_map(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial or ControlLoop
-        What to judge. The limit of a loop plays no part in stability.
+    family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
+        What to judge, with the names that `deadtime.crossings` knows. The limit of a loop plays no
+        part in stability.
     ranges : mapping of str to (low, high), (low, high, n) or ndarray
         Exactly two names. A range is sampled at n points, both ends included, or at as many as
         `shape` says; an array holds the points themselves, increasing. The first name is the first

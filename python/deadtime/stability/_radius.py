@@ -56,8 +56,8 @@ def stability_radius(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial or ControlLoop
-        What to judge.
+    family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
+        What to judge, with the names that `deadtime.crossings` knows.
     point : mapping of str to float
         The parameters that move, one to three of them, and where they are: a stable point.
     scales : mapping of str to float, optional

@@ -113,8 +113,8 @@ def robust_map(
 
     Parameters
     ----------
-    family : ParametricQuasiPolynomial or ControlLoop
-        What to judge.
+    family : ParametricQuasiPolynomial, ControlLoop, TransferFunction or DelaySystem
+        What to judge, with the names that `deadtime.crossings` knows.
     ranges : mapping of str to (low, high), (low, high, n) or ndarray
         Exactly two names, as in `stability_map`: ranges or the points themselves.
     over : mapping of str to (low, high)

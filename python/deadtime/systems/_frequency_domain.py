@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.validation import real_array
 from deadtime.roots import QuasiPolynomial
 from deadtime.systems._margins import Margins, margins
-from deadtime.systems._phase import argument
-from deadtime.systems._ratio import first_term
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,11 +88,12 @@ class FrequencyDomain:
         if not self._num.coefficients.any():
             raise ValueError("the zero transfer function has no phase")
         size = np.abs(frequencies).ravel()
-        (a, p), (b, q) = first_term(self._num), first_term(self._den)
+        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
         start = np.pi * (int(a < 0.0) - int(b < 0.0) + 0.5 * (p - q))
         phase = np.full(size.shape, start)
         above = size > 0.0
-        phase[above] = argument(self._num, size[above]) - argument(self._den, size[above])
+        phase[above] = self._num._native.argument(size[above])
+        phase[above] -= self._den._native.argument(size[above])
         mirrored = np.where(frequencies.ravel() < 0.0, -phase, phase)
         return np.asarray(mirrored.reshape(frequencies.shape))
 
@@ -114,7 +113,7 @@ class FrequencyDomain:
         """
         if not self._num.coefficients.any():
             return 0.0
-        (a, p), (b, q) = first_term(self._num), first_term(self._den)
+        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
         if p > q:
             return 0.0
         return a / b if p == q else math.copysign(math.inf, a * b)

@@ -12,7 +12,7 @@ from deadtime._base.validation import real_array
 from deadtime.roots import QuasiPolynomial
 from deadtime.roots._quasipolynomial import is_number
 
-__all__ = ["Polynomial", "quasi_polynomial", "without_common_delay"]
+__all__ = ["Polynomial", "quasi_polynomial", "without_common_delay", "without_common_powers"]
 
 Polynomial: TypeAlias = QuasiPolynomial | float | Sequence[float] | NDArray[Any]
 
@@ -46,3 +46,12 @@ def without_common_delay(
         for h in (n, d)
     )
     return n, d
+
+
+def without_common_powers(
+    one: QuasiPolynomial, other: QuasiPolynomial
+) -> tuple[QuasiPolynomial, QuasiPolynomial]:
+    """Divide both by the highest power of s that divides every row of both exactly."""
+    k = min(one._native.powers_of_s(), other._native.powers_of_s())
+    one, other = (QuasiPolynomial._wrap(h._native.without_powers(k)) for h in (one, other))
+    return one, other

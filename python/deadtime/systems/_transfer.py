@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.ranges import OpenRange
 from deadtime._base.validation import non_negative, unmasked
+from deadtime._deadtime import ratio
 from deadtime.roots import (
     Parameter,
     ParametricQuasiPolynomial,
@@ -19,14 +20,17 @@ from deadtime.roots import (
     delay,
     s,
 )
-from deadtime.roots._frequency import powers_of_s, without_powers
 from deadtime.roots._quasipolynomial import is_number
 from deadtime.roots._text import latex
 from deadtime.systems._frequency_domain import FrequencyDomain
 from deadtime.systems._interchange import Writable, polynomials_of_control, polynomials_of_scipy
-from deadtime.systems._parts import Polynomial, quasi_polynomial, without_common_delay
+from deadtime.systems._parts import (
+    Polynomial,
+    quasi_polynomial,
+    without_common_delay,
+    without_common_powers,
+)
 from deadtime.systems._poles import HasPoles
-from deadtime.systems._ratio import ratio
 from deadtime.systems._realisation import Realisable, Realisation, of_ratio
 from deadtime.systems._responses import HasResponses
 
@@ -214,7 +218,7 @@ class TransferFunction(FrequencyDomain, HasPoles, HasResponses, Writable):
         if points.dtype.kind not in "biufc":
             raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
         flat = points.astype(np.complex128).ravel()
-        values = ratio(self._num, self._den, flat)
+        values = ratio(self._num._native, self._den._native, flat)
         return values.reshape(points.shape) if points.ndim else complex(values[0])
 
     # Poles and zeros
@@ -292,8 +296,7 @@ class TransferFunction(FrequencyDomain, HasPoles, HasResponses, Writable):
         """
         if not self._num.coefficients.any():
             return TransferFunction(0.0)
-        k = min(powers_of_s(self._num), powers_of_s(self._den))
-        return TransferFunction(without_powers(self._num, k), without_powers(self._den, k))
+        return TransferFunction(*without_common_powers(self._num, self._den))
 
     def _determinant(self) -> QuasiPolynomial:
         return self._den
@@ -485,8 +488,7 @@ def _sum(first: TransferFunction, second: TransferFunction) -> TransferFunction:
     """Over the common denominator as far as it is seen exactly: all of it, or its powers of s."""
     if first._den == second._den:
         return TransferFunction(first._num + second._num, first._den)
-    k = min(powers_of_s(first._den), powers_of_s(second._den))
-    d, q = without_powers(first._den, k), without_powers(second._den, k)
+    d, q = without_common_powers(first._den, second._den)
     return TransferFunction(first._num * q + second._num * d, first._den * q)
 
 

@@ -1,4 +1,4 @@
-//! Arrays across the seam: borrowed where their memory allows it, gathered where it does not.
+//! Arrays of NumPy: borrowed where their memory allows it, copied in C order where it does not.
 
 use std::borrow::Cow;
 
@@ -12,7 +12,7 @@ use crate::errors::to_python;
 /// What memory is asked for.
 const COPY: &str = "the copy of an array";
 
-/// The elements in C order: a borrow when they lie so in memory, a gathered copy otherwise.
+/// The elements in C order: borrowed where they lie so in memory, copied otherwise.
 pub(crate) fn in_order<'a, T: Element + Copy>(
     array: &'a PyReadonlyArrayDyn<'_, T>,
 ) -> PyResult<Cow<'a, [T]>> {
@@ -45,7 +45,7 @@ pub(crate) fn column<S, T>(list: &[S], of: impl Fn(&S) -> T) -> PyResult<Vec<T>>
     ))
 }
 
-/// The outcome of work at the seam itself.
+/// A result of the core as one of Python, for work that is done without a task.
 pub(crate) fn converted<T>(outcome: Result<T, Error>) -> PyResult<T> {
     outcome.map_err(|error| Python::attach(|py| to_python(py, error)))
 }

@@ -25,7 +25,7 @@ pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
             let Some((place, radius, _)) = roots.first().copied() else {
                 return own(py, "DeadtimeError", (message,));
             };
-            // What to move the edge by so that the first of them is clear of it.
+            // How far the edge has to move so that the first of them is no longer on it.
             let distance = (4.0 * radius)
                 .max(16.0 * f64::EPSILON * place.norm())
                 .max(f64::MIN_POSITIVE);
@@ -41,7 +41,7 @@ pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
     }
 }
 
-/// An instance of a class of `deadtime._base.errors`.
+/// An exception of a class of `deadtime._base.errors`.
 pub(crate) fn own<'py, A>(py: Python<'py>, class: &str, arguments: A) -> PyErr
 where
     A: pyo3::call::PyCallArgs<'py>,

@@ -1,4 +1,4 @@
-//! The seam between the `deadtime` core and Python: it converts and nothing else.
+//! The bindings of the `deadtime` core to Python: they convert and do nothing else.
 
 mod arrays;
 mod boxes;
@@ -6,6 +6,7 @@ mod by_name;
 mod dde;
 mod errors;
 mod fixed_step;
+mod frequency;
 mod loop_run;
 mod matrix;
 mod pointers;
@@ -35,6 +36,11 @@ mod _deadtime {
     use super::dde::{LoopResponse, PyLinearLoop, on_samples};
     #[pymodule_export]
     use super::fixed_step::{FixedStepResponse, fixed_step_run};
+    #[pymodule_export]
+    use super::frequency::{
+        PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
+        end_of_gain, gain_range, loop_margins, ratio,
+    };
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]

@@ -2,7 +2,7 @@
 
 use deadtime::quasipoly::QuasiPolynomial as Core;
 use deadtime::roots::{self, Edge, Region};
-use deadtime::{Error, Task};
+use deadtime::{Error, Task, frequency};
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -30,7 +30,7 @@ pub(crate) struct Expansion {
 /// A quasi-polynomial of the core.
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct QuasiPolynomial {
-    core: Core,
+    pub(crate) core: Core,
 }
 
 pub(crate) fn wrapped(py: Python<'_>, result: Result<Core, Error>) -> PyResult<QuasiPolynomial> {
@@ -102,6 +102,33 @@ impl QuasiPolynomial {
 
     fn derivative(&self, py: Python<'_>, order: u32) -> PyResult<Self> {
         wrapped(py, self.core.derivative(order))
+    }
+
+    /// The highest power of s that divides every row exactly.
+    fn powers_of_s(&self) -> usize {
+        self.core.powers_of_s()
+    }
+
+    /// Divided by s^k, which must divide it.
+    fn without_powers(&self, k: usize) -> Self {
+        let core = self.core.without_powers(k);
+        Self { core }
+    }
+
+    /// First term a s^p of the Taylor series at zero that is not zero to rounding: a and p.
+    fn first_term(&self) -> (f64, u32) {
+        frequency::first_term(&self.core)
+    }
+
+    /// Argument of h(j omega) at frequencies above zero, continuous from zero on, in C order.
+    fn argument<'py>(
+        &self,
+        py: Python<'py>,
+        omega: PyReadonlyArrayDyn<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let omega = in_order(&omega)?;
+        let found = run_here(py, |task| frequency::argument(&self.core, &omega, task))?;
+        Ok(found.into_pyarray(py))
     }
 
     /// Values at all points, in C order.

@@ -1,4 +1,4 @@
-//! The one place where Python is left: thread pool, GIL, Ctrl-C, panics.
+//! The one place where the interpreter is released: thread pool, GIL, Ctrl-C, panics.
 //!
 //! A kernel runs inside one process-local rayon pool while the calling thread, detached from the
 //! interpreter, waits and looks for signals. Any number of Python threads may call at once. The
@@ -20,13 +20,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::errors::to_python;
 
-/// How often the waiting thread looks for signals and reports progress.
+/// How often the waiting thread checks for signals and reports progress.
 pub(crate) const POLL: Duration = Duration::from_millis(20);
 
 /// Environment variables that limit the number of threads, the first one set wins.
 const THREAD_VARIABLES: [&str; 2] = ["DEADTIME_NUM_THREADS", "RAYON_NUM_THREADS"];
 
-/// More threads than any machine this runs on has use for; asking for a million of them hangs it.
+/// Upper limit on the number of threads: a million of them would hang the machine.
 const MAX_THREADS: usize = 1024;
 
 struct Pool {
@@ -39,7 +39,7 @@ static POOL: LazyLock<ArcSwapOption<Pool>> = LazyLock::new(ArcSwapOption::empty)
 
 /// Run `work` in the pool with the interpreter released; Ctrl-C stops it at its next check.
 ///
-/// `progress`, if given, is called now and then with the number of finished items.
+/// `progress`, if given, is called at intervals of `POLL` with the number of finished items.
 pub(crate) fn run<T, F>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -69,9 +69,9 @@ where
 
 type Finished<T> = std::thread::Result<Result<T, Error>>;
 
-/// Have `work` done in the pool, looking for signals and reporting progress until it is.
+/// Run `work` in the pool, checking for signals and reporting progress until it is done.
 ///
-/// What comes back is the result, if there is one, and the exception for which it was stopped.
+/// Returns the result, if there is one, and the exception that stopped it, if one did.
 fn wait<T, F>(
     pool: &Arc<Pool>,
     task: &Task,
@@ -89,7 +89,7 @@ where
         let _ = tell.send(result);
     });
     // SAFETY: the type of a job, but for the lifetime of what it borrows: `Waiting` keeps the
-    // caller here until the job has sent its last word, after which it touches nothing borrowed.
+    // caller here until the job has sent its result, after which it touches nothing borrowed.
     // A scope of rayon would do the same, but it cannot be left in a forked child, in which the
     // job never ends: its thread is not there, so nothing borrowed is touched there either.
     #[allow(unsafe_code)]
@@ -122,7 +122,7 @@ where
     }
 }
 
-/// A job that is not left alone, unless a fork has taken the caller to another process.
+/// Waits for a job to end, unless the caller is now in a forked child.
 struct Waiting<T> {
     hear: Receiver<Finished<T>>,
     process: u32,
@@ -144,7 +144,7 @@ impl<T> Waiting<T> {
 impl<T> Drop for Waiting<T> {
     fn drop(&mut self) {
         if !self.is_over && !self.is_elsewhere() {
-            // The word, or that the job is gone.
+            // Either the result, or an error because the job is gone.
             let _ = self.hear.recv();
         }
     }
@@ -168,7 +168,7 @@ fn settle<T>(result: Option<Finished<T>>, refused: Option<PyErr>) -> PyResult<T>
 
 /// Call `work` attached to the interpreter, whatever this thread's state is.
 ///
-/// pyo3 keeps books of its own on who is attached, and NumPy detaches without an entry in them.
+/// pyo3 counts attached threads by itself, and NumPy detaches without telling it.
 #[allow(unsafe_code)]
 pub(crate) fn attached<T>(work: impl FnOnce(Python<'_>) -> T) -> T {
     struct Release(pyo3::ffi::PyGILState_STATE);
@@ -183,8 +183,8 @@ pub(crate) fn attached<T>(work: impl FnOnce(Python<'_>) -> T) -> T {
     Python::attach(work)
 }
 
-/// Run `work` that knows no threads on the calling one, interpreter released; Ctrl-C stops it at
-/// one of its next checks. A call costs a tenth of one through the pool.
+/// Run single-threaded `work` on the calling thread, interpreter released; Ctrl-C stops it at one
+/// of its next checks. A call costs a tenth of one through the pool.
 pub(crate) fn run_here<T, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     T: Send,
@@ -207,7 +207,7 @@ where
 
 type Refusal = Arc<Mutex<Option<PyErr>>>;
 
-/// A task that looks for signals by itself, and where it puts the exception they raise.
+/// A task that checks for signals by itself, and where it puts the exception they raise.
 fn listening() -> (Task, Refusal) {
     let refused = Refusal::default();
     let keep = Arc::clone(&refused);
@@ -247,7 +247,7 @@ pub(crate) fn internal(panic: &(dyn Any + Send)) -> PyErr {
     ))
 }
 
-/// The pool of this process with the wanted number of threads, built where there is none.
+/// The pool of this process with the requested number of threads, built where there is none.
 fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
     let threads = wanted(threads)?;
     let process = std::process::id();

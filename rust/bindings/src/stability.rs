@@ -11,16 +11,9 @@ use crate::arrays::{column, in_order};
 use crate::by_name::ByName;
 use crate::errors::to_python;
 use crate::quasipoly::{QuasiPolynomial, wrapped};
-use crate::runtime::{run, run_here};
+use crate::runtime::run;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
-
-/// Gains, frequencies and jumps (0 where unknown) of crossings.
-type Crossings<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i32>>,
-);
 
 /// One summand of a family; parameters that it does not depend on are left out.
 #[derive(FromPyObject)]
@@ -173,28 +166,6 @@ impl PyFamily {
                 .map(|found| map_boundaries(py, &self.inner, axes, &found))
                 .transpose()
         })
-    }
-
-    /// Crossings of the imaginary axis as one gain grows within a range; `values` holds the others.
-    fn crossings<'py>(
-        &self,
-        py: Python<'py>,
-        values: Vec<f64>,
-        parameter: usize,
-        ends: (f64, f64),
-    ) -> PyResult<Crossings<'py>> {
-        let family = &self.inner;
-        let found = run_here(py, |task| {
-            stability::crossings_along(family, &values, parameter, ends, task)
-        })?;
-        let gains: Vec<f64> = found.iter().map(|place| place.gain).collect();
-        let omegas: Vec<f64> = found.iter().map(|place| place.omega).collect();
-        let jumps: Vec<i32> = found.iter().map(|place| place.jump.unwrap_or(0)).collect();
-        Ok((
-            gains.into_pyarray(py),
-            omegas.into_pyarray(py),
-            jumps.into_pyarray(py),
-        ))
     }
 }
 

@@ -3,11 +3,12 @@
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
 //! Python. Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots
-//! ← stability; quasipoly ← dde.
+//! ← stability ← frequency; quasipoly ← dde.
 
 pub mod dde;
 pub mod elementary;
 pub mod error;
+pub mod frequency;
 pub mod lambertw;
 pub mod memory;
 pub mod quasipoly;

@@ -142,16 +142,16 @@ fn checked(given: &DelayProblem<'_>) -> PyResult<Problem> {
     let problem = Problem {
         start,
         end,
-        initial,
+        y0: initial,
         delays: given.delays.as_array().to_vec(),
         neutral: given.neutral,
         rtol: given.rtol,
         atol: given.atol.as_array().to_vec(),
-        longest: given.max_step,
-        times: times.transpose()?,
-        keep: given.dense_output,
-        sparsity: converted(sparsity.transpose())?,
-        most: given.max_steps,
+        max_step: given.max_step,
+        t_eval: times.transpose()?,
+        dense_output: given.dense_output,
+        jac_sparsity: converted(sparsity.transpose())?,
+        max_steps: given.max_steps,
         events: given.events.iter().map(event).collect(),
         jumps: given.jumps.iter().map(jump).collect(),
         ..Problem::default()
@@ -183,7 +183,7 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
         Array2::from_shape_vec((values.len() / dim.max(1), dim), values)
             .map_err(|error| PyValueError::new_err(error.to_string()))
     };
-    let by_time = rows(found.values)?;
+    let by_time = rows(found.y)?;
     let mut values = array(0.0, (dim, by_time.nrows()))?;
     values.assign(&by_time.t());
     drop(by_time);
@@ -194,7 +194,7 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
         Outcome::NotFinite(time) => ("not finite", time),
         Outcome::TooMany(time) => ("max_steps", time),
     };
-    let event_values = found.event_values.into_iter().map(rows);
+    let event_values = found.y_events.into_iter().map(rows);
     let breaks = column(&found.breaks, |point: &BreakingPoint| point.time)?;
     let pieces = DelayPieces {
         history: found.history,
@@ -202,10 +202,10 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
         end: found.end,
     };
     Ok(DelayRun {
-        t: found.times.into_pyarray(py).unbind(),
+        t: found.t.into_pyarray(py).unbind(),
         y: values.into_pyarray(py).unbind(),
         t_events: found
-            .event_times
+            .t_events
             .into_iter()
             .map(|times| times.into_pyarray(py).unbind())
             .collect(),
@@ -213,10 +213,10 @@ fn report(py: Python<'_>, found: Solution, dim: usize) -> PyResult<DelayRun> {
             .map(|values| values.map(|values| values.into_pyarray(py).unbind()))
             .collect::<PyResult<_>>()?,
         breaks: breaks.into_pyarray(py).unbind(),
-        nfev: found.calls,
-        n_nodes: found.nodes,
-        n_elements: found.elements,
-        n_rejected: found.refused,
+        nfev: found.nfev,
+        n_nodes: found.n_nodes,
+        n_elements: found.n_elements,
+        n_rejected: found.n_rejected,
         outcome,
         end,
         pieces: Py::new(py, pieces)?,

@@ -11,7 +11,7 @@ use crate::errors::to_python;
 
 /// Error of the history as a part of the tolerance.
 const SHARE: f64 = 0.01;
-/// What lasts longer than this part of the largest delay is seen in a history.
+/// Features of a history shorter than this part of the largest delay may be missed.
 const RESOLUTION: f64 = 1e-3;
 
 /// Fill in history and breaking points of a problem.
@@ -37,7 +37,7 @@ pub(super) fn read(
         };
         vec![Piece::new(before, start, 1, value).with_slopes()]
     } else if problem.delays.is_empty() {
-        vec![Piece::new(start - 1.0, start, 1, problem.initial.clone()).with_slopes()]
+        vec![Piece::new(start - 1.0, start, 1, problem.y0.clone()).with_slopes()]
     } else {
         let found = fitted(problem, (first, start), history, slope, breaks)?;
         points = found.1;
@@ -49,7 +49,7 @@ pub(super) fn read(
         piece.value(start, &mut last);
     }
     let jumps = problem
-        .initial
+        .y0
         .iter()
         .zip(&last)
         .enumerate()
@@ -81,7 +81,7 @@ fn fitted(
         SHARE * (atol.copied().unwrap_or(0.0) + problem.rtol * size)
     };
     let mut failure = None;
-    let gap = problem.longest.min(RESOLUTION * (start - first));
+    let gap = problem.max_step.min(RESOLUTION * (start - first));
     let found = approximate((first, start), gap, breaks, rows, tolerance, |time, out| {
         let (values, slopes) = out.split_at_mut(dim);
         let read = sample("history", history, time, values).and_then(|()| match slope {

@@ -1,4 +1,4 @@
-//! Limits of a run: divergence, and the least difference of two times.
+//! Limits of a run: finite numbers, divergence, and the least difference of two times.
 
 use super::scalar::Scalar;
 use crate::Error;
@@ -25,4 +25,22 @@ pub(crate) fn check_growth<S: Scalar>(x: &[S], u: S, t: S) -> Result<(), Error> 
 /// Two times closer than this are equal: rounding errors of sums of delays and samples.
 pub(crate) fn slack<S: Scalar>(t: S, delay: S) -> f64 {
     16.0 * f64::EPSILON * (t.value().abs() + delay.value())
+}
+
+/// Check that all numbers, and their slopes, are finite.
+///
+/// # Errors
+/// [`Error::Argument`] with the first one that is not.
+pub(crate) fn finite<S: Scalar>(name: &str, values: &[S]) -> Result<(), Error> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(value) => Err(Error::argument(format!(
+            "{name} holds {}: give finite numbers",
+            if value.value().is_finite() {
+                value.slope()
+            } else {
+                value.value()
+            }
+        ))),
+        None => Ok(()),
+    }
 }

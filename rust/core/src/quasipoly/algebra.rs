@@ -66,6 +66,25 @@ impl QuasiPolynomial {
         Self::new(vec![vec![1.0]], vec![delay])
     }
 
+    /// The highest k such that sᵏ divides every row exactly; 0 for the zero function.
+    pub fn powers_of_s(&self) -> usize {
+        let first = |row: &Vec<f64>| row.iter().position(|c| *c != 0.0);
+        self.coefficients
+            .iter()
+            .filter_map(first)
+            .min()
+            .unwrap_or(0)
+    }
+
+    /// `self` divided by s^`k`, which must divide it.
+    pub fn without_powers(&self, k: usize) -> Self {
+        let mut rest = self.clone();
+        for row in &mut rest.coefficients {
+            row.drain(..k.min(row.len().saturating_sub(1)));
+        }
+        rest
+    }
+
     fn rows(&self) -> Vec<(Vec<f64>, f64)> {
         self.terms()
             .map(|(row, delay)| (row.to_vec(), delay))

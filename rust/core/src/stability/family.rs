@@ -152,7 +152,7 @@ impl Family {
     }
 
     /// Distinct delays with the terms that share them.
-    pub(super) fn rows(&self) -> impl Iterator<Item = (&Affine, &[Term])> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (&Affine, &[Term])> {
         self.delays.iter().zip(self.terms.iter().map(Vec::as_slice))
     }
 

@@ -11,8 +11,8 @@
 //! the command and, where L ≠ 0, returns with weight L. Time counts from the start of the run;
 //! every signal is scalar, x has any length.
 
-use super::reference::finite;
 use crate::Error;
+use crate::dde::limits::finite;
 use crate::dde::scalar::Scalar;
 
 /// The matrices of the loop, row-major; n is the length of `b`.

@@ -1,9 +1,10 @@
 //! Responses of a loop, sampled or in continuous time, after a check of the start.
 
 use super::linear_loop::{LinearLoop, Start};
-use super::reference::{Reference, finite};
+use super::reference::Reference;
 use super::requested_output::{RequestedOutput, Trajectory};
 use super::{continuous, sampled};
+use crate::dde::limits::finite;
 use crate::dde::scalar::Scalar;
 use crate::{Error, Task};
 

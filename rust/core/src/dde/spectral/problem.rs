@@ -82,7 +82,7 @@ pub struct Problem {
     /// End of the solution.
     pub end: f64,
     /// y at the start.
-    pub initial: Vec<f64>,
+    pub y0: Vec<f64>,
     /// The constant delays.
     pub delays: Vec<f64>,
     /// Does the right-hand side take delayed derivatives?
@@ -100,16 +100,16 @@ pub struct Problem {
     /// Absolute tolerance: one, or one for each component.
     pub atol: Vec<f64>,
     /// Largest length of an element.
-    pub longest: f64,
+    pub max_step: f64,
     /// Times at which y is requested, ascending; without them y is returned at every node.
-    pub times: Option<Vec<f64>>,
+    pub t_eval: Option<Vec<f64>>,
     /// Keep every piece instead of those that a delay still reaches.
-    pub keep: bool,
+    pub dense_output: bool,
     /// The components on which the right-hand side depends; determined by differences where it is
     /// not given.
-    pub sparsity: Option<Sparsity>,
+    pub jac_sparsity: Option<Sparsity>,
     /// Upper limit on the elements tried, accepted or not.
-    pub most: Option<u64>,
+    pub max_steps: Option<u64>,
 }
 
 /// Outcome of a run.
@@ -131,27 +131,27 @@ pub enum Outcome {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// Times of the output.
-    pub times: Vec<f64>,
+    pub t: Vec<f64>,
     /// y at them, one time after the other.
-    pub values: Vec<f64>,
+    pub y: Vec<f64>,
     /// The stored pieces.
     pub history: History,
     /// End of the solution within the pieces.
     pub end: f64,
     /// Times of the crossings of each event.
-    pub event_times: Vec<Vec<f64>>,
+    pub t_events: Vec<Vec<f64>>,
     /// y at them, one crossing after the other.
-    pub event_values: Vec<Vec<f64>>,
+    pub y_events: Vec<Vec<f64>>,
     /// The breaking points on which elements end.
     pub breaks: Vec<BreakingPoint>,
     /// Calls of the right-hand side.
-    pub calls: u64,
+    pub nfev: u64,
     /// Nodes at which the right-hand side was evaluated.
-    pub nodes: u64,
+    pub n_nodes: u64,
     /// Elements accepted.
-    pub elements: u64,
+    pub n_elements: u64,
     /// Elements tried and rejected.
-    pub refused: u64,
+    pub n_rejected: u64,
     /// Outcome of the run.
     pub outcome: Outcome,
 }
@@ -159,7 +159,7 @@ pub struct Solution {
 impl Problem {
     /// Number of components.
     pub fn dim(&self) -> usize {
-        self.initial.len()
+        self.y0.len()
     }
 
     /// The largest delay, 0 without any.
@@ -211,7 +211,7 @@ impl Problem {
                 self.start - self.memory()
             ));
         }
-        if let Some(value) = self.initial.iter().find(|value| !value.is_finite()) {
+        if let Some(value) = self.y0.iter().find(|value| !value.is_finite()) {
             return refuse(format!("y at the start is {value:?}: give finite numbers"));
         }
         if !(self.rtol >= LEAST_RTOL && self.rtol < 1.0) {
@@ -233,14 +233,14 @@ impl Problem {
                 self.dim()
             ));
         }
-        if self.longest.is_nan() || self.longest <= 0.0 {
+        if self.max_step.is_nan() || self.max_step <= 0.0 {
             return refuse(format!(
                 "max_step={}: give a number above zero",
-                self.longest
+                self.max_step
             ));
         }
         let within = |time: f64| time >= self.start && time <= self.end;
-        if let Some(times) = &self.times
+        if let Some(times) = &self.t_eval
             && !(times.is_sorted() && times.iter().all(|time| within(*time)))
         {
             return refuse(format!(

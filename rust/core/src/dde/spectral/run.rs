@@ -115,33 +115,33 @@ impl<'a> Run<'a> {
         let mut run = Self {
             problem,
             solution: Solution {
-                times: Vec::new(),
-                values: Vec::new(),
+                t: Vec::new(),
+                y: Vec::new(),
                 history: problem.history.clone(),
                 end: problem.start,
-                event_times: Vec::new(),
-                event_values: Vec::new(),
+                t_events: Vec::new(),
+                y_events: Vec::new(),
                 breaks: Vec::new(),
-                calls: 0,
-                nodes: 0,
-                elements: 0,
-                refused: 0,
+                nfev: 0,
+                n_nodes: 0,
+                n_elements: 0,
+                n_rejected: 0,
                 outcome: Outcome::Finished,
             },
             breaks,
             jump: first.unwrap_or(problem.jumps.len()),
-            watch: Watch::new(&problem.events, equation, problem.start, &problem.initial)?,
-            element: Element::new(Newton::new(problem.sparsity.as_ref())),
+            watch: Watch::new(&problem.events, equation, problem.start, &problem.y0)?,
+            element: Element::new(Newton::new(problem.jac_sparsity.as_ref())),
             reading: Reading::default(),
-            state: problem.initial.clone(),
+            state: problem.y0.clone(),
             fresh: None,
-            length: (problem.end - problem.start).min(problem.longest),
+            length: (problem.end - problem.start).min(problem.max_step),
             order: preferred,
             preferred,
             shortest_delay: delays.fold(f64::INFINITY, f64::min),
             stalled: 0.0,
             wait: (0, 1),
-            output: Output::new(problem.times.as_deref()),
+            output: Output::new(problem.t_eval.as_deref()),
         };
         run.output.start(problem.start, &run.state)?;
         Ok(run)
@@ -160,8 +160,8 @@ impl<'a> Run<'a> {
             if end - start <= SHORTEST * start.abs().max(end.abs()) {
                 return Ok(Some(Outcome::Shrunk(start)));
             }
-            let tried = self.solution.elements + self.solution.refused;
-            if self.problem.most.is_some_and(|most| tried >= most) {
+            let tried = self.solution.n_elements + self.solution.n_rejected;
+            if self.problem.max_steps.is_some_and(|most| tried >= most) {
                 return Ok(Some(Outcome::TooMany(start)));
             }
             let nodes = nodes(self.order);
@@ -173,7 +173,7 @@ impl<'a> Run<'a> {
             };
             self.element.set(self.problem, nodes, (start, end), begin)?;
             let ended = self.element.sweep(self.problem, nodes, equation, task)?;
-            let before = self.solution.refused;
+            let before = self.solution.n_rejected;
             match ended {
                 Sweeps::Converged(count) => {
                     nodes.coefficients(&self.element.y, &mut self.element.coefficients);
@@ -209,7 +209,7 @@ impl<'a> Run<'a> {
                     } else {
                         retried = true;
                     }
-                    self.solution.refused += 1;
+                    self.solution.n_rejected += 1;
                 }
                 Sweeps::NotFinite(0) if start == self.problem.start => {
                     return Err(self.no_start());
@@ -221,10 +221,10 @@ impl<'a> Run<'a> {
                         return Ok(Some(Outcome::NotFinite(self.element.t[node])));
                     }
                     self.length = RETREAT * (end - start);
-                    self.solution.refused += 1;
+                    self.solution.n_rejected += 1;
                 }
             }
-            if self.solution.refused > before && end - start > self.shortest_delay {
+            if self.solution.n_rejected > before && end - start > self.shortest_delay {
                 let wait = (2 * self.wait.1).min(LONGEST_WAIT);
                 self.wait = (wait, wait);
             }
@@ -240,13 +240,13 @@ impl<'a> Run<'a> {
             .collect();
         Error::argument(format!(
             "the right-hand side is not finite at t={:?}, y={:?}: it is {slopes:?}",
-            self.problem.start, self.problem.initial
+            self.problem.start, self.problem.y0
         ))
     }
 
     /// The largest length that is allowed now.
     fn longest(&self) -> f64 {
-        let longest = self.problem.longest;
+        let longest = self.problem.max_step;
         let overlaps = !self.problem.neutral
             && self.wait.0 == 0
             && self.length.min(longest) >= OVERLAP * self.shortest_delay;
@@ -296,7 +296,7 @@ impl<'a> Run<'a> {
     /// Choose a larger order or a shorter element.
     fn refuse(&mut self, verdict: Verdict) {
         let length = self.element.end - self.element.start;
-        self.solution.refused += 1;
+        self.solution.n_rejected += 1;
         if self.order < self.preferred {
             self.order = control::order_for(self.order + 3, self.preferred);
             self.length = length;
@@ -317,7 +317,7 @@ impl<'a> Run<'a> {
             let error = unread.error;
             return self.refuse(Verdict { error, ..verdict });
         };
-        self.solution.refused += 1;
+        self.solution.n_rejected += 1;
         // It ends only this element: the points that follow from it are left to the same
         // comparison.
         let order = self.breaks.smooth() - 1;
@@ -374,7 +374,7 @@ impl<'a> Run<'a> {
         let last = stop.is_some() || end >= self.problem.end;
         self.output.give(&piece, (y, t), until, last)?;
         self.solution.history.push(piece)?;
-        self.solution.elements += 1;
+        self.solution.n_elements += 1;
         self.solution.end = until;
         for (state, row) in self.state.iter_mut().zip(self.element.y.chunks_exact(n)) {
             *state = row[n - 1];
@@ -387,7 +387,7 @@ impl<'a> Run<'a> {
             self.output.end(end, &self.state);
             return Ok(Some(Outcome::Event));
         }
-        if !self.problem.keep {
+        if !self.problem.dense_output {
             self.solution.history.forget(end - self.problem.memory());
         }
         self.plan(verdict, end - start);
@@ -477,13 +477,13 @@ impl<'a> Run<'a> {
     }
 
     fn finished(mut self) -> Solution {
-        self.solution.times = self.output.times;
-        self.solution.values = self.output.values;
+        self.solution.t = self.output.times;
+        self.solution.y = self.output.values;
         let (calls, columns) = self.element.newton.spent();
-        self.solution.calls = self.element.calls + calls;
-        self.solution.nodes = self.element.evaluated + columns;
-        self.solution.event_times = self.watch.times;
-        self.solution.event_values = self.watch.values;
+        self.solution.nfev = self.element.calls + calls;
+        self.solution.n_nodes = self.element.evaluated + columns;
+        self.solution.t_events = self.watch.times;
+        self.solution.y_events = self.watch.values;
         self.solution
     }
 }

@@ -42,7 +42,7 @@ fn constant(value: f64, start: f64, memory: f64) -> History {
 fn scalar(delay: f64, end: f64, rtol: f64) -> Problem {
     Problem {
         end,
-        initial: vec![1.0],
+        y0: vec![1.0],
         delays: vec![delay],
         history: constant(0.0, 0.0, delay),
         breaks: vec![BreakingPoint {
@@ -51,8 +51,8 @@ fn scalar(delay: f64, end: f64, rtol: f64) -> Problem {
         }],
         rtol,
         atol: vec![1e-2 * rtol],
-        longest: f64::INFINITY,
-        times: Some(vec![end]),
+        max_step: f64::INFINITY,
+        t_eval: Some(vec![end]),
         ..Problem::default()
     }
 }
@@ -85,7 +85,7 @@ fn the_tolerance_is_kept() {
         for end in [0.7, 1.0, 3.3, 10.0] {
             let problem = scalar(1.0, end, rtol);
             let found = solve(&problem, &mut linear_decay(), &Task::new()).unwrap();
-            let error = (found.values[0] - steps(end)).abs();
+            let error = (found.y[0] - steps(end)).abs();
             assert!(error < rtol, "{rtol} {end}: {error}");
         }
     }
@@ -112,11 +112,11 @@ fn memory_is_bounded_where_nobody_asks_for_the_past() {
     };
     let mut problem = scalar(1.0, 2000.0, 1e-8);
     let most = solve(&problem, &mut equation, &Task::new()).unwrap();
-    assert!(most.elements > 300 && most.history.len() < 10);
-    problem.keep = true;
+    assert!(most.n_elements > 300 && most.history.len() < 10);
+    problem.dense_output = true;
     let all = solve(&problem, &mut equation, &Task::new()).unwrap();
-    assert_eq!(all.values, most.values);
-    assert_eq!(all.history.len() as u64, all.elements + 1);
+    assert_eq!(all.y, most.y);
+    assert_eq!(all.history.len() as u64, all.n_elements + 1);
 }
 
 #[test]
@@ -141,8 +141,8 @@ fn a_delay_far_shorter_than_the_elements_costs_no_more() {
     );
     problem.history = History::new(past.unwrap().pieces);
     let found = solve(&problem, &mut linear_decay(), &Task::new()).unwrap();
-    assert!((found.values[0] - (10.0 * s).exp()).abs() < 1e-9);
-    assert!(found.elements < 100, "{}", found.elements);
+    assert!((found.y[0] - (10.0 * s).exp()).abs() < 1e-9);
+    assert!(found.n_elements < 100, "{}", found.n_elements);
 }
 
 #[test]
@@ -167,8 +167,8 @@ fn stiff_equations_take_long_elements() {
     );
     problem.history = History::new(past.unwrap().pieces);
     let found = solve(&problem, &mut equation, &Task::new()).unwrap();
-    assert!((found.values[0] - 5.0_f64.cos()).abs() < 1e-8);
-    assert!(found.elements < 150, "{}", found.elements);
+    assert!((found.y[0] - 5.0_f64.cos()).abs() < 1e-8);
+    assert!(found.n_elements < 150, "{}", found.n_elements);
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn bad_problems_are_refused() {
             ..good.clone()
         },
         Problem {
-            initial: vec![f64::NAN],
+            y0: vec![f64::NAN],
             ..good.clone()
         },
         Problem {
@@ -227,11 +227,11 @@ fn bad_problems_are_refused() {
             ..good.clone()
         },
         Problem {
-            longest: 0.0,
+            max_step: 0.0,
             ..good.clone()
         },
         Problem {
-            times: Some(vec![4.0]),
+            t_eval: Some(vec![4.0]),
             ..good.clone()
         },
         Problem {
@@ -263,7 +263,7 @@ fn elements_have_the_order_of_radau_collocation() {
         problem.history = constant(1.0, 0.0, 10.0);
         let mut element = element::Element::default();
         let begin = element::Begin {
-            initial: &problem.initial,
+            initial: &problem.y0,
             history: &problem.history,
             smooth: false,
             jumps: (false, false),
@@ -308,7 +308,7 @@ proptest! {
         });
         problem.history = History::new(past.unwrap().pieces);
         let found = solve(&problem, &mut equation, &Task::new()).unwrap();
-        prop_assert!((found.values[0] - (4.0 * rate).exp()).abs() < 1e-8 * (1.0 + (4.0 * rate).exp()));
+        prop_assert!((found.y[0] - (4.0 * rate).exp()).abs() < 1e-8 * (1.0 + (4.0 * rate).exp()));
     }
 
     #[test]
@@ -318,7 +318,7 @@ proptest! {
             problem.start = start;
             problem.history = constant(0.3, start, delay);
             problem.breaks = vec![BreakingPoint { time: start, order: 0 }];
-            solve(&problem, &mut linear_decay(), &Task::new()).unwrap().values[0]
+            solve(&problem, &mut linear_decay(), &Task::new()).unwrap().y[0]
         };
         prop_assert!((run(shift) - run(0.0)).abs() < 1e-7);
     }

@@ -5,6 +5,7 @@ use super::terms::Term;
 use super::track;
 use super::track::{Piece, Track};
 use crate::Error;
+use crate::dde::limits::finite;
 use crate::memory::room;
 
 /// The matrices by their delays, row-major, and their sizes.
@@ -93,11 +94,7 @@ impl Signal {
                 pair[1], pair[0]
             )));
         }
-        if let Some(value) = series.iter().find(|value| !value.is_finite()) {
-            return Err(Error::argument(format!(
-                "a signal holds {value}: give finite numbers"
-            )));
-        }
+        finite("a signal", series)?;
         // A piece with its series; a run works on a copy.
         room::<[f64; 48]>("the signal", edges.len())?;
         let piece = |(i, pair): (usize, &[f64])| {

@@ -118,7 +118,8 @@ pub(super) fn nodes() -> &'static Series {
     &TABLES.nodes
 }
 
-/// The transformation of values at the nodes to coefficients: the part of value i in c_k at `[i][k]`.
+/// The transformation of values at the nodes to coefficients: the part of value i in c_k at
+/// `[i][k]`.
 pub(super) fn transform() -> &'static [Series; TERMS] {
     &TABLES.transform
 }

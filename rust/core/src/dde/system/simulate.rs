@@ -2,6 +2,7 @@
 
 use super::equations::{Past, Signal, SystemEquations, SystemResponse};
 use super::run;
+use crate::dde::limits::finite;
 use crate::{Error, Task};
 
 /// A validated system.
@@ -70,11 +71,7 @@ impl LinearSystem {
                 "the derivative of the history does not have {n} components"
             )));
         }
-        if let Some(value) = past.state.iter().find(|value| !value.is_finite()) {
-            return Err(Error::argument(format!(
-                "the initial state holds {value}: give finite numbers"
-            )));
-        }
+        finite("the initial state", &past.state)?;
         if let Some(time) = times.iter().find(|time| !time.is_finite()) {
             return Err(Error::argument(format!(
                 "the times hold {time}: give finite ones"

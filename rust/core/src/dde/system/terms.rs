@@ -4,7 +4,7 @@ use crate::Error;
 
 use super::legendre::TERMS;
 use super::track::{Sizes, Track};
-use crate::dde::limits::slack;
+use crate::dde::limits::{finite, slack};
 
 /// A matrix, row-major, with a delay in s.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,12 +30,7 @@ impl Term {
                 self.matrix.len()
             )));
         }
-        match self.matrix.iter().find(|entry| !entry.is_finite()) {
-            Some(entry) => Err(Error::argument(format!(
-                "{name} holds {entry}: give finite numbers"
-            ))),
-            None => Ok(()),
-        }
+        finite(name, &self.matrix)
     }
 }
 

@@ -71,8 +71,7 @@ const LONGEST_GAIN: f64 = 1e6;
 /// Factor on a proved length that covers its rounding error.
 const ROUNDED_DOWN: f64 = 1.0 - 1e-12;
 
-/// Upper limit on the spans tried for one reach, and the factors by which they shrink: at least to
-/// this many times what was proved, at most by this share.
+/// Upper limit on the spans tried for one reach.
 const MAX_REACH_ROUNDS: usize = 40;
 
 /// The next span tried, as a multiple of the length proved with the last one.

@@ -40,8 +40,8 @@ pub(crate) fn add_zeros(discs: &mut Vec<Disc>, zeros: u32) {
 /// roots.
 ///
 /// # Errors
-/// As [`count`](crate::roots::count); [`Error::CountMismatch`] where double precision does not suffice
-/// to locate what was counted.
+/// As [`count`](crate::roots::count); [`Error::CountMismatch`] where double precision does not
+/// suffice to locate what was counted.
 ///
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Region, roots}};

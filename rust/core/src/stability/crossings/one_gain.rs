@@ -98,7 +98,7 @@ pub fn crossings_along(
             "a root stays at s = 0 whatever {name} is: divide the equation by s"
         )));
     }
-    let top = radius(&a, &b, range, name)?;
+    let top = radius_of_members(&a, &b, range, name)?;
     if top == 0.0 {
         return Ok(Vec::new());
     }
@@ -135,8 +135,11 @@ fn at_zero(h: &QuasiPolynomial) -> f64 {
     h.coefficients().iter().filter_map(|row| row.first()).sum()
 }
 
-/// A radius that no root with Re s ≥ 0 of any member exceeds.
-fn radius(
+/// A radius that no root with Re s ≥ 0 of any member a + k b exceeds, k between the ends of `range`.
+///
+/// # Errors
+/// [`Error::Argument`] where the leading coefficient vanishes or does not outweigh the later ones.
+pub(crate) fn radius_of_members(
     a: &QuasiPolynomial,
     b: &QuasiPolynomial,
     range: (f64, f64),

@@ -1,0 +1,37 @@
+//! Quasi-polynomials on the imaginary axis: margins, crossings, stable ranges and phases.
+//!
+//! `two_sided` are products of quasi-polynomials with conjugates, `waves` real functions of the
+//! frequency made of them, `squares` the difference of two moduli; `zeros` finds all their zeros up
+//! to the frequencies of `bounds`. From these are `margins` of a loop, and of an `equation` in which
+//! one number varies the `crossings`, those of `delays` and `multiples` of one, and stable `ranges`.
+//! `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
+//! their phases; `polynomial` finds roots of small polynomials.
+
+mod argument;
+mod bounds;
+mod chains;
+mod crossings;
+mod delays;
+mod equation;
+mod margins;
+mod multiples;
+mod passage;
+mod polynomial;
+mod ranges;
+mod ratio;
+mod squares;
+mod two_sided;
+mod waves;
+mod zeros;
+
+pub use argument::argument;
+pub use bounds::end_of_gain;
+pub use crossings::{Crossings, crossings};
+pub use delays::{delay_margin, delay_range};
+pub use margins::{Margins, margins};
+pub use passage::Crossing;
+pub use ranges::{corner_range, damping_range, gain_range};
+pub use ratio::{first_term, ratio};
+
+#[cfg(test)]
+mod tests;
