@@ -69,6 +69,7 @@ MADE = {
     "PlannedBound": lambda: planned().bound,
     "ProvedBoxes": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3),
     "QuasiPolynomial": lambda: h,
+    "PlantWithDelays": lambda: dtm.loops.PlantWithDelays(1.0 / (dtm.s + dtm.delay(1.0))),
     "RationalPlant": lambda: dtm.RationalPlant([1.0], [1.0, 1.0]),
     "Recording": lambda: dtm.Recording(
         np.arange(9.0), np.zeros(9), np.zeros(9), units={"output": "m"}
@@ -122,7 +123,7 @@ def public_types():
 def test_the_list_of_types_is_complete():
     # Base classes that are never instantiated, tuples of arrays, and what has a test of its own.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
-        "Controller", "Plant", "PlantWithDelays", "OffsetW", "NoiseModel", "WhiteNoise",
+        "Controller", "Plant", "OffsetW", "NoiseModel", "WhiteNoise",
         "Comparison",
     }  # fmt: skip
 
