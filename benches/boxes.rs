@@ -1,7 +1,7 @@
-//! Proved boxes, one thread: until 0.1 % of the ranges are undecided, or 1 % of three.
+//! Proved boxes, one thread: until 0.1 % of two ranges are undecided, or 1 % of three.
 //!
 //! The velocity loop s + (Kp + Kv s) e^(−0.36 s) is neutral: chains and infinitely many boundaries
-//! meet at Kv = ±1. With the delay as a third parameter it moves with them.
+//! meet at Kv = ±1. With the delay as a third parameter the boundary depends on it too.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deadtime::Task;

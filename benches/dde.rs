@@ -1,5 +1,5 @@
-//! The linear stepper: one simulation of ten seconds each, the poles of a sampled loop, sweeps, and
-//! runs in fixed steps.
+//! Simulation of linear loops: one simulation of ten seconds each, the poles of a sampled loop, sweeps, and
+//! simulations in fixed steps.
 
 use std::hint::black_box;
 
@@ -99,7 +99,7 @@ fn poles(criterion: &mut Criterion) {
         b: &[1.0],
         k: &k,
         l: &[0.0],
-        scale: &[1.0],
+        gain: &[1.0],
         delay: &[DELAY],
         sample_time: &[SAMPLE_TIME],
     };

@@ -1,17 +1,19 @@
 """Delay estimation: the error of every method beside the Cramér-Rao bound, coverage, and time.
 
-The first table flies each case `--runs` times, each with noise of its own, and estimates the delay
-by every method: root-mean-square errors in ms, those a right implementation is known to have had
-over 200 runs of its own noise, and the ratio to the bound. Steps begin after a second at rest; the
-output at the start is known to the methods that can use it, and to the bound. `arx_scan` is what
-MATLAB's `delayest` does, refined between samples; it and `gcc` stand for the peers, of which none
-estimates a delay inside a loop with an interval.
+For the first table, each case is simulated `--runs` times, each time with different noise, and the
+delay is estimated by every method. The table has the root-mean-square errors in ms, the known
+errors of a correct implementation over 200 runs with its own noise, and the ratio to the bound.
+Steps begin after a second at rest. The output at the start is given to the methods that can use it,
+and to the bound. `arx_scan` is the method of MATLAB's `delayest`, refined between samples. It and
+`gcc` take the place of peers, because no other package estimates a delay inside a loop with an
+interval.
 
-Then: the systematic error of the map from overshoot to delay by one pair of roots; how many of
-`--coverage-runs` intervals hold the truth; how long an estimate with its intervals takes.
+The other tables have the systematic error of the map from overshoot to delay by one pair of roots,
+the share of `--coverage-runs` intervals that contain the true value, and the time of an estimate
+with its intervals.
 
 Run ``python benches/estimation.py [--runs N] [--coverage-runs N] [--case TEXT] [--method TEXT]
-[--quick]``. Works in as many processes as there are processors.
+[--quick]``. It uses as many processes as there are processors.
 """
 
 from __future__ import annotations
@@ -37,13 +39,13 @@ SAMPLE = 0.065
 REST = 16 * SAMPLE
 LAST = 5.0
 
-#: Intervals that hold the truth in 95 % of the flights; two thousand tell 1 % from it.
+#: The level of the intervals. Two thousand runs distinguish coverages that differ by 1 %.
 LEVEL = 0.95
 
 
 @dataclass(frozen=True)
 class Case:
-    """A loop, what is flown on it, and the errors that are known, in ms by column."""
+    """A loop, the experiment that is run on it, and the known errors, in ms by column."""
 
     name: str
     loop: dtm.ControlLoop
@@ -51,17 +53,17 @@ class Case:
     noise: float
     known: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ("delay",)
-    believed: Mapping[str, Any] = field(default_factory=dict)
+    assumed: Mapping[str, Any] = field(default_factory=dict)
     sensor: bool = True
 
     @property
     def noise_in_loop(self) -> bool:
-        """Whether the controller sees the noise: that of a sensor, in sampled loops."""
+        """Whether the controller reads the noise, as it does with sensor noise in sampled loops."""
         return self.sensor and self.loop.is_sampled
 
     def given(self) -> dtm.ControlLoop:
-        """What the estimators are told."""
-        return self.loop.replace(delay=None, **self.believed)
+        """The loop that the estimators are given."""
+        return self.loop.replace(delay=None, **self.assumed)
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class Column:
 
 
 class Tally(NamedTuple):
-    """Errors by quantity in s or the gain's unit, intervals that held, flights refused."""
+    """Errors by quantity in s or the gain's unit, intervals with the true value, refused runs."""
 
     errors: dict[str, list[float]]
     held: dict[str, int]
@@ -203,7 +205,7 @@ def cases() -> list[Case]:
             plain,
             0.01,
             noted(2.76, 59.5, 59.7, 69.0, 59.8, 52.8, 61.0, 93.0, 95.0),
-            believed={"lag": 0.0},
+            assumed={"lag": 0.0},
         ),
         Case(
             "lag 60 ms fitted",
@@ -212,7 +214,7 @@ def cases() -> list[Case]:
             0.01,
             noted(18.3, 20.3, 21.3),
             free=("delay", "gain", "lag"),
-            believed={"lag": 0.0},
+            assumed={"lag": 0.0},
         ),
         Case("PRBS 20 s held limit 1 %", loop(), dtm.Experiment.prbs(20.0, 0.4, 0.4), 0.01),
         Case(
@@ -228,7 +230,7 @@ def cases() -> list[Case]:
 def tally(
     case: Case, column: Column, seeds: range, intervals: bool = False, level: float = LEVEL
 ) -> Tally:
-    """Fly the case with the noise of these seeds and estimate; runs in other processes."""
+    """Simulate the case with these seeds and estimate; this runs in other processes."""
     errors: dict[str, list[float]] = {}
     held: dict[str, int] = {}
     refused = 0
@@ -239,12 +241,12 @@ def tally(
     if column.start_known and "delay" in case.free and hasattr(method, "initial_output"):
         method = replace(method, initial_output=0.0)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of feedback, in every flight
+        warnings.simplefilter("ignore")  # about feedback, in every run
         for seed in seeds:
-            flight = case.experiment.run(case.loop, case.noise, seed, case.noise_in_loop)
+            recording = case.experiment.run(case.loop, case.noise, seed, case.noise_in_loop)
             try:
                 fit = dtm.estimate_delay(
-                    flight,
+                    recording,
                     given.continuous() if column.continuous else given,
                     method=method,
                     free=case.free,
@@ -327,20 +329,23 @@ def cell(value: float, wide: int) -> str:
 
 
 def error_of_the_map() -> None:
-    """How far the map by one pair of roots is off, without any noise."""
+    """The error of the map by one pair of roots, without any noise."""
     known = [0.06, 0.22, 0.31, 0.43, 0.89, 1.36, 1.86, 2.36, 2.83, 3.61, 4.35, math.nan]
     gains = [0.40, 0.45, 0.4714, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4, 1.5 + 1e-9]
     print(
         f"\n{'Kp Td':>8}{'exact Mo %':>12}{'paper: error of Td %':>22}{'known':>8}{'exact map':>11}"
     )
     for x, expected in zip(gains, known, strict=True):
-        flown = loop(Kp=x, delay=1.0, sample_time=None, limit=None)
-        flight = dtm.Experiment.step(31.0, sample_time=0.005, rest=1.0).run(flown)
-        row = f"{x:8.4f}{100.0 * (flight.output.max() - 1.0):12.2f}"
+        known_loop = loop(Kp=x, delay=1.0, sample_time=None, limit=None)
+        recording = dtm.Experiment.step(31.0, sample_time=0.005, rest=1.0).run(known_loop)
+        row = f"{x:8.4f}{100.0 * (recording.output.max() - 1.0):12.2f}"
         for way, wide in (("dominant", 22), ("exact", 19)):
             try:
                 fit = dtm.estimate_delay(
-                    flight, flown.replace(delay=None), method=Overshoot(map=way), free=("delay",)
+                    recording,
+                    known_loop.replace(delay=None),
+                    method=Overshoot(map=way),
+                    free=("delay",),
                 )
                 row += f"{100.0 * (fit.delay - 1.0):>+{wide}.3f}"
             except dtm.NotIdentifiableError:
@@ -352,7 +357,7 @@ def error_of_the_map() -> None:
 
 
 def coverage(pool: Executor, runs: int, text: str) -> None:
-    """How many intervals hold the truth."""
+    """The share of intervals that contain the true value."""
     plain = step()
     rows = [
         ("delay", Case("", loop(), plain, 0.01), Column("", OutputError())),
@@ -373,11 +378,11 @@ def coverage(pool: Executor, runs: int, text: str) -> None:
         ),
         *(
             (
-                f"noise in the {where}, told {told}",
+                f"noise in the {where}, assumed: {assumed}",
                 Case("", loop(Kp), plain, 0.01, free=("delay", "gain"), sensor=where == "loop"),
-                Column("", Waveform(noise=told)),
+                Column("", Waveform(noise=assumed)),
             )
-            for where, Kp, told in (
+            for where, Kp, assumed in (
                 ("log", 1.31, "recording"),
                 ("log", 1.31, "auto"),
                 ("loop", 3.0, "loop"),
@@ -390,8 +395,8 @@ def coverage(pool: Executor, runs: int, text: str) -> None:
         if text not in column.method.name:
             continue
         found = next(shared(pool, [(case, column)], runs, intervals=True))
-        told = runs - found.refused
-        shares = "  ".join(f"{n} {100 * held / told:.1f} %" for n, held in found.held.items())
+        answered = runs - found.refused
+        shares = "  ".join(f"{n} {100 * held / answered:.1f} %" for n, held in found.held.items())
         print(f"{column.method.name + ', ' + label:44}{runs:6d}{found.refused:9d}  {shares}")
 
 
@@ -400,11 +405,11 @@ def times(columns: list[Column], repetitions: int, most: int) -> None:
     print(f"\n{'ms for 308 samples':36}{'estimate, intervals':>20}{'profile':>10}")
     experiment = dtm.Experiment.prbs(20.0, 0.4, 0.4)
     for free in (("delay",), ("delay", "gain"), ("delay", "gain", "lag"))[:most]:
-        flown = loop(lag=0.06 if "lag" in free else 0.0)
-        flight = experiment.run(flown, 0.01, seed=1)
+        known_loop = loop(lag=0.06 if "lag" in free else 0.0)
+        recording = experiment.run(known_loop, 0.01, seed=1)
         for column in columns:
             try:
-                durations = [timed(flight, flown, column, free) for _ in range(repetitions)]
+                durations = [timed(recording, known_loop, column, free) for _ in range(repetitions)]
             except (dtm.DeadtimeError, ValueError):
                 continue
             estimate, profile = (statistics.median(each) for each in zip(*durations, strict=True))
@@ -413,12 +418,14 @@ def times(columns: list[Column], repetitions: int, most: int) -> None:
 
 
 def timed(
-    flight: dtm.Recording, flown: dtm.ControlLoop, column: Column, free: tuple[str, ...]
+    recording: dtm.Recording, known_loop: dtm.ControlLoop, column: Column, free: tuple[str, ...]
 ) -> tuple[float, float]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         begin = time.perf_counter()
-        fit = dtm.estimate_delay(flight, flown.replace(delay=None), method=column.method, free=free)
+        fit = dtm.estimate_delay(
+            recording, known_loop.replace(delay=None), method=column.method, free=free
+        )
         if fit.calibrated:
             for name in fit.stderr:
                 fit.ci(LEVEL, name)
@@ -434,27 +441,27 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--runs", type=int, default=200, help="flights of each case and method; 0: none"
+        "--runs", type=int, default=200, help="runs of each case and method; 0: none"
     )
     parser.add_argument(
-        "--coverage-runs", type=int, default=2000, help="flights of each coverage; 0: none"
+        "--coverage-runs", type=int, default=2000, help="runs of each coverage; 0: none"
     )
-    parser.add_argument("--case", default="", help="only cases whose name has this in it")
-    parser.add_argument("--method", default="", help="only methods whose name has this in it")
-    parser.add_argument("--quick", action="store_true", help="a flight of some cases")
+    parser.add_argument("--case", default="", help="only cases whose name contains this text")
+    parser.add_argument("--method", default="", help="only methods whose name contains this text")
+    parser.add_argument("--quick", action="store_true", help="one run of some cases")
     given = parser.parse_args()
     chosen = [case for case in cases() if given.case in case.name]
     columns = [c for c in COLUMNS if given.method in f"{c.method.name} {c.name}"]
     runs, covering, repetitions = given.runs, given.coverage_runs, 11
     if given.quick:
         runs, covering, repetitions, chosen = 1, 2, 1, chosen[4:5] + chosen[-3:]
-    # Each worker has its own flights; threads below NumPy would only be in each other's way.
+    # Each worker simulates its own runs; threads of NumPy's libraries would compete with them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
         begin = time.perf_counter()
         if runs:
             errors_of_methods(pool, chosen, columns, runs)
-            print(f"{runs} flights a cell, {time.perf_counter() - begin:.0f} s")
+            print(f"{runs} runs a cell, {time.perf_counter() - begin:.0f} s")
         if not given.case:
             error_of_the_map()
             if covering:

@@ -1,7 +1,7 @@
 //! Lambert W: time per block of 1000 elements, one thread.
 //!
-//! The disc is what control problems ask for; next to -1/e and extreme exponents are where
-//! other implementations slow down or fail.
+//! Control problems have arguments in the disc. Next to -1/e and at extreme exponents other
+//! implementations become slow or fail.
 
 use std::hint::black_box;
 

@@ -93,7 +93,7 @@ fn characteristic_roots(c: &mut Criterion) {
     }
 }
 
-/// `n` states in a ring, dense coupling now and coupling to the next one later.
+/// `n` states in a ring, with dense coupling without delay and delayed coupling to the next state.
 fn ring(n: usize) -> Option<CharacteristicMatrix> {
     let filled = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
         (0..n)

@@ -1,4 +1,4 @@
-//! The spectral method of steps with right-hand sides that cost next to nothing.
+//! The spectral method of steps with right-hand sides of negligible cost.
 
 use std::hint::black_box;
 

@@ -1,8 +1,9 @@
-//! Stability maps of six families, one thread: counts alone on a picture of 1000 by 1000 cells, with abscissa on
-//! 100 by 100, and how counts grow with the picture: 500, 1000 and 2000 cells a side.
+//! Stability maps of six families, one thread: counts alone on 1000 by 1000 cells, with abscissa on
+//! 100 by 100, and the time of counts for 500, 1000 and 2000 cells a side.
 //!
-//! The velocity loop is neutral, with a filter on the derivative it is retarded of degree 3; the pendulum
-//! is unstable without control, the two gains of the fifth have a delay each; the last one is a family over both delays.
+//! The velocity loop is neutral; with a filter on the derivative it is retarded of degree 3. The
+//! pendulum is unstable without control. The two gains of the fifth family have a delay each. The
+//! parameters of the last one are two delays.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;

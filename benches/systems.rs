@@ -27,7 +27,7 @@ fn scalar(state: Vec<Term>, derivative: Vec<Term>) -> SystemEquations {
     }
 }
 
-/// Ten oscillators in a ring, each pulled by the delayed position of the next.
+/// Ten oscillators in a ring, each driven by the delayed position of the next.
 fn ring() -> SystemEquations {
     let n = 20;
     let mut now = vec![0.0; n * n];

@@ -1,9 +1,10 @@
-"""Delay equations: time at equal true error, ours beside what else Python offers.
+"""Delay equations: time at equal true error, ours beside other solvers in Python.
 
-Every solver runs over a ladder of settings, once each, against references that two unrelated
-methods agree on (`tests/reference`); for 1e-6 and for 1e-9 its fastest setting that keeps the true
-error below is timed, ours and the peer's in turn. Compilation (JiTCDDE, numba) is left out. The
-last lines are sweeps: time a trajectory. Run ``python benches/peers/dde.py [--quick]``.
+Every solver is run once with each of several settings, and compared with references on which two
+unrelated methods agree (`tests/reference`). For 1e-6 and for 1e-9, the fastest setting whose true
+error is smaller is timed, ours and the peer's in turn. Compilation (JiTCDDE, numba) is not
+included. The last lines are sweeps: time per trajectory. Run ``python benches/peers/dde.py
+[--quick]``.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ LONG = 1.0
 
 @dataclass
 class Problem:
-    """One problem: where the truth is known, and who solves it in which settings."""
+    """One problem: the times at which the solution is known, the solvers and their settings."""
 
     name: str
     times: Values
@@ -60,7 +61,7 @@ def known(file: str, name: str) -> tuple[Values, Values, dict[str, Any]]:
 
 def loops() -> Iterable[Problem]:
     def simulated(times: Values, controller: Any, **fields: Any) -> Run:
-        # As the peers' equations, the loop is there before the clock starts.
+        # The loop is constructed before the timing starts, as the peers' equations are.
         loop = dtm.ControlLoop(
             dtm.Integrator(), controller, delay=DELAY, delay_path="measurement", **fields
         )
@@ -111,7 +112,7 @@ def loops() -> Iterable[Problem]:
 def solve(
     fun: Any, history: Any, delay: float, tolerances: list[float], vectorized: bool = True
 ) -> list[Run]:
-    """`solve_dde` over a ladder of tolerances; `fun` takes all nodes at once, or is compiled."""
+    """`solve_dde` for several tolerances; `fun` takes all nodes at once, or is compiled."""
 
     def at(tolerance: float) -> Run:
         def simulate(times: Values) -> Values:
@@ -217,7 +218,7 @@ def tried(problem: Problem, runs: list[Run]) -> list[tuple[float, float, Run]]:
 
 
 def compare(problem: Problem, rounds: int) -> None:
-    """Print one line for each target, each of our ways and each peer."""
+    """Print one line for each target, each of our methods and each peer."""
     ours = {name: tried(problem, runs) for name, runs in problem.ours.items()}
     others = {name: tried(problem, runs) for name, runs in problem.peers.items()}
     for target in TARGETS:

@@ -1,10 +1,10 @@
 """A heat equation with a delayed source: ours beside scipy's BDF by the method of steps.
 
-u_t = D u_xx + a u(x, t - 1) on n points between two cold ends, at the same rtol and atol. BDF is
-given the sparsity of the Jacobian, `vectorized`, and starts anew at every multiple of the delay
-with the dense output of the piece before. The truth is a closed form: each sine is an eigenvector
-of the difference matrix, and its factor solves a scalar delay equation in exponentials times
-polynomials. Run ``python benches/peers/heat.py [--quick]``.
+u_t = D u_xx + a u(x, t - 1) on n points with u = 0 at both ends, at the same rtol and atol. BDF is
+given the sparsity of the Jacobian and `vectorized`, and is restarted at every multiple of the delay
+with the dense output of the interval before. The exact solution has a closed form: each sine is an
+eigenvector of the difference matrix, and its factor solves a scalar delay equation in exponentials
+times polynomials. Run ``python benches/peers/heat.py [--quick]``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Lambert W beside scipy and FLINT: time per element, alternated in one process, errors beside it.
 
-Errors are |w - W|/(|W| 2^-52) on a sample, with W from FLINT's ball arithmetic; correct rounding
-is at most 0.5. Run ``python benches/peers/lambertw.py [--quick] [--threads N]``. FLINT is there for
-scale: it computes with proved bounds, one number at a time, called from a Python loop.
+Errors are |w - W|/(|W| 2^-52) on a sample, with W from FLINT's ball arithmetic; correct rounding is
+at most 0.5. Run ``python benches/peers/lambertw.py [--quick] [--threads N]``. The time of FLINT is
+listed for orientation: it computes with proved bounds, one number at a time, in a Python loop.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def alternated(rounds: int, *calls: Callable[[], object]) -> np.ndarray:
 
 
 def exact(z: np.ndarray, k: np.ndarray) -> list[flint.acb]:
-    # FLINT has no signed zeros; what lies on a cut here has an imaginary part of +0, its side.
+    # FLINT has no signed zeros; points on a cut here have an imaginary part of +0, as in FLINT.
     points = [flint.acb(point.real, point.imag) for point in z.astype(complex)]
     return [point.lambertw(int(branch)) for point, branch in zip(points, k, strict=True)]
 

@@ -1,8 +1,8 @@
 """The drone's packets beside pyardrone: time a packet, alternated in one process.
 
-A short packet of navdata (500 bytes) is what both read; of a full one pyardrone knows no more than
-some options in their older sizes, so that its line is ours alone. pyardrone makes views of the
-bytes, ours checks and converts to SI units. Run ``python benches/peers/navdata.py [--quick]``.
+Both read a short packet of navdata (500 bytes). Of a full one pyardrone reads only some options in
+their older sizes, so that line has no peer. pyardrone makes views of the bytes, ours checks and
+converts to SI units. Run ``python benches/peers/navdata.py [--quick]``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from deadtime.links.ardrone2.navdata import (
 
 try:
     with warnings.catch_warnings():
-        # Its docstrings have escapes that Python warns of.
+        # Its docstrings have escapes that cause warnings of Python.
         warnings.simplefilter("ignore")
         from pyardrone import at
         from pyardrone.navdata import NavData

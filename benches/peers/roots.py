@@ -1,15 +1,15 @@
 """All roots of a region beside qpmr, tdcpy and cxroots, on every certified reference case.
 
-Each peer runs in a process of its own that is ended after a time limit; ours and theirs take
-turns. A peer is right when it finds every certified root of the upper half plane and no other:
-`miss` counts certified roots further than 1e-6 (of their modulus) from any it returned, `extra`
-what it returned further than that from any certified one. An m-fold root, or m within 1 per cent,
-need only be met to the m-th root of 1e-10, by one number or by several. All get the upper half of
-the region; cxroots, which refuses a contour through a root, gets an edge 2 per cent of the height
-below the real axis, where ours and qpmr know what to do with roots on it. Times are medians, with
-whatever turns the coefficients into what the program takes and after a first call; ratios are
-those of cases that both get right.
-Run ``python benches/peers/roots.py [--quick] [--only CASE …] [--peers PEER …]``.
+Each peer runs in a process of its own that is ended after a time limit; ours and theirs take turns.
+The answer of a peer is right if it contains every certified root of the upper half plane and no
+other: `miss` counts certified roots further than 1e-6 (of their modulus) from any returned root,
+`extra` returned roots further than that from any certified one. An m-fold root, or m roots within 1
+per cent, need only be accurate to the m-th root of 1e-10, as one number or as several. All get the
+upper half of the region. cxroots refuses a contour through a root, so it gets an edge 2 per cent of
+the height below the real axis; ours and qpmr accept roots on the real axis. Times are medians after
+a first call and include the conversion of the coefficients to the format of the program; ratios are
+those of cases that both get right. Run ``python benches/peers/roots.py [--quick] [--only CASE …]
+[--peers PEER …]``.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ PEERS: dict[str, Callable[[np.ndarray, np.ndarray, Region], Any]] = {
 
 
 def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
-    """What a call gives, and the median of its times: caches are warm after the first."""
+    """The result of a call and the median of its times after a first call."""
     seconds: list[float] = []
     while not seconds or (sum(seconds) < 0.05 and len(seconds) < 20):
         start = time.perf_counter()
@@ -88,7 +88,7 @@ def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
 
 
 def serve(name: str, pipe: Connection) -> None:
-    """Answer cases until the pipe closes: roots and seconds, or what went wrong."""
+    """Answer cases until the pipe closes: roots and seconds, or the error."""
     warnings.simplefilter("ignore")
     logging.disable(logging.CRITICAL)
     np.seterr(all="ignore")
@@ -105,7 +105,7 @@ def serve(name: str, pipe: Connection) -> None:
 
 
 class Peer:
-    """A peer in its process, which a call that takes too long ends."""
+    """A peer in its own process, which is ended if a call takes too long."""
 
     def __init__(self, name: str, limit: float) -> None:
         self.name, self.limit = name, limit
@@ -137,12 +137,12 @@ def roots_of(
     re: tuple[float, float],
     im: tuple[float, float],
 ) -> np.ndarray:
-    """Ours, roots on the edge among them, as peers list them."""
+    """Our roots, including those on the edge, because peers list them too."""
     return dtm.QuasiPolynomial(coefficients, delays).roots(re=re, im=im, edge="inside").roots
 
 
 def judge(found: Any, case: dict[str, Any]) -> tuple[int, int]:
-    """How many certified roots were missed, and how many of the others are none."""
+    """The number of certified roots that were missed, and of returned ones that are no roots."""
     certified = np.array([complex(re, im) for re, im, _ in case["roots"]])
     a, b, _, d = case["region"]
     near = (found.real >= a - NEAR) & (found.real <= b + NEAR)

@@ -1,13 +1,13 @@
-"""Counts of unstable roots over two gains: our map beside peers and beside brute force of our own.
+"""Counts of unstable roots over two gains: our map beside peers and beside our own brute force.
 
-(a) qpmr and tdcpy know one equation at a time: a few cells, drawn at random, are asked one by one
-    for the roots in a region which ours says holds all unstable ones of these cells and is little
-    larger; a map takes their time by its number of cells. Each has a first call behind it. A cell
-    on which a peer raises counts as disagreeing.
+(a) qpmr and tdcpy solve one equation at a time. For a few cells, drawn at random, they find the
+    roots in a region that by our bounds contains all unstable roots of these cells and is little
+    larger. The time of a map is their time per cell times the number of cells. Each has made a
+    first call before. A cell for which a peer raises an error counts as disagreeing.
 (b) numpy with scipy's Lambert W, for the one family that has such a formula, s + Kp exp(-s T).
-(c) Our own: every cell counted alone (``proof="cells"``) and a loop of pointwise counts.
+(c) Our own methods: every cell counted alone (``proof="cells"``) and a loop of pointwise counts.
 
-Ratios are times a map of that way over ours, counts alone, on one thread. Run
+Ratios are the time of a map by that method divided by ours, counts alone, on one thread. Run
 ``python benches/peers/stability_map.py [--quick]``.
 """
 
@@ -100,7 +100,7 @@ def by_lambertw(ranges: Ranges, side: int) -> np.ndarray:
 
 
 def seconds(call: Callable[[], Any], rounds: int = 1) -> tuple[Any, float]:
-    """What a call gives, and the least of its times."""
+    """The result of a call and the least of its times."""
     least = np.inf
     for _ in range(rounds):
         start = time.perf_counter()
@@ -110,7 +110,7 @@ def seconds(call: Callable[[], Any], rounds: int = 1) -> tuple[Any, float]:
 
 
 def unstable_region(members: list[dtm.QuasiPolynomial]) -> Region:
-    """A region, little larger than needed, that holds the unstable roots of all members."""
+    """A region, little larger than needed, that contains the unstable roots of all members."""
     roots = np.concatenate([h.rightmost(h.count(re=(0.0, None)) or 1).roots for h in members])
     unstable = roots[roots.real > 0.0]
     right, top = unstable.real.max(initial=0.0), unstable.imag.max(initial=0.0)
@@ -120,7 +120,7 @@ def unstable_region(members: list[dtm.QuasiPolynomial]) -> Region:
 def cell_by_cell(
     chart: dtm.stability.StabilityMap, count: Count, cells: list[tuple[int, int]], limit: float
 ) -> tuple[float, int, int]:
-    """Mean seconds a cell, cells asked, and cells that disagree."""
+    """Mean seconds per cell, number of cells, and number of cells that disagree."""
     (first, x), (second, y) = chart.axes.items()
     family = chart.family
     assert family is not None

@@ -40,7 +40,6 @@ if TYPE_CHECKING:
         P,
         RationalPlant,
         kit_plant,
-        simulate,
         simulate_fixed_step,
         sweep,
     )
@@ -78,7 +77,7 @@ _ROOMS = {
     "systems": "DelaySystem TransferFunction feedback",
     "loops": (
         "ControlLoop DerivativeFilter FirstOrder Integrator P PD PI PID PV RationalPlant kit_plant "
-        "simulate simulate_fixed_step sweep"
+        "simulate_fixed_step sweep"
     ),
     "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
     "recordings": "Recording read_recording",
@@ -92,6 +91,9 @@ _ROOMS = {
     "internet": "",
     "paper": "",
 }
+#: Version of the installed package.
+__version__: str
+
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names.split()}
 
 __all__ = [
@@ -142,7 +144,6 @@ __all__ = [
     "read_recording",
     "robust_map",
     "s",
-    "simulate",
     "simulate_fixed_step",
     "solve_dde",
     "stability_map",
@@ -157,6 +158,8 @@ if not TYPE_CHECKING:  # A type checker reads the imports above.
         """Load the room of a name when the name is first used."""
         if name in _ROOM_OF:
             value = getattr(importlib.import_module(f"deadtime.{_ROOM_OF[name]}"), name)
+        elif name == "__version__":
+            value = importlib.import_module("importlib.metadata").version("deadtime")
         elif name in _ROOMS and not name.startswith("_"):
             value = importlib.import_module(f"deadtime.{name}")
         else:

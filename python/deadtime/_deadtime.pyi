@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "AtCommand",
     "Certificate",
     "CharacteristicMatrix",
     "Contour",
@@ -15,19 +16,31 @@ __all__ = [
     "DelayRun",
     "Expansion",
     "Family",
+    "FixedStepResponse",
+    "LegendreTables",
     "LinearLoop",
     "LinearSystem",
+    "LinearSystemResponse",
+    "LoopPacket",
+    "LoopResponse",
+    "LoopSensitivities",
     "MapBoundary",
     "MapCells",
     "Margins",
     "Monotone",
+    "Navdata",
+    "NavdataLayout",
+    "NavdataOption",
     "ProvedBoxes",
     "QuasiPolynomial",
     "RootSet",
+    "SampledCells",
     "Segment",
     "Sensitivity",
     "Signal",
     "StabilityRadius",
+    "SweepMetrics",
+    "SweepResponses",
     "at_read",
     "at_write",
     "configuration_read",
@@ -42,6 +55,7 @@ __all__ = [
     "doubles_read",
     "doubles_write",
     "end_of_gain",
+    "fixed_step_run",
     "gain_range",
     "lambertw",
     "lambertw0",
@@ -59,21 +73,19 @@ __all__ = [
     "loop_packet_read",
     "loop_packet_write",
     "loop_sensitivities",
-    "nap",
     "navdata_full",
     "navdata_layouts",
     "navdata_read",
     "navdata_write",
+    "on_samples",
     "proved_boxes",
     "ratio",
     "robust_map",
     "sampled_abscissa_grid",
-    "solve_delay_equation",
-    "spin",
+    "solve_dde",
     "stability_radius",
-    "sweep_figures",
+    "sweep_metrics",
     "sweep_responses",
-    "thread_count",
     "wrightomega",
 ]
 
@@ -283,10 +295,6 @@ def delay_range(family: Family, value: float) -> _Pair: ...
 def gain_range(family: Family, value: float, bounds: _Pair) -> _Pair: ...
 def damping_range(family: Family, value: float, highest: float) -> _Pair: ...
 def corner_range(family: Family, value: float, highest: float) -> _Pair: ...
-def thread_count(threads: int | None = None) -> int: ...
-def spin(
-    seconds: float, threads: int | None = None, progress: Callable[[int], object] | None = None
-) -> int: ...
 def limit_threads(threads: int | None) -> int | None: ...
 
 lambertw: np.ufunc
@@ -297,7 +305,6 @@ wrightomega: np.ufunc
 lambertw_derivative: np.ufunc
 lambertw_offset: np.ufunc
 dde_roots: np.ufunc
-nap: np.ufunc
 __pyx_capi__: dict[str, object]
 
 def lambertw_number(z: object, k: object) -> np.complex128 | None: ...
@@ -427,124 +434,260 @@ def robust_map(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> NDArray[np.int32]: ...
-def fixed_step_run(
-    plant: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float],
-    controller: tuple[
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        float,
-        float,
-        float,
-        float,
-    ],
-    delay: float,
-    delay_path: str,
-    limit: float | None,
-    sample_steps: int | None,
-    solver: str,
-    step: float,
-    steps: int,
-    state: NDArray[np.float64],
-    output: float,
-    command: float,
-    reference: tuple[float, NDArray[np.float64], NDArray[np.float64]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def on_samples(
-    since: NDArray[np.float64], start: float, sample_time: float, sample_phase: float
-) -> NDArray[np.float64]: ...
+
+_Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
+
+class _SampleUpdate(Protocol):
+    @property
+    def states(self) -> NDArray[np.float64]: ...
+    @property
+    def command(self) -> NDArray[np.float64]: ...
+    @property
+    def reference(self) -> NDArray[np.float64]: ...
+
+class _LoopEquations(Protocol):
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def E(self) -> NDArray[np.float64]: ...
+    @property
+    def K(self) -> NDArray[np.float64]: ...
+    @property
+    def L(self) -> float: ...
+    @property
+    def M(self) -> float: ...
+    @property
+    def C(self) -> NDArray[np.float64]: ...
+    @property
+    def D(self) -> float: ...
+    @property
+    def impulse(self) -> float: ...
+    @property
+    def update(self) -> _SampleUpdate | None: ...
+
+class _LoopRun(Protocol):
+    @property
+    def state(self) -> NDArray[np.float64]: ...
+    @property
+    def command(self) -> float: ...
+    @property
+    def reference_before(self) -> float: ...
+    @property
+    def reference(self) -> float | NDArray[np.float64]: ...
+    @property
+    def reference_time(self) -> NDArray[np.float64] | None: ...
+    @property
+    def command_history(self) -> NDArray[np.float64] | None: ...
+    @property
+    def sample_phase(self) -> float: ...
+
+@final
+class LoopResponse:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+    @property
+    def breaks(self) -> NDArray[np.float64]: ...
+    @property
+    def reference(self) -> NDArray[np.float64]: ...
 
 @final
 class LinearLoop:
     def __new__(
         cls,
-        a: NDArray[np.float64],
-        b: NDArray[np.float64],
-        e: NDArray[np.float64],
-        k: NDArray[np.float64],
-        l: float,
-        m: float,
-        c: NDArray[np.float64],
-        d: float,
+        equations: _LoopEquations,
         delay: float,
         sample_time: float | None = None,
         limit: float | None = None,
-        impulse: float = 0.0,
-        update: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> LinearLoop: ...
-    def simulate(
-        self,
-        output_times: NDArray[np.float64],
-        input_times: NDArray[np.float64],
-        state: NDArray[np.float64],
-        command: float,
-        reference_before: float,
-        reference_times: NDArray[np.float64],
-        reference_values: NDArray[np.float64],
-        command_history: NDArray[np.float64],
-        sample_phase: float,
-    ) -> tuple[
-        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]: ...
+    def outputs(self, time: NDArray[np.float64], run: _LoopRun) -> NDArray[np.float64]: ...
     def respond(
-        self,
-        time: NDArray[np.float64],
-        ahead: float,
-        state: NDArray[np.float64],
-        command: float,
-        before: float,
-        reference: float | tuple[NDArray[np.float64], NDArray[np.float64]],
-        command_history: NDArray[np.float64] | None,
-        sample_phase: float,
-    ) -> tuple[
-        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]: ...
+        self, time: NDArray[np.float64], run: _LoopRun, output_lead: float
+    ) -> LoopResponse: ...
     def transition_matrix(self) -> NDArray[np.float64]: ...
     def balanced_matrix(self) -> NDArray[np.float64]: ...
     def poles(self) -> NDArray[np.complex128]: ...
 
+def on_samples(
+    since: NDArray[np.float64], start: float, sample_time: float, sample_phase: float
+) -> NDArray[np.float64]: ...
+
+class _SampledLoops(Protocol):
+    @property
+    def cells(self) -> int: ...
+    @property
+    def states(self) -> int: ...
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def K(self) -> NDArray[np.float64]: ...
+    @property
+    def L(self) -> NDArray[np.float64]: ...
+    @property
+    def gain(self) -> NDArray[np.float64]: ...
+    @property
+    def delay(self) -> NDArray[np.float64]: ...
+    @property
+    def sample_time(self) -> NDArray[np.float64]: ...
+
+@final
+class SampledCells:
+    @property
+    def abscissa(self) -> NDArray[np.float64]: ...
+    @property
+    def unstable(self) -> NDArray[np.int32]: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+def sampled_abscissa_grid(
+    loops: _SampledLoops,
+    *,
+    decay: float,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> SampledCells: ...
+
+class _StateSpace(Protocol):
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def C(self) -> NDArray[np.float64]: ...
+    @property
+    def D(self) -> float: ...
+
+class _ControllerEquations(Protocol):
+    @property
+    def A(self) -> NDArray[np.float64]: ...
+    @property
+    def B(self) -> NDArray[np.float64]: ...
+    @property
+    def E(self) -> NDArray[np.float64]: ...
+    @property
+    def C(self) -> NDArray[np.float64]: ...
+    @property
+    def p(self) -> float: ...
+    @property
+    def q(self) -> float: ...
+    @property
+    def M(self) -> float: ...
+    @property
+    def impulse(self) -> float: ...
+
+class _FixedStepSettings(Protocol):
+    @property
+    def delay(self) -> float: ...
+    @property
+    def delay_path(self) -> str: ...
+    @property
+    def limit(self) -> float | None: ...
+    @property
+    def sample_steps(self) -> int | None: ...
+    @property
+    def solver(self) -> str: ...
+    @property
+    def step(self) -> float: ...
+    @property
+    def steps(self) -> int: ...
+    @property
+    def initial_output(self) -> float: ...
+
+@final
+class FixedStepResponse:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+
+def fixed_step_run(
+    plant: _StateSpace,
+    controller: _ControllerEquations,
+    run: _LoopRun,
+    settings: _FixedStepSettings,
+) -> FixedStepResponse: ...
+
+class _LoopSlopes(Protocol):
+    @property
+    def row(self) -> NDArray[np.float64]: ...
+    @property
+    def row_slopes(self) -> NDArray[np.float64]: ...
+    @property
+    def state_slopes(self) -> NDArray[np.float64]: ...
+    @property
+    def command_slopes(self) -> NDArray[np.float64]: ...
+    @property
+    def output_lead_slopes(self) -> NDArray[np.float64]: ...
+
+@final
+class LoopSensitivities:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+
 def loop_sensitivities(
-    states: int,
-    row: NDArray[np.float64],
-    row_slopes: NDArray[np.float64],
-    state: NDArray[np.float64],
-    state_slopes: NDArray[np.float64],
-    command: float,
-    command_slopes: NDArray[np.float64],
-    ahead: NDArray[np.float64],
-    output_times: NDArray[np.float64],
-    input_times: NDArray[np.float64],
-    reference_before: float,
-    reference_times: NDArray[np.float64],
-    reference_values: NDArray[np.float64],
-    command_history: NDArray[np.float64],
-    sample_phase: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def sweep_figures(
-    states: int,
-    rows: NDArray[np.float64],
-    amplitude: float,
-    is_ahead: bool,
-    steady: NDArray[np.float64],
+    slopes: _LoopSlopes,
+    run: _LoopRun,
+    output_time: NDArray[np.float64],
+    input_time: NDArray[np.float64],
+) -> LoopSensitivities: ...
+
+class _LoopSets(Protocol):
+    @property
+    def states(self) -> int: ...
+    @property
+    def rows(self) -> NDArray[np.float64]: ...
+    @property
+    def amplitude(self) -> float: ...
+    @property
+    def is_ahead(self) -> bool: ...
+
+@final
+class SweepMetrics:
+    @property
+    def metrics(self) -> dict[str, NDArray[np.float64]]: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+@final
+class SweepResponses:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+
+def sweep_metrics(
+    sets: _LoopSets,
+    *,
+    steady_state: NDArray[np.float64],
     span: float,
     settling: float,
-    rise: tuple[float, float],
+    rise: _Pair,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+) -> SweepMetrics: ...
 def sweep_responses(
-    states: int,
-    rows: NDArray[np.float64],
-    amplitude: float,
-    is_ahead: bool,
-    times: NDArray[np.float64],
+    sets: _LoopSets,
+    time: NDArray[np.float64],
+    *,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
-def legendre_tables() -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+) -> SweepResponses: ...
 
-_Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
+@final
+class LegendreTables:
+    @property
+    def nodes(self) -> NDArray[np.float64]: ...
+    @property
+    def transform(self) -> NDArray[np.float64]: ...
+
+def legendre_tables() -> LegendreTables: ...
 
 @final
 class Signal:
@@ -552,45 +695,48 @@ class Signal:
         cls, edges: NDArray[np.float64], series: NDArray[np.float64], breaks: Sequence[int]
     ) -> Signal: ...
 
+class _SystemMatrices(Protocol):
+    @property
+    def states(self) -> int: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def outputs(self) -> int: ...
+    @property
+    def A(self) -> _Terms: ...
+    @property
+    def N(self) -> _Terms: ...
+    @property
+    def B(self) -> _Terms: ...
+    @property
+    def C(self) -> _Terms: ...
+    @property
+    def F(self) -> _Terms: ...
+    @property
+    def D(self) -> _Terms: ...
+
+@final
+class LinearSystemResponse:
+    @property
+    def outputs(self) -> NDArray[np.float64]: ...
+    @property
+    def states(self) -> NDArray[np.float64]: ...
+    @property
+    def inputs(self) -> NDArray[np.float64]: ...
+    @property
+    def breaks(self) -> NDArray[np.float64]: ...
+
 @final
 class LinearSystem:
-    def __new__(
-        cls,
-        states: int,
-        inputs: int,
-        outputs: int,
-        a: _Terms,
-        n: _Terms,
-        b: _Terms,
-        c: _Terms,
-        f: _Terms,
-        d: _Terms,
-    ) -> LinearSystem: ...
+    def __new__(cls, matrices: _SystemMatrices) -> LinearSystem: ...
     def simulate(
         self,
-        times: NDArray[np.float64],
+        time: NDArray[np.float64],
         state: NDArray[np.float64],
         history: Signal,
-        slopes: Signal | None,
+        history_derivative: Signal | None,
         inputs: Signal,
-    ) -> tuple[
-        NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]: ...
-
-def sampled_abscissa_grid(
-    cells: int,
-    states: int,
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    k: NDArray[np.float64],
-    l: NDArray[np.float64],
-    scale: NDArray[np.float64],
-    delay: NDArray[np.float64],
-    sample_time: NDArray[np.float64],
-    decay: float,
-    threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]: ...
+    ) -> LinearSystemResponse: ...
 
 @final
 class DelayPieces:
@@ -610,70 +756,180 @@ class DelayPieces:
     def count(self) -> int: ...
     def evaluate(self, times: NDArray[np.float64], nu: int) -> NDArray[np.float64]: ...
 
+class _DelayEvent(Protocol):
+    @property
+    def function(self) -> Callable[..., Any]: ...
+    @property
+    def direction(self) -> int: ...
+    @property
+    def terminal(self) -> int: ...
+
+class _DelayJump(Protocol):
+    @property
+    def time(self) -> float: ...
+    @property
+    def change(self) -> Callable[..., Any] | None: ...
+
+class _DelayProblem(Protocol):
+    @property
+    def fun(self) -> Any: ...
+    @property
+    def t_span(self) -> _Pair: ...
+    @property
+    def history(self) -> Any: ...
+    @property
+    def history_derivative(self) -> Callable[..., Any] | None: ...
+    @property
+    def delays(self) -> NDArray[np.float64]: ...
+    @property
+    def y0(self) -> NDArray[np.float64]: ...
+    @property
+    def neutral(self) -> bool: ...
+    @property
+    def rtol(self) -> float: ...
+    @property
+    def atol(self) -> NDArray[np.float64]: ...
+    @property
+    def t_eval(self) -> NDArray[np.float64] | None: ...
+    @property
+    def dense_output(self) -> bool: ...
+    @property
+    def events(self) -> Sequence[_DelayEvent]: ...
+    @property
+    def jumps(self) -> Sequence[_DelayJump]: ...
+    @property
+    def history_breaks(self) -> NDArray[np.float64]: ...
+    @property
+    def args(self) -> tuple[Any, ...]: ...
+    @property
+    def vectorized(self) -> bool: ...
+    @property
+    def max_step(self) -> float: ...
+    @property
+    def max_steps(self) -> int | None: ...
+    @property
+    def jac_sparsity(self) -> tuple[list[int], list[int]] | None: ...
+
 @final
 class DelayRun:
     @property
-    def times(self) -> NDArray[np.float64]: ...
+    def t(self) -> NDArray[np.float64]: ...
     @property
-    def values(self) -> NDArray[np.float64]: ...
+    def y(self) -> NDArray[np.float64]: ...
     @property
-    def event_times(self) -> list[NDArray[np.float64]]: ...
+    def t_events(self) -> list[NDArray[np.float64]]: ...
     @property
-    def event_values(self) -> list[NDArray[np.float64]]: ...
+    def y_events(self) -> list[NDArray[np.float64]]: ...
     @property
     def breaks(self) -> NDArray[np.float64]: ...
     @property
-    def calls(self) -> int: ...
+    def nfev(self) -> int: ...
     @property
-    def nodes(self) -> int: ...
+    def n_nodes(self) -> int: ...
     @property
-    def elements(self) -> int: ...
+    def n_elements(self) -> int: ...
     @property
-    def refused(self) -> int: ...
+    def n_rejected(self) -> int: ...
     @property
-    def outcome(self) -> int: ...
+    def outcome(self) -> str: ...
     @property
-    def place(self) -> float: ...
+    def end(self) -> float: ...
     @property
     def pieces(self) -> DelayPieces: ...
 
-def solve_delay_equation(
-    fun: Callable[..., Any] | tuple[int, int],
-    args: tuple[Any, ...],
-    vectorized: bool,
-    span: tuple[float, float],
-    initial: NDArray[np.float64],
-    delays: NDArray[np.float64],
-    neutral: bool,
-    history: Any,
-    history_slope: Callable[[float], Any] | None,
-    history_breaks: NDArray[np.float64],
-    tolerances: tuple[float, NDArray[np.float64]],
-    longest: float,
-    times: NDArray[np.float64] | None,
-    keep: bool,
-    sparsity: tuple[list[int], list[int]] | None,
-    most: int | None,
-    events: list[tuple[Any, int, int]],
-    jumps: list[tuple[float, Any]],
-) -> DelayRun: ...
+def solve_dde(problem: _DelayProblem) -> DelayRun: ...
 
-_Words: TypeAlias = tuple[int, int, int, int]
-_LoopFields: TypeAlias = tuple[int, float, int, float, float, float, float, int]
+@final
+class AtCommand:
+    @property
+    def sequence(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def arguments(self) -> tuple[Any, ...]: ...
 
 def at_write(commands: Sequence[tuple[str, tuple[Any, ...]]], first: int) -> bytes: ...
-def at_read(datagram: bytes) -> list[tuple[int, str, tuple[Any, ...]]]: ...
-def navdata_read(
-    packet: bytes, verify: bool
-) -> tuple[_Words, list[tuple[int, bytes, tuple[float, ...] | None]], bool]: ...
+def at_read(datagram: bytes) -> list[AtCommand]: ...
+
+@final
+class NavdataOption:
+    @property
+    def tag(self) -> int: ...
+    @property
+    def body(self) -> bytes: ...
+    @property
+    def values(self) -> tuple[float, ...] | None: ...
+
+@final
+class Navdata:
+    @property
+    def header(self) -> int: ...
+    @property
+    def state(self) -> int: ...
+    @property
+    def sequence(self) -> int: ...
+    @property
+    def vision(self) -> int: ...
+    @property
+    def options(self) -> list[NavdataOption]: ...
+    @property
+    def checksum_matches(self) -> bool: ...
+
+@final
+class NavdataLayout:
+    @property
+    def tag(self) -> int: ...
+    @property
+    def length(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def fields(self) -> list[str]: ...
+
+def navdata_read(packet: bytes, verify: bool) -> Navdata: ...
 def navdata_write(
-    head: _Words, options: Sequence[tuple[int, bytes, tuple[float, ...] | None]]
+    options: Sequence[tuple[int, bytes, tuple[float, ...] | None]],
+    *,
+    header: int,
+    state: int,
+    sequence: int,
+    vision: int,
 ) -> bytes: ...
-def navdata_layouts() -> list[tuple[int, int, str, list[str]]]: ...
+def navdata_layouts() -> list[NavdataLayout]: ...
 def navdata_full() -> list[tuple[int, int]]: ...
 def configuration_read(dump: bytes) -> list[tuple[str, str]]: ...
 def configuration_write(settings: Sequence[tuple[str, str]]) -> bytes: ...
-def loop_packet_read(packet: bytes) -> _LoopFields: ...
-def loop_packet_write(fields: _LoopFields) -> bytes: ...
+
+@final
+class LoopPacket:
+    @property
+    def sequence(self) -> int: ...
+    @property
+    def sent(self) -> float: ...
+    @property
+    def echo_sequence(self) -> int: ...
+    @property
+    def echo_sent(self) -> float: ...
+    @property
+    def held(self) -> float: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def reference(self) -> float: ...
+    @property
+    def flags(self) -> int: ...
+
+def loop_packet_read(packet: bytes) -> LoopPacket: ...
+def loop_packet_write(
+    *,
+    sequence: int,
+    sent: float,
+    echo_sequence: int,
+    echo_sent: float,
+    held: float,
+    value: float,
+    reference: float,
+    flags: int,
+) -> bytes: ...
 def doubles_read(packet: bytes, count: int) -> list[float]: ...
 def doubles_write(values: Sequence[float]) -> bytes: ...

@@ -326,7 +326,7 @@ def test_a_window_that_begins_in_flight_knows_the_commands_before_it():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"window": (6.0, 11.0)}, "nothing excites"),
+        ({"window": (6.0, 11.0)}, "does not excite"),
         ({"window": (0.0, 1.05)}, "too few"),
         ({"free": ()}, "at least one"),
         ({"free": ("delay", "mass")}, "choose from"),

@@ -59,7 +59,7 @@ def test_a_recording_may_begin_with_its_step():
     flight = dtm.Experiment.step(6.0).run(loop)
     fit = dtm.estimate_delay(flight, loop.replace(delay=None), method="waveform")
     assert (fit.delay, fit.gain) == pytest.approx((0.36, 1.0), abs=1e-6)
-    with pytest.raises(dtm.NotIdentifiableError, match="nothing excites"):
+    with pytest.raises(dtm.NotIdentifiableError, match="does not excite"):
         dtm.estimate_delay(flight, loop, method="waveform", window=(3.0, 6.0))
 
 

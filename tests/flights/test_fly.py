@@ -73,7 +73,7 @@ def test_a_programme_says_what_to_hold_when():
     assert told == [1.0] * 5 + [1.25] * 2 + [1.0] * 2
     with pytest.raises(ValueError, match=r"may come to 1\.5 m, outside"):
         programme.check(Limits(max_height=1.4))
-    with pytest.raises(ValueError, match="command more often"):
+    with pytest.raises(ValueError, match="shorter sample time"):
         StepProgramme((1.0, 1.2), (3.0, 3.0), 0.25).check(Limits())
     with pytest.raises(ValueError, match="one hold for each"):
         StepProgramme((1.0, 1.2), (3.0,))

@@ -84,7 +84,7 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--host", "127.0.0.1", "--virtual-time"), "take one"),
         (("--max-climb", "nan"), "max_climb"),
         (("--step", "-0.2"), "step"),
-        (("--step", "1e-5"), "lost in the noise"),
+        (("--step", "1e-5"), "within the noise"),
         (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),
     ],
 )

@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "deadtime"
 
 # Rooms of the Python package, in order: a file imports from its own room and from those above it in
-# this list, for types, late and in any other way.
+# this list. This includes late imports and imports for types.
 ROOMS = [
     "_base",
     "special",
@@ -37,9 +37,9 @@ NUMERICS = {"special", "dde", "roots", "systems", "loops", "stability"}
 #: The one file after the numerics that may import the native module: its wire formats.
 WIRE = "links._wire"
 
-#: Imports for types that run back, with the reason.
+#: Imports for types from a later room, with the reason.
 BACKWARDS = {
-    # A quotient of two quasi-polynomials is a transfer function: its type says so.
+    # The annotation of a quotient of two quasi-polynomials is a transfer function.
     ("roots._quasipolynomial", "systems"),
 }
 
@@ -83,7 +83,7 @@ def test_no_import_runs_back():
         allowed = ROOMS[: ROOMS.index(room(name)) + 1]
         for module, imported in imports(path):
             if module == "":
-                # The paper's reproduction is written as a user would write it.
+                # The reproduction of the paper uses the package as its users do.
                 assert imported == "_deadtime" or room(name) == "paper", f"{name}: {imported}"
             elif module != "_deadtime" and (name, room(module)) not in BACKWARDS:
                 assert room(module) in allowed, f"{name} imports {module}"
@@ -99,7 +99,7 @@ def files_used(name, path):
     """The files of its own room that a file imports."""
     for module, imported in imports(path):
         if room(module) != room(name) or module.endswith("_plots"):
-            continue  # A result draws itself by a late import of the drawing, which knows it.
+            continue  # A result imports its drawing functions late, and these import the result.
         for target in (f"{module}.{imported}", module, f"{module}.__init__"):
             if target in NAMES and target != name:
                 yield target

@@ -27,7 +27,7 @@ def estimated():
 
 def mapped():
     chart = dtm.stability_map(LOOP, {"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(3, 4))
-    assert chart.stable.shape == (3, 4)  # computed once and kept, so it is sent along
+    assert chart.stable.shape == (3, 4)  # computed once and stored, so it is pickled too
     return chart
 
 
@@ -85,7 +85,7 @@ def test_results_survive_copying_and_stay_read_only(kind, way):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_a_loop_that_was_used_survives_copying(way):
-    # What a loop keeps for speed, its native form among it, once kept it from being pickled.
+    # The cached native form of a loop could not be pickled once.
     LOOP.step_response()
     other = WAYS[way](LOOP)
     assert other == LOOP
@@ -109,7 +109,7 @@ def test_a_copied_response_is_still_measured_between_its_output_times():
     ],
 )
 def test_errors_survive_pickling(error):
-    # An error that does not survive this breaks the pool it is raised in.
+    # An error that cannot be pickled breaks the pool in which it is raised.
     for way in WAYS.values():
         other = way(error)
         assert type(other) is type(error)

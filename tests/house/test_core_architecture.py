@@ -229,7 +229,7 @@ def test_the_core_knows_nothing_of_python():
 
 
 def test_the_wire_formats_stand_alone():
-    # What reads bytes from a network has nothing around it that could be unsafe or panic.
+    # The crate that reads bytes from a network has no unsafe code and no panics.
     manifest = tomllib.loads((WIRE_FORMATS / "Cargo.toml").read_text(encoding="utf-8"))
     assert manifest["dependencies"] == {}
     table_of_contents = (WIRE_FORMATS / "src" / "lib.rs").read_text(encoding="utf-8")
@@ -247,7 +247,7 @@ def test_only_one_file_of_the_seam_knows_the_wire_formats():
 
 
 def test_the_seam_holds_no_formula():
-    # Converting needs no transcendental function; whoever needs one belongs in the core.
+    # Conversion needs no transcendental function; code that needs one belongs in the core.
     for path in rust_sources(BINDINGS):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"\.(exp|ln|sin|cos|sqrt|powi|powf)\(", text), path.name

@@ -57,8 +57,9 @@ DRAWN = {
 
 
 def drawing_methods():
-    """Every method of a public type that takes axes or is named for a drawing."""
-    for kind in (getattr(dtm, name) for name in dtm.__all__):
+    """Every drawing method of the public types of all rooms."""
+    rooms = (getattr(dtm, room) for room in dtm._ROOMS if room != "_base.errors")
+    for kind in (getattr(room, name) for room in rooms for name in room.__all__):
         if isinstance(kind, type):
             for name in ("plot", "bode", "nyquist"):
                 if callable(getattr(kind, name, None)):
@@ -71,7 +72,7 @@ def test_the_list_of_drawings_is_complete():
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_drawing_without_matplotlib_says_which_line_installs_it(name, monkeypatch):
-    # All but one raised a bare ModuleNotFoundError.
+    # All but one raised a plain ModuleNotFoundError once.
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(dtm.MissingExtraError, match=r"pip install 'deadtime\[plot\]'") as raised:
         DRAWN[name]()
@@ -101,7 +102,7 @@ def without(missing, *arguments, cwd=None):
     ],
 )
 def test_commands_that_draw_nothing_need_no_matplotlib(arguments):
-    # The command once asked for matplotlib before it looked at what it was to do.
+    # The command once required matplotlib before it examined its options.
     done = without(["matplotlib"], *arguments.split())
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)

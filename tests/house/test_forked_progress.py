@@ -13,11 +13,12 @@ import os
 import sys
 import warnings
 
-warnings.simplefilter("ignore", DeprecationWarning)  # forking with threads about is what is tested
+warnings.simplefilter("ignore", DeprecationWarning)  # the test forks a process with threads
 import deadtime as dtm
-from deadtime import _deadtime
 
 child = None
+Kp, T = dtm.parameters("Kp T")
+family, ranges = dtm.s + Kp * dtm.delay(T), {{"Kp": (0.1, 3.0), "T": (0.1, 0.5)}}
 
 
 def progress(done):
@@ -29,14 +30,14 @@ def progress(done):
 
 
 try:
-    _deadtime.spin(0.3, 2, progress)
+    # Longer than it takes for progress to be reported.
+    shape = (150, 150)
+    dtm.stability_map(family, ranges, shape, proof="cells", threads=2, progress=progress)
 except BaseException as error:
     if child == 0:
         assert {expected}, repr(error)
         abs(dtm.lambertw([1.0, 2.0], threads=2))  # new threads of its own
-        Kp, T = dtm.parameters("Kp T")
-        ranges = {{"Kp": (0.1, 3.0), "T": (0.1, 0.5)}}
-        dtm.stability_map(dtm.s + Kp * dtm.delay(T), ranges, shape=(9, 9))
+        dtm.stability_map(family, ranges, shape=(9, 9))
         os._exit(7)
     raise
 assert child > 0
@@ -54,7 +55,7 @@ print("ended", ended)
     ],
 )
 def test_a_child_forked_in_a_progress_function_does_not_hang(act, expected):
-    # It waited for ever for threads that a fork does not take along.
+    # It once waited forever for threads that do not exist in the child.
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(act=act, expected=expected)],
         capture_output=True,

@@ -89,7 +89,7 @@ def test_attributes_of_frozen_objects_cannot_be_deleted(one):
 
 @pytest.mark.parametrize("threads", [-1, 10**6, 10**30, 2.5, "2"])
 def test_numbers_of_threads_that_no_machine_has(threads):
-    # A million threads once brought the whole machine to a standstill.
+    # A million threads once made the whole machine unusable.
     A, B = dtm.parameters("A B")
     ranges = {"A": (0, 1), "B": (0, 1)}
     with pytest.raises((TypeError, ValueError), match="threads="):
@@ -100,7 +100,7 @@ def test_numbers_of_threads_that_no_machine_has(threads):
 
 @pytest.mark.parametrize(("gain", "delay"), [(1e300, 0.36), (1e-300, 0.36), (2.0, 1e-200)])
 def test_numbers_near_the_ends_of_double_precision_do_not_hang(gain, delay):
-    # The bound of the roots once bisected for ever between numbers whose product overflows.
+    # The bisection for the bound of the roots did not end if a product overflowed.
     code = (
         "import deadtime as dtm\n"
         f"try: print(dtm.ControlLoop(dtm.Integrator(), dtm.P({gain}), delay={delay}).rightmost())\n"
@@ -113,13 +113,13 @@ def test_numbers_near_the_ends_of_double_precision_do_not_hang(gain, delay):
 
 
 def test_a_refused_abscissa_says_the_true_reason():
-    # It was once said to be a constant, or to need more lines than had been drawn.
+    # The message once said that it is a constant, or that it needs more lines.
     loops = {
         omega: LOOP.replace(controller=dtm.PV(2.0, 0.3, filter=dtm.DerivativeFilter(omega)))
         for omega in (1e20, 1e100, 1e153)
     }
     ideal = LOOP.replace(controller=dtm.PV(2.0, 0.3)).spectral_abscissa()
-    # As far as squares of omega are numbers, the filter is as good as none.
+    # As long as omega squared does not overflow, such a filter has no effect.
     assert abs(loops[1e20].spectral_abscissa() - ideal) < 1e-13
     assert abs(loops[1e100].spectral_abscissa() - ideal) < 1e-13
     with pytest.raises(ValueError, match="differ too much in size for double precision"):
@@ -181,7 +181,7 @@ def test_fits_that_would_take_minutes_are_refused():
 
 @pytest.mark.parametrize("kind", ["noise", "wrong sign"])
 def test_outputs_that_do_not_respond_to_a_step_are_refused(kind):
-    # A gain at the end of its search once came back with adequate=True.
+    # A gain at the bound of its search was once returned with adequate=True.
     times = np.arange(150) * 0.065
     step = (times > 1.0).astype(float)
     output = {
@@ -237,7 +237,7 @@ def test_ctrl_c_ends_a_command_with_one_line(tmp_path):
         cwd=tmp_path,
     )
     assert process.stdout.readline() == "up\n"
-    time.sleep(0.2)  # wherever it then is: importing, reading options or counting
+    time.sleep(0.2)  # in any state: importing, reading options or counting
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130

@@ -73,7 +73,7 @@ TAKERS = {
 }
 
 
-#: Those that hand the mask on to what they return.
+#: Functions whose result has the mask of the argument.
 UFUNCS = (
     "dde_roots",
     "lambertw",
@@ -86,7 +86,7 @@ UFUNCS = (
 
 @pytest.mark.parametrize("taker", TAKERS)
 def test_no_function_takes_what_is_under_a_mask(taker):
-    # NumPy drops the mask of what it makes an array of, and 1e6 here was taken for a number.
+    # NumPy drops the mask in a conversion, and the masked 1e6 was used as a number.
     values = np.array([0.1, 1e6, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
     masked = np.ma.array(values, mask=values > 1e5)
     if taker in UFUNCS:
@@ -147,7 +147,7 @@ def test_masked_rows_of_a_recording_are_left_out(column, rows):
 @pytest.mark.parametrize("rows", [(10,), (9, 10), (10, 11)])
 @pytest.mark.parametrize("column", [1, 2])
 def test_a_masked_row_that_hides_a_step_is_refused(column, rows):
-    # The step would seem to come a row later, and the delay a row shorter.
+    # The step would appear a row later, and the delay a row shorter.
     columns = [ROWS, STEP, OUTPUT]
     columns[column] = masked(columns[column], *rows)
     with pytest.raises(dtm.RecordingError, match="the reference changes there"):

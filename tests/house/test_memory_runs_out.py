@@ -8,7 +8,7 @@ import pytest
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits the address space")
 
-#: What asks for more than there is, the room it is given beside what is in use, MiB, and the words.
+#: A call, the memory it may use in addition to that in use, MiB, and the words of its error.
 CASES = {
     "a map": (
         "dtm.stability_map(dtm.s + Kp * dtm.delay(T), RANGES, shape=(7000, 7000))",
@@ -63,7 +63,7 @@ WIDE = {{"Kp": (0.1, 30.0), "Kv": (-1, 30), "T": (0.1, 5)}}
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.8), delay=0.36, sample_time=0.065)
 ONES = np.ones(10_000_000, dtype=complex)
 STRIDED = np.linspace(0.0, 10.0, 20_000_001)[::2]
-dtm.lambertw(np.ones(100_000))  # the threads are there
+dtm.lambertw(np.ones(100_000))  # starts the threads
 LOOP.simulate([0.0, 1.0])
 used = re.search(r"VmSize:\\s+(\\d+)", open("/proc/self/status").read())[1]
 most = int(used) * 1024 + {room} * 2**20
@@ -79,7 +79,7 @@ print(dtm.lambertw(1.0).real, LOOP.simulate([0.0, 1.0]).outputs.size)
 
 @pytest.mark.parametrize("case", CASES)
 def test_memory_that_runs_out_ends_the_call_alone(case):
-    # A failed allocation of Rust ended the whole process with SIGABRT.
+    # A failed allocation in Rust once ended the whole process with SIGABRT.
     call, room, words = CASES[case]
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(room=room, call=call)],

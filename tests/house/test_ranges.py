@@ -11,7 +11,7 @@ VELOCITY = s + (Kp + Kv * s) * delay(T)
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36)
 FAST = {"threads": 1}
 
-#: What takes a range of one parameter, with something of the answer to compare.
+#: Functions that take a range of one parameter, each with a part of the result to compare.
 ASKED = {
     "map": lambda r: dtm.stability_map(
         VELOCITY, {"Kp": r, "Kv": (0, 0.5)}, (4, 3), at={"T": 0.36}, **FAST

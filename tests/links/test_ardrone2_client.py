@@ -9,7 +9,7 @@ from deadtime import FlightAbortedError, LinkError
 from deadtime.links import Limits, run
 from deadtime.links.ardrone2 import ARDrone2, Navdata, build_navdata
 from deadtime.links.ardrone2.commands import Ref, decode
-from deadtime.links.ardrone2.connection import _Door
+from deadtime.links.ardrone2.connection import _PeerFilter
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.emulator.settings import Settings
 from emulated import LIMITS, client_of, connected, emulator
@@ -140,7 +140,7 @@ def test_every_cycle_repeats_the_wish_and_no_setpoint_is_repeated_when_it_is_old
                 assert refs[0].take_off is (time - given <= LIMITS.landing_after)
             numbers = [number for _, commands in sent for number, _ in commands]
             assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-            with pytest.raises(FlightAbortedError, match="told to land"):
+            with pytest.raises(FlightAbortedError, match="commanded to land"):
                 drone.command(0.1)
             await asyncio.sleep(8.0)
             assert emulated.truth().phase is Phase.LANDED
@@ -175,7 +175,7 @@ def test_silence_while_taking_off_lands_it(begun):
             await asyncio.sleep(begun)
             drone._link.reader.accept = lambda packet, now: None  # commands still arrive
             lost = now()
-            with pytest.raises(LinkError, match="nothing heard"):
+            with pytest.raises(LinkError, match="nothing received"):
                 await taking_off
             assert now() - lost < 1.2
             with pytest.raises(LinkError, match="while landing"):
@@ -289,7 +289,7 @@ def test_silence_in_flight_is_told_and_landing_ends_in_bounded_time():
                 None
             )  # navdata no longer arrive, commands do
             lost = now()
-            with pytest.raises(LinkError, match="nothing heard"):
+            with pytest.raises(LinkError, match="nothing received"):
                 await look(drone)
             assert now() - lost == pytest.approx(1.0, abs=0.05)
             with pytest.raises(LinkError, match="while landing"):
@@ -331,7 +331,7 @@ def test_a_dead_drone_ends_the_context_in_bounded_time():
                     await look(drone)
 
             stranded = []
-            with pytest.raises(LinkError, match="nothing heard"):
+            with pytest.raises(LinkError, match="nothing received"):
                 await strand()
             assert now() - stranded[0] < 5.0
 
@@ -405,7 +405,7 @@ def test_what_a_socket_hands_on_from_elsewhere_is_counted_and_dropped():
     # A system that filters less than it should: the protocol checks address and port itself.
     async def fly():
         async with connected() as (_, drone):
-            door = _Door(drone._link.take, drone._link.reader.refuse)
+            door = _PeerFilter(drone._link.take, drone._link.reader.refuse)
             door._peer = ("127.0.0.1", 5554)
             before = (await drone.state()).sequence
             forged = build_navdata(Navdata(1 << 31, before + 1))
@@ -452,7 +452,7 @@ def test_a_setting_that_is_never_acknowledged_ends_the_handshake(monkeypatch):
 
 @pytest.mark.parametrize(
     ("piece", "said"),
-    [(b"x" * 100_000, "no end within 65536 bytes"), (b"x", "nothing came for 2 s")],
+    [(b"x" * 100_000, "no end within 65536 bytes"), (b"x", "nothing received for 2 s")],
 )
 def test_settings_that_never_end_are_not_waited_for(piece, said):
     async def trickle(reader, writer):
@@ -539,7 +539,7 @@ def test_a_drone_that_forgot_its_client_is_not_flown_on():
         async with connected() as (emulated, drone):
             await drone.take_off()
             emulated.drone._bootstrap, emulated.drone._sequence = True, 0  # it was restarted
-            with pytest.raises(LinkError, match="count anew"):
+            with pytest.raises(LinkError, match="restarted its count"):
                 await look(drone)
             emulated.drone._bootstrap = False
 

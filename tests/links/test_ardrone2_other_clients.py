@@ -176,11 +176,11 @@ async def fly_ps_drone():
         await asyncio.sleep(0.1)
         for key, value in (("general:navdata_demo", "TRUE"), ("custom:session_id", "-all")):
             await client.config(key, value)
-            for wanted in (True, False):  # waits for the bit without an end, then for its reset
+            for requested in (True, False):  # waits for the bit without an end, then for its reset
                 async with asyncio.timeout(2.0):
-                    while navdata.heard[-1][1].command_acknowledged is not wanted:
+                    while navdata.heard[-1][1].command_acknowledged is not requested:
                         await client.sleep(0.001, every=0.1)
-                if wanted:
+                if requested:
                     await client.at("CTRL", 5, 0)
         await client.at("CTRL", 5, 0)
         await client.at("CTRL", 4, 0)

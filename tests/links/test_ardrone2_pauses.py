@@ -55,7 +55,7 @@ def test_after_a_pause_beyond_the_watchdog_a_landed_drone_is_not_asked_to_take_o
             went_on = now()
             with pytest.raises(FlightAbortedError, match=rf"stood still for {pause:.0f}\."):
                 await go_on(client, going_on)
-            with pytest.raises(FlightAbortedError, match="told to land"):
+            with pytest.raises(FlightAbortedError, match="commanded to land"):
                 client.hover()
             await asyncio.sleep(0.5)
             assert drone.phase == "landed"

@@ -103,7 +103,7 @@ def test_a_setting_that_is_not_taken_back_is_warned_of(monkeypatch):
             await drone.connect()
             monkeypatch.setattr(Settings, "set", lambda self, name, value: False)
             begun = asyncio.get_running_loop().time()
-            with pytest.warns(RuntimeWarning, match="could not be put back .*control_vz_max = 7"):
+            with pytest.warns(RuntimeWarning, match="could not be restored .*control_vz_max = 7"):
                 await drone.close()
             assert asyncio.get_running_loop().time() - begun < 4.0
 

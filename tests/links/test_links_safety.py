@@ -59,8 +59,12 @@ def test_a_limit_that_limits_nothing_is_refused(name, wrong):
 def test_limits_that_contradict_each_other_are_refused():
     with pytest.raises(ValueError, match="max_height"):
         Limits(min_height=2.0, max_height=1.0)
+    with pytest.raises(ValueError, match="max_height"):
+        Limits(min_height=2.0, max_height=2.0)
     with pytest.raises(ValueError, match="landing_after"):
         Limits(command_age=2.0)
+    with pytest.raises(ValueError, match="landing_after"):
+        Limits(command_age=1.0, landing_after=1.0)
 
 
 def test_the_largest_gain_leaves_a_factor_of_two_to_instability():
@@ -103,6 +107,31 @@ def test_what_is_within_the_limits_passes():
     watch.check(STATE, now=10.29, reference=0.1)
     later = replace(STATE, time=10.1, sequence=8, vehicle_time=3.1, height=1.3, battery=None)
     watch.check(later, now=10.1)
+
+
+EXACTLY = {
+    "age": ({"time": 0.0, "vehicle_time": None}, {"now": 0.3}),
+    "missing": ({"missing": 20}, {}),
+    "roll": ({"roll": math.radians(15.0)}, {}),
+    "battery": ({"battery": 20.0}, {}),
+    "lowest": ({"height": 0.2}, {}),
+    "highest": ({"height": 3.0}, {}),
+    "error": ({"height": 1.0}, {"reference": 2.0}),
+}
+
+
+@pytest.mark.parametrize("limit", EXACTLY)
+def test_what_is_exactly_at_a_limit_passes(limit):
+    state, others = EXACTLY[limit]
+    Watch(Limits()).check(replace(STATE, **state), **{"now": 10.0, **others})
+
+
+def test_a_height_may_stand_still_for_exactly_as_long_as_the_limit_says():
+    watch = Watch(Limits())
+    for now in (0.0, 0.5, 1.0):
+        watch.check(replace(STATE, time=now, vehicle_time=None), now=now, reference=1.5)
+    with pytest.raises(FlightAbortedError, match="has read"):
+        watch.check(replace(STATE, time=1.001, vehicle_time=None), now=1.001, reference=1.5)
 
 
 def test_a_height_that_jumps_is_not_believed():

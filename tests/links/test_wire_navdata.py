@@ -47,7 +47,8 @@ def checked(packet):
 
 
 def test_the_classes_have_the_fields_of_the_native_tables():
-    for tag, _, _, names in navdata_layouts():
+    for layout in navdata_layouts():
+        tag, names = layout.tag, layout.fields
         name, kind = room._FIELDS[tag]
         if name == "clock":
             assert names == ["time"]

@@ -176,7 +176,7 @@ def test_what_such_a_loop_cannot_do_is_refused_by_name():
     with pytest.raises(ValueError, match="sensitivities"):
         loop.simulate([0.0, 1.0], sensitivities=("Kp",))
     with pytest.raises(ValueError, match="state space"):
-        dtm.sweep(loop, {"Kp": [0.1, 0.2]})
+        dtm.sweep(loop, {"Kp": (0.1, 0.2, 2)})
     with pytest.raises(ValueError, match="impulse of the command"):
         dtm.ControlLoop(INSIDE, dtm.PD(0.1, 0.1), delay=0.2).step_response()
 

@@ -210,3 +210,37 @@ def test_a_delay_of_almost_nothing_is_refused_at_once():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=1e-9)
     with pytest.raises(ValueError, match="set to zero"):
         loop.simulate([0.0, 1.0])
+
+
+# Impulses
+
+
+@pytest.mark.parametrize("delay_path", ["command", "measurement"])
+@pytest.mark.parametrize(
+    "loop",
+    [
+        dtm.ControlLoop(dtm.Integrator(0.9, 0.1), dtm.PI(1.2, 0.4), delay=0.3),
+        dtm.ControlLoop(1.0 / (dtm.s + 0.5 * dtm.delay(1.0)), dtm.P(0.7), delay=0.2),
+    ],
+    ids=["rational", "delays inside"],
+)
+def test_an_impulse_response_is_the_slope_of_the_step_response(loop, delay_path):
+    loop = loop.replace(delay_path=delay_path)
+    time = np.array([0.05, 0.41, 1.3, 2.77, 5.0])
+    step = 1e-4
+    slope = (loop.simulate(np.append(0, time + step)).outputs
+             - loop.simulate(np.append(0, time - step)).outputs)[1:] / (2 * step)  # fmt: skip
+    found = loop.impulse_response(np.append(0, time))
+    np.testing.assert_allclose(found.outputs[1:], slope, atol=1e-6)
+    assert np.isnan(found.inputs).all()
+    assert loop.impulse_response().time[-1] > 5.0
+
+
+def test_loops_without_an_impulse_response_say_so():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.25)
+    with pytest.raises(ValueError, match="sees no impulse"):
+        loop.replace(sample_time=0.1).impulse_response()
+    with pytest.raises(ValueError, match=r"limit=1\.0"):
+        loop.replace(limit=1.0).impulse_response()
+    with pytest.raises(ValueError, match="delay of this loop is None"):
+        dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0)).impulse_response()

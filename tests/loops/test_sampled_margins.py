@@ -6,6 +6,7 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.loops._sampled_margins import sampled_margins
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -29,7 +30,7 @@ LOOPS = [
     sampled(dtm.Integrator(0.85, 0.1), dtm.PID(2.0, 0.2, 0.1, SMOOTH), 0.3),
     sampled(dtm.FirstOrder(2.0, -1.0), dtm.P(-1.2), 0.2),
     sampled(dtm.FirstOrder(2.0, 0.5), dtm.PI(0.4, 0.8), 0.2),
-    sampled(dtm.RationalPlant([4.0], [1.0, 0.4, 4.0]), dtm.PI(0.05, 0.2), 0.36, 0.02),
+    sampled(dtm.RationalPlant([4.0], [1.0, 0.4, 4.0]), dtm.PI(0.05, 0.2), 0.36),
 ]
 
 
@@ -133,7 +134,8 @@ def test_fast_samples_have_the_margins_of_the_continuous_loop(controller):
 def test_no_gain_below_the_margin_is_unstable(Kp, Kv, delay, period, lag):
     loop = sampled(dtm.Integrator(0.85, lag), dtm.PV(Kp, Kv, SMOOTH), delay, period)
     assume(loop.spectral_abscissa() < -1e-3)
-    found = loop.margin()
+    # Without the delay margin, which takes matrices of up to a thousand samples.
+    found = sampled_margins(loop._sampled_gain, True, lambda: (math.nan, math.nan))
     assert radius(loop, found.gain_margin) == pytest.approx(1.0, abs=1e-7)
     for factor in np.linspace(1.0, found.gain_margin, 15)[:-1]:
         assert radius(loop, factor) < 1.0

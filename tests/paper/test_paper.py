@@ -368,7 +368,7 @@ def test_the_summary_counts_every_comparison(found):
 def test_an_unknown_part_is_refused():
     with pytest.raises(ValueError, match="table9: not one of table1"):
         paper.reproduce(only=["table9"])
-    with pytest.raises(ValueError, match="no part is asked for"):
+    with pytest.raises(ValueError, match="only is empty"):
         paper.reproduce(only=[])
 
 

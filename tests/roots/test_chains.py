@@ -95,7 +95,7 @@ def test_an_edge_that_is_almost_straight_has_the_starts_of_the_straight_one():
     # Points within 1e-9 of an edge lie on it, and then its delays have no common base: roots of
     # the difference part are counted from where Im s = 0, half a turn of mu up.
     straight, almost = (
-        s**2 + 0.5 * s * delay(1.0 + off) + 3.0 * delay(2.0) for off in (0.0, 2e-10)
+        s**2 - 0.5 * s * delay(1.0 + off) + 3.0 * delay(2.0) for off in (0.0, 2e-10)
     )
     (one,) = almost.chains()
     assert not one.periodic

@@ -217,7 +217,7 @@ REFUSED = [
     (s + K * delay(1.0), {"K": (1, 1)}, None, "below its high end"),
     (s + K * delay(1.0), {}, None, "crossings are those of one"),
     (s + T * delay(T), {"T": (0, 1)}, None, "both a factor and a delay"),
-    (s + K**2 * delay(1.0), {"K": (0, 1)}, None, "otherwise than"),
+    (s + K**2 * delay(1.0), {"K": (0, 1)}, None, "only as a factor"),
     (s + delay(T) + delay(7 * T), {"T": (0, 1)}, None, "several delays"),
     (s + 1.0 + 2.0 * s * delay(T), {"T": (0, 1)}, None, "chains"),
     (s * delay(T) + 1.0, {"T": (0, 1)}, None, "not causal"),

@@ -272,7 +272,7 @@ def test_orders_of_derivatives():
 
 
 def test_public_names():
-    assert {"QuasiPolynomial", "RootSet", "delay", "s"} <= set(dtm.__all__)
+    assert {"QuasiPolynomial", "delay", "s"} <= set(dtm.__all__)
 
 
 @pytest.mark.parametrize("h", [s + 2.0 * delay(0.36), s + (2.0 + 0.3 * s) * delay(0.36)])

@@ -315,7 +315,7 @@ def test_the_second_root_of_a_loop_of_almost_no_gain():
     assert BallCounter(h.coefficients, h.delays).rectangle((-1e3, 1.0), (-10.0, 10.0)) == 4
     assert h.count(re=(-1e3, 1), im=(-10, 10)) == 4
     # A gain of 1e-400 is none of double precision's numbers: refused, and where.
-    with pytest.raises(ContourError, match="double precision can tell"):
+    with pytest.raises(ContourError, match="double precision can resolve"):
         QuasiPolynomial([[0.0, 1e200], [1e-200, 0.0]], [0.0, 1.0]).count(re=(-1e3, 1), im=(-10, 10))
 
 

@@ -4,12 +4,12 @@ from itertools import pairwise
 
 import flint
 
-# Of Taylor polynomials next to several roots.
+# Order of Taylor polynomials next to several roots.
 ORDER = 9
 
 
 def ball_count(proof):
-    """Verify a certificate of a closed rectangle in python-flint's balls; the count.
+    """Verify a certificate of a closed rectangle in python-flint's balls and return its count.
 
     Each segment: g on the whole of it, by the mean value form over balls, or in a disc by its
     Taylor polynomial; then the turns of arg h between the ends of segments, as principal arguments
@@ -56,8 +56,8 @@ def ball_count(proof):
                 total += (horner(primed, z) - gap * horner(row, z)) * (-z * gap).exp()
             return total
 
-        def crowded_turn(part):
-            """Turn of g, which keeps to a disc without 0 by its Taylor polynomial at the middle."""
+        def taylor_turn(part):
+            """Change of arg g, whose Taylor polynomial shows that it stays in a disc without 0."""
             middle = ball(part.middle)
             radius = max(abs(part.end - part.middle), abs(part.middle - part.start))
             reach = arb(radius) * (1 + arb(2) ** -50)
@@ -81,7 +81,7 @@ def ball_count(proof):
             for part in contour.segments:
                 turned -= taus[part.reference] * (arb(part.end.imag) - arb(part.start.imag))
                 along = arb(0)
-                # In eight pieces: a rectangle of balls is wider than the disc.
+                # In eight pieces, because a rectangle of balls is wider than the disc.
                 ends = [part.start + k / 8 * (part.end - part.start) for k in range(8)] + [part.end]
                 for start, end in pairwise(ends):
                     a, b = ball(start), ball(end)
@@ -89,7 +89,7 @@ def ball_count(proof):
                     first, last = g(a, part.reference), g(b, part.reference)
                     over = (first + slope(hull, part.reference) * (hull - a)) / first
                     if not over.real > 0:
-                        along = crowded_turn(part)
+                        along = taylor_turn(part)
                         break
                     along += (last / first).arg()
                 turned += along

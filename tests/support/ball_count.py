@@ -1,13 +1,13 @@
-"""Roots of quasi-polynomials counted in ball arithmetic: a second opinion that shares nothing.
+"""Roots of quasi-polynomials counted in ball arithmetic, without any code of the package.
 
-h(s) = Σ p_j(s) e^(−s τ_j) has as many roots in a polygon as arg h turns along it, over 2π. With a
-row c as reference, arg h = arg g − τ_c Im s, g = Σ p_j(s) e^(−s(τ_j−τ_c)). On a piece with middle
-m and half length r, Taylor's formula gives |g − g(m)| ≤ |g′(m)| r + B r²/2, B a bound on |g″| over
-the ball that covers the piece. Where that is below 0.9 |g(m)|, arg g stays within 65° of arg g(m),
-so that the change between the ends is the principal one; elsewhere the piece is divided. All of it
-in python-flint's balls: nothing can overflow, every rounding is carried along, and the precision is
-raised from 64 bits to 448 where a value is not known to 1 part in 100. Numbers given as floats are
-taken exactly. What cannot be decided is an error, never a number.
+h(s) = Σ p_j(s) e^(−s τ_j) has as many roots in a polygon as the change of arg h along it, divided
+by 2π. With a row c as reference, arg h = arg g − τ_c Im s, g = Σ p_j(s) e^(−s(τ_j−τ_c)). On a piece
+with middle m and half length r, Taylor's formula gives |g − g(m)| ≤ |g′(m)| r + B r²/2, B a bound
+on |g″| over the ball that covers the piece. Where that is below 0.9 |g(m)|, arg g stays within 65°
+of arg g(m), so that the change between the ends is the principal one; elsewhere the piece is
+divided. Everything is computed in python-flint's balls: nothing overflows, every rounding error is
+bounded, and the precision is raised from 64 bits to 448 where a value is not known to 1 part in
+100. Numbers given as floats are taken exactly. What cannot be decided is an error, never a number.
 """
 
 import math
@@ -19,15 +19,16 @@ from flint import acb, acb_poly, arb
 
 PRECISIONS = (64, 112, 224, 448)
 
-# Corners and coefficients: products of few doubles are exact, exponents far apart nearly so.
+# Bits of corners and coefficients: products of few doubles are exact, or nearly so if their
+# exponents differ much.
 EXACT_BITS = 1200
 
-# Bisections of one edge: far beyond what a root 1e-30 of its length away takes.
+# Bisections of one edge: many more than for a root at a distance of 1e-30 of its length.
 DEEPEST = 160
 
 
 class OnContourError(Exception):
-    """A root is on the contour, or closer to it than the highest precision can tell."""
+    """A root is on the contour, or closer to it than the highest precision resolves."""
 
     def __init__(self, place):
         super().__init__(f"a root on the contour near {place}")
@@ -118,7 +119,7 @@ class BallCounter:
         return total.abs_upper()
 
     def _known(self, z, c, evaluate):
-        """`evaluate` at the lowest precision that tells the value from 0 to 1 part in 100."""
+        """`evaluate` at the lowest precision that gives the value to 1 part in 100."""
         for bits in PRECISIONS:
             with precision(bits):
                 found = evaluate(z, c)
@@ -129,7 +130,7 @@ class BallCounter:
         raise OnContourError(middle_of(z))
 
     def condition(self, z):
-        """Σ |b_jk s^k e^(−sτ_j)| over |h| at a complex number: how much of the terms cancels."""
+        """Σ |b_jk s^k e^(−sτ_j)| over |h| at a complex number: how much the terms cancel."""
         z = acb(z.real, z.imag)
         with precision(PRECISIONS[-1]):
             size, total = z.abs_upper(), arb(0)
@@ -212,7 +213,7 @@ class BallCounter:
             return self._revolutions(turned, 2 * arb.pi())
 
     def rectangle(self, re, im):
-        """Roots with Re s and Im s in the open ranges; half the way where it is its own mirror."""
+        """Roots with Re s and Im s in the open ranges; uses symmetry to the real axis."""
         (a, b), (c, d) = map(exact, re), map(exact, im)
         if c + d != 0:
             return self.polygon([(a, c), (b, c), (b, d), (a, d)])
@@ -225,13 +226,13 @@ class BallCounter:
             return self._revolutions(turned, arb.pi())
 
     def upper_rectangle(self, re, height):
-        """Roots with 0 ≤ Im s < `height`, those on the real axis among them."""
+        """Roots with 0 ≤ Im s < `height`, including those on the real axis."""
         both, real = self.rectangle(re, (-height, height)), self.real(re)
         assert (both + real) % 2 == 0
         return (both + real) // 2
 
     def disc(self, center, radius, sides=4):
-        """Roots inside the regular polygon of so many sides that touches a disc from outside."""
+        """Roots inside the regular polygon with this number of sides around a disc."""
         with precision(EXACT_BITS):
             r = exact(radius)
             if sides == 4:
@@ -248,7 +249,7 @@ class BallCounter:
         return self.polygon(corners)
 
     def right_of(self, sigma):
-        """Roots with Re s > `sigma`, a line right of the chains."""
+        """Roots with Re s > `sigma`, where the line is to the right of the chains."""
         radius = self.outermost(sigma)
         with precision(EXACT_BITS):
             if not (radius > exact(sigma)):
@@ -283,7 +284,7 @@ class BallCounter:
         raise ValueError("no radius within the range of doubles")
 
     def real(self, re):
-        """Real roots in an open interval whose ends are none; an error at multiple ones.
+        """Real roots in an open interval whose ends are no roots; an error at multiple ones.
 
         But for one at 0 that stands in the coefficients, as a power of s that all have in common.
         """
@@ -303,7 +304,7 @@ class BallCounter:
             if self.pieces > self.max_pieces:
                 raise TooManyPiecesError(f"more than {self.max_pieces} pieces")
             with precision(EXACT_BITS):
-                # Not in the middle: roots like to be there.
+                # Not in the middle, where roots of symmetric cases often are.
                 m = a + (b - a) * arb(27) / 64
             c = self.leading_row(m)
             with precision(PRECISIONS[-1]):

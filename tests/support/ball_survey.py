@@ -1,4 +1,4 @@
-"""Counts, roots and rightmost roots of random troublesome functions against ball arithmetic.
+"""Counts, roots and rightmost roots of random hard functions against ball arithmetic.
 
 ``python tests/support/ball_survey.py --cases 10000 --seed 1`` prints every case that is not
 equal and a table at the end; ``--only NUMBER`` repeats one case and prints the function.
@@ -17,21 +17,21 @@ from deadtime._base.errors import ContourError
 from flint import arb
 from trouble import trouble
 
-# A root this close to the edge, relative to its modulus, is a reason to refuse.
+# A root whose relative distance to the edge is smaller than this justifies a refusal.
 NEAR = 1e-9
 
-# Tests in the survey below, in the order of the table.
+# Questions of the survey, in the order of the table.
 QUESTIONS = ("count", "half plane", "sum of roots", "discs", "beside a root", "rightmost")
 
 
 class Package:
-    """Asks the package, and adds up the time it takes."""
+    """Calls the package and measures the total time."""
 
     def __init__(self):
         self.seconds = 0.0
 
     def __call__(self, ask):
-        """A value or an error."""
+        """The value or the error of a call."""
         start = time.perf_counter()
         try:
             return ask()
@@ -42,7 +42,7 @@ class Package:
 
 
 def refusal(counter, error):
-    """Why the package refused.
+    """The reason for a refusal of the package.
 
     'near': a root is where it says. 'drowned': none is, but there the rounding of the terms in
     double precision is above 1/16 of |h|. 'clear': not even that.
@@ -67,14 +67,14 @@ def region_count(counter, case):
 
 
 def discs_right(counter, found):
-    """Are the discs disjoint, and does each hold its multiplicity?"""
+    """Whether the discs are disjoint and each contains as many roots as its multiplicity."""
     for k, (z, r, m) in enumerate(
         zip(found.roots.tolist(), found.radii.tolist(), found.multiplicities.tolist(), strict=True)
     ):
         gaps = np.abs(found.roots - z) - found.radii - r
         if (np.delete(gaps, k) < 0).any():
             return f"the disc about {z} meets another"
-        # An exact root at 0, and mirror images.
+        # An exact root at 0, and conjugate roots.
         if r == 0.0 or (z.imag < 0 and z.conjugate() in found.roots):
             continue
         held = None
@@ -101,7 +101,7 @@ def beside_a_root(case, found):
 
 
 def examine(case, ask_package):
-    """Verdict per question: 'equal', 'refused …', 'wrong: …' or 'unknown' where balls give up."""
+    """Verdict per question: 'equal', 'refused …', 'wrong: …' or 'unknown' if undecided."""
     h = dtm.QuasiPolynomial(case.coefficients, case.delays)
     counter = BallCounter(case.coefficients, case.delays, max_pieces=40_000)
     verdicts, places = {}, {}
@@ -143,7 +143,7 @@ def examine(case, ask_package):
             if found.counted != found.multiplicities.sum():
                 verdicts["sum of roots"] = f"wrong: counted {found.counted}, not {wanted}"
             elif found.counted != wanted and case.im[0] == 0.0:
-                # Discs that meet the axis are documented to count with all their roots.
+                # All roots of a disc that meets the axis are counted, as documented.
                 below = found.multiplicities[abs(found.roots.imag) <= found.radii] - 1
                 if 0 < found.counted - wanted <= below.sum():
                     verdicts["sum of roots"] = "cluster on the axis"
@@ -172,7 +172,7 @@ def examine(case, ask_package):
             counter.pieces = 0
             judge("rightmost", first, 0)
         elif len(first):
-            # Roots that tie are listed by centres: the edge is that of the disc furthest right.
+            # Roots with equal real parts are ordered by centres: take the rightmost disc.
             z, r = max(
                 zip(first.roots.tolist(), first.radii.tolist(), strict=True),
                 key=lambda disc: disc[0].real + disc[1],
@@ -180,7 +180,7 @@ def examine(case, ask_package):
 
             def beyond():
                 with precision(EXACT_BITS):
-                    # Beyond the disc by 1e-24 of the modulus: the root may be at its very edge.
+                    # Beyond the disc by 1e-24 of the modulus, because the root may be on its edge.
                     edge = arb(z.real) + arb(r) + arb(1e-24) * arb(abs(z) or 1.0)
                 return counter.right_of(edge)
 
@@ -193,7 +193,7 @@ def examine(case, ask_package):
                 if held is not None:
                     verdicts["rightmost"] = held if held == "unknown" else f"wrong: {held}"
         elif h.kind == "retarded":
-            # There are infinitely many, and one is rightmost.
+            # There are infinitely many roots, and one of them is rightmost.
             verdicts["rightmost"] = "refused: empty"
             places["rightmost"] = str(first.region[0])
         else:

@@ -1,4 +1,4 @@
-"""The command `deadtime`, run in this process: starting one costs more than most of them take."""
+"""The command `deadtime`, run in this process, because starting a process takes longer."""
 
 import io
 import json
@@ -11,7 +11,7 @@ from deadtime._cli.app import run as run_command
 
 
 def run(*arguments, cwd="."):
-    """What a process of its own would end with; the real ones are in `test_cli_failures`."""
+    """Exit code and output of a command; `test_cli_failures` runs real processes."""
     command = ["deadtime", *map(str, arguments)]
     out, err = io.StringIO(), io.StringIO()
     with (
@@ -29,14 +29,14 @@ def run(*arguments, cwd="."):
 
 
 def found(*arguments, cwd="."):
-    """What a command says with `--json`."""
+    """The output of a command with `--json`."""
     result = run(*arguments, "--json", cwd=cwd)
     assert result.returncode == 0, result.stderr
     return json.loads(result.stdout)
 
 
 def one_clear_line(result):
-    """What a command that failed says on standard error: something, and no traceback."""
+    """The standard error of a command that failed: not empty, and no traceback."""
     assert result.returncode not in (0, None)
     assert "Traceback" not in result.stderr
     assert result.stderr.strip(), "nothing was said"

@@ -11,7 +11,7 @@ LIMITS = Limits(max_climb=1.0)
 
 
 def skip_if_too_busy(said):
-    """Skip where a flight in real time was ended because this machine did not keep up."""
+    """Skip if a flight in real time was ended because this machine was too slow."""
     said = str(said)
     if any(word in said for word in ("messages in a row", "s old, more than", "no command for")):
         pytest.skip(f"this machine was too busy for real time: {said}")
@@ -44,7 +44,7 @@ async def connected(limits=LIMITS, full=True, **options):
 
 
 def connecting(limits=LIMITS, full=True, **options):
-    """What the experiment takes: a context manager whose value is a connected vehicle."""
+    """The argument of the experiment: a context manager that gives a connected vehicle."""
 
     @asynccontextmanager
     async def connect():

@@ -1,4 +1,4 @@
-"""Recordings of real flights, read from where they lie; nothing of them is copied."""
+"""Recordings of real flights, read from a folder beside the project."""
 
 from pathlib import Path
 

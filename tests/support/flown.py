@@ -1,4 +1,4 @@
-"""Flights of the estimation benchmark: one step of an integrator, its sensor noisy."""
+"""Recordings of the estimation benchmark: one step of an integrator with sensor noise."""
 
 import deadtime as dtm
 import numpy as np
@@ -21,7 +21,7 @@ def fly(
     size=1.0,
     noise_in_loop=True,
 ):
-    """A flight with its command logged, and what is known of its loop."""
+    """A recording with its command logged, and its loop without the delay."""
     loop = dtm.ControlLoop(
         dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=ts, limit=limit
     )
@@ -36,18 +36,18 @@ def fly(
 
 
 def swapped(recording, **signals):
-    """The recording with other signals in it."""
+    """The recording with other signals."""
     parts = {name: getattr(recording, name) for name in ("time", "reference", "output", "command")}
     return dtm.Recording(**parts | signals)
 
 
 def noise_for_output(recording, seed=0):
-    """The recording with nothing but noise as its output."""
+    """The recording with noise alone as its output."""
     random = np.random.default_rng(seed)
     return swapped(recording, output=random.normal(size=len(recording)))
 
 
-#: The rows of the benchmark: what each flight is like.
+#: The rows of the benchmark: the parameters of each recording.
 CASES = {
     "continuous, Kp 1.31": {"ts": None, "dt": 0.01, "limit": None, "noise": 0.01},
     "continuous, Kp 3": {"ts": None, "dt": 0.01, "limit": None, "noise": 0.01, "Kp": 3.0},
@@ -63,7 +63,7 @@ CASES = {
 
 
 def errors_of(case, runs, method, **options):
-    """Errors of the delay in ms over flights with different noise, and the estimates."""
+    """Errors of the delay in ms over recordings with different noise, and the estimates."""
     what = CASES[case]
     noise_in_loop = what.get("ts", TS) is not None
     found, errors = [], []

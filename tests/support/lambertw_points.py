@@ -1,4 +1,4 @@
-"""Arguments of Lambert W, and what compares its results bit by bit."""
+"""Arguments of Lambert W, and functions that compare its results bit by bit."""
 
 import math
 
@@ -9,7 +9,7 @@ import numpy as np
 EPS = 2.0**-52
 # The double next to -1/e; it lies below -1/e by 1.2e-17.
 BRANCH_POINT = -0.36787944117144233
-# Long enough for the thread pool whatever the kernel's speed, short enough to be quick.
+# Long enough for the thread pool at any speed of the kernel, and short enough for a test.
 LARGE = 60_001
 
 

@@ -1,4 +1,4 @@
-"""A drone that does the worst a real one might, to hold a client against.
+"""A drone with the worst possible behaviour of a real one, to test a client.
 
 It takes off whenever the take-off bit is set, from a landing and from the ground, and follows a
 motion until its own watchdog lands it. Rising and landing are quick, so that a flight is short.
@@ -36,7 +36,7 @@ class _Reading(asyncio.Protocol):
 
 
 class LevelDrone:
-    """`uplink` and `late` are how long commands and navdata are on their way, s.
+    """`uplink` and `late` are the times of travel of commands and navdata, s.
 
     `told` has all datagrams, when they were sent, and when the drone had begun to come down last.
     """
@@ -101,14 +101,14 @@ class LevelDrone:
         self.advance(now)
 
     def _deliver(self, packet):
-        """To the socket of the client, who may not read it at the moment."""
+        """Send to the socket of the client, which may not read it at the moment."""
         if not self.held and not self.backlog:
             self.navdata.sendto(packet, self.peer)
         elif len(self.backlog) < ROOM:
             self.backlog.append(packet)
 
     def stand_still(self, duration):
-        """The client's program does nothing for so long, in virtual time; the drone goes on."""
+        """Pause the client's program for this virtual time; the drone continues."""
         loop = asyncio.get_running_loop()
         end, self.held = loop.time() + duration, True
         while loop.time() < end:
@@ -131,7 +131,7 @@ class LevelDrone:
         self.phase, self.since = phase, time
 
     def advance(self, now):
-        """Everything up to now, at its time."""
+        """Process all events up to now, each at its time."""
         while True:
             tick = self.time + self.tick
             arrival = self.coming[0][0] if self.coming else now + 1.0
@@ -213,6 +213,6 @@ async def level(limits=Limits(max_climb=1.0), **how):  # noqa: B008
         LevelDrone(**how) as drone,
         ARDrone2("127.0.0.1", limits, **drone.ports) as client,
     ):
-        # What was sent is with the drone, also if the program then stands still.
+        # Sent datagrams have reached the drone, also if the program pauses afterwards.
         client._link._commands.sendto = lambda data: drone._sent(data, None)
         yield drone, client

@@ -1,10 +1,10 @@
-"""Packets of navdata that real drones have sent, read from where they lie."""
+"""Packets of navdata that real drones have sent, read from a folder beside the project."""
 
 import struct
 
 from flights import flight_path
 
-#: A packet of a drone that waits to be configured, as it was captured.
+#: A captured packet of a drone that waits to be configured.
 BOOTSTRAP = bytes.fromhex("88776655100c804f0100000000000000ffff0800a6020000")
 
 

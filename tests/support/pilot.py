@@ -20,7 +20,7 @@ WAKE = b"\x01\x00\x00\x00"
 
 
 class Pilot:
-    """A client without sockets: sends commands at its times and reads the navdata that come."""
+    """A client without sockets: sends commands at given times and reads the navdata."""
 
     def __init__(self, **options):
         options.setdefault("noise", 0.0)
@@ -67,7 +67,7 @@ class Pilot:
         return self
 
     def fly(self):
-        """Take off and hover until everything has settled."""
+        """Take off and hover until the drone is at rest."""
         self.wait(12.0, UP)
         assert self.truth.phase is Phase.FLYING
         return self

@@ -12,16 +12,16 @@ CASES = {
     )["cases"]
 }
 
-# A root lies exactly on an edge.
+# Cases with a root exactly on an edge.
 ROOT_ON_AN_EDGE = {"on_contour"}
 
-# No rightmost root: chains lie as far right or further.
+# Cases without a rightmost root: chains lie as far right or further.
 CHAINS_LEAD = {"tdscontrol_2.6_tau2=2", "tdscontrol_2.6_tau2=2.05", "diff_26"}
 
-# The reference knows the rightmost root of the region only.
+# Cases whose reference is the rightmost root of the region only.
 REGION_ONLY = {"high_freq"}
 
-# Slack for the centre's own last bit where a radius is that small.
+# Tolerance for the last bit of the centre where a radius is that small.
 ULP = 2.3e-16
 
 

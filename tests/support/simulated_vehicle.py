@@ -1,4 +1,4 @@
-"""A vehicle that is nothing but a height model, for tests in virtual time."""
+"""A vehicle that consists of a height model only, for tests in virtual time."""
 
 import asyncio
 
@@ -9,7 +9,7 @@ KIT = (0.15265, 5.1529, 5.820)
 
 
 class SimulatedVehicle:
-    """Flies the kit's height model behind a delay; `trouble` may change any state it reports."""
+    """The kit's height model with a delay; `trouble` may change any state that it reports."""
 
     def __init__(self, delay=0.26, noise=0.0, random=None, trouble=None, tells_climb=True):
         self.delay, self.noise, self.random = delay, noise, random
@@ -72,7 +72,7 @@ class SimulatedVehicle:
         return late[-1] if late else 0.0
 
     async def _fly(self):
-        """5 ms at a time, exact for a held setpoint but for where in them it changes."""
+        """Steps of 5 ms, exact for a setpoint that changes between steps only."""
         b1, b0, a = KIT
         step, slow, began = 0.005, 0.0, self.clock()
         while True:

@@ -1,4 +1,4 @@
-"""Random transfer functions, loops with margins, and what rounding may do to their values."""
+"""Random transfer functions, loops with margins, and bounds on the rounding of their values."""
 
 import deadtime as dtm
 import numpy as np
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 numbers = st.floats(-5, 5, allow_subnormal=False).map(lambda x: round(x, 3))
 times = st.floats(0, 2, allow_subnormal=False).map(lambda x: round(x, 3))
-# Not so close to 0 that its powers underflow: 0 is a point of its own.
+# Not so close to 0 that powers underflow; 0 itself is included.
 points = st.complex_numbers(max_magnitude=3, allow_subnormal=False).filter(
     lambda z: z == 0 or abs(z) > 1e-50
 )
@@ -31,13 +31,13 @@ def transfer_functions(draw):
 
 
 def terms(h, z):
-    """Sum of the moduli of the terms of h: what its rounding error is measured against."""
+    """Sum of the moduli of the terms of h, the scale of its rounding error."""
     powers = abs(z) ** np.arange(h.degree + 1)
     return float(np.exp(-z.real * h.delays) @ (np.abs(h.coefficients) @ powers))
 
 
 def error(G, z):
-    """Bound on the rounding error of G(z): the terms are few and the powers low."""
+    """Bound on the rounding error of G(z), for few terms and low powers."""
     n, d = abs(G.num(z)), abs(G.den(z))
     return 1e-13 * (terms(G.num, z) + n / d * terms(G.den, z)) / d
 
@@ -56,6 +56,6 @@ LOOPS = [
     (1 + 0.4 * s) * delay(0.2) / (s * (s + 1 + 0.3 * delay(1.5))),
     0.9 * (s + 0.2) / (s + 2) * delay(0.5),
     5.0 / (s + 1) ** 3,
-    # Three crossings, the least delay at the last.
+    # Three crossings; the last has the least delay.
     2.0 / s + 0.5 * s / (s**2 + 0.05 * s + 25),
 ]

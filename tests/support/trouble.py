@@ -1,9 +1,9 @@
-"""Random quasi-polynomials and regions that aim at trouble, reproducible from a seed and a number.
+"""Random quasi-polynomials and regions that are hard to count, reproducible from seed and number.
 
-Each case is one of the KINDS below and a rectangle of about 0 to 60 roots, a fifth of them with an
-edge that passes a planted root at 1e-13 to 0.1 of its size. The floats that come out are the
-function: expanding a product rounds its coefficients, which splits multiple roots by a little, and
-that little is what is asked for.
+Each case is one of the KINDS below and a rectangle of about 0 to 60 roots. A fifth of the
+rectangles have an edge whose distance from a given root is 1e-13 to 0.1 of its modulus. The
+resulting floats define the function: expanding a product rounds its coefficients, which separates
+multiple roots slightly, and the roots so separated are part of the test.
 """
 
 import math
@@ -14,7 +14,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Trouble:
-    """A function, a region that may hold hard places, and a line right of its chains."""
+    """A function, a region that may contain hard cases, and a line to the right of its chains."""
 
     number: int
     kind: str
@@ -121,7 +121,7 @@ def difference(rng):
 
 
 def near_multiple(rng):
-    """(s−a)(s−a−ε)… times a loop, or plus a little of it."""
+    """(s−a)(s−a−ε)… times a loop, or plus a small multiple of it."""
     a, h = round(float(rng.normal()), int(rng.integers(0, 4))), {0.0: np.ones(1)}
     for k in range(int(rng.integers(2, 5))):
         eps = float(k and rng.choice([0.0, 1.0]) * 10.0 ** rng.uniform(-10, -1))
@@ -134,7 +134,7 @@ def near_multiple(rng):
 
 
 def near_multiple_pair(rng):
-    """A pair of complex roots twice or thrice, nearly."""
+    """A pair of complex roots of multiplicity nearly two or three."""
     a, w, h = float(rng.normal()), float(rng.uniform(0.1, 10)), {0.0: np.ones(1)}
     for k in range(int(rng.integers(2, 4))):
         eps = float(k and rng.choice([0.0, 1.0]) * 10.0 ** rng.uniform(-10, -1))
@@ -144,7 +144,7 @@ def near_multiple_pair(rng):
 
 
 def loops_squared(rng):
-    """(s + k e^(−sT))² with a little more, k T around 1/e among them, or cubed."""
+    """(s + k e^(−sT))² or its cube with a small perturbation, also with k T around 1/e."""
     T = float(10 ** rng.uniform(-1, 1))
     k = float(rng.normal()) if rng.random() < 0.5 else math.exp(-1) / T * (1 + tiny(rng))
     loop = {0.0: np.array([0.0, 1.0]), T: np.array([k])}
@@ -159,7 +159,7 @@ def tiny(rng):
 
 
 def on_the_axes(rng):
-    """A root planted on the real or on the imaginary axis, or anywhere, twice at times."""
+    """A root at a given point of the real or imaginary axis or the plane, sometimes double."""
     h = [retarded, neutral][rng.integers(2)](rng)[0]
     size = float(10 ** rng.uniform(-1, 1))
     z = [complex(size), complex(-size), complex(0, size), complex(0.3 * size, size)][
@@ -207,11 +207,11 @@ def size_of(h, place):
 
 
 def trouble(seed, number):
-    """Case `number` of those of a seed."""
+    """Case `number` of a seed."""
     rng = np.random.default_rng([seed, number])
     kind = list(KINDS)[rng.integers(len(KINDS))]
     h = {}
-    # Planting a root may take away all there is.
+    # Adding a root may leave the zero function.
     while not h:
         h, place = KINDS[kind](rng)
         h = {t: p for t, p in h.items() if np.any(p)}
@@ -224,7 +224,7 @@ def trouble(seed, number):
     a = middle - width * rng.uniform(0.05, 1)
     b = middle + width * rng.uniform(0.05, 1)
     if span:
-        # Not so far left that roots of the chains would be rounding alone.
+        # Not so far left that the values at roots of the chains are rounding errors alone.
         a = max(a, -30.0 / span)
         b = max(b, a + 0.1 * width)
     d = height * rng.uniform(0.3, 1)

@@ -101,6 +101,12 @@ def test_crossings_of_gain_and_delay():
         loop.crossings({"Kp": (0, 1)})
 
 
+def test_the_sensitivity_is_that_of_the_closed_loop():
+    G = 2.0 / s * delay(0.36)
+    points = 1j * np.array([0.1, 1.0, 3.0])
+    np.testing.assert_allclose(G.sensitivity()(points), 1.0 / (1.0 + G(points)), rtol=1e-14)
+
+
 def test_a_delay_beside_the_coefficients():
     assert dtm.TransferFunction([2.0], [1.0, 0.0], delay=0.36) == 2.0 / s * delay(0.36)
     with pytest.raises(ValueError, match="delay"):

@@ -211,8 +211,8 @@ def test_pictures_are_labelled(pyplot, G):
 
 def test_plots_use_the_axes_that_are_given(pyplot):
     _, axes = pyplot.subplots(2, 1)
-    assert TransferFunction(s * delay(0.1)).bode([0.1, 1.0, 10.0], axes=axes) is axes
+    assert TransferFunction(s * delay(0.1)).bode([0.1, 1.0, 10.0], ax=axes) is axes
     _, ax = pyplot.subplots()
     assert (1 / (s + 1)).nyquist([0.1, 1.0], ax=ax) is ax
-    with pytest.raises(ValueError, match="axes has 1"):
-        (1 / s).bode(axes=[ax])
+    with pytest.raises(ValueError, match="ax has 1"):
+        (1 / s).bode(ax=[ax])

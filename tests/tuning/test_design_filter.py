@@ -44,7 +44,7 @@ def test_design_chooses_a_filter_itself(choice):
     best = dtm.design(LOOP, fixed={"Kp": 2.0}, filter="auto")
     assert best.filter_choice.omega == choice.omega
     assert best.gains == choice.design.gains
-    assert best.traded[-1].demand == "filter"
+    assert best.traded[-1].requirement == "filter"
     assert "filter at" in best.summary()
 
 

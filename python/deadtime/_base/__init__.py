@@ -1,1 +1,1 @@
-"""What every room uses: errors, checked arguments, frozen results, processes, drawing, pages."""
+"""What every room uses: errors, arguments, frozen results, processes, progress, drawing, pages."""

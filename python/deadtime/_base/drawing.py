@@ -1,4 +1,4 @@
-"""What every drawing uses. Matplotlib is imported when something is drawn, not before."""
+"""Figures and axes for all drawings. Matplotlib is imported when something is drawn."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def check_matplotlib() -> None:
 
 
 def empty_figure(width: float, height: float) -> Figure:
-    """A figure that belongs to nobody's window, without axes."""
+    """Make a figure without a window and without axes."""
     check_matplotlib()
     from matplotlib.figure import Figure
 
@@ -53,9 +53,9 @@ def empty_figure(width: float, height: float) -> Figure:
 def new_figure(
     width: float = 7.0, height: float = 4.0, rows: int = 1, columns: int = 1, even: bool = False
 ) -> tuple[Figure, Any]:
-    """A figure that belongs to nobody's window, and its axes; rows share their x axis.
+    """Make a figure without a window, and its axes; rows share their x axis.
 
-    The first row is the highest unless they are to be even.
+    The first row is the highest one unless `even` is true.
     """
     figure = empty_figure(width, height)
     ratios = None if rows == 1 or even else [3.0, *([1.0] * (rows - 1))]
@@ -76,12 +76,16 @@ def shown_axes(ax: Axes | None) -> Axes:
     return pyplot.subplots(layout="constrained")[1]
 
 
-def shown_rows(axes: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
+def shown_rows(ax: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
     """The given axes, or those of a new pyplot figure below one another."""
-    if axes is not None:
-        if len(axes) != rows:
-            raise ValueError(f"axes has {len(axes)} of them: give {rows}")
-        return axes
+    if ax is not None:
+        try:
+            given = len(ax)
+        except TypeError as error:
+            raise TypeError(f"ax={ax!r}: give a sequence of {rows} axes") from error
+        if given != rows:
+            raise ValueError(f"ax has {given} axes: give {rows}")
+        return ax
     check_matplotlib()
     from matplotlib import pyplot
 
@@ -91,8 +95,8 @@ def shown_rows(axes: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
 def as_svg(figure: Figure, name: str) -> str:
     """A figure as an SVG element to be put into a page; the same picture gives the same text.
 
-    Matplotlib names the parts of every picture alike; `name` before them tells the pictures of
-    one page apart.
+    Matplotlib gives the parts of every picture the same identifiers; `name` before them makes
+    those of one page different.
     """
     import matplotlib
 

@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions that carry the evidence.
+"""The exceptions of the package, which carry the evidence.
 
 Bad arguments are `ValueError` or `TypeError`; everything else derives from `DeadtimeError`.
 """
@@ -117,7 +117,7 @@ class MissingExtraError(DeadtimeError, ImportError):
 
 
 class WorkerError(DeadtimeError, RuntimeError):
-    """Other processes that were to work cannot start, or were killed."""
+    """Worker processes cannot start, or were killed."""
 
 
 class LinkError(DeadtimeError):

@@ -1,4 +1,4 @@
-"""Results that do not change, also after they were pickled or copied."""
+"""Immutable results, also after pickling and copying."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pages are made of: one file without anything to fetch, with its style and its pictures."""
+"""HTML pages in one file, with their style and pictures in it: nothing is loaded from elsewhere."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ def page(title: str, body: Iterable[str], style: str = "") -> str:
 
 
 def write_page(text: str, path: Path) -> Path:
-    """Write a page to `path`, its folder being made where it is not there, and return it."""
+    """Write a page to `path`, creating its folder where necessary, and return the path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
     return path
 
 
 def table_row(cells: Sequence[str], tag: str, width: int) -> str:
-    """A row; its last cell spans what is left of `width` columns."""
+    """Make a row; its last cell spans the remaining ones of `width` columns."""
     span = width - len(cells) + 1
     scope = ' scope="col"' if tag == "th" else ""
     opened = [f"<{tag}{scope}>"] * (len(cells) - 1)
@@ -67,7 +67,7 @@ def table_row(cells: Sequence[str], tag: str, width: int) -> str:
 
 
 def table(heads: Sequence[str], rows: Iterable[str], title: str = "") -> str:
-    """A table of rows that are made already."""
+    """Make a table from rows in HTML."""
     caption = f"<caption>{escaped(title)}</caption>" if title else ""
     return f"<table>{caption}{table_row(heads, 'th', len(heads))}{''.join(rows)}</table>"
 
@@ -83,5 +83,5 @@ def picture(name: str, figure: Figure, caption: str) -> str:
 
 
 def escaped(words: str) -> str:
-    """Words as the text of a page."""
+    """Escape text for a page."""
     return html.escape(words)

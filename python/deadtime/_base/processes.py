@@ -1,4 +1,4 @@
-"""Independent work shared out among processes, in batches, with progress and a clean Ctrl-C."""
+"""Independent work distributed over processes in batches, with progress and interrupts."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
-from deadtime._base.errors import MissingExtraError, WorkerError
+from deadtime._base.errors import WorkerError
+from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.validation import whole_number
 
-__all__ = ["Progress", "shared_out"]
+__all__ = ["shared_out"]
 
 T = TypeVar("T")
 
-#: Called with the numbers of items that are done and of all items; True for a bar.
-Report: TypeAlias = Callable[[int, int], object]
-Progress: TypeAlias = bool | Report
-
-#: Fewer items than this are done before other processes have started.
+#: Number of items below which starting other processes takes longer than the work.
 FEW = 100
 
-#: Items of one batch, at most: so often progress is reported, and so many an interrupt waits for.
+#: Largest number of items in a batch: larger ones cost less to hand over, smaller ones report
+#: progress more often and are interrupted sooner.
 BATCH = 10
 
 
@@ -40,26 +38,25 @@ def shared_out(
         workers = 1
     size = max(1, min(BATCH, count // (4 * workers)))
     batches = [range(start, min(start + size, count)) for start in range(0, count, size)]
-    with _reporting(progress, count) as report:
+    with reported(progress, count) as report:
         if workers == 1:
-            return _here(task, batches, report, count)
-        return _elsewhere(task, batches, report, count, workers)
+            return _here(task, batches, report)
+        return _elsewhere(task, batches, report, workers)
 
 
-def _here(
-    task: Callable[[range], list[T]], batches: list[range], report: Report, count: int
-) -> list[T]:
+def _here(task: Callable[[range], list[T]], batches: list[range], report: Report | None) -> list[T]:
     results: list[T] = []
     for batch in batches:
         results += task(batch)
-        report(len(results), count)
+        if report is not None:
+            report(len(results))
     return results
 
 
 def _elsewhere(
-    task: Callable[[range], list[T]], batches: list[range], report: Report, count: int, workers: int
+    task: Callable[[range], list[T]], batches: list[range], report: Report | None, workers: int
 ) -> list[T]:
-    """Batches on other processes; an interrupt waits for those that are at work and no others."""
+    """Run batches in other processes; an interrupt waits for the running ones only."""
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _left_to_the_parent)
     try:
         with _interrupts_held_back():
@@ -69,7 +66,8 @@ def _elsewhere(
         for future in as_completed(futures):
             found[futures[future]] = future.result()
             done += len(found[futures[future]])
-            report(done, count)
+            if report is not None:
+                report(done)
     except BrokenProcessPool as error:
         raise WorkerError(
             "the other processes cannot start or were killed: in a script, keep what it "
@@ -82,10 +80,10 @@ def _elsewhere(
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C waits, and processes that start meanwhile never see one.
+    """Delay Ctrl-C, and hide it from processes that start meanwhile.
 
-    It goes to every process of a terminal, and only the one that asked is to answer. A process
-    that starts cannot say so in time, but takes over what its parent has blocked.
+    A terminal sends it to all its processes, and only the parent is to handle it. A new process
+    inherits the signals that its parent has blocked.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
@@ -98,26 +96,5 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 def _left_to_the_parent() -> None:
-    """Where nothing can be blocked, leave Ctrl-C to the parent from the first batch on."""
+    """Ignore Ctrl-C in a worker, where signals cannot be blocked; the parent handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-@contextmanager
-def _reporting(progress: Progress, count: int) -> Iterator[Report]:
-    """What to call with the numbers of items done and of all items."""
-    if callable(progress):
-        yield progress
-        return
-    if not progress:
-        yield lambda done, total: None
-        return
-    try:
-        from rich import progress as bars
-    except ImportError as error:
-        raise MissingExtraError(
-            "a progress bar needs rich: install it with pip install 'deadtime[cli]', or give a "
-            "function as progress"
-        ) from error
-    with bars.Progress(transient=True) as bar:
-        task = bar.add_task("done", total=count)
-        yield lambda done, total: bar.update(task, completed=done)

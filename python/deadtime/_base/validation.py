@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import sys
 from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
@@ -70,8 +71,8 @@ def unmasked(name: str, values: Any) -> Any:
 
     NumPy drops the mask as it makes an array of them, and what was under it counts.
     """
-    if type(values) is np.ndarray:
-        return values
+    if type(values) is np.ndarray or "numpy.ma" not in sys.modules:
+        return values  # without numpy.ma there are no masked arrays, and it is slow to load
     if isinstance(values, np.ma.MaskedArray):
         masked = np.argwhere(np.ma.getmaskarray(values))
         if masked.size or values is np.ma.masked:

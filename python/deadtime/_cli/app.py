@@ -15,7 +15,7 @@ from deadtime._base.errors import DeadtimeError
 
 __all__ = ["COMMANDS", "app", "run"]
 
-#: What ends a command with one line; anything else is a defect and shows where it is.
+#: Errors that end a command with one line; any other is a defect and prints its traceback.
 FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 
 #: Exit code after a defect: that of an error within a program, as `sysexits.h` has it.
@@ -91,7 +91,7 @@ COMMANDS = {
 
 
 class _Commands(TyperGroup):
-    """Commands that hold their help alone until one is called."""
+    """Commands that are imported when they are called."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         if args and args[0] in COMMANDS:
@@ -149,9 +149,9 @@ for _name, _command in COMMANDS.items():
 
 
 def run() -> None:
-    """Run the command; a failure is one line on standard error and a non-zero exit.
+    """Run the command; an error is one line on standard error and a non-zero exit code.
 
-    What the command does not expect is a defect of its own: it shows where it happened.
+    An unexpected error is a defect of the package: its traceback is printed.
     """
     try:
         app()
@@ -159,7 +159,7 @@ def run() -> None:
         if ended.code == INTERRUPTED:  # typer says nothing when it ends so
             raise KeyboardInterrupt from None
         raise
-    except BrokenPipeError:  # whoever read the output has had enough of it
+    except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except FAILURES as error:

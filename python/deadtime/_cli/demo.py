@@ -11,7 +11,8 @@ import typer
 
 from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, estimates_table, print_json, print_table, stages
+from deadtime._cli.comparisons import estimates_table
+from deadtime._cli.show import console, print_json, print_table, stages
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 from deadtime.reports import demo_recording, study

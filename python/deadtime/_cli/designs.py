@@ -119,6 +119,6 @@ def _told(found: Design) -> dict[str, object]:
         "checked": found.checked,
         "proved": found.proved,
         "step": found.step_info,
-        "traded": {trade.demand: trade.words for trade in found.traded},
+        "traded": {trade.requirement: trade.words for trade in found.traded},
         "filter": None if choice is None else choice.omega,
     }

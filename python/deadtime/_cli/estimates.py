@@ -10,9 +10,9 @@ import typer
 
 from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
+from deadtime._cli.comparisons import estimates_table
 from deadtime._cli.show import (
     console,
-    estimates_table,
     print_json,
     print_table,
     save_figure,
@@ -108,7 +108,7 @@ def estimate_delays(
 
 
 def _chosen(method: str | None, number: int, options: dict[str, Any]) -> str:
-    """The method, once it is clear that so many files and these options are for it."""
+    """The method, checked against the number of files and the options."""
     if method is None:
         method = "all" if number == 1 else "auto"
     if method not in CHOICES:

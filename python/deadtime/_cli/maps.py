@@ -29,7 +29,7 @@ Ends = tuple[float, float]
 Proof = Literal["curves", "cells"]
 Gains = Literal["Kp", "Kv"]
 
-#: Boundaries of a map that are described.
+#: Boundaries of a map that are printed.
 SHOWN_CURVES = 4
 
 
@@ -51,10 +51,12 @@ def map_gains(
     ] = 0.0,
     damping: Annotated[
         Ends | None,
-        typer.Option(help="And: least damping ratio, of roots that decay slower than so many 1/s."),
+        typer.Option(
+            help="And: least damping ratio, of roots that decay slower than this rate, 1/s."
+        ),
     ] = None,
     proof: Annotated[
-        Proof, typer.Option(help="Prove whole rows by their crossings, or every cell alone.")
+        Proof, typer.Option(help="Prove whole rows by their crossings, or each cell by itself.")
     ] = "curves",
     along: Annotated[
         Gains | None, typer.Option(help="List the crossings of the axis along this gain.")
@@ -131,9 +133,10 @@ def map_gains(
         console.print(f"and {len(curves) - SHOWN_CURVES} shorter boundaries", highlight=False)
     if best is not None:
         gains = ", ".join(f"{name} = {value:.4g}" for name, value in best.items())
-        bears = "any further delay" if margin == np.inf else f"{margin:.4g} s more delay"
+        further = "infinite" if margin == np.inf else f"{margin:.4g} s"
         console.print(
-            f"most stable cell: {gains}, spectral abscissa {abscissa:.4g} 1/s; it bears {bears}",
+            f"most stable cell: {gains}, spectral abscissa {abscissa:.4g} 1/s; its delay margin is "
+            f"{further}",
             highlight=False,
             soft_wrap=True,
         )
@@ -148,7 +151,7 @@ def _crossings_along(
     best: dict[str, float] | None,
     axes: Mapping[str, np.ndarray],
 ) -> Crossings:
-    """Crossings along one gain within its range, the other one at `at` or that of the best cell."""
+    """Crossings along one gain within its range, at a value of the other gain."""
     other = "Kv" if along == "Kp" else "Kp"
     if at is None:
         if best is None:

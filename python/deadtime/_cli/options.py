@@ -48,7 +48,7 @@ __all__ = [
 
 
 def _drawn_later(path: Path | None) -> Path | None:
-    """A picture that cannot be written is refused before the work for it."""
+    """Refuse a picture that cannot be written before the work for it begins."""
     if path is not None:
         check_picture(path)
     return path
@@ -93,7 +93,7 @@ Plot = Annotated[
 As_json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
-#: How often the shortest time of a loop may go into the time simulated: a minute's work.
+#: Upper limit on the ratio of the simulated time to the shortest time of the loop (bounds time).
 MOST_PARTS = 1e6
 
 SHORT_TIMES = ("delay", "lag", "sample_time")
@@ -130,7 +130,7 @@ def described_loop(
 
 
 def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
-    """Refuse a simulation that would go on for minutes, because its parts are so short.
+    """Refuse a simulation that would take minutes, since the loop has very short times.
 
     Without a `duration`: of ten times the longest time of the loop, as for a step response.
     """
@@ -148,7 +148,7 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
         if 0.0 < length < duration / MOST_PARTS:
             raise ValueError(
                 f"{name} is {length:g} s, less than a millionth of the {duration:g} s to simulate: "
-                "that takes too long; leave out what lasts almost nothing, or shorten the rest"
+                "that takes too long; leave such a time out, or shorten the simulation"
             )
 
 

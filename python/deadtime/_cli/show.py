@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -16,8 +16,6 @@ from rich.table import Table
 
 from deadtime._base.drawing import check_matplotlib
 from deadtime._cli.readable import shows
-from deadtime.estimation import Comparison
-from deadtime.estimation._compare import COLUMNS, truth_row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +24,6 @@ __all__ = [
     "check_picture",
     "console",
     "counted",
-    "estimates_table",
     "plain",
     "print_json",
     "print_table",
@@ -84,21 +81,6 @@ def save_figure(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=150)
 
 
-def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = None) -> Table:
-    """The delay by every method, with the truth beside it where it is known."""
-    table = Table(title="Delay of the loop", title_justify="left", box=None, padding=(0, 1, 0, 0))
-    for index, head in enumerate(COLUMNS):
-        justify: Literal["left", "right"] = "right" if 0 < index < len(COLUMNS) - 1 else "left"
-        table.add_column(head, justify=justify, no_wrap=True)
-    for row in comparison.rows():
-        # A reason does not fit into a cell; it is said in full below the table.
-        table.add_row(*(row if len(row) > 2 else [row[0], "refused"]))
-    if truth is not None:
-        table.add_section()
-        table.add_row(*truth_row(truth), style="bold")
-    return table
-
-
 ERRORS = Console(stderr=True)
 
 
@@ -115,10 +97,10 @@ def _bar() -> Progress:
 
 
 @contextmanager
-def counted(what: str, total: int, quiet: bool) -> Iterator[Callable[[int], object] | None]:
-    """A progress bar over so many items; call it with the number that is done."""
+def counted(what: str, total: int, quiet: bool) -> Iterator[bool | Callable[[int], object]]:
+    """A progress bar over `total` items; call it with the number that is done."""
     if quiet or not ERRORS.is_terminal:
-        yield None
+        yield False
         return
     with _bar() as progress:
         task = progress.add_task(what, total=total)

@@ -17,7 +17,7 @@ from deadtime.systems._plots import plot_responses
 
 __all__ = ["simulate_step"]
 
-#: What a step response has also where it comes to no steady state.
+#: Metrics that a step response has also without a steady state.
 PEAK = ("peak", "peak_time")
 
 

@@ -6,8 +6,6 @@ import ctypes
 from _ctypes import CFuncPtr
 from typing import Any
 
-import scipy
-
 __all__ = ["addresses"]
 
 _SIGNATURE = "void (double, double *, double *, double *, double *, void *)"
@@ -30,6 +28,8 @@ def addresses(function: Any) -> tuple[int, int] | None:
     A signature that is known and is not that of a right-hand side raises ValueError. Functions
     of a `ctypes` library without ``argtypes`` do not know theirs.
     """
+    import scipy
+
     if isinstance(function, scipy.LowLevelCallable):
         capsule = tuple.__getitem__(function, 0)
         name = _name(capsule)
@@ -61,7 +61,7 @@ def _check_ctypes(function: Any) -> None:
         and types[0] is ctypes.c_double
         and all(kind in pointers for kind in types[1:-1])
         and (types[-1] is ctypes.c_void_p or issubclass(types[-1], ctypes._Pointer))
-        # What a library's function has unless it was told otherwise.
+        # The default of a function of a ctypes library.
         and result in (None, ctypes.c_int)
     )
     if not fits:

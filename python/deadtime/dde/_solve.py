@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, SupportsFloat
+from dataclasses import dataclass
+from typing import Any, NamedTuple, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,8 @@ __all__ = ["solve_dde"]
 Array = NDArray[np.float64]
 
 _METHODS = ("auto", "spectral")
-_NONE = np.empty(0)
+#: What `DelayResult.status` is where the run did not fail.
+_STATUS = {"finished": 0, "event": 1}
 
 
 def solve_dde(
@@ -153,7 +155,7 @@ def solve_dde(
         raise ValueError(f"method={method!r}: give one of {names}")
     start, end = (finite("t_span", time) for time in t_span)
     lags = np.atleast_1d(real_array("delays", delays)).ravel()
-    past, slope = _history(history)
+    past, derivative = _history(history)
     initial = _initial(past, y0, start)
     if not callable(past) and past.size == 1:
         past = np.repeat(past, initial.size)
@@ -162,68 +164,109 @@ def solve_dde(
         raise TypeError(f"fun={fun!r} is no function")
     if compiled is not None and args:
         raise ValueError("args: a compiled function takes its data from its LowLevelCallable")
-    times = None if t_eval is None else _vector("t_eval", t_eval)
-    run = _deadtime.solve_delay_equation(
-        fun if compiled is None else compiled,
-        tuple(args),
-        bool(vectorized),
-        (start, end),
-        initial,
-        lags,
-        bool(neutral),
-        past,
-        slope,
-        _vector("history_breaks", history_breaks),
-        (finite("rtol", rtol), _vector("atol", atol)),
-        max_step if max_step == np.inf else positive("max_step", max_step),
-        times,
-        bool(dense_output),
-        _pattern(jac_sparsity, initial.size),
-        None if max_steps is None else whole_number("max_steps", max_steps),
-        _events(events),
-        _jumps(jumps, start, end),
+    run = _deadtime.solve_dde(
+        DelayProblem(
+            fun=fun if compiled is None else compiled,
+            t_span=(start, end),
+            history=past,
+            history_derivative=derivative,
+            delays=lags,
+            y0=initial,
+            neutral=bool(neutral),
+            rtol=finite("rtol", rtol),
+            atol=_vector("atol", atol),
+            t_eval=None if t_eval is None else _vector("t_eval", t_eval),
+            dense_output=bool(dense_output),
+            events=_events(events),
+            jumps=_jumps(jumps, start, end),
+            history_breaks=_vector("history_breaks", history_breaks),
+            args=tuple(args),
+            vectorized=bool(vectorized),
+            max_step=max_step if max_step == np.inf else positive("max_step", max_step),
+            max_steps=None if max_steps is None else whole_number("max_steps", max_steps),
+            jac_sparsity=_pattern(jac_sparsity, initial.size),
+        )
     )
-    status = (0, 1, -1, -1, -1)[run.outcome]
+    status = _STATUS.get(run.outcome, -1)
     return DelayResult(
-        t=run.times,
-        y=run.values,
+        t=run.t,
+        y=run.y,
         sol=DelaySolution(run.pieces) if dense_output else None,
-        t_events=None if events is None else run.event_times,
-        y_events=None if events is None else run.event_values,
+        t_events=None if events is None else run.t_events,
+        y_events=None if events is None else run.y_events,
         breaks=run.breaks,
-        nfev=run.calls,
-        n_nodes=run.nodes,
-        n_elements=run.elements,
-        n_rejected=run.refused,
+        nfev=run.nfev,
+        n_nodes=run.n_nodes,
+        n_elements=run.n_elements,
+        n_rejected=run.n_rejected,
         status=status,
         message=_message(run),
         success=status >= 0,
     )
 
 
-def _message(run: Any) -> str:
-    outcome, place = run.outcome, run.place
-    if outcome == 4:
+class DelayEvent(NamedTuple):
+    """A function whose zeros count, which of them, and which one ends the run (0 for none)."""
+
+    function: Callable[..., Any]
+    direction: int
+    terminal: int
+
+
+class DelayJump(NamedTuple):
+    """A time at which the right-hand side jumps, and what makes y jump there."""
+
+    time: float
+    change: Callable[..., Any] | None
+
+
+@dataclass(frozen=True, eq=False)
+class DelayProblem:
+    """The arguments of `solve_dde`, checked, as the native part takes them."""
+
+    fun: Any
+    t_span: tuple[float, float]
+    history: Any
+    history_derivative: Callable[..., Any] | None
+    delays: Array
+    y0: Array
+    neutral: bool
+    rtol: float
+    atol: Array
+    t_eval: Array | None
+    dense_output: bool
+    events: list[DelayEvent]
+    jumps: list[DelayJump]
+    history_breaks: Array
+    args: tuple[Any, ...]
+    vectorized: bool
+    max_step: float
+    max_steps: int | None
+    jac_sparsity: tuple[list[int], list[int]] | None
+
+
+def _message(run: _deadtime.DelayRun) -> str:
+    if run.outcome == "finished":
+        return "The end of t_span was reached."
+    if run.outcome == "event":
+        return "A terminal event occurred."
+    if run.outcome == "max_steps":
         return (
-            f"max_steps={run.elements + run.refused} elements were tried by t={place!r}, and "
-            f"{run.refused} of them refused. Where fun switches on y and holds it at the switch "
-            "(a sliding mode), smooth the switch; where fun is noisy, or rtol and atol ask for "
-            "less than the rounding of t, raise them; where the run is long, give a larger "
+            f"max_steps={run.n_elements + run.n_rejected} elements were tried by t={run.end!r}, "
+            f"and {run.n_rejected} of them refused. Where fun switches on y and holds it at the "
+            "switch (a sliding mode), smooth the switch; where fun is noisy, or rtol and atol ask "
+            "for less than the rounding of t, raise them; where the run is long, give a larger "
             "max_steps."
         )
-    if outcome == 0:
-        return "The end of t_span was reached."
-    if outcome == 1:
-        return "A terminal event occurred."
-    if outcome == 2:
+    if run.outcome == "short":
         return (
-            f"Elements became as short as rounding allows at t={place!r}: the solution grows "
+            f"Elements became as short as rounding allows at t={run.end!r}: the solution grows "
             "without bound there, or the right-hand side is rough. Declare times at which it "
             "jumps (jumps), raise rtol and atol, or limit max_step; a linear loop with a limit "
             "is solved exactly by ControlLoop.simulate."
         )
     return (
-        f"The right-hand side is not finite at t={place!r} and later: the solution leaves the "
+        f"The right-hand side is not finite at t={run.end!r} and later: the solution leaves the "
         "domain of fun there. Check fun for roots, logarithms and divisions, or end the run "
         "with a terminal event."
     )
@@ -284,8 +327,8 @@ def _pattern(pattern: Any, dim: int) -> tuple[list[int], list[int]] | None:
     return rows.tolist(), columns.tolist()
 
 
-def _events(events: Any) -> list[tuple[Any, int, int]]:
-    """Return function, direction and terminal number of each event."""
+def _events(events: Any) -> list[DelayEvent]:
+    """Return the events as the native part takes them."""
     if events is None:
         return []
     found = []
@@ -294,19 +337,19 @@ def _events(events: Any) -> list[tuple[Any, int, int]]:
             raise TypeError(f"events: {event!r} is no function")
         direction = int(np.sign(finite("direction", getattr(event, "direction", 0))))
         terminal = finite("terminal", getattr(event, "terminal", None) or 0)
-        if terminal < 0 or terminal != int(terminal):
+        if not 0 <= terminal < 2**31 or terminal != int(terminal):
             raise ValueError(f"terminal={terminal}: give True, or the number of a crossing")
-        found.append((event, direction, int(terminal)))
+        found.append(DelayEvent(event, direction, int(terminal)))
     return found
 
 
-def _jumps(jumps: Iterable[Any], start: float, end: float) -> list[tuple[float, Any]]:
-    """Return times and changes of the jumps within the span, in order."""
+def _jumps(jumps: Iterable[Any], start: float, end: float) -> list[DelayJump]:
+    """Return the jumps within the span, in order."""
     found = []
     for jump in jumps:
         time, change = jump if isinstance(jump, tuple) else (jump, None)
         if change is not None and not callable(change):
             raise TypeError(f"jumps: {change!r} is no function of t and y")
-        found.append((finite("jumps", time), change))
-    found.sort(key=lambda jump: jump[0])
-    return [jump for jump in found if start < jump[0] < end]
+        found.append(DelayJump(finite("jumps", time), change))
+    found.sort(key=lambda jump: jump.time)
+    return [jump for jump in found if start < jump.time < end]

@@ -12,7 +12,7 @@ import numpy as np
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.ranges import OpenRange
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import check_setpoint_active
+from deadtime.estimation.data._evidence import check_setpoint_active, independent_samples
 from deadtime.estimation.data._runs import paired_runs
 from deadtime.estimation.methods._decay import Decay
 from deadtime.estimation.methods._decrement import Decrement
@@ -83,8 +83,7 @@ class Comparison:
         plain, lagged = self._fits()
         if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
             return plain
-        rho = min(0.99, max(0.0, lagged.whiteness.autocorrelation))
-        effective = lagged.residuals.size * (1.0 - rho) / (1.0 + rho)
+        effective = independent_samples(lagged.residuals.size, lagged.whiteness.autocorrelation)
         gain = 2.0 * effective * np.log(plain.rms / lagged.rms) if lagged.rms > 0 else np.inf
         return lagged if gain > np.log(max(effective, 2.0)) else plain
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
+from deadtime._base.progress import Stages, stage_report
 from deadtime._base.validation import positive
 from deadtime.flights._height_control import HeightControl
 from deadtime.flights._learn import FlightStudy, learn
@@ -153,7 +154,7 @@ def fly_experiment(
     connect: Connect,
     plan: FlightPlan,
     folder: Path,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Stages = False,
     run: Callable[[Coroutine[Any, Any, list[FlownSteps]]], list[FlownSteps]] = asyncio.run,
     warn: Callable[[str], None] = lambda warning: None,
 ) -> FlightStudy:
@@ -168,8 +169,9 @@ def fly_experiment(
         The plan.
     folder : Path
         Folder for the recordings, which are written during the flights.
-    progress : callable
-        Called with the name of each stage as it begins: one for each flight, and two between.
+    progress : bool or callable
+        Called with the name of each stage as it begins, or True to print the names on stderr: one
+        for each flight, and two between.
     run : callable
         Runs a coroutine to its end: `asyncio.run`, or `deadtime.links.run` in virtual time. It is
         called once before the design and once after it.
@@ -194,19 +196,20 @@ def fly_experiment(
     NotIdentifiableError
         If the flights do not determine the delay.
     """
+    report = stage_report(progress)
     plan.check()
     _check_folder(folder)
     tried = [P(Kp) for Kp in plan.gains]
-    flown = run(fly_all(connect, tried, plan, plan.hold, folder, 1, progress))
-    progress("estimating the delay")
-    learned = learn(flown, plan.limits.max_climb, plan.step, plan.gain_margin, progress)
+    flown = run(fly_all(connect, tried, plan, plan.hold, folder, 1, report))
+    report("estimating the delay")
+    learned = learn(flown, plan.limits.max_climb, plan.step, plan.gain_margin, report)
     for warning in learned.warnings():
         warn(warning)
     # The best P first: if it does not perform as designed, PV should not be tried.
     controllers = [design.loop.controller for design in (learned.proportional, learned.designed)]
     designed = [one for one in controllers if isinstance(one, (P, PV))]
     hold = plan.checked_hold
-    checked = run(fly_all(connect, designed, plan, hold, folder, len(flown) + 1, progress))
+    checked = run(fly_all(connect, designed, plan, hold, folder, len(flown) + 1, report))
     return FlightStudy(plan.step, plan.limits.max_climb, learned, tuple(checked))
 
 
@@ -228,7 +231,7 @@ async def fly_all(
     hold: float,
     folder: Path,
     number: int,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Callable[[str], object] = lambda stage: None,
 ) -> list[FlownSteps]:
     """Make one flight under each controller over one link; `number` is that of the first."""
     flown = []

@@ -213,7 +213,7 @@ def learn(
     max_climb: float,
     step: float,
     gain_margin: float,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Callable[[str], object] = lambda stage: None,
 ) -> Learned:
     """Estimate the delay from flights under P control, and design gains for its interval.
 

@@ -202,7 +202,7 @@ async def fly_steps(
             state = await vehicle.state()
             if not state.flying:
                 raise FlightAbortedError(
-                    "the vehicle no longer flies, although it was not told to land"
+                    "the vehicle no longer flies, although it was not commanded to land"
                 )
             time = now()
             reference = programme.reference(sample * programme.sample_time)

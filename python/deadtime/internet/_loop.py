@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from errno import EEXIST
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from deadtime._base.errors import DeadtimeError
+from deadtime._base.progress import Stages, stage_report
 from deadtime._base.validation import positive
 from deadtime.estimation import (
     DelayEstimate,
@@ -48,7 +49,7 @@ def run_internet_loop(
     mode: Mode = "virtual",
     folder: Path | None = None,
     methods: Sequence[str] = tuple(METHODS),
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Stages = False,
 ) -> InternetLoop:
     """Run the loop once for each gain, and estimate the delay from every run.
 
@@ -67,8 +68,8 @@ def run_internet_loop(
     methods : sequence of str
         How the delay is estimated: ``"dominant"`` (the paper's overshoot), ``"exact"``,
         ``"waveform"``, ``"output_error"``.
-    progress : callable, optional
-        Called with the name of each stage as it begins.
+    progress : bool or callable
+        Called with the name of each stage as it begins; True prints the names on stderr.
 
     Returns
     -------
@@ -83,6 +84,7 @@ def run_internet_loop(
     OSError
         When the folder cannot be made.
     """
+    report = stage_report(progress)
     if not len(gains):
         raise ValueError("gains is empty: give one or more")
     trials = [
@@ -104,16 +106,16 @@ def run_internet_loop(
         folder.mkdir(parents=True, exist_ok=True)
     runs = []
     for one, stem in zip(trials, stems, strict=True):
-        progress(f"K = {one.gain:g}: running")
+        report(f"K = {one.gain:g}: running")
         reports, recordings = _run(one, mode, folder, stem)
-        progress(f"K = {one.gain:g}: estimating")
+        report(f"K = {one.gain:g}: estimating")
         estimates, refusals = _estimate(one, recordings, methods)
         runs.append(
             InternetRun(
                 one, reports["plant"], reports["controller"], recordings, estimates, refusals
             )
         )
-    progress("replaying the steps")
+    report("replaying the steps")
     times = np.concatenate([answer_times(run.plant["arrivals"]) for run in runs])
     age = float(np.mean([run.age for run in runs]))
     if not (np.isfinite(times).any() and math.isfinite(age)):

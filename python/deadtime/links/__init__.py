@@ -1,8 +1,8 @@
 """Links to vehicles and to the other end of a loop, on asyncio.
 
-What every link shares is here: the protocol of a vehicle, what must hold for a command before it
-leaves, the rules that end a flight, recordings that are saved as they come, and a clock that jumps
-from event to event, for tests and for experiments in seconds. Each vehicle has a package beside it.
+What all links share: the protocol of a vehicle, the checks of a command before it is sent, the
+rules that end a flight, recordings that are written during a run, and a virtual clock that advances
+from event to event, for tests and simulated experiments. Each vehicle has a package of its own.
 """
 
 from deadtime.links.clock import now

@@ -1,4 +1,4 @@
-"""The native wire formats, for the packages of the vehicles: nothing else here knows of them."""
+"""The native wire formats, for the packages of the vehicles. No other file imports them."""
 
 from deadtime._deadtime import (
     at_read,

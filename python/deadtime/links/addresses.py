@@ -1,4 +1,4 @@
-"""Addresses of sockets, compared by what they mean: ``0::1`` and ``::1`` are one host."""
+"""Canonical addresses of sockets, so that ``0::1`` and ``::1`` compare as one host."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Address: TypeAlias = tuple[str, int]
 
 
 def canonical(host: str) -> str:
-    """The one spelling of a numeric address; a name is left as it is.
+    """The canonical form of a numeric address; a name is returned unchanged.
 
-    An IPv4 address that a socket of IPv6 tells as ``::ffff:a.b.c.d`` is the IPv4 address, and the
-    scope of a link-local address is the number of its interface, where there is such a one.
+    An IPv4 address that an IPv6 socket reports as ``::ffff:a.b.c.d`` becomes the IPv4 address, and
+    the scope of a link-local address the number of its interface, where that exists.
 
     Examples
     --------
@@ -32,20 +32,20 @@ def canonical(host: str) -> str:
     if address.ipv4_mapped is not None:
         return str(address.ipv4_mapped)
     plain, _, scope = str(address).partition("%")
-    with suppress(OSError):  # no interface of this name: a number, or none here
+    with suppress(OSError):  # the scope is a number, or no interface of this machine
         scope = str(socket.if_nametoindex(scope))
     return f"{plain}%{scope}" if scope else plain
 
 
 def for_socket(address: Address, own_host: str) -> tuple[Any, ...]:
-    """An address as a socket that is bound to `own_host` needs it to send there."""
+    """An address in the form for sending from a socket that is bound to `own_host`."""
     host, port = address
     if ":" not in own_host:
         return address
     if ":" not in host:
         return f"::ffff:{host}", port
     plain, _, scope = host.partition("%")
-    # In two parts the system's own call would lose the scope.
+    # A pair (host, port) would lose the scope.
     return (plain, port, 0, int(scope)) if scope.isdecimal() else address
 
 

@@ -1,7 +1,7 @@
-"""The clock that every age on a link is read from.
+"""The clock of all times and ages on a link.
 
-The event loop's own clock stands still while a laptop sleeps; to a vehicle that waits for commands
-that time has passed.
+The clock of the event loop stops while a laptop sleeps, but for a vehicle that waits for commands
+that time passes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["now"]
 
 
 def _counted() -> float:
-    """Time since the machine was started, its sleep included where the system counts that, s."""
+    """Time since the machine was started, s, with its sleep where the system counts that."""
     if hasattr(time, "CLOCK_BOOTTIME"):  # Linux
         return time.clock_gettime(time.CLOCK_BOOTTIME)
     if hasattr(time, "CLOCK_UPTIME_RAW"):  # macOS, whose CLOCK_MONOTONIC goes on in sleep
@@ -23,17 +23,17 @@ def _counted() -> float:
     return time.monotonic()
 
 
-#: What brings both clocks to the same reading when the program begins, s.
-_AHEAD = _counted() - time.monotonic()
+#: Difference of the two clocks when the program starts, s.
+_OFFSET = _counted() - time.monotonic()
 
 
 def now() -> float:
-    """The running event loop's clock, and the time that the machine slept since the program began.
+    """The clock of the running event loop, plus the time the machine slept since the program began.
 
     Returns
     -------
     float
-        s. In virtual time it is the virtual clock.
+        Time in s; in virtual time that of the virtual clock.
 
     Raises
     ------
@@ -50,4 +50,4 @@ def now() -> float:
     3600.0
     """
     loop = asyncio.get_running_loop()
-    return loop.time() if isinstance(loop, VirtualTimeLoop) else _counted() - _AHEAD
+    return loop.time() if isinstance(loop, VirtualTimeLoop) else _counted() - _OFFSET

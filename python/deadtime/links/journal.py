@@ -1,4 +1,4 @@
-"""A recording that is saved row by row as it comes, on a thread that nobody waits for."""
+"""Write a recording to a CSV file row by row, on a thread of its own."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ __all__ = ["Journal"]
 
 
 class Journal:
-    """Rows of numbers in a CSV file, written by a thread of its own as they come.
+    """A CSV file of numbers whose rows are written by a background thread.
 
-    `write` waits for no disk, so a slow one delays nobody who flies. Rows are in the file, whole
-    and in their order, as soon as the system takes them; `close` waits until all are on the disk.
-    What a program leaves open is closed when it ends, by an exception as well. A process that is
-    killed loses the rows that the disk has not taken yet.
+    `write` does not wait for the disk, so a slow one does not delay a control loop. Rows are
+    complete and in order in the file as soon as the system accepts them; `close` waits until all
+    are on the disk. An open journal is closed when the program ends, also by an exception. A
+    process that is killed loses the rows that were not yet written.
 
     Parameters
     ----------
     path : path-like
-        File to make; its folder is made where it is not there.
+        File to create; its folder is created if it does not exist.
     columns : sequence of str
-        Names for the first line, best with their units: ``height_m``.
+        Names for the first line, preferably with units: ``height_m``.
 
     Raises
     ------
     FileExistsError
-        If the file is there: a recording is never written over.
+        If the file exists: recordings are never overwritten.
     OSError
-        If the file cannot be made. Also of `write` and `close`: if the disk did not take a row
-        before, for example because it is full.
+        If the file cannot be created. Also from `write` and `close`: if an earlier row could not
+        be written, for example because the disk is full.
     ValueError
-        If names repeat or hold a comma, a quote or the end of a line.
+        If names repeat or contain a comma, a quote or a line end.
 
     Examples
     --------
@@ -60,20 +60,22 @@ class Journal:
         self.columns = tuple(columns)
         self.rows = 0
         if not self.columns or len(set(self.columns)) != len(self.columns):
-            raise ValueError(f"columns={list(columns)}: give one or more names, each once")
+            raise ValueError(f"columns={list(columns)}: give one or more different names")
         for name in self.columns:
             if not name or any(sign in name for sign in ',"\r\n'):
-                raise ValueError(f"the column name {name!r} cannot stand in the first line of CSV")
+                raise ValueError(
+                    f"the column name {name!r} contains a comma, a quote or a line end, or is empty"
+                )
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        # Unbuffered: what a call of the system took is in the file.
+        # Unbuffered, so that every accepted row is in the file.
         try:
             file = open(self.path, "xb", buffering=0)  # noqa: SIM115
         except FileExistsError:
             raise FileExistsError(
-                EEXIST, "there already; give another name", str(self.path)
+                EEXIST, "the file exists already; give another name", str(self.path)
             ) from None
         self._writer = _Writer(file, str(self.path))
-        # Also at the end of the program, if nobody has closed it.
+        # Also closes the file at the end of the program.
         self._finish = weakref.finalize(self, self._writer.finish)
         self._put(self.columns)
 
@@ -83,7 +85,7 @@ class Journal:
         Raises
         ------
         OSError
-            If the disk did not take an earlier row.
+            If an earlier row could not be written.
         ValueError
             If the row has another length than the columns, a value is not finite, or the journal
             is closed.
@@ -103,17 +105,17 @@ class Journal:
 
     def _put(self, cells: Iterable[str]) -> None:
         if not self._finish.alive:
-            raise ValueError(f"the journal {self.path} is closed: open another one")
+            raise ValueError(f"the journal {self.path} is closed: open a new one")
         self._writer.check()
         self._writer.lines.put((",".join(cells) + "\n").encode())
 
     def close(self) -> None:
-        """Wait until all rows are on the disk and close the file; may be called twice.
+        """Wait until all rows are on the disk, and close the file; may be called again.
 
         Raises
         ------
         OSError
-            If the disk did not take a row.
+            If a row could not be written.
         """
         self._finish()
         self._writer.check()
@@ -137,24 +139,24 @@ class Journal:
 
 
 class _Writer:
-    """The thread of one journal, and its file; it knows nothing of the journal, which may go."""
+    """The thread and the file of a journal, without a reference to the journal itself."""
 
     def __init__(self, file: FileIO, path: str) -> None:
-        #: Lines to be written; None ends it.
+        #: Lines to be written; None ends the thread.
         self.lines: SimpleQueue[bytes | None] = SimpleQueue()
         self._file, self._path = file, path
         self._error: OSError | None = None
-        # A daemon, so that the end of the program comes to `finish` and does not wait before.
+        # A daemon thread, so that the program does not wait for it before it calls `finish`.
         self._thread = threading.Thread(target=self._write_all, daemon=True, name=f"journal {path}")
         self._thread.start()
 
     def check(self) -> None:
-        """Raise what the disk has said."""
+        """Raise the error of an earlier row."""
         if self._error is not None:
             raise self._error
 
     def finish(self) -> None:
-        """Write what waits, have the system put it on the disk, and close the file."""
+        """Write the waiting lines to the disk, and close the file."""
         self.lines.put(None)
         self._thread.join()
 
@@ -168,18 +170,18 @@ class _Writer:
             self._error = OSError(error.errno, error.strerror, self._path)
 
     def _waiting(self) -> list[bytes | None]:
-        """All lines that are there; waits for the first."""
+        """All waiting lines; waits for the first."""
         waiting = [self.lines.get()]
         while not self.lines.empty():
             waiting.append(self.lines.get())
         return waiting
 
     def _write(self, waiting: list[bytes | None]) -> bool:
-        """Write lines; False once the end is among them."""
+        """Write lines; return False after the last."""
         lines = b"".join(line for line in waiting if line is not None)
         begin, written = self._file.tell(), 0
         try:
-            while written < len(lines):  # a disk that is all but full takes a part
+            while written < len(lines):  # a nearly full disk may accept a part
                 written += self._file.write(lines[written:])
         except OSError:
             whole = lines.rfind(b"\n", 0, written) + 1

@@ -20,19 +20,19 @@ def parent_ended() -> asyncio.Event:
     What is read until then is discarded. Without a standard input it has ended already.
     """
     ended = asyncio.Event()
-    if sys.stdin is None:  # its number may be that of another file by now
+    if sys.stdin is None:  # its descriptor may belong to another file by now
         ended.set()
         return ended
     loop, number = asyncio.get_running_loop(), sys.stdin.fileno()
 
     def read() -> None:
-        # Not by sys.stdin: at its end the interpreter wants a lock that this thread would hold.
+        # Not by sys.stdin, whose lock this thread would hold when the interpreter ends.
         with suppress(OSError):
             while os.read(number, 4096):
                 pass
-        with suppress(RuntimeError):  # the loop may have ended before
+        with suppress(RuntimeError):  # the loop may have ended
             loop.call_soon_threadsafe(ended.set)
 
-    # A daemon: nobody waits for input that may never end.
+    # A daemon thread, because the input may never end.
     threading.Thread(target=read, daemon=True).start()
     return ended

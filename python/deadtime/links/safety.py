@@ -1,9 +1,9 @@
-"""What must hold of a command before it leaves, and the rules that end a flight.
+"""Checks of a command before it is sent, and the rules that end a flight.
 
-A command is a number in [-1, 1] by its type: nothing else can be written to the wire. A flight
-ends (hover, then land) when the vehicle strays from what it was asked, when it tilts, when its
-battery runs low, when a sensor is lost or stands still, when its messages are old or missing, and
-when it says that there is an emergency.
+The type of a command is a number in [-1, 1]: nothing else can be sent. A flight ends (hover, then
+land) when the vehicle is too far from its reference, tilts too far, has a low battery, loses a
+sensor or repeats one reading, when its messages are old or missing, and when it reports an
+emergency.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["Limits", "UnitCommand", "Watch", "largest_gain"]
 
 
 class UnitCommand(float):
-    """A finite number in [-1, 1]: a share of what the vehicle may do.
+    """A finite number in [-1, 1]: a share of the largest motion of the vehicle.
 
     Raises
     ------
@@ -41,7 +41,9 @@ class UnitCommand(float):
     def __new__(cls, value: SupportsFloat = 0.0) -> Self:  # noqa: D102
         number = finite("command", value)
         if not -1.0 <= number <= 1.0:
-            raise ValueError(f"command={number} is outside [-1, 1]: saturate it, or ask for less")
+            raise ValueError(
+                f"command={number} is outside [-1, 1]: use a smaller value, or `saturated`"
+            )
         return super().__new__(cls, number)
 
     @classmethod
@@ -55,15 +57,15 @@ class UnitCommand(float):
 
 @dataclass(frozen=True)
 class Limits:
-    """What a flight is kept within; none of it is a promise of the vehicle.
+    """Limits of a flight. They are checked here; the vehicle does not guarantee them.
 
     Attributes
     ----------
     max_climb : float
-        Largest vertical speed that is ever asked for, m/s.
+        Largest commanded vertical speed, m/s.
     min_height, max_height : float
-        Beyond these a flight is aborted, m. The vehicle is told the upper one, too, where it takes
-        it.
+        Beyond these a flight is aborted, m. The upper one is set in the vehicle too, where it has
+        such a setting.
     max_angle : float
         Roll or pitch beyond which a flight is aborted, rad.
     min_battery : float
@@ -71,16 +73,16 @@ class Limits:
     max_error : float
         Distance from the reference beyond which a flight is aborted, m.
     max_jump : float
-        Fastest change of the measured height that is believed, m/s.
+        Largest plausible rate of change of the measured height, m/s.
     max_state_age : float
         Age of the newest message of the vehicle beyond which a flight is aborted, s: the time since
-        it arrived, and by how much later than others it did so by the vehicle's clock.
+        its arrival, plus its delay relative to the fastest message, by the clock of the vehicle.
     max_still : float
-        How long the height may read the same to the last digit, away from the reference, s.
+        Longest time for which exactly the same height may be read away from the reference, s.
     max_missing : int
-        Messages in a row that may be lost before a flight is aborted.
+        Successive messages that may be lost before a flight is aborted.
     command_age : float
-        A command older than this is replaced by hovering, s.
+        Age beyond which a command is replaced by hovering, s.
     landing_after : float
         Time without any new command after which the link lands the vehicle, s.
     """
@@ -108,32 +110,32 @@ class Limits:
         if self.command_age >= self.landing_after:
             raise ValueError(
                 f"command_age={self.command_age} is not below landing_after={self.landing_after}: "
-                "a vehicle hovers before it lands"
+                "a vehicle has to hover before it lands"
             )
 
     def lines(self) -> list[str]:
-        """The limits in words, one a line, to be shown before a flight."""
+        """The limits in words, one for each line, to be shown before a flight."""
         return [
             f"climbs and sinks at no more than {self.max_climb:g} m/s",
             f"stays between {self.min_height:g} and {self.max_height:g} m, no more than "
             f"{self.max_error:g} m from the reference",
             f"aborts beyond {math.degrees(self.max_angle):g} degrees of roll or pitch, below "
-            f"{self.min_battery:g} % of battery, after {self.max_state_age:g} s without news",
+            f"{self.min_battery:g} % of battery, after {self.max_state_age:g} s without a message",
             f"hovers {self.command_age:g} s after the last command, lands after "
             f"{self.landing_after:g} s",
         ]
 
 
 def largest_gain(delay: float, gain: float = 1.0) -> float:
-    r"""The proportional gain that is flown at most before the delay is known.
+    r"""The largest proportional gain of a flight before the delay is known.
 
     Half of the gain pi / (2 delay gain) at which an integrator with this delay loses stability: a
-    gain margin of 2 if the delay is what it is believed to be.
+    gain margin of 2 if the assumed delay is right.
 
     Parameters
     ----------
     delay : float
-        What the delay is believed to be, lags included, s.
+        Assumed delay, lags included, s.
     gain : float
         Vertical speed per unit of command.
 
@@ -164,12 +166,12 @@ def jumps(before: float, height: float, passed: float, max_jump: float) -> bool:
     return not abs(height - before) <= max_jump * passed + BUMP
 
 
-#: Distance from the reference at which a height that does not change at all is no rest, m.
+#: Distance from the reference, m, beyond which a constant height is suspicious.
 AWAY = 0.05
 
 
 class Watch:
-    """Watches the states of one flight and ends it when a rule is broken.
+    """Checks the states of one flight, and raises when a rule is broken.
 
     Parameters
     ----------
@@ -188,19 +190,19 @@ class Watch:
         self.limits = limits
         self._last: VehicleState | None = None
         self._moved = -math.inf
-        self._least_ahead = math.inf
+        self._least_difference = math.inf
 
     def check(self, state: VehicleState, now: float, reference: float | None = None) -> None:
-        """Hold the newest state against the limits.
+        """Check the newest state against the limits.
 
         Parameters
         ----------
         state : VehicleState
-            The newest there is; the same one may come again.
+            The newest state; the same one may be given again.
         now : float
             `deadtime.links.now`, s.
         reference : float, optional
-            Height that was asked for, m; without it the error is not watched.
+            Reference of the height, m; without it the error is not checked.
 
         Raises
         ------
@@ -220,12 +222,12 @@ class Watch:
         return last is not None and reference is not None and abs(last.height - reference) > AWAY
 
     def _lateness(self, state: VehicleState) -> float:
-        """By how much later a message arrived than the promptest, as the vehicle's clock tells."""
+        """Delay of a message relative to the fastest one, by the clock of the vehicle, s."""
         if state.vehicle_time is None:
             return 0.0
-        ahead = state.time - state.vehicle_time
-        self._least_ahead = min(self._least_ahead, ahead)
-        return ahead - self._least_ahead
+        difference = state.time - state.vehicle_time
+        self._least_difference = min(self._least_difference, difference)
+        return difference - self._least_difference
 
     def _broken(self, state: VehicleState, now: float, reference: float | None) -> str | None:
         limits = self.limits
@@ -236,7 +238,7 @@ class Watch:
             return f"the newest message is {age:.2f} s old, more than {limits.max_state_age:g} s"
         if state.missing > limits.max_missing:
             return f"{state.missing} messages in a row were lost, more than {limits.max_missing}"
-        for angle in (abs(state.roll), abs(state.pitch)):  # one by one: `max` may skip a NaN
+        for angle in (abs(state.roll), abs(state.pitch)):  # separately: `max` may ignore a NaN
             if not angle <= limits.max_angle:
                 return (
                     f"the vehicle is tilted by {math.degrees(angle):.0f} degrees, more than "
@@ -259,7 +261,7 @@ class Watch:
         if now - self._moved > limits.max_still:
             return (
                 f"the height has read {state.height:.3f} m for {now - self._moved:.1f} s although "
-                "it is not where it should be"
+                "it is not at the reference"
             )
         return self._broken_since(state)
 

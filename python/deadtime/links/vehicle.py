@@ -1,4 +1,4 @@
-"""What every vehicle can be asked, whatever its wire protocol."""
+"""The protocol of a vehicle, independent of its wire format."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ __all__ = ["Vehicle", "VehicleState"]
 
 @dataclass(frozen=True)
 class VehicleState:
-    """What a vehicle said of itself in one message.
+    """The state of a vehicle from one of its messages.
 
     Attributes
     ----------
     time : float
-        When the message arrived, s of `deadtime.links.now`.
+        Arrival of the message, s of `deadtime.links.now`.
     height : float
         Above the ground, m.
     flying : bool
-        In the air under its own control: off the ground and not on the way down to it.
+        In the air under control: off the ground and not landing.
     landed : bool
         On the ground with its motors off.
     sequence : int
-        Number of the message, as the vehicle counts.
+        Number of the message, counted by the vehicle.
     vehicle_time : float, optional
-        The vehicle's own clock at the message, s.
+        Clock of the vehicle at the message, s.
     climb : float, optional
         Vertical speed, m/s, up positive.
     climb_setpoint : float, optional
-        The vertical speed that the vehicle is following, m/s, up positive: its echo of the
-        commands that have reached it.
+        The vertical speed that the vehicle follows, m/s, up positive: its echo of the commands that
+        have arrived.
     roll, pitch : float
         rad.
     battery : float, optional
@@ -39,9 +39,9 @@ class VehicleState:
     emergency : bool
         The vehicle has cut its motors.
     fault : str, optional
-        What the vehicle says is wrong with it, to follow "that": "its ultrasound is deaf".
+        Fault reported by the vehicle, as a clause: "its ultrasound receives no echo".
     missing : int
-        Messages lost in a row, the most in the second before this one.
+        Largest number of successive messages lost in the last second.
     """
 
     time: float
@@ -63,21 +63,21 @@ class VehicleState:
 class Vehicle(Protocol):
     """A vehicle whose climb can be commanded.
 
-    As an asynchronous context manager it is connected on entry, and landed and closed on the way
-    out, whatever the reason. Connecting never takes off.
+    As an asynchronous context manager it connects on entry, and lands and closes on exit, also by
+    an exception. Connecting never takes off.
     """
 
     async def connect(self) -> None:
-        """Make the link and set the vehicle's own limits.
+        """Open the link and set the limits of the vehicle.
 
         Raises
         ------
         LinkError
-            If the vehicle does not answer, or does not take over a limit.
+            If the vehicle does not answer, or does not accept a limit.
         """
 
     async def take_off(self) -> None:
-        """Leave the ground; returns when the vehicle holds its height and takes commands."""
+        """Take off; returns when the vehicle holds its height and accepts commands."""
 
     async def state(self) -> VehicleState:
         """The newest message of the vehicle; waits for the first.
@@ -89,9 +89,9 @@ class Vehicle(Protocol):
         """
 
     def command(self, climb: float) -> float:
-        """Ask for a vertical speed in m/s, up positive; return what was sent after limits.
+        """Command a vertical speed in m/s, up positive; return the one that was sent after limits.
 
-        A command is good for a short while only: who stops commanding hovers.
+        A command is valid for a short time only; without a new one the vehicle hovers.
 
         Raises
         ------
@@ -100,10 +100,10 @@ class Vehicle(Protocol):
         """
 
     def hover(self) -> None:
-        """Ask for no motion."""
+        """Command no motion."""
 
     async def land(self) -> None:
-        """Land; returns when the vehicle is on the ground. May be called at any time, and twice."""
+        """Land; returns when the vehicle is on the ground. May be called at any time, and again."""
 
     async def close(self) -> None:
         """End the link; a vehicle in the air is landed first."""

@@ -1,10 +1,10 @@
-"""An event loop whose clock jumps to the next event, with a network in its memory.
+"""An event loop in virtual time, with a network in memory.
 
-A program on asyncio that takes its time from the loop runs in it unchanged: sleeping takes no time,
-the order of events is that of their times, and every run is the same to the bit. Datagrams and
-streams travel between addresses of the same loop, at once and in the order in which they were sent;
-delay, loss and reordering are put between by a relay. Threads, processes and real sockets have no
-place in it: nothing outside can be waited for while the clock jumps.
+An asyncio program that reads the time from its loop runs unchanged: its clock advances to the next
+event at once, events are ordered by their times, and all runs give the same bits. Datagrams and
+streams between addresses of the same loop arrive at once and in order; a relay adds delay, loss and
+reordering. Threads, processes and real sockets are not supported, because the clock does not wait
+for anything outside.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 Address = tuple[str, int]
 
-#: Ports that are given out where none is asked for.
+#: Ports for endpoints that ask for a free one.
 FREE_PORTS = range(49152, 65536)
 
 
@@ -34,7 +34,7 @@ def run(main: Coroutine[Any, Any, T]) -> T:
     Raises
     ------
     LinkError
-        If everything waits and nothing is due any more: in virtual time that never ends.
+        If all tasks wait and no event is scheduled, so that the program would never end.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def run(main: Coroutine[Any, Any, T]) -> T:
 
 
 class _Jump(selectors.BaseSelector):
-    """Moves the clock where a selector would wait; what is registered is only the loop's waker."""
+    """Advances the clock where a selector would wait; only the waker of the loop is registered."""
 
     def __init__(self) -> None:
         self.time = 0.0
@@ -61,7 +61,7 @@ class _Jump(selectors.BaseSelector):
         if ready:
             return ready
         if timeout is None:
-            raise LinkError("nothing is due any more and everything waits: a wait without an end")
+            raise LinkError("all tasks wait and no event is scheduled: the program would never end")
         self.time += max(timeout, 0.0)
         return []
 
@@ -101,13 +101,13 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         *args: Any,
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
-        """As of asyncio; what is due at the end of all times is not waited for."""
+        """As in asyncio; an event at infinity is never scheduled."""
         if when == math.inf:
             return asyncio.TimerHandle(when, callback, args, self, context)
         return super().call_at(when, callback, *args, context=context)
 
-    def _free(self, wanted: Address, taken: dict[Address, Any]) -> Address:
-        host, port = wanted
+    def _free(self, requested: Address, taken: dict[Address, Any]) -> Address:
+        host, port = requested
         if port == 0:
             port = next(port for port in FREE_PORTS if (host, port) not in taken)
         elif (host, port) in taken:
@@ -121,7 +121,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         remote_addr: Address | None = None,
         **others: Any,
     ) -> tuple[asyncio.DatagramTransport, asyncio.DatagramProtocol]:
-        """As of asyncio, between addresses of this loop."""
+        """As in asyncio, between addresses of this loop."""
         local = self._free(local_addr or ("127.0.0.1", 0), self._datagrams)
         protocol = protocol_factory()
         transport = _Datagrams(self, protocol, local, remote_addr)
@@ -137,7 +137,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         port: int | None = None,
         **others: Any,
     ) -> _Server:
-        """As of asyncio, between addresses of this loop."""
+        """As in asyncio, between addresses of this loop."""
         local = self._free((host or "127.0.0.1", port or 0), self._servers)
         self._servers[local] = _Server(self, protocol_factory, local)
         return self._servers[local]
@@ -149,15 +149,15 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         port: int | None = None,
         **others: Any,
     ) -> tuple[asyncio.Transport, asyncio.Protocol]:
-        """As of asyncio, between addresses of this loop."""
-        there = (host or "127.0.0.1", port or 0)
-        server = self._servers.get(there)
+        """As in asyncio, between addresses of this loop."""
+        remote = (host or "127.0.0.1", port or 0)
+        server = self._servers.get(remote)
         if server is None:
-            raise ConnectionRefusedError(111, f"nothing listens on {there[0]}:{there[1]}")
-        here = self._free((there[0], 0), self._servers)
+            raise ConnectionRefusedError(111, f"nothing listens on {remote[0]}:{remote[1]}")
+        local = self._free((remote[0], 0), self._servers)
         near_protocol, far_protocol = protocol_factory(), server.protocol_factory()
-        near = _Stream(self, near_protocol, here, there)
-        far = _Stream(self, far_protocol, there, here)
+        near = _Stream(self, near_protocol, local, remote)
+        far = _Stream(self, far_protocol, remote, local)
         near.peer, far.peer = far, near
         self.call_soon(far_protocol.connection_made, far)
         self.call_soon(near_protocol.connection_made, near)
@@ -166,7 +166,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
 
 
 class _Datagrams(asyncio.DatagramTransport):
-    """One end of a network that loses nothing and takes no time."""
+    """A datagram endpoint of a network without loss and delay."""
 
     def __init__(
         self,
@@ -185,14 +185,14 @@ class _Datagrams(asyncio.DatagramTransport):
             return
         target = addr or self._remote
         if target is None:
-            raise ValueError("no address to send to: the endpoint is not connected")
+            raise ValueError("no address to send to: give one, or connect the endpoint")
         if len(data) > 65507:
-            raise OSError(90, f"a datagram of {len(data)} bytes: 65507 at most")
-        there = self._loop._datagrams.get((target[0], target[1]))
-        if there is not None:
-            self._loop.call_soon(there._receive, bytes(data), self._local)
+            raise OSError(90, f"a datagram of {len(data)} bytes: at most 65507 are possible")
+        receiver = self._loop._datagrams.get((target[0], target[1]))
+        if receiver is not None:
+            self._loop.call_soon(receiver._receive, bytes(data), self._local)
         elif self._remote is not None:
-            # As the system does on one machine: a connected socket learns that nobody listens.
+            # As on one machine: a connected socket gets an error if nobody listens.
             error = ConnectionRefusedError(111, f"nobody receives at {target[0]}:{target[1]}")
             self._loop.call_soon(self._protocol.error_received, error)
 
@@ -214,7 +214,7 @@ class _Datagrams(asyncio.DatagramTransport):
 
 
 class _Stream(asyncio.Transport):
-    """One end of a connection; what is written arrives at the other in order."""
+    """One end of a connection; data arrive at the other end in order."""
 
     peer: _Stream | None = None
 
@@ -234,7 +234,7 @@ class _Stream(asyncio.Transport):
             cast(asyncio.Protocol, self._protocol).data_received(data)
 
     def _end(self) -> None:
-        """The other end has nothing more to say."""
+        """The other end sends no more data."""
         if self._closing:
             return
         if not cast(asyncio.Protocol, self._protocol).eof_received():
@@ -260,7 +260,7 @@ class _Stream(asyncio.Transport):
         return self._closing
 
     def pause_reading(self) -> None:
-        """Nothing to pause: what is on its way is in memory already."""
+        """Nothing to pause: data arrive at once."""
 
     def resume_reading(self) -> None:
         """Nothing to resume."""
@@ -276,7 +276,7 @@ class _Stream(asyncio.Transport):
 
 
 class _Listening:
-    """What a server says of its socket."""
+    """The socket of a server, for its address."""
 
     def __init__(self, local: Address) -> None:
         self._local = local

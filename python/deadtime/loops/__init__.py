@@ -12,7 +12,6 @@ from deadtime.loops._derivative_filter import DerivativeFilter
 from deadtime.loops._fixed_step import simulate_fixed_step
 from deadtime.loops._given_plants import PlantWithDelays
 from deadtime.loops._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
-from deadtime.loops._simulate import simulate
 from deadtime.loops._sweep import Sweep, SweepStatus, sweep
 
 __all__ = [
@@ -32,7 +31,6 @@ __all__ = [
     "Sweep",
     "SweepStatus",
     "kit_plant",
-    "simulate",
     "simulate_fixed_step",
     "sweep",
 ]

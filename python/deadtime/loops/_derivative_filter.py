@@ -12,11 +12,10 @@ The filter x' = F x + G v, d = C x, driven by the samples v_k of what it filters
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete
 
 from deadtime._base.validation import positive
 
@@ -25,8 +24,6 @@ __all__ = ["PAPER_FILTER", "DerivativeFilter", "Discretisation", "SampledFilter"
 Vector = NDArray[np.float64]
 
 Discretisation: TypeAlias = Literal["hold", "tustin", "backward"]
-
-_SCIPY = {"hold": "zoh", "tustin": "bilinear", "backward": "backward_diff"}
 
 
 @dataclass(frozen=True)
@@ -105,6 +102,15 @@ def discretised(
     F: Vector, G: Vector, C: Vector, sample_time: float, method: Discretisation
 ) -> SampledFilter:
     """Return the filter of a sample time in s by one of the methods."""
-    system = (F, G[:, None], C[None, :], np.zeros((1, 1)))
-    found = cast(Any, cont2discrete)(system, sample_time, method=_SCIPY[method])
-    return SampledFilter(found[0], found[1][:, 0], found[2][0], float(found[3][0, 0]))
+    from scipy.linalg import expm, solve
+
+    n, into = len(F), G[:, None]
+    if method == "hold":
+        held = expm(sample_time * np.block([[F, into], [np.zeros((1, n + 1))]]))
+        return SampledFilter(held[:n, :n], held[:n, n], C, 0.0)
+    # s for (z - 1)/(Ts (w z + 1 - w)), w the weight of the later end of a sample.
+    later = 0.5 if method == "tustin" else 1.0
+    left = np.eye(n) - later * sample_time * F
+    Fd = solve(left, np.eye(n) + (1.0 - later) * sample_time * F)
+    Gd = solve(left, sample_time * into)[:, 0]
+    return SampledFilter(Fd, Gd, solve(left.T, C), float(later * (C @ Gd)))

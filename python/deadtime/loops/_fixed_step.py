@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.validation import finite, positive
 from deadtime._deadtime import fixed_step_run
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._model import refuse_discretised
+from deadtime.loops._model import LoopRun, refuse_discretised
 from deadtime.loops._plants import realise
 from deadtime.loops._run import reference_jumps
 from deadtime.systems import Response
@@ -20,8 +20,22 @@ __all__ = ["simulate_fixed_step"]
 
 Vector = NDArray[np.float64]
 
-# A length of time within this part of a step of a whole number of steps is that number.
+#: Distance of a time to a whole number of steps, in steps, that counts as rounding.
 _WHOLE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class FixedStepSettings:
+    """What surrounds plant and controller, and how the run is made."""
+
+    delay: float
+    delay_path: str
+    limit: float | None
+    sample_steps: int | None
+    solver: str
+    step: float
+    steps: int
+    initial_output: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,34 +134,29 @@ def simulate_fixed_step(
     values = loop.parameters
     plant = realise(*loop.plant._polynomials(values))
     past = float(jumps.at(np.array([np.nextafter(0.0, -1.0)]))[0])
-    state, command = specification.rest_at(initial, past)
-    steps = _steps(duration, length)
-    outputs, inputs = fixed_step_run(
-        (plant.A, plant.B, plant.C, plant.D),
-        loop.controller._equations(values)[:8],
-        delay,
-        loop.delay_path,
-        loop.limit,
-        _sample_steps(loop.sample_time, length),
-        solver,
-        length,
-        steps,
-        state,
-        initial,
-        command,
-        (before, jumps.times, jumps.values),
+    run = LoopRun(*specification.rest_at(initial, past), before, jumps.values, jumps.times)
+    settings = FixedStepSettings(
+        delay=delay,
+        delay_path=loop.delay_path,
+        limit=loop.limit,
+        sample_steps=_sample_steps(loop.sample_time, length),
+        solver=solver,
+        step=length,
+        steps=_steps(duration, length),
+        initial_output=initial,
     )
-    times = length * np.arange(steps + 1, dtype=np.float64)
+    found = fixed_step_run(plant, loop.controller._equations(values), run, settings)
+    times = length * np.arange(settings.steps + 1, dtype=np.float64)
     moved = np.diff(jumps.values, prepend=before) != 0.0
     within = (jumps.times >= 0.0) & (jumps.times <= times[-1])
     return Response(
         time=times,
-        outputs=outputs,
-        inputs=inputs,
+        outputs=found.outputs,
+        inputs=found.inputs,
         breaks=jumps.times[moved & within],
         reference=jumps.at(times),
         steady_state=specification.steady_state(float(jumps.values[-1])),
-        _dense=_Lines(times, outputs),
+        _dense=_Lines(times, found.outputs),
     )
 
 

@@ -25,7 +25,7 @@ __all__ = ["LoopGain"]
 
 
 class LoopGain:
-    """The part of `ControlLoop` that cuts it at the command."""
+    """The loop gain of a `ControlLoop`, which is cut at the command."""
 
     specification: LoopSpecification
 
@@ -172,7 +172,7 @@ class LoopGain:
         return self.open_loop().phase(omega)
 
     def bode(
-        self, omega: ArrayLike | None = None, *, axes: Sequence[Axes] | None = None
+        self, omega: ArrayLike | None = None, *, ax: Sequence[Axes] | None = None
     ) -> Sequence[Axes]:
         """Draw gain and phase of the loop gain over frequency, and mark the margins.
 
@@ -182,7 +182,7 @@ class LoopGain:
             Frequencies in rad/s, above zero and increasing; by default from two decades below
             the gain crossover to where the delay has turned the phase a few times, of a sampled
             loop to pi/sample_time.
-        axes : sequence of two matplotlib.axes.Axes, optional
+        ax : sequence of two matplotlib.axes.Axes, optional
             Where to draw gain and phase; a new figure by default.
 
         Returns
@@ -205,12 +205,12 @@ class LoopGain:
                 high = np.pi / loop.sample_time
                 low = min(low, 0.01 * high)
             omega = np.geomspace(low, high, 1001)
-        drawn = shown_rows(axes, 2)
+        drawn = shown_rows(ax, 2)
         plot_bode(drawn, self, real_array("omega", omega), found)
         return drawn
 
     def _delay_margin(self) -> float:
-        """Further delay that the stable loop bears, s."""
+        """Delay margin of a loop that must be stable, s."""
         loop = self.specification
         if loop.sample_time is None:
             return self.margin()._delay_margin()
@@ -224,6 +224,6 @@ class LoopGain:
         return SampledLoopGain.of(loop.model, loop.known_delay, cast(float, loop.sample_time))
 
     def _further_delay(self) -> tuple[float, float]:
-        """How much more delay a stable sampled loop bears, and the frequency it then swings at."""
+        """Delay margin in s of a stable sampled loop, and the frequency of its crossing."""
         loop = self.specification
         return further_delay(SampledNumber(loop.model_at, loop.parameters, "delay"))

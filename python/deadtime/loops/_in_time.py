@@ -1,12 +1,15 @@
-"""What a control loop does in time: simulations and step responses."""
+"""What a control loop does in time: simulations, step and impulse responses."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from deadtime._base.validation import finite
+from deadtime.loops._characteristic import closed_loop
 from deadtime.loops._run import settled_step, simulate_loop
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._specification import LoopSpecification
@@ -16,7 +19,7 @@ __all__ = ["LoopInTime"]
 
 
 class LoopInTime:
-    """The part of `ControlLoop` that simulates it."""
+    """The simulations of a `ControlLoop`."""
 
     specification: LoopSpecification
 
@@ -140,3 +143,45 @@ class LoopInTime:
         rational = self.specification.plant.is_rational
         run = settled_step if rational else settled_step_with_delays
         return run(self.specification, finite("amplitude", amplitude))
+
+    def impulse_response(self, time: ArrayLike | None = None) -> Response:
+        """Response to an impulse of the reference of unit area, from rest at zero.
+
+        Parameters
+        ----------
+        time : array_like, optional
+            As in `step_response`.
+
+        Returns
+        -------
+        Response
+            The derivative of the step response. Its inputs are NaN: the command holds an impulse
+            where the controller passes the reference on.
+
+        Raises
+        ------
+        ValueError
+            If the loop is sampled or has a limit, its delay is None, or the output holds an
+            impulse.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=2.0), delay=0.25)
+        >>> print(loop.impulse_response([0.0, 0.25, 0.5, 0.75]).outputs)
+        [0. 2. 2. 1.]
+        """
+        loop = self.specification
+        loop.refuse_hold(
+            "reads its reference at samples and sees no impulse: use "
+            "continuous().impulse_response()"
+        )
+        if loop.limit is not None:
+            raise ValueError(
+                f"limit={loop.limit}: the command that an impulse causes is beyond any limit; "
+                "leave it out with loop.replace(limit=None)"
+            )
+        _ = loop.known_delay
+        closed = closed_loop(loop.plant, loop.controller, loop.parameters, loop.delay_path)
+        found = closed.impulse_response(time)
+        return replace(found, inputs=np.full_like(found.inputs, np.nan))

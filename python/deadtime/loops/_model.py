@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,32 @@ from deadtime.loops._batched_matrices import column, number, vector, zeros
 from deadtime.loops._controllers import Controller, FilterUpdate
 from deadtime.loops._plants import Plant, StateSpace, realise, rest
 
-__all__ = ["LoopModel", "rest_of", "state_at_rest"]
+__all__ = ["LoopModel", "LoopRun", "rest_of", "state_at_rest"]
 
 Vector = NDArray[np.float64]
+
+
+class SampleUpdate(NamedTuple):
+    """What a sample does to the states: x becomes J x + G w + H r."""
+
+    states: Vector
+    command: Vector
+    reference: Vector
+
+
+class LoopRun(NamedTuple):
+    """Where a run starts, and its reference, as the stepper takes them."""
+
+    state: Vector
+    #: Before the start.
+    command: float
+    reference_before: float = 0.0
+    #: A number, to which the reference steps at the start, or values that hold from their times on.
+    reference: float | Vector = 0.0
+    reference_time: Vector | None = None
+    #: Commands at the samples before the start, the latest one last.
+    command_history: Vector | None = None
+    sample_phase: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +63,8 @@ class LoopModel:
     C: Vector
     D: Any
     impulse: Any
-    #: J, G, H of x := J x + G w + H r at samples, where a discretised filter has states.
-    update: tuple[Vector, Vector, Vector] | None = None
+    #: What a sample does to the states, where a discretised filter has some.
+    update: SampleUpdate | None = None
     #: The plant alone.
     plant: StateSpace | None = None
 
@@ -94,21 +117,7 @@ class LoopModel:
         self, delay: float, sample_time: float | None = None, limit: float | None = None
     ) -> LinearLoop:
         """Return the loop as the stepper holds it."""
-        return LinearLoop(
-            self.A,
-            self.B,
-            self.E,
-            self.K,
-            self.L,
-            self.M,
-            self.C,
-            self.D,
-            delay,
-            sample_time,
-            limit,
-            self.impulse,
-            self.update,
-        )
+        return LinearLoop(self, delay, sample_time, limit)
 
     @cached_property
     def rest_gains(self) -> tuple[float, float] | None:
@@ -118,8 +127,8 @@ class LoopModel:
         A, B, E = self.A, self.B, self.E
         if self.update is not None:
             # What a sample moves rests where the sample does not move it.
-            states, command, reference = self.update
-            A, B, E = A + states - np.eye(n), B + command, E + reference
+            A = A + self.update.states - np.eye(n)
+            B, E = B + self.update.command, E + self.update.reference
         matrix[:n, :n] = A
         matrix[:n, n] = B
         matrix[n, :n] = self.K
@@ -135,7 +144,7 @@ class LoopModel:
         return float(self.C @ x[:n] + self.D * x[n]), float(x[n])
 
 
-def _update(plant: StateSpace, update: FilterUpdate, size: int) -> tuple[Vector, Vector, Vector]:
+def _update(plant: StateSpace, update: FilterUpdate, size: int) -> SampleUpdate:
     """What a sample does to all states: the filter reads the output, its states come last."""
     states, command, reference = np.eye(size), np.zeros(size), np.zeros(size)
     n = len(plant.B)
@@ -143,7 +152,7 @@ def _update(plant: StateSpace, update: FilterUpdate, size: int) -> tuple[Vector,
     states[-2:, :n] = np.outer(update.G, plant.C)
     command[-2:] = update.G * plant.D
     reference[-2:] = update.H
-    return states, command, reference
+    return SampleUpdate(states, command, reference)
 
 
 def refuse_discretised(controller: Controller, sample_time: float | None, what: str) -> None:

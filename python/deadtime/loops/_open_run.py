@@ -1,4 +1,4 @@
-"""A plant alone, under a command that was logged: no controller closes the loop."""
+"""Response of a plant without a controller to a logged command."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops._model import LoopModel
+from deadtime.loops._model import LoopModel, LoopRun
 from deadtime.loops._plants import Plant, realise, rest
 
 __all__ = ["open_response"]
@@ -27,7 +27,7 @@ def open_response(
     values : mapping of str to float
         Its numbers.
     times : ndarray, shape (n,)
-        Where the output is wanted, s, increasing.
+        Output times in s, increasing.
     command_time, command : ndarray, shape (m,)
         From when each command holds, s, increasing. A plant that comes to rest under a constant
         command rests under the first one; one that integrates is at zero until then.
@@ -48,6 +48,6 @@ def open_response(
     # The run begins where the earlier of the two clocks does.
     start = float(min(times[0], command_time[0]))
     clock = np.concatenate([[start], times]) if times[0] > start else times
-    held = (command_time, command)
-    found = open_loop.native(0.0).respond(clock, 0.0, state, before, before, held, None, 0.0)[0]
-    return np.asarray(found[clock.size - times.size :])
+    run = LoopRun(state, before, before, command, command_time)
+    outputs = open_loop.native(0.0).respond(clock, run, 0.0).outputs
+    return np.asarray(outputs[clock.size - times.size :])

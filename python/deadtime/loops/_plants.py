@@ -118,7 +118,7 @@ class Plant(ABC):
         return realise(*self._polynomials(self.parameters))
 
 
-# Why numbers cannot be zero.
+#: Reasons why a number cannot be zero, for errors.
 NO_GAIN = "a plant without gain does not answer its command, so the loop is open"
 NO_TIME = "the plant is then a gain alone, RationalPlant([gain], [1.0])"
 

@@ -33,7 +33,7 @@ __all__ = ["LoopPoles"]
 
 
 class LoopPoles:
-    """The part of `ControlLoop` that asks for its poles; the limit is left out throughout."""
+    """The poles of a `ControlLoop`; its limit is left out throughout."""
 
     specification: LoopSpecification
 
@@ -278,7 +278,7 @@ class LoopPoles:
     def stable_range(self, name: str) -> tuple[float, float]:
         """Interval of one named number, around its present value, on which the loop is stable.
 
-        The ends are the nearest values on either side at which a pole comes to the edge of
+        The ends are the nearest values on either side at which a pole reaches the edge of
         stability, or a neutral loop loses strong stability. None is passed over, however soon
         stability is regained: of a continuous loop they are among all its `crossings`; of a
         sampled one, steps are taken for which the loop gain on the unit circle keeps clear of -1.

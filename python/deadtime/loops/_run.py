@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import finite, increasing, one_dimensional, real_array
 from deadtime._deadtime import on_samples
+from deadtime.loops._model import LoopRun
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
@@ -23,31 +24,30 @@ __all__ = ["LEAST", "SHORTEST", "reference_jumps", "settled_step", "simulate_loo
 
 Vector = NDArray[np.float64]
 
-_NONE = np.empty(0)
-
-
-# The default time of a step response: at first so many times the slowest constant of the loop (at
-# least so many seconds), doubled until the last quarter is settled or the response has run away.
+#: Output times of a step response by default.
 _POINTS = 501
+#: Its first duration, as a multiple of the slowest time constant of the loop, at least LEAST,
+#: in s.
 SHORTEST = 10.0
 LEAST = 0.01
+#: The duration is doubled, at most this many times, until the last quarter stays within _SETTLED of
+#: the goal or the response is _LOST times as far away from it.
 _DOUBLINGS = 10
 _SETTLED = 0.005
 _LOST = 20.0
 
 
 class _Again:
-    """The output of one run at any times: the run is made again for them."""
+    """Output of a run at other times: the run is repeated for them."""
 
-    __slots__ = ("arguments", "loop", "start")
+    __slots__ = ("loop", "run", "start")
 
-    def __init__(self, loop: LoopSpecification, start: float, arguments: tuple[Any, ...]) -> None:
-        self.loop, self.start, self.arguments = loop, start, arguments
+    def __init__(self, loop: LoopSpecification, start: float, run: LoopRun) -> None:
+        self.loop, self.start, self.run = loop, start, run
 
     def __call__(self, times: Vector) -> Vector:
-        arguments = _since_start(self.loop, self.start, self.arguments)
-        later = times - self.start + self.loop.output_lead
-        return self.loop.native.simulate(later, _NONE, *arguments)[0]
+        run = _since_start(self.loop, self.start, self.run)
+        return self.loop.native.outputs(times - self.start + self.loop.output_lead, run)
 
 
 class _Jumps(NamedTuple):
@@ -84,26 +84,26 @@ def simulate_loop(
         raise ValueError("time is empty: give at least one output time")
     initial = finite("initial_output", initial_output)
     before = initial if reference_before is None else finite("reference_before", reference_before)
-    held: float | tuple[Vector, Vector]
-    past = before
+    held: float | Vector
+    past, held_from = before, None
     if type(reference) is float and reference_time is None:
         held = last = finite("reference", reference)
     else:
         jumps = reference_jumps(times, reference, reference_time, before)
-        held, last = (jumps.times, jumps.values), float(jumps.values[-1])
+        held, held_from, last = jumps.values, jumps.times, float(jumps.values[-1])
         if jumps.times[0] < times[0]:
             past = jumps.just_before(float(times[0]))
     history = None
     if not isinstance(command_history, tuple) or command_history:
         history = one_dimensional("command_history", command_history)
     phase = finite("sample_phase", sample_phase)
-    arguments = (*loop.rest_at(initial, past), before, held, history, phase)
-    # The times are the caller's; what is kept must not change with them.
+    run = LoopRun(*loop.rest_at(initial, past), before, held, held_from, history, phase)
+    # The array belongs to the caller; the response must not change with it.
     kept = times.copy()
-    arrays = loop.native.respond(kept, loop.output_lead, *arguments)
+    found = loop.native.respond(kept, run, loop.output_lead)
     start = float(kept[0])
-    again = _Again(loop, start, arguments)
-    response = Response._of_fresh(kept, arrays, loop.steady_state(last), again)
+    again = _Again(loop, start, run)
+    response = Response._of_fresh(kept, found, loop.steady_state(last), again)
     if not sensitivities:
         return response
     names = slope_names(loop, sensitivities)
@@ -112,19 +112,16 @@ def simulate_loop(
         names,
         (initial, past),
         _moved(loop, kept - start, start, phase),
-        _since_start(loop, start, arguments),
+        _since_start(loop, start, run),
     )
     return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
 
 
-def _since_start(
-    loop: LoopSpecification, start: float, arguments: tuple[Any, ...]
-) -> tuple[Any, ...]:
-    """Arguments of the stepper, whose clock is zero at the start, from those in the caller's."""
-    state, command, before, held, history, phase = arguments
-    times, values = held if type(held) is tuple else (np.array([start]), np.array([held]))
-    since = _moved(loop, times - start, start, phase)
-    return state, command, before, since, values, _NONE if history is None else history, phase
+def _since_start(loop: LoopSpecification, start: float, run: LoopRun) -> LoopRun:
+    """The run in the clock of the stepper, which is zero at the start."""
+    times = np.array([start]) if run.reference_time is None else run.reference_time
+    since = _moved(loop, times - start, start, run.sample_phase)
+    return run._replace(reference=np.atleast_1d(run.reference), reference_time=since)
 
 
 def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -> Vector:

@@ -6,8 +6,7 @@ drives the output by b r e^(-s delay) / h and the command by a r / h, h = a g + 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,17 +24,6 @@ Vector = NDArray[np.float64]
 
 #: Relative error to which an initial output must be the one at rest.
 _AT_REST = 1e-9
-
-
-@dataclass(frozen=True)
-class _Again:
-    """The output at any times: the run is made again for them."""
-
-    dense: Callable[[Vector], Vector]
-
-    def __call__(self, times: Vector) -> Vector:
-        outputs: Vector = np.atleast_2d(self.dense(times))[0]
-        return outputs
 
 
 def simulate_with_delays(
@@ -87,7 +75,6 @@ def simulate_with_delays(
         for driven in (output, command)
     ]
     steady = output.dcgain() * float(jumps.values[-1])
-    dense = runs[0]._dense
     return Response(
         time=times,
         outputs=runs[0].outputs,
@@ -95,7 +82,7 @@ def simulate_with_delays(
         breaks=np.union1d(runs[0].breaks, runs[1].breaks),
         reference=jumps.at(times),
         steady_state=steady if np.isfinite(steady) else None,
-        _dense=None if dense is None else _Again(dense),
+        _dense=runs[0]._dense,
     )
 
 

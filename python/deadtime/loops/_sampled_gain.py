@@ -22,7 +22,6 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigvals, matrix_balance
 
 from deadtime._base.validation import real_array
 from deadtime.loops._model import LoopModel
@@ -65,6 +64,8 @@ class SampledLoopGain:
     @classmethod
     def of(cls, model: LoopModel, delay: float, sample_time: float) -> SampledLoopGain:
         """Cut the loop of `model` at its command."""
+        from scipy.linalg import matrix_balance
+
         whole = math.floor(delay / sample_time)
         part = max(delay - whole * sample_time, 0.0)
         n = len(model.B)
@@ -109,11 +110,15 @@ class SampledLoopGain:
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
         """Poles of L but those at zero of the whole samples."""
+        from scipy.linalg import eigvals
+
         return np.asarray(eigvals(self.T), dtype=np.complex128)
 
     @cached_property
     def zeros(self) -> NDArray[np.complex128]:
         """Zeros of L that are finite."""
+        from scipy.linalg import eigvals
+
         size = len(self.b)
         upper = np.column_stack([self.T, self.b])
         pencil = np.vstack([upper, np.append(self.c, 0.0)])

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from deadtime.loops._sampled_gain import SampledLoopGain
 
@@ -180,6 +179,8 @@ def _crowded(gain: SampledLoopGain, angle: Vector, points: NDArray[np.complex128
 
 def _zero_at_one(gains: Gains, here: _Curve, there: _Curve) -> float | None:
     """A value between two at which a pole stands at z = 1."""
+    from scipy.optimize import brentq
+
     if here.at_one * there.at_one > 0.0:
         return None
     if there.at_one == 0.0:

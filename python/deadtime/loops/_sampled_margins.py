@@ -21,7 +21,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.systems import Margins
@@ -87,6 +86,8 @@ def _gain_crossovers(gain: SampledLoopGain) -> tuple[Vector, Vector]:
 
 def _crossings(f: Callable[[Vector], Vector], angles: Vector) -> Vector:
     """Zeros of `f` between `angles`, pairs around an extremum between two of them included."""
+    from scipy.optimize import brentq, minimize_scalar
+
     values = f(angles)
 
     def one(angle: float) -> float:

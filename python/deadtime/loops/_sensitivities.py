@@ -9,13 +9,13 @@ Squire & Trapp 1998).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._deadtime import loop_sensitivities
-from deadtime.loops._model import refuse_discretised, state_at_rest
+from deadtime.loops._model import LoopRun, refuse_discretised, state_at_rest
 from deadtime.loops._specification import LoopSpecification
 
 __all__ = ["output_and_input_slopes", "slope_names"]
@@ -24,6 +24,20 @@ Vector = NDArray[np.float64]
 Slopes = dict[str, Vector]
 
 _STEP = 1e-30
+
+
+class LoopSlopes(NamedTuple):
+    """A loop as the stepper takes it, and derivatives by parameters, a row a parameter.
+
+    They are derivatives of the row, of the state and the command before the start, and of how much
+    earlier than its measurement the output is.
+    """
+
+    row: Vector
+    row_slopes: Vector
+    state_slopes: Vector
+    command_slopes: Vector
+    output_lead_slopes: Vector
 
 
 def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...]:
@@ -56,19 +70,18 @@ def output_and_input_slopes(
     names: Sequence[str],
     initial: tuple[float, float],
     since: Vector,
-    arguments: tuple[Any, ...],
+    run: LoopRun,
 ) -> tuple[Slopes, Slopes]:
-    """Slopes of outputs and inputs at times `since` the start.
+    """Slopes of outputs and inputs at times `since` the start, as are those of the run.
 
-    `initial` holds output and reference before the start, `arguments` what the stepper takes.
+    `initial` holds output and reference before the start.
     """
     if not names:
         return {}, {}
     values: dict[str, Any] = dict(loop.parameters)
-    state, command, *rest = arguments
     # In units of their own size, all slopes are comparable with the values.
     units = {name: abs(values[name]) or 1.0 for name in names}
-    rows, states, commands, aheads = [], [], [], []
+    rows, states, commands, leads = [], [], [], []
     for name in names:
         stepped = values | {name: complex(values[name], _STEP * units[name])}
         rows.append(_row(loop, stepped).imag / _STEP)
@@ -76,23 +89,18 @@ def output_and_input_slopes(
         states.append(np.imag(begin) / _STEP)
         commands.append(np.imag(held) / _STEP)
         moves = name == "delay" and loop.delay_path == "measurement"
-        aheads.append(units[name] if moves else 0.0)
-    outputs, inputs = loop_sensitivities(
-        len(state),
-        _row(loop, values),
-        np.array(rows),
-        state,
-        np.array(states),
-        command,
-        np.array(commands),
-        np.array(aheads),
-        since + loop.output_lead,
-        since,
-        *rest,
+        leads.append(units[name] if moves else 0.0)
+    slopes = LoopSlopes(
+        row=_row(loop, values),
+        row_slopes=np.array(rows),
+        state_slopes=np.array(states),
+        command_slopes=np.array(commands),
+        output_lead_slopes=np.array(leads),
     )
+    found = loop_sensitivities(slopes, run, since + loop.output_lead, since)
     return (
-        {name: row / units[name] for name, row in zip(names, outputs, strict=True)},
-        {name: row / units[name] for name, row in zip(names, inputs, strict=True)},
+        {name: row / units[name] for name, row in zip(names, found.outputs, strict=True)},
+        {name: row / units[name] for name, row in zip(names, found.inputs, strict=True)},
     )
 
 

@@ -1,7 +1,7 @@
-"""Whether a response that is in its settling band at the end of a run is there for good.
+"""Whether a response that is in its settling band at the end of a run stays there.
 
-A response may pass through the band, or creep or swing out of it later than anyone looked. It
-counts as settled where it has been inside for three of the slowest time constants of the closed
+A response may pass through the band, or leave it slowly after the end of the run. It counts as
+settled where it has been inside for three of the slowest time constants of the closed
 loop, 1/abs(abscissa). Poles of a loop cost many times what its simulation does, so that they are
 only asked for where the native part did not see the response die down well within the band, or
 where a pole or zero of plant or controller is slow against the time simulated: closed-loop poles
@@ -24,16 +24,16 @@ __all__ = ["TIME_CONSTANTS", "abscissae", "slowest_times"]
 
 Vector = NDArray[np.float64]
 
-#: How many of the slowest time constants a settled response has been in its band.
+#: Slowest time constants that a response must have been in its band to count as settled.
 TIME_CONSTANTS = 3.0
 
 
 def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None) -> Vector:
-    """Spectral abscissa in 1/s of each set, limit left out; NaN where there is none to be had."""
+    """Spectral abscissa in 1/s of each set, limit left out; NaN where it cannot be found."""
     count = max(np.size(value) for value in numbers.values())
     moving = {name: value for name, value in numbers.items() if name != "limit"}
     if loop.is_sampled:
-        return sampled_grid(loop.plant, loop.controller, moving, threads=threads)[0]
+        return sampled_grid(loop.plant, loop.controller, moving, threads=threads).abscissa
     columns = {name: np.broadcast_to(value, count).tolist() for name, value in moving.items()}
     found = np.full(count, np.nan)
     for i in range(count):
@@ -47,7 +47,7 @@ def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None
 
 
 def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any], count: int) -> Vector:
-    """At least the longest 1/abs(root) of plant and controller, roots at zero left out, s.
+    """Upper bound on the longest 1/abs(root) of plant and controller, roots at zero left out, s.
 
     1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... (Fujiwara 1916).
     """

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eig, matrix_balance
 
 from deadtime import _deadtime
+from deadtime._deadtime import sampled_abscissa_grid
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
 from deadtime.loops._model import LoopModel, refuse_discretised
@@ -30,15 +30,16 @@ __all__ = [
     "sampled_roots",
 ]
 
-# Numbers of a loop that cannot be negative, and those that keep their sign because the loop has no
-# meaning at zero; those of a filter.
+#: Numbers of a loop that cannot be negative.
 _NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"})
+#: Numbers that keep their sign, since the loop has no meaning at zero.
 _KEEPS_SIGN = frozenset({"time_constant"})
+#: Numbers of a filter.
 _OF_FILTER = frozenset({"omega", "damping"})
 
-# What counts as zero on the way down to it, and how far a sampled loop is followed where it may be
-# stable for ever, as parts of the value.
+#: Relative value below which a number counts as zero on the way down.
 _NEARLY_ZERO = 1e-6
+#: Relative value up to which a sampled loop is followed where it may be stable for any value.
 _FARTHEST = 1e6
 
 
@@ -83,6 +84,8 @@ def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> boo
 
 def _balanced(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix in units that make its norm small, each command in its own."""
+    from scipy.linalg import matrix_balance
+
     with np.errstate(invalid="ignore"):  # units beyond integers, read as places as well
         return np.asarray(matrix_balance(matrix, permute=False)[0], dtype=np.float64)
 
@@ -96,6 +99,8 @@ def _eigenvalues(
     matrix: NDArray[np.float64],
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
     """Eigenvalues and first-order bounds on their errors."""
+    from scipy.linalg import eig
+
     z, left, right = cast(Any, eig)(matrix, left=True, right=True)
     # |dz| <= ||error|| / |y* x|.
     overlap = np.abs(np.sum(left.conj() * right, axis=0))
@@ -196,6 +201,29 @@ def _bounds(name: str, value: float) -> tuple[float, float]:
     return (0.0 if name in _NON_NEGATIVE or name in _KEEPS_SIGN else -math.inf), math.inf
 
 
+class SampledLoops(NamedTuple):
+    """Loops of one structure: every array holds one entry for all of them, or one a loop."""
+
+    cells: int
+    states: int
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
+    K: NDArray[np.float64]
+    L: NDArray[np.float64]
+    #: Factor on B.
+    gain: NDArray[np.float64]
+    delay: NDArray[np.float64]
+    sample_time: NDArray[np.float64]
+
+
+class SampledCells(NamedTuple):
+    """What is known of the poles of each of many loops."""
+
+    abscissa: NDArray[np.float64]
+    unstable: NDArray[np.int32]
+    status: NDArray[np.uint8]
+
+
 def sampled_grid(
     plant: Plant,
     controller: Controller,
@@ -203,7 +231,7 @@ def sampled_grid(
     decay: float = 0.0,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+) -> SampledCells:
     """Abscissa, number of poles outside exp(-decay Ts) and status of loops of one structure.
 
     `values` names every number of the loop; each is one for all cells or an array with one entry
@@ -231,11 +259,11 @@ def sampled_grid(
         part = {name: a if len(a) == 1 else a[group] for name, a in arrays.items()}
         size = cells if isinstance(group, slice) else len(group)
         report = None if progress is None else lambda n, done=done: progress(done + n)
-        abscissa[group], unstable[group], status[group] = _grid_of_gains(
-            plant, controller, part, size, decay, threads, report
-        )
+        found = _grid_of_gains(plant, controller, part, size, decay, threads, report)
+        abscissa[group], unstable[group] = found.abscissa, found.unstable
+        status[group] = found.status
         done += size
-    return abscissa, unstable, status
+    return SampledCells(abscissa, unstable, status)
 
 
 def _grid_of_gains(
@@ -246,7 +274,7 @@ def _grid_of_gains(
     decay: float,
     threads: int | None,
     progress: Callable[[int], object] | None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+) -> _deadtime.SampledCells:
     """Like `sampled_grid`, where only gains, delay and sample time vary."""
     fixed = {name: float(array[0]) for name, array in arrays.items()} | {"gain": 1.0}
     gains = controller._gains()
@@ -257,18 +285,16 @@ def _grid_of_gains(
         model = LoopModel.build(plant, controller, alone)
         feedback = feedback + arrays[name][:, None] * model.K
         direct = direct + arrays[name] * model.L
-    scale = arrays["gain"] if "gain" in arrays else np.ones(1)
-    return _deadtime.sampled_abscissa_grid(
-        cells,
-        len(model.B),
-        np.ascontiguousarray(model.A),
-        model.B,
-        feedback,
-        direct * scale,
-        scale,
-        arrays["delay"],
-        arrays["sample_time"],
-        decay,
-        threads,
-        progress,
+    gain = arrays["gain"] if "gain" in arrays else np.ones(1)
+    loops = SampledLoops(
+        cells=cells,
+        states=len(model.B),
+        A=model.A,
+        B=model.B,
+        K=feedback,
+        L=direct * gain,
+        gain=gain,
+        delay=arrays["delay"],
+        sample_time=arrays["sample_time"],
     )
+    return sampled_abscissa_grid(loops, decay=decay, threads=threads, progress=progress)

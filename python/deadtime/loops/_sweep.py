@@ -7,18 +7,19 @@ handed to the native part in blocks, so that memory stays bounded.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.ranges import given_points, is_range
 from deadtime._base.validation import finite, increasing, positive, real_array, thread_number
-from deadtime._deadtime import sweep_figures, sweep_responses
+from deadtime._deadtime import sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._run import LEAST, SHORTEST
@@ -43,8 +44,8 @@ _TO_SETTLE = 8.0
 # that it stays there.
 _DOUBTFUL = 4
 
-#: Figures in the order in which the native part gives them.
-_FIGURES = (
+#: Metrics of a step response.
+_METRICS = (
     "rise_time",
     "settling_time",
     "peak_time",
@@ -55,7 +56,6 @@ _FIGURES = (
     "peak",
     "steady_state",
 )
-_SETTLING = _FIGURES.index("settling_time")
 
 
 class SweepStatus(IntEnum):
@@ -168,7 +168,7 @@ def sweep(
     settling: float = 0.02,
     rise: tuple[float, float] = (0.1, 0.9),
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Progress = False,
 ) -> Sweep:
     """Simulate the step response of a loop for many sets of its numbers.
 
@@ -200,8 +200,8 @@ def sweep(
         Parts of the step between which the rise time is measured.
     threads : int, optional
         Number of threads; by default ``DEADTIME_NUM_THREADS``, else all cores.
-    progress : callable, optional
-        Called now and then with the number of finished sets.
+    progress : bool or callable
+        True for a progress bar; or called now and then with the number of finished sets.
 
     Returns
     -------
@@ -259,12 +259,21 @@ def sweep(
     sampled = 1.0 if "sample_time" in values else common.sample_time
     refuse_discretised(common.controller, sampled, "a sweep")
     sets = _Sets(common, arrays, shape, height, band, parts, thread_number(threads))
-    if time is None and not responses:
-        return sets.until_settled(progress)
-    times = _times(time, responses)
-    if responses:
-        return sets.outputs(times, progress)
-    return sets.decided(times, progress)
+    times = None if time is None and not responses else _times(time, responses)
+    with reported(progress, math.prod(shape)) as report:
+        if times is None:
+            return sets.until_settled(report)
+        return sets.outputs(times, report) if responses else sets.decided(times, report)
+
+
+class LoopSets(NamedTuple):
+    """Loops of one structure, a row a loop, and the step of their reference."""
+
+    states: int
+    rows: Vector
+    amplitude: float
+    #: Whether the output runs ahead of the clock of the stepper by the delay.
+    is_ahead: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,8 +283,8 @@ class _Sets:
     loop: ControlLoop
     arrays: Mapping[str, Vector]
     shape: tuple[int, ...]
-    height: float
-    band: float
+    amplitude: float
+    settling: float
     rise: tuple[float, float]
     threads: int | None
 
@@ -288,9 +297,9 @@ class _Sets:
         return replace(self, arrays=arrays, shape=places.shape)
 
     def blocks(
-        self, progress: Callable[[int], object] | None
-    ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any], tuple[int, Vector, float, bool], Any]]:
-        """Places, numbers, rows for the native part, and its progress, block by block."""
+        self, progress: Report | None
+    ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any], LoopSets, Any]]:
+        """Places, numbers, sets for the native part, and its progress, block by block."""
         flat = {name: np.broadcast_to(a, self.shape).ravel() for name, a in self.arrays.items()}
         loop, done = self.loop, 0
         for place, part in _blocks(loop, flat, math.prod(self.shape)):
@@ -300,40 +309,44 @@ class _Sets:
             rows = np.ascontiguousarray(np.broadcast_to(row, (len(place), row.shape[-1])))
             ahead = loop.delay_path == "measurement"
             report = None if progress is None else lambda n, done=done: progress(done + n)
-            yield place, numbers, (model.B.shape[-1], rows, self.height, ahead), report
+            yield place, numbers, LoopSets(model.B.shape[-1], rows, self.amplitude, ahead), report
             done += len(place)
 
-    def outputs(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+    def outputs(self, times: Vector, progress: Report | None) -> Sweep:
         """Outputs at given times."""
         count = math.prod(self.shape)
         found, status = np.full((count, len(times)), np.nan), np.empty(count, dtype=np.uint8)
-        for place, _, rows, report in self.blocks(progress):
-            found[place], status[place] = sweep_responses(
-                *rows, times - times[0], self.threads, report
-            )
+        for place, _, sets, report in self.blocks(progress):
+            part = sweep_responses(sets, times - times[0], threads=self.threads, progress=report)
+            found[place], status[place] = part.outputs, part.status
         outputs = found.reshape(*self.shape, len(times))
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
-    def measured(self, times: Vector, progress: Callable[[int], object] | None = None) -> Sweep:
+    def measured(self, times: Vector, progress: Report | None = None) -> Sweep:
         """Metrics; the status tells of sets that are in the band, but may leave it later."""
         count, span = math.prod(self.shape), float(times[-1] - times[0])
-        found, status = np.full((count, len(_FIGURES)), np.nan), np.empty(count, dtype=np.uint8)
-        for place, numbers, rows, report in self.blocks(progress):
-            steady = np.broadcast_to(_steady(self.loop, numbers, self.height), (len(place),))
-            figures, ended = sweep_figures(
-                *rows, steady, span, self.band, self.rise, self.threads, report
+        metrics = {name: np.full(count, np.nan) for name in _METRICS}
+        status = np.empty(count, dtype=np.uint8)
+        for place, numbers, sets, report in self.blocks(progress):
+            steady = np.broadcast_to(_steady(self.loop, numbers, self.amplitude), (len(place),))
+            part = sweep_metrics(
+                sets,
+                steady_state=steady,
+                span=span,
+                settling=self.settling,
+                rise=self.rise,
+                threads=self.threads,
+                progress=report,
             )
-            inside = span - figures[:, _SETTLING]
+            inside = span - part.metrics["settling_time"]
             slow = TIME_CONSTANTS * slowest_times(self.loop, numbers, len(place)) > inside
-            ended[slow & (ended == SweepStatus.OK)] = _DOUBTFUL
-            found[place], status[place] = figures, ended
-        metrics = {
-            name: column.reshape(self.shape).copy()
-            for name, column in zip(_FIGURES, found.T, strict=True)
-        }
-        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), metrics)
+            status[place] = np.where(slow & (part.status == SweepStatus.OK), _DOUBTFUL, part.status)
+            for name, values in part.metrics.items():
+                metrics[name][place] = values
+        shaped = {name: values.reshape(self.shape) for name, values in metrics.items()}
+        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), shaped)
 
-    def decided(self, times: Vector, progress: Callable[[int], object] | None) -> Sweep:
+    def decided(self, times: Vector, progress: Report | None) -> Sweep:
         """Metrics; doubtful sets are decided by how long they have been in the band."""
         found = self.measured(times, progress)
         status, settled = found.status.flatten(), found.metrics["settling_time"].ravel()
@@ -344,7 +357,7 @@ class _Sets:
             status[doubtful[stays]] = SweepStatus.OK
         return self._told(found, times, found.metrics, status)
 
-    def until_settled(self, progress: Callable[[int], object] | None) -> Sweep:
+    def until_settled(self, progress: Report | None) -> Sweep:
         """Metrics of all sets, over a longer time where a set has not settled."""
         loop = self.loop
         numbers: dict[str, Any] = loop.parameters | dict(self.arrays)

@@ -1,11 +1,11 @@
-"""The reproduction of a paper: every number printed in it beside ours, with a verdict.
+"""Reproduction of a paper: every printed number beside the computed one, with a verdict.
 
 S. K. Armah and S. Yi, "Analysis of Time Delays in Quadrotor Systems and Design of Control" (2017):
 the delay of a loop from the overshoot of its step response by Lambert W, and gains for it. Each
 table and figure is a function that computes it with the public models of this package and returns
 data; `reproduce` runs them all, and ``deadtime reproduce`` prints them and writes a page.
 
-This namespace is imported on demand: ``from deadtime import paper``.
+Import it with ``from deadtime import paper``.
 """
 
 from deadtime.loops._derivative_filter import PAPER_FILTER

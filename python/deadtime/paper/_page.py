@@ -1,4 +1,4 @@
-"""The page of the reproduced paper: every number beside ours, the figures, what came out."""
+"""The page of the reproduced paper: every printed number beside the computed one, and figures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ nav a { margin-right: .8rem; }
 
 HEADS = ("where", "what", "printed", "ours", "verdict", "why, and with which model")
 
-#: What the drawings show.
+#: Captions of the figures.
 CAPTIONS = {
     "table1": "The delays that the measured overshoots give: printed, by the dominant root, and by "
     "the exact step response.",
@@ -75,7 +75,7 @@ def render_reproduction(found: Reproduction, figures: dict[str, Figure] | None =
     )
     body = [
         "<p>S. K. Armah and S. Yi, “Analysis of Time Delays in Quadrotor Systems and Design of "
-        "Control”: every printed number beside the one that the models of this package give. The "
+        "Control”: every printed number beside the one computed with this package. The "
         "verdicts are computed from the digits.</p>",
         f'<p class="verdict">{escaped(found.summary())}</p>',
         f"<nav>{links}</nav>",

@@ -1,4 +1,4 @@
-"""The figures of the reproduced paper. Matplotlib is imported when something is drawn."""
+"""Figures of the reproduced paper. Matplotlib is imported when something is drawn."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ PRINTED: dict[str, Any] = {"color": "0.25", "marker": "o", "ms": 5, "ls": "", "m
 
 @singledispatch
 def draw(part: object) -> Figure | None:
-    """Draw a part of the reproduction; None where there is nothing to draw."""
+    """Draw a part of the reproduction; None for a part without a figure."""
     return None
 
 
 def _colours(count: int) -> list[Any]:
-    """Colours in an order that the eye sees, for many curves of one family."""
+    """Ordered colours for many curves of one family."""
     from matplotlib import colormaps
 
     return [colormaps["viridis"](place) for place in np.linspace(0.0, 0.9, count)]
@@ -83,7 +83,7 @@ def _table1(part: Table1) -> Figure:
 
 @draw.register(Figure2)
 def _figure2(part: Figure2) -> Figure:
-    """Responses, and what a hold and a lag do to the time scale and to the fit of Table 1."""
+    """Responses, and the effect of a hold and a lag on the time scale and the fit of Table 1."""
     figure, (left, middle, right) = new_figure(12.0, 4.0, columns=3)
     colours = _colours(len(part.simulated))
     for (gain, response), colour in zip(part.simulated.items(), colours, strict=True):
@@ -122,7 +122,7 @@ def _figure2(part: Figure2) -> Figure:
 
 @draw.register(Figure3)
 def _figure3(part: Figure3) -> Figure:
-    """Responses near the limit, the rightmost root, and what coarse steps make of the limit."""
+    """Responses near the limit, the rightmost root, and the limit of coarse simulations."""
     figure, (left, middle, right) = new_figure(12.0, 4.0, columns=3)
     shown = [(f"K = {gain:g}", one) for gain, one in part.responses.items() if gain < 18.0]
     _responses(left, shown, COLOURS)
@@ -138,7 +138,9 @@ def _figure3(part: Figure3) -> Figure:
     right.plot(steps, list(part.coarse_limits.values()), color=COLOURS[0], marker="o", ms=4)
     right.axhline(part.limit, color=COLOURS[1], lw=1.0, ls=":", label="exact")
     right.axhspan(18.0, 19.0, color="0.85", label="printed: 18 to 19")
-    _legend(right, "As fixed steps see it", xlabel="step / ms", ylabel="critical K / (1/s)")
+    _legend(
+        right, "Limit of fixed-step simulations", xlabel="step / ms", ylabel="critical K / (1/s)"
+    )
     return figure
 
 
@@ -160,7 +162,7 @@ def _table2(part: Table2) -> Figure:
 
 @draw.register(Gap)
 def _gap(part: Gap) -> Figure:
-    """The way from one estimate to the other."""
+    """The contributions to the difference of the estimates."""
     figure, ax = new_figure(6.5, 2.8)
     start = part.dominant
     for row, (name, added) in enumerate(part.parts.items()):
@@ -207,10 +209,10 @@ def _figure6(part: Figure6) -> Figure:
 
 @draw.register(Figure7)
 def _figure7(part: Figure7) -> Figure:
-    """Delays from the flights' overshoots, and the response they belong to."""
+    """Delays from the overshoots of the flights, and the corresponding response."""
     figure, (left, right) = new_figure(10.0, 3.8, columns=2)
     _responses(left, [("2.3 % overshoot", part.response)], COLOURS)
-    _step_axes(left, "The loop that the flights are said to be", " / m")
+    _step_axes(left, "The loop with the delay of the flights", " / m")
     flights = np.arange(1, len(part.flights) + 1)
     for name, label, marker, colour in (
         ("saturated", "exact, limit 1 m/s", "o", COLOURS[1]),
@@ -294,7 +296,7 @@ def _figure10(part: Figure10) -> Figure:
 
 @draw.register(Figure11)
 def _figure11(part: Figure11) -> Figure:
-    """Responses of the model of the flights, and where they settle."""
+    """Responses of the model of the flights, with their settling times."""
     figure, (left, right) = new_figure(10.0, 3.8, columns=2)
     labels = [(f"Kv = {gain:g}", one) for gain, one in part.responses.items()]
     for ax in (left, right):

@@ -1,8 +1,8 @@
-"""A number of the paper beside ours, and the verdict, which is computed from its digits.
+"""A printed number beside the computed one, with a verdict from its digits.
 
-A number printed with n digits is reproduced when ours, rounded to the last of them, is the same.
-Otherwise both are rounded to fewer and fewer digits until they agree. One agreeing digit is no
-agreement: two of them are the least that is called one.
+A number printed with n digits is reproduced if the computed one, rounded to n digits, is equal.
+Otherwise both are rounded to fewer digits until they agree. At least two agreeing digits count as
+agreement.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any
 
 __all__ = ["Comparison", "Verdict", "agreeing_digits", "printed_digits"]
 
-#: Fewer agreeing digits than this are no agreement.
+#: Fewest agreeing digits that count as agreement.
 LEAST_DIGITS = 2
 
 
 class Verdict(Enum):
-    """What became of a number or a statement of the paper."""
+    """Verdict on a number or a statement of the paper."""
 
     EXACT = "reproduced"
     """Every printed digit agrees."""
@@ -29,11 +29,11 @@ class Verdict(Enum):
     DIFFERENT = "not reproduced"
     """Fewer than two digits agree."""
     CONFIRMED = "confirmed"
-    """A statement, or limits between which ours lies, that our numbers bear out."""
+    """A statement, or an interval, that the computed numbers confirm."""
     CONTRADICTED = "not supported"
-    """A statement that our numbers, or the paper's own, contradict."""
+    """A statement that the computed or the printed numbers contradict."""
     MEASURED = "measured"
-    """Read off an experiment: no model has to give it; where one can, it stands beside it."""
+    """A measurement, with the value of a model beside it where there is one."""
 
 
 def printed_digits(printed: str) -> int:
@@ -60,14 +60,14 @@ def printed_digits(printed: str) -> int:
 
 
 def agreeing_digits(printed: str, computed: float) -> int:
-    """How many leading digits of a printed number a computed one has, after rounding.
+    """Number of leading digits that a printed and a computed number share, after rounding.
 
     Parameters
     ----------
     printed : str
-        The number as it is printed, with the digits it is printed with.
+        The number with its printed digits.
     computed : float
-        The same, computed.
+        The computed number.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def _rounded(number: Decimal, exponent: int) -> Decimal:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One number or statement of the paper, and what our models make of it.
+    """One number or statement of the paper, with the computed value.
 
     Made by its constructors, which compute the verdict.
 
@@ -106,23 +106,23 @@ class Comparison:
     where : str
         Table, figure or section.
     quantity : str
-        What it is.
+        Name of the quantity.
     printed : str
-        As printed, with its digits.
+        The printed digits.
     computed : float or complex or None
-        Ours; None where nothing can be computed.
+        The computed number; None where there is none.
     shown : str
-        Ours in words, with two digits more than are printed.
+        The computed value as text, with two more digits than printed.
     model : str
-        What it was computed with.
+        The model of the computation.
     verdict : Verdict
-        Computed from the two.
+        The verdict.
     digits : (int, int) or None
-        Digits that agree and digits printed, of numbers.
+        Agreeing and printed digits, of numbers.
     note : str
-        Why, where there is more to say.
+        Explanation, if any.
     details : mapping of str to float
-        Further numbers that belong to it.
+        Further numbers.
 
     Examples
     --------
@@ -244,7 +244,7 @@ class Comparison:
         note: str = "",
         **details: float,
     ) -> Comparison:
-        """Ask whether a number lies between two that the paper gives."""
+        """Compare a number with an interval of the paper."""
         holds = limits[0] <= computed <= limits[1]
         shown = f"{computed:.3f}"
         verdict = Verdict.CONFIRMED if holds else Verdict.DIFFERENT
@@ -274,7 +274,7 @@ class Comparison:
         computed: float | complex | None = None,
         **details: float,
     ) -> Comparison:
-        """Ask whether a statement holds."""
+        """Check a statement."""
         verdict = Verdict.CONFIRMED if holds else Verdict.CONTRADICTED
         return cls(where, quantity, printed, computed, shown, model, verdict, None, note, details)
 
@@ -290,7 +290,7 @@ class Comparison:
         shown: str = "",
         **details: float,
     ) -> Comparison:
-        """Put beside a measurement what a model gives, if one can."""
+        """Show a measurement beside the value of a model, if there is one."""
         if not shown:
             shown = "–"
             if computed is not None:

@@ -1,9 +1,9 @@
 """Figure 10: the rightmost root of the altitude loop under proportional-plus-velocity control.
 
 u = Kp (r - z) - Kv dz/dt with Kp = 2 and Td = 0.36 s: s + (Kp + Kv s) e^(-s Td), neutral, with a
-chain of roots near Re s = ln(Kv)/Td. The velocity is in truth a filtered derivative (38 rad/s,
-damping 1), which makes the loop retarded and moves the roots: `filtered` below. The best gain is
-where the rightmost root lies furthest left.
+chain of roots near Re s = ln(Kv)/Td. The real velocity is a filtered derivative (38 rad/s,
+damping 1), which makes the loop retarded and moves the roots: `filtered` below. At the best gain
+the rightmost root is furthest left.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ GAIN = 2.0
 #: Velocity gains of the figure, and those of a curve.
 GRID, FINE = np.round(np.arange(0.1, 1.0, 0.1), 1), np.linspace(0.005, 1.0, 200)
 
-#: A change of the rightmost root by more than this part of it is not minor.
+#: Largest relative change of the rightmost root that counts as minor.
 MINOR = 0.1
 
 
@@ -108,7 +108,7 @@ class Figure10:
         """Rightmost roots and best gains, without and with the filter."""
         curves = (self.ideal, self.filtered)
         rows = [
-            (f"Kv = {gain:g}", *(_told(curve.roots[float(gain)]) for curve in curves))
+            (f"Kv = {gain:g}", *(_in_words(curve.roots[float(gain)]) for curve in curves))
             for gain in GRID
         ]
         rows.append(("best", *(f"Kv = {one.best:.4f}: {one.best_abscissa:.4f}" for one in curves)))
@@ -128,7 +128,7 @@ class Figure10:
             f"Kv = 0.3 is the most stable gain only among multiples of 0.1: the best is "
             f"{ideal.best:.4f} ({ideal.best_abscissa:.3f} 1/s).",
             f"The filter is not minor: at Kv = 0.3 the rightmost root moves from "
-            f"{_told(ideal.roots[0.3])} to {_told(filtered.roots[0.3])}, the best gain is "
+            f"{_in_words(ideal.roots[0.3])} to {_in_words(filtered.roots[0.3])}, the best gain is "
             f"{filtered.best:.3f} ({filtered.best_abscissa:.3f}), and the loop is stable up to "
             f"{filtered.critical:.3f} instead of {ideal.critical:.3f}.",
         )
@@ -196,7 +196,7 @@ def _turns_complex() -> float:
     return float(brentq(lead, 0.3, 0.7, xtol=1e-6))
 
 
-def _told(root: complex) -> str:
+def _in_words(root: complex) -> str:
     if abs(root.imag) < 1e-9:
         return f"{root.real:.4f}"
     return f"{root.real:.4f} ± {root.imag:.4f}i"
@@ -250,7 +250,7 @@ def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comp
             'filter "has only a minor effect"',
             "minor",
             holds=moved < MINOR,
-            shown=f"{_told(ideal.roots[0.3])} → {_told(filtered.roots[0.3])} at Kv = 0.3",
+            shown=f"{_in_words(ideal.roots[0.3])} → {_in_words(filtered.roots[0.3])} at Kv = 0.3",
             model="filter of 38 rad/s, damping 1",
             note=f"at Kv = 0.7 {ideal.roots[0.7].real:.3f} → {filtered.roots[0.7].real:.3f}; "
             f"stable up to {ideal.critical:.4f} → {filtered.critical:.4f}; the best gain "

@@ -1,8 +1,8 @@
 """Figure 11 and section 4.4: the flights under proportional-plus-velocity control, and the filter.
 
 The model of the flights has the measured delay, the filter of the velocity and the limit of the
-vertical speed. Its settling time answers to little: a ripple of the slow oscillation that just
-touches the band of 2 % moves it by half a period.
+vertical speed. Its settling time is sensitive: an oscillation that just reaches the band of 2 %
+changes it by half a period.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LIMIT = 1.0
 #: Half widths of the settling band, in parts of the step: the usual one, and a little more.
 BAND, WIDER = 0.02, 0.021
 
-#: What is printed as the cutoff of the filter, rad/s and Hz.
+#: Printed cutoff of the filter, rad/s and Hz.
 CUTOFF, CUTOFF_HZ = "5.68", "0.90"
 
 
@@ -61,18 +61,18 @@ class SettlingTimes:
 
 @dataclass(frozen=True, eq=False)
 class Figure11:
-    """Figure 11, as the model has it.
+    """Figure 11, from the model.
 
     Attributes
     ----------
     responses : dict of float to Response
         Of the model of the flights, over Kv.
     settling : tuple of SettlingTimes
-        One a flight.
+        One for each flight.
     unlimited : Response
         At Kv = 0.3 without the limit: the paper's simulation.
     cutoffs : dict of str to float
-        What one could call the cutoff of the filter, rad/s.
+        Possible definitions of the cutoff of the filter, rad/s.
     comparisons : tuple of Comparison
         The printed numbers beside ours.
     """
@@ -113,7 +113,7 @@ class Figure11:
         return (
             f"At Kv = 0.7 a ripple of the model peaks just outside the band: it settles after "
             f"{slow.from_motion:.2f} s to 2 % and after {slow.wider:.2f} s to 2.1 %. The flight's "
-            f"{PRINTED[0.7]} s agrees with the latter, but such a number tells little.",
+            f"{PRINTED[0.7]} s agrees with the latter, but such a number has little significance.",
         )
 
 
@@ -155,7 +155,7 @@ def _settling(gain: float, response: Response) -> SettlingTimes:
 
 
 def _cutoffs() -> dict[str, float]:
-    """Where w^2 s/(s + w)^2, or a part of it, has lost 3 dB, in rad/s.
+    """Frequencies at which w^2 s/(s + w)^2, or a part of it, is down by 3 dB, in rad/s.
 
     Of the low pass w^2/(s + w)^2 below, of the high pass s^2/(s + w)^2 above, and of the band pass
     w s/(s + w)^2 at its lower edge.

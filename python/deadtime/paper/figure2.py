@@ -1,8 +1,8 @@
 """Figure 2: simulated and measured step responses of the Internet loop, and their time scales.
 
-The figure prints no numbers. Here the loop of section 2.1 runs in virtual time, its delay is read
-from the overshoots as in Table 1, and the question that the paper leaves open, why the time scales
-of simulation and experiment differ, is answered as far as its data reach.
+The figure prints no numbers. Here the loop of section 2.1 runs in virtual time, and its delay is
+estimated from the overshoots as in Table 1. The paper leaves open why the time scales of simulation
+and experiment differ; this is answered as far as its data allow.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Scenario:
     Attributes
     ----------
     words : str
-        What it is.
+        Description.
     sample_time, jitter : float
         As in `internet_loop`, s.
     """
@@ -58,7 +58,7 @@ SCENARIOS = (
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """The delay that the overshoot gives of a loop whose round trip is known, as in Table 1.
+    """The delay from the overshoot of a loop with known round trip, as in Table 1.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Trial:
     recording : Recording
         Of the first seed.
     delays : ndarray
-        Estimates by the dominant root, one a seed, s.
+        Estimates by the dominant root, one for each seed, s.
     """
 
     gain: float
@@ -168,34 +168,34 @@ class Figure2:
         )
 
     def findings(self) -> tuple[str, ...]:
-        """The answer to the question of Figure 2, and how far it reaches."""
+        """The answer to the question of Figure 2, and its limits."""
         hold, lag, both = self.explanations
         held = [one.period_ratio for one in (*self.stretches, *self.fitted) if one.hold > 0.0]
         return (
             "With a delay alone, K and the overshoot fix the time scale. At the same K and "
-            "overshoot, another time scale is proof of a second time in the loop.",
-            f"A hold is a weak one: {1e3 * HOLDS[-1]:g} ms stretch the period by "
+            "overshoot, another time scale proves a second time constant in the loop.",
+            f"A hold has a small effect: {1e3 * HOLDS[-1]:g} ms stretch the period by "
             f"{_span(self._periods(hold=HOLDS[-1]))}, and the first peak may even come earlier. "
-            f"A lag is a strong one: {1e3 * LAGS[-1]:g} ms stretch it by "
+            f"A lag has a large effect: {1e3 * LAGS[-1]:g} ms stretch it by "
             f"{_span(self._periods(lag=LAGS[-1]))}.",
-            f"The overshoots of Table 1 speak for a hold and against a lag. One delay for all "
+            f"The overshoots of Table 1 indicate a hold and no lag. One delay for all "
             f"gains leaves {hold.misfits[0]:.1f} points; a hold of "
             f"{1e3 * hold.values[hold.best]:.0f} ms with {1e3 * hold.delays[hold.best]:.0f} ms of "
             f"delay leaves {hold.misfits[hold.best]:.1f}, and its period is "
             f"{_span(one.period_ratio for one in self.fitted)} times as long; every lag makes it "
             f"worse ({lag.misfits[-1]:.1f} points at {1e3 * lag.values[-1]:.0f} ms), also beside "
             f"that hold ({both.misfits[-1]:.1f} at {1e3 * both.values[-1]:.0f} ms). The fit by a "
-            "hold is a narrow dip: it proves no hold of that length.",
+            "hold is a narrow minimum: it is no proof of a hold of that length.",
             f"So a hold explains periods of {_span(held)} times that of the delay alone, for "
             "these overshoots. More needs a lag, which Table 1 contradicts, or a model clock that "
             "does not run in real time: at a rate c it stretches all times by 1/c, while the "
             "overshoot is that of c K Td.",
             "The paper's data do not decide between them: it prints no time of a peak, no sample "
             "time of the two computers and no round trip. The rise of the delay in Table 1 from "
-            "0.09 to 0.13 s is not its method's: at a constant round trip the method's estimates "
-            f"rise by {1e3 * self._rise():.1f} ms from K = 5 to 10. Runs at different hours, of "
-            "round trips that differ by a third, would explain it as well.",
-            "With a jitter of 20 ms and the newest answer winning, the delay that acts is "
+            "0.09 to 0.13 s is not caused by its method: at a constant round trip the method's "
+            f"estimates rise by {1e3 * self._rise():.1f} ms from K = 5 to 10. Runs at different "
+            "hours, of round trips that differ by a third, would explain it as well.",
+            "With a jitter of 20 ms and the newest answer in use, the effective delay is "
             f"{1e3 * self._won():.0f} ms shorter than with a constant round trip of the same mean.",
         )
 
@@ -206,12 +206,12 @@ class Figure2:
         return [float(one.delays.mean()) for one in self.trials if one.scenario == scenario]
 
     def _rise(self) -> float:
-        """How much longer the estimate is at the largest gain than at the smallest, s."""
+        """Estimate at the largest gain minus that at the smallest, s."""
         steady = self._means(SCENARIOS[0])
         return steady[-1] - steady[0]
 
     def _won(self) -> float:
-        """How much shorter the estimates are where answers overtake one another, s."""
+        """By how much estimates are shorter where answers overtake each other, s."""
         return float(np.mean(self._means(SCENARIOS[0])) - np.mean(self._means(SCENARIOS[2])))
 
 

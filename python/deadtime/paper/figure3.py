@@ -1,8 +1,8 @@
 """Figure 3: the gain at which the integrator with Td = 0.1 s loses stability.
 
 By its roots (right) it is pi/(2 Td) = 15.708. The simulation on the left is said to be stable at 18
-and unstable at 19; no converged simulation is. Coarse fixed steps shift the limit: which steps
-shift it so far is found by bisection over the gain.
+and unstable at 19; no converged simulation is. Coarse fixed steps shift the limit; the steps
+that shift it so far are found by bisection over the gain.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DELAY = 0.1
 #: Lengths of step of a coarse simulation, s.
 STEPS = (0.001, 0.02, 0.04, 0.065, 0.07, 0.075, 0.08, 0.085, 0.09)
 
-#: Sample time of a loop with a hold, s, for contrast: a hold lowers the limit.
+#: Sample time of a loop with a hold, s, for comparison: a hold lowers the limit.
 HOLD = 0.065
 
 #: Relative width at which the bisection for a limit ends.
@@ -41,7 +41,7 @@ class Figure3:
     Attributes
     ----------
     responses : dict of float to Response
-        Exact step responses for the gains that the paper tells apart.
+        Exact step responses for the gains of the paper.
     rightmost : dict of float to complex
         Rightmost root over the gain, 1/s.
     limit : float
@@ -65,7 +65,7 @@ class Figure3:
         """Limits of coarse simulations, and roots."""
         return (
             Grid(
-                "Limit of stability as a simulation in fixed steps (ode3) sees it",
+                "Limit of stability of a simulation in fixed steps (ode3)",
                 ("step", "critical K"),
                 tuple((f"{1e3 * h:g} ms", f"{k:.2f}") for h, k in self.coarse_limits.items()),
             ),
@@ -87,7 +87,7 @@ class Figure3:
         return (
             f"The loop loses stability at K = {self.limit:.3f}. A simulation that is stable at 18 "
             f"and not at 19 has a delay of {low:.1f} to {high:.1f} ms instead of 100, or steps so "
-            f"coarse (of those tried: {', '.join(fits)} ms) that it says more of itself than of "
+            f"coarse (of those tried: {', '.join(fits)} ms) that it describes itself more than "
             "the loop.",
             f"With the command held for 65 ms the limit is {self.held_limit:.2f}: leaving out the "
             "hold errs on the unsafe side.",

@@ -1,7 +1,7 @@
-"""Figures 6 and 7: the altitude under proportional control, simulated and flown.
+"""Figures 6 and 7: the altitude under proportional control, in simulation and flight.
 
-Figure 6 shows the simulations of Table 2. Of Figure 7, the flights, the printed overshoots are what
-can be worked with: each is turned into a delay in three ways.
+Figure 6 shows the simulations of Table 2. From Figure 7, the flights, the printed
+overshoots are used: each is converted to a delay in three ways.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from deadtime.systems import Response
 
 __all__ = ["Figure6", "Figure7", "Flight", "figure6", "figure7"]
 
-#: Delay that the paper goes on with, s.
+#: Delay that the paper uses further on, s.
 DELAY = 0.36
 
 #: Overshoots of the five flights as printed, percent.
@@ -50,7 +50,7 @@ class Figure6:
         """What the figure shows."""
         return (
             "The responses of Table 2. Three of the seven delays lie within 0.13 ms of one "
-            "another: no eye tells them apart, and no recording at 65 ms would.",
+            "another, which neither the figure nor a recording at 65 ms can resolve.",
         )
 
 
@@ -87,7 +87,7 @@ def figure6() -> Figure6:
 
 @dataclass(frozen=True)
 class Flight:
-    """The delay that the overshoot of a flight gives, in s.
+    """The delay from the overshoot of a flight, in s.
 
     Attributes
     ----------
@@ -107,12 +107,12 @@ class Flight:
 
 @dataclass(frozen=True, eq=False)
 class Figure7:
-    """Figure 7: what the measured overshoots say.
+    """Figure 7: the delays from the measured overshoots.
 
     Attributes
     ----------
     flights : tuple of Flight
-        One a flight.
+        One for each flight.
     response : Response
         The loop with the delay that 2.3 % gives, its limit included.
     comparisons : tuple of Comparison
@@ -154,7 +154,7 @@ class Figure7:
 
 
 def figure7() -> Figure7:
-    """Turn the overshoots of Figure 7 into delays.
+    """Convert the overshoots of Figure 7 to delays.
 
     Returns
     -------

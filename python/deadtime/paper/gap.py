@@ -1,8 +1,8 @@
 """Sections 4.2, 4.3 and 5: why the two estimates of the delay, 0.3682 s and 0.3598 s, differ.
 
-Both start from the same overshoot of 2.30 %, so noise cannot be the reason. Between them lie three
-steps, each taken alone here: the dominant root for the exact linear response, the limit of the
-speed, and the coarse steps of the simulation.
+Both start from the same overshoot of 2.30 %, so noise cannot be the reason. Three effects explain
+the difference, each computed separately here: the dominant root instead of the exact linear
+response, the limit of the speed, and the coarse steps of the simulation.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from deadtime.paper.table2 import SAMPLE_TIME, altitude_loop
 
 __all__ = ["Gap", "gap"]
 
-#: Overshoot of the flights (%), gain, and the delay in samples that the paper settles on.
+#: Overshoot of the flights (%), gain, and the delay in samples that the paper chooses.
 OVERSHOOT, GAIN, SAMPLES = "2.30", 1.31, 5.6646
 
 
@@ -47,7 +47,7 @@ class Gap:
 
     @property
     def parts(self) -> dict[str, float]:
-        """What each step adds to the delay on the way from the root to the simulation, s."""
+        """Contributions to the difference between the two estimates, s."""
         return {
             "dominant root": self.linear - self.dominant,
             "saturation": self.saturated - self.linear,
@@ -55,7 +55,7 @@ class Gap:
         }
 
     def grids(self) -> tuple[Grid, ...]:
-        """The way from one estimate to the other."""
+        """The contributions to the difference of the estimates."""
         delays = (self.linear, self.saturated, self.simulation)
         steps = (
             ("the exact response for the dominant root", "dominant root"),
@@ -82,8 +82,8 @@ class Gap:
         return (
             f"The two estimates differ by {whole:.2f} ms from the same overshoot: "
             f"{added['saturation']:+.2f} ms is the limit of the speed, "
-            f"{added['dominant root']:+.2f} ms the dominant root taken for the whole response, "
-            f"{added['coarse steps']:+.2f} ms the coarse steps. Noise has no part in it.",
+            f"{added['dominant root']:+.2f} ms the dominant root in place of the whole response, "
+            f"{added['coarse steps']:+.2f} ms the coarse steps. Noise does not contribute.",
         )
 
 

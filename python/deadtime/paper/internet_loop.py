@@ -1,10 +1,10 @@
 """The integrator controlled over the Internet (section 2.1, Figure 1), in virtual time.
 
 One computer holds the integrator z' = w, the other the controller. Every `sample_time` the first
-sends what it measures; the answer K (r - z) comes back one round trip later and holds until a
-newer one arrives. Round trips are constant or drawn from a gamma distribution; an answer that was
-overtaken on its way is dropped, as is one that was lost. Between arrivals z is a straight line, so
-the run is exact. With a constant round trip it is the sampled `ControlLoop`, to rounding.
+sends its output; the answer K (r - z) arrives one round trip later and holds until a newer one
+arrives. Round trips are constant or drawn from a gamma distribution; overtaken and lost answers are
+dropped. Between arrivals z is linear, so the run is exact. With a constant round trip it is the
+sampled `ControlLoop`, to rounding.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import deadtime as dtm
 
 __all__ = ["internet_loop"]
 
-#: Rest before the step: the estimators read there where the loop was, s.
+#: Rest before the step, s, from which the estimators read the initial output.
 REST = 1.0
 
 
@@ -49,7 +49,7 @@ def internet_loop(
     seed : int
         Of round trips and losses.
     duration : float
-        How long the response is logged, s.
+        Duration of the log, s.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def internet_loop(
 
     Examples
     --------
-    The delay from the overshoot, as in Table 1, without and with the hold taken for what it is:
+    The delay from the overshoot, as in Table 1, without and with the hold in the model:
 
     >>> import deadtime as dtm
     >>> from deadtime import paper
@@ -82,13 +82,13 @@ def internet_loop(
         if not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{name}={value}: give a finite number above zero")
     if loss >= 1.0:
-        raise ValueError(f"loss={loss}: with no answer at all there is no loop; give less than 1")
+        raise ValueError(f"loss={loss}: give a number below 1, so that answers arrive")
     before, after = math.ceil(REST / sample_time), math.ceil(duration / sample_time)
     time = sample_time * np.arange(-before, after + 1)
     reference = np.where(time >= 0.0, 1.0, 0.0)
     trips = _round_trips(time.size, delay, jitter, loss, seed)
     output, command = np.zeros(time.size), np.zeros(time.size)
-    # Answers on their way: when they arrive, which packet they answer, the command.
+    # Answers in transit: arrival, number of the answered packet, command.
     under_way: list[tuple[float, int, float]] = []
     state, held, latest, clock = 0.0, 0.0, -1, float(time[0])
     for packet, now in enumerate(time.tolist()):

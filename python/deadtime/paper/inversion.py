@@ -1,8 +1,8 @@
-"""From the overshoot of a step to the delay, in the two ways that the paper compares.
+"""Delay from the overshoot of a step, in the two ways that the paper compares.
 
 By the dominant root: W0(-K Td)/Td (eq. 3) is to have the damping ratio (eq. 6) that a second-order
-system with this overshoot has (eq. 5). By simulation: the delay at which the simulated loop
-overshoots by so much, here with exact simulations, so that nothing is left of a solver's step.
+system with this overshoot has (eq. 5). By simulation: the delay at which the simulated loop has
+this overshoot, here with exact simulations, without the error of a solver.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import deadtime as dtm
 
 __all__ = ["damping_of", "delay_by_dominant_root", "delay_by_simulation", "overshoot"]
 
-#: Longest delay that is looked for, in units of 1/(gain Kp): the limit of stability is pi/2.
+#: Longest delay of the search, in units of 1/(gain Kp): the limit of stability is pi/2.
 LONGEST = 1.55
 
 
@@ -38,7 +38,7 @@ def delay_by_dominant_root(gain: float, part: float) -> float:
     gain : float
         K = Kp of the unit integrator, 1/s.
     part : float
-        Overshoot as a part of the step.
+        Overshoot as a share of the step.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def delay_by_simulation(loop: dtm.ControlLoop, part: float) -> float:
     loop : ControlLoop
         An integrator under proportional control; its delay does not matter.
     part : float
-        Overshoot as a part of the step.
+        Overshoot as a share of the step.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What every part of the reproduction has: comparisons, and tables of what else it found."""
+"""The protocol of a part of the reproduction: comparisons and further tables."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ __all__ = ["Grid", "Part"]
 
 @dataclass(frozen=True)
 class Grid:
-    """A table in words, for a terminal or a page.
+    """A table of text, for a terminal or a page.
 
     Attributes
     ----------
     title : str
-        What it shows.
+        Title.
     heads : tuple of str
-        Its columns.
+        Headings of the columns.
     rows : tuple of tuple of str
-        Its cells.
+        Cells.
     """
 
     title: str
@@ -35,18 +35,18 @@ class Part(Protocol):
     Attributes
     ----------
     comparisons : tuple of Comparison
-        The numbers printed there beside ours.
+        The printed numbers beside the computed ones.
     """
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
-        """The numbers printed there beside ours."""
+        """The printed numbers beside the computed ones."""
         ...
 
     def grids(self) -> tuple[Grid, ...]:
-        """Further tables: what the numbers alone do not say."""
+        """Further tables."""
         ...
 
     def findings(self) -> tuple[str, ...]:
-        """What came out, in sentences."""
+        """The findings, in sentences."""
         ...

@@ -1,4 +1,4 @@
-"""All tables and figures at once, with the verdicts counted."""
+"""`reproduce`: compute all tables and figures, and count the verdicts."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from deadtime._base.progress import Stages, stage_report
 from deadtime.paper.comparison import Comparison, Verdict
 from deadtime.paper.figure2 import figure2
 from deadtime.paper.figure3 import figure3
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PARTS", "TITLES", "Reproduction", "reproduce"]
 
-#: What is reproduced, in the order of the paper.
+#: The parts, in the order of the paper.
 PARTS: Mapping[str, Callable[[], Part]] = {
     "table1": table1,
     "figure2": figure2,
@@ -61,18 +62,18 @@ class Reproduction:
     Attributes
     ----------
     parts : mapping of str to object
-        What the functions of this namespace return, by their names.
+        Results of the functions of this room, by their names.
     """
 
     parts: Mapping[str, Part]
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
-        """Every printed number beside ours, in the order of the paper."""
+        """Every printed number beside the computed one, in the order of the paper."""
         return tuple(one for part in self.parts.values() for one in part.comparisons)
 
     def counts(self) -> dict[Verdict, int]:
-        """How often each verdict was given.
+        """Number of each verdict.
 
         Returns
         -------
@@ -97,7 +98,7 @@ class Reproduction:
             f"digits, {counts[Verdict.DIFFERENT]} not. "
             f"{sum(counts[one] for one in said)} statements: {counts[Verdict.CONFIRMED]} "
             f"confirmed, {counts[Verdict.CONTRADICTED]} not supported. "
-            f"{counts[Verdict.MEASURED]} measurements, which no model has to give."
+            f"{counts[Verdict.MEASURED]} measurements, which are not compared."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -125,7 +126,7 @@ class Reproduction:
         }
 
     def figures(self) -> dict[str, Figure]:
-        """Draw the figures of the parts that are there.
+        """Draw the figures of the computed parts.
 
         Returns
         -------
@@ -141,17 +142,15 @@ class Reproduction:
         return {name: figure for name, part in self.parts.items() if (figure := draw(part))}
 
 
-def reproduce(
-    only: Iterable[str] | None = None, progress: Callable[[str], object] | None = None
-) -> Reproduction:
+def reproduce(only: Iterable[str] | None = None, progress: Stages = False) -> Reproduction:
     """Reproduce the tables and figures of the paper.
 
     Parameters
     ----------
     only : iterable of str, optional
         Names of parts; all by default.
-    progress : callable, optional
-        Called with the title of each part before it is computed.
+    progress : bool or callable
+        Called with the title of each part before it is computed; True prints it on stderr.
 
     Returns
     -------
@@ -160,7 +159,7 @@ def reproduce(
     Raises
     ------
     ValueError
-        If there is no such part, or none is asked for.
+        If a part does not exist, or `only` is empty.
 
     Examples
     --------
@@ -169,16 +168,16 @@ def reproduce(
     >>> print(found.summary().split(".")[0])
     19 printed numbers: 19 reproduced to every digit, 0 to fewer digits, 0 not
     """
-    wanted = list(PARTS) if only is None else list(dict.fromkeys(only))
-    unknown = [name for name in wanted if name not in PARTS]
+    report = stage_report(progress)
+    names = list(PARTS) if only is None else list(dict.fromkeys(only))
+    unknown = [name for name in names if name not in PARTS]
     if unknown:
         raise ValueError(f"{', '.join(unknown)}: not one of {', '.join(PARTS)}")
-    if not wanted:
-        raise ValueError(f"no part is asked for: give one or more of {', '.join(PARTS)}")
+    if not names:
+        raise ValueError(f"only is empty: give one or more of {', '.join(PARTS)}")
     parts = {}
     for name in PARTS:
-        if name in wanted:
-            if progress is not None:
-                progress(TITLES[name])
+        if name in names:
+            report(TITLES[name])
             parts[name] = PARTS[name]()
     return Reproduction(parts)

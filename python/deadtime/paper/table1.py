@@ -1,6 +1,6 @@
-"""Table 1: the integrator over the Internet, its overshoots and the delays they give.
+"""Table 1: the integrator over the Internet, its overshoots and the delays from them.
 
-Measured overshoots Mp of the loop z' = K (r - z) with the delay of two computers between; each
+Measured overshoots Mp of the loop z' = K (r - z) with a network between two computers; each
 gives a damping ratio (eq. 5), a delay (eqs. 3 and 6) and the dominant pair of roots.
 """
 
@@ -33,29 +33,29 @@ PRINTED = {
 #: Gain to measured overshoot in percent.
 PRINTED_OVERSHOOTS = {gain: float(row[0]) for gain, row in PRINTED.items()}
 
-#: Percent: what a plot of the experiment shows as no overshoot.
+#: Smallest overshoot that is visible in a plot, percent.
 UNSEEN = 0.05
 
 
 @dataclass(frozen=True)
 class Table1Row:
-    """What follows from one measured overshoot.
+    """Results from one measured overshoot.
 
     Attributes
     ----------
     gain : float
         K, 1/s.
     overshoot : float
-        As measured, percent.
+        Measured overshoot, percent.
     damping : float
-        Eq. 5 of it.
+        Damping ratio by eq. 5.
     delay : float
         By the dominant root, s.
     exact_delay : float
         By the exact step response, s.
     taken_delay : float
-        What the paper went on with: the delay as printed, but where one digit of it is printed, in
-        whole milliseconds, s.
+        The delay that the paper uses further on: as printed, or in whole milliseconds where one
+        digit is printed, s.
     root : complex
         Dominant root at `taken_delay`, 1/s.
     root_damping : float
@@ -79,7 +79,7 @@ class Table1:
     Attributes
     ----------
     rows : tuple of Table1Row
-        One a gain from 5 to 10.
+        One for each gain from 5 to 10.
     comparisons : tuple of Comparison
         The printed numbers beside ours.
     """
@@ -111,9 +111,9 @@ class Table1:
         exact = [row.exact_delay for row in self.rows]
         return (
             "The column of damping ratios is not equation (5) of the printed overshoots but the "
-            "damping ratio of the dominant root at the delay that the paper went on with.",
+            "damping ratio of the dominant root at the delay that the paper uses further on.",
             f"By the exact step response the delays run from {1e3 * min(exact):.1f} to "
-            f"{1e3 * max(exact):.1f} ms: the trend with K is not the dominant root's doing (see "
+            f"{1e3 * max(exact):.1f} ms: the trend with K is not caused by the dominant root (see "
             "Figure 2).",
         )
 

@@ -1,9 +1,8 @@
-"""Table 2: the overshoot of the simulated altitude loop over delays of so many samples.
+"""Table 2: the overshoot of the simulated altitude loop over the delay in samples.
 
 z' = w, w the limited command of u = Kp (r - z) with Kp = 1.31, Td = N Ts later, Ts = 0.065 s; the
-vertical speed is limited to 1 m/s. The printed figures come from a block diagram in coarse fixed
-steps: `simulink` is that model, found afterwards among many. What the loop itself does is the
-exact simulation.
+vertical speed is limited to 1 m/s. The printed numbers are from a block diagram in coarse fixed
+steps: `simulink` is a model of it, selected among many. The exact simulation shows the loop itself.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ PRINTED = (
     ("5.7", "2.429", "0.3705"),
 )
 
-#: When the reference of the coarse model steps: not on one of its steps, s.
+#: Time of the step in the coarse model, s, which is not one of its time steps.
 STEP_TIME = 0.5
 
 
@@ -78,9 +77,9 @@ def simulink(delay: float, end: float = 10.0) -> Response:
 
     Notes
     -----
-    Chosen because it fits, from about 1500 variants of step, formula, delay path and phase. That
-    the speed was limited is certain (no variant without comes within 0.7 points), steps near 0.065
-    s are very likely, formula and phase are not identified: the paper names ode8.
+    Selected because it fits, from about 1500 variants of step, formula, delay path and phase. The
+    limit of the speed is certain (no variant without it is within 0.7 points), steps near 0.065 s
+    are very likely; formula and phase are not identified: the paper names ode8.
 
     Examples
     --------
@@ -135,7 +134,7 @@ class Table2:
     Attributes
     ----------
     rows : tuple of Table2Row
-        One a delay.
+        One for each delay.
     comparisons : tuple of Comparison
         The printed numbers beside those of the coarse model.
     """
@@ -169,9 +168,9 @@ class Table2:
         unlimited = max(abs(row.printed - row.unlimited) for row in self.rows)
         return (
             "Coarse fixed steps of one sample with the speed limited to 1 m/s give every printed "
-            f"digit; they are off by up to {off:.3f} points from what the loop does.",
-            f"Without the limit the overshoots are off by up to {unlimited:.3f} points: the limit "
-            "was there. The order of the solver and the phase of the step are not identified.",
+            f"digit; they differ by up to {off:.3f} points from the exact response.",
+            f"Without the limit the overshoots differ by up to {unlimited:.3f} points: the limit "
+            "was active. The order of the solver and the phase of the step are not identified.",
         )
 
 

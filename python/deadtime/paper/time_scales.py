@@ -1,14 +1,15 @@
-"""What a hold and a lag do to the time scale of the Internet loop (Figure 2).
+"""The effect of a hold and a lag on the time scale of the Internet loop (Figure 2).
 
 The paper finds simulated and measured responses alike, but on different time scales. A loop of an
 integrator, a gain K and a delay Td alone has one time, Td: the overshoot determines K Td, so at
 equal K and equal overshoot its time scale is fixed. A hold Ts or a lag of the plant adds a second
-time, and with it another time scale at the same overshoot:
+time constant, and with it another time scale at the same overshoot:
 
-* `stretch`: how much longer first peak and period are with a given hold or lag than with the delay
-  alone, K and overshoot being the same.
-* `explain`: how well delay and hold, or delay and lag, the same for all gains, give all the
-  overshoots of Table 1, which a delay alone does not.
+* `stretch`: ratio of first peak and period with a given hold or lag to those with the delay alone,
+at
+  the same K and overshoot.
+* `explain`: fit of delay and hold, or delay and lag, the same for all gains, to all overshoots of
+  Table 1, which a delay alone does not explain.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ from deadtime.paper.table1 import PRINTED_OVERSHOOTS
 
 __all__ = ["Explanation", "Stretch", "explain", "stretch", "time_scale"]
 
-#: Step of the delays that are tried, and the longest of them, s.
+#: Step of the tried delays, and the longest of them, s.
 DELAY_STEP, LONGEST_DELAY = 5e-4, 0.14
 
-#: How long responses are watched, s: of a stable loop the first peak, within 0.6 s, is the highest.
+#: Simulated time, s: the first peak of a stable loop, within 0.6 s, is the highest.
 WATCHED = 1.5
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A loop with a hold or a lag beside the loop of a delay alone with the same overshoot.
+    """A loop with a hold or a lag, compared with a delay alone of the same overshoot.
 
     Attributes
     ----------
@@ -68,7 +69,7 @@ class Stretch:
 def stretch(
     gain: float, overshoot: float, *, hold: float = 0.0, lag: float = 0.0
 ) -> Stretch | None:
-    """How a hold or a lag stretches the response at the same gain and the same overshoot.
+    """Stretch of the response by a hold or a lag, at the same gain and overshoot.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def stretch(
     Returns
     -------
     Stretch or None
-        None where hold or lag alone overshoot by more.
+        None where the hold or lag alone has a larger overshoot.
 
     Examples
     --------
@@ -98,7 +99,7 @@ def stretch(
 
 
 def time_scale(loop: dtm.ControlLoop) -> Stretch:
-    """Put a loop beside that of a delay alone with the same gain and the same overshoot.
+    """Compare a loop with a delay alone of the same gain and overshoot.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def time_scale(loop: dtm.ControlLoop) -> Stretch:
     Raises
     ------
     ValueError
-        If no delay alone makes the integrator overshoot by as much.
+        If no delay alone gives the integrator this overshoot.
 
     Examples
     --------
@@ -176,24 +177,24 @@ def _measured(loop: dtm.ControlLoop) -> tuple[float, float]:
 
 
 def _period(loop: dtm.ControlLoop) -> float:
-    """Period of the oscillation that the dominant roots make."""
+    """Period of the oscillation of the dominant roots."""
     return 2.0 * math.pi / abs(complex(loop.rightmost().roots[0]).imag)
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Delay and one more time, the same for all gains, fitted to the overshoots of Table 1.
+    """Delay and a hold or lag, the same for all gains, fitted to the overshoots of Table 1.
 
     Attributes
     ----------
     name : {"hold", "lag"}
         The other time.
     hold : float
-        A hold that is there in any case, s; 0 for none.
+        A given hold, s; 0 for none.
     values : ndarray, shape (n,)
         Holds or lags tried, s; the first is 0.
     delays : ndarray, shape (n,)
-        The delay that fits best with each, s.
+        The best delay for each, s.
     misfits : ndarray, shape (n,)
         Root of the mean square of the six differences of overshoot, in percent of the step.
     overshoots : ndarray, shape (n, 6)
@@ -209,7 +210,7 @@ class Explanation:
 
     @property
     def words(self) -> str:
-        """What is fitted, in words."""
+        """The fitted quantities, in words."""
         held = f", a hold of {1e3 * self.hold:.0f} ms" if self.hold else ""
         return f"delay{held} and {self.name}"
 
@@ -225,7 +226,7 @@ def explain(name: str, values: NDArray[np.float64], *, hold: float = 0.0) -> Exp
     Parameters
     ----------
     name : {"hold", "lag"}
-        What is tried beside the delay.
+        The second quantity.
     values : ndarray
         Its values above zero, s; zero is tried too.
     hold : float
@@ -238,7 +239,7 @@ def explain(name: str, values: NDArray[np.float64], *, hold: float = 0.0) -> Exp
     Raises
     ------
     ValueError
-        If `name` is neither, or there are to be two holds.
+        If `name` is neither, or two holds are given.
 
     Examples
     --------
@@ -261,7 +262,7 @@ def explain(name: str, values: NDArray[np.float64], *, hold: float = 0.0) -> Exp
         if value > 0.0:
             sets["sample_time" if name == "hold" else "lag"] = np.full((1, 1), value)
         found = dtm.sweep(loop, sets, WATCHED)["overshoot"]
-        # What has diverged overshoots by any number: it fits nothing.
+        # Diverged responses fit no overshoot.
         misfit = np.sqrt(np.mean((np.nan_to_num(found, nan=1e3) - measured) ** 2, axis=1))
         row = int(np.argmin(misfit))
         best_delays.append(delays[row])

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from deadtime._base.progress import Stages, stage_report
 from deadtime._base.ranges import OpenRange
 from deadtime.estimation import Comparison, DelayEstimate, compare_methods
 from deadtime.experiments import Experiment, Noise
@@ -172,7 +172,7 @@ def study(
     *,
     window: OpenRange | None = None,
     truth: DemoRecording | None = None,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Stages = False,
 ) -> Study:
     """Estimate the delay of a recorded loop and design a controller for it.
 
@@ -182,26 +182,27 @@ def study(
         As for `estimate_delay`.
     truth : DemoRecording, optional
         The simulated recording with its true loop, to report beside the estimates.
-    progress : callable, optional
-        Called with the name of each stage as it begins.
+    progress : bool or callable
+        Called with the name of each stage as it begins; True prints the names on stderr.
 
     Returns
     -------
     Study
     """
-    progress("estimating the delay")
+    report = stage_report(progress)
+    report("estimating the delay")
     comparison = compare_methods(recording, loop, window)
     fitted = comparison.best.loop
-    progress("finding the limits of the gain")
+    report("finding the limits of the gain")
     held = critical_gain(fitted)
     continuous = critical_gain(fitted.continuous())
-    progress("mapping the gains")
+    report("mapping the gains")
     template = PV(Kp=1.0, Kv=0.1, filter=PAPER_FILTER)
     interval = comparison.best.ci(0.95, "delay")
     designed = design(fitted, controller=template, delay=interval)
-    progress("designing without the delay, for comparison")
+    report("designing without the delay, for comparison")
     naive = design(fitted, controller=template, delay=0.0)
-    progress("simulating both designs")
+    report("simulating both designs")
     loop_of_responses = fitted if truth is None else truth.truth
     responses = {
         "designed for the delay": _step_response(loop_of_responses, designed.loop.controller),

@@ -32,11 +32,11 @@ __all__ = ["Chain", "chains_of"]
 
 _Floats: TypeAlias = NDArray[np.float64]
 
-#: Points whose distance from an edge is this much of a degree lie on it.
+#: Distance from an edge, in degrees of a polynomial, below which a point counts as on it.
 _ON_EDGE = 1e-9
-#: Bases are looked for among fractions of the least delay with denominators up to this.
+#: Largest denominator of the fractions of the least delay that are tried as its common measure.
 _MAX_DENOMINATOR = 64
-#: Degree in z up to which chains are told one by one.
+#: Largest degree of the polynomial in z whose roots are computed, one for each chain.
 _MAX_DEGREE = 128
 
 

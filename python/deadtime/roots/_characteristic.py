@@ -185,8 +185,8 @@ class Characteristic:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.
 
         For a neutral equation, roots closer to the chains than 1e-3 of one over the longest
-        delay are not told from them; ``rightmost().region`` shows how close the search came.
-        Where it came no closer and found no root, there is an error and no number.
+        delay are not distinguished from them; ``rightmost().region`` shows how close the search
+        came. Where it came no closer and found no root, there is an error and no number.
 
         Parameters
         ----------
@@ -206,7 +206,7 @@ class Characteristic:
 
         Examples
         --------
-        Stable for delays of 1 and 2 as long as these are exact, and not a hair's breadth beside:
+        Stable for delays of exactly 1 and 2, and unstable for arbitrarily close ones:
 
         >>> from deadtime import delay, s
         >>> h = s - 0.25 + (1/3 - 0.75 * s) * delay(1.0) + 0.5 * s * delay(2.0)

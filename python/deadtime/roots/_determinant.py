@@ -28,13 +28,17 @@ Entry: TypeAlias = Mapping[tuple[int, float], float]
 #: A quasi-polynomial without rounding: integer coefficients by power of s and delay.
 _Exact: TypeAlias = dict[tuple[int, Fraction], int]
 
-# Most states and most terms that are expanded: the work grows like n 2^n times the terms.
+# Upper limits on the states and the terms of an expansion, whose work grows like n 2^n times the
+# terms.
 _LARGEST = 10
 _MOST_TERMS = 1000
-# Rounding the coefficients may cost at most so many times what rounding the entries costs.
+
+# Upper limit on the effect of rounding the coefficients, in units of that of rounding the entries:
+# a larger one expands more systems and loses digits of their roots.
 _MOST_GROWTH = 1e4
-# Frequencies among which the worst are sought, on the imaginary axis, where stability is decided,
-# and those of them at which it is measured.
+
+# Number of frequencies on the imaginary axis, where stability is decided, among which the worst are
+# searched, and of those at which the effect is measured.
 _CANDIDATES = 4001
 _SAMPLES = 64
 

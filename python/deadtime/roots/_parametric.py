@@ -17,12 +17,13 @@ import numbers
 import sys
 from collections.abc import Collection, Mapping
 from functools import cached_property
-from typing import Any, NamedTuple, SupportsFloat, TypeAlias, cast
+from typing import Any, NamedTuple, SupportsFloat, cast
 
 from deadtime._base.ranges import numbers_at
 from deadtime._base.validation import finite
 from deadtime._deadtime import Family
 from deadtime.roots._quasipolynomial import QuasiPolynomial, is_number
+from deadtime.roots._text import Delay, Monomial, Powers, Terms, family_text, latex
 
 __all__ = ["Parameter", "ParametricQuasiPolynomial", "parameters"]
 
@@ -31,23 +32,15 @@ _MAX_TERMS = 100_000
 
 _EPS = sys.float_info.epsilon
 
-#: Name and power of each parameter, by name.
-_Powers: TypeAlias = tuple[tuple[str, int], ...]
-#: Constant part, and name and slope of each parameter, by name.
-_Delay: TypeAlias = tuple[float, tuple[tuple[str, float], ...]]
-#: Powers of the parameters, power of s, delay.
-_Monomial: TypeAlias = tuple[_Powers, int, _Delay]
-_Terms: TypeAlias = dict[_Monomial, float]
-
-_NO_DELAY: _Delay = (0.0, ())
-_ONE: _Monomial = ((), 0, _NO_DELAY)
+_NO_DELAY: Delay = (0.0, ())
+_ONE: Monomial = ((), 0, _NO_DELAY)
 
 
 class FamilyTerm(NamedTuple):
     """One term as the native core takes it."""
 
     coefficient: float
-    exponents: _Powers
+    exponents: Powers
     power: int
     constant: float
     slopes: tuple[tuple[str, float], ...]
@@ -80,7 +73,7 @@ class ParametricQuasiPolynomial:
     __array_ufunc__ = None  # numpy scalars and arrays leave the operation to this class
 
     _names: tuple[str, ...]
-    _terms: _Terms
+    _terms: Terms
 
     def __init__(self) -> None:
         raise TypeError(
@@ -90,7 +83,7 @@ class ParametricQuasiPolynomial:
 
     @classmethod
     def _of(
-        cls, names: tuple[str, ...], terms: Mapping[_Monomial, float]
+        cls, names: tuple[str, ...], terms: Mapping[Monomial, float]
     ) -> ParametricQuasiPolynomial:
         for coefficient in terms.values():
             if not math.isfinite(coefficient):
@@ -101,7 +94,7 @@ class ParametricQuasiPolynomial:
         self._adopt(names, {key: value for key, value in terms.items() if value != 0.0})
         return self
 
-    def _adopt(self, names: tuple[str, ...], terms: _Terms) -> None:
+    def _adopt(self, names: tuple[str, ...], terms: Terms) -> None:
         object.__setattr__(self, "_names", names)
         object.__setattr__(self, "_terms", terms)
 
@@ -154,7 +147,7 @@ class ParametricQuasiPolynomial:
 
     def _with(self, values: Mapping[str, float]) -> ParametricQuasiPolynomial:
         """Return the family of the parameters that are not in `values`."""
-        found: _Terms = {}
+        found: Terms = {}
         for (powers, power, (constant, slopes)), number in self._terms.items():
             exponents, rates = dict(powers), dict(slopes)
             factor = math.prod((values[q] ** exponents.get(q, 0) for q in values), start=number)
@@ -271,7 +264,7 @@ class ParametricQuasiPolynomial:
                 slopes[powers[0][0]] = coefficient
             else:
                 constant = coefficient
-        key: _Monomial = ((), 0, (constant, tuple(sorted(slopes.items()))))
+        key: Monomial = ((), 0, (constant, tuple(sorted(slopes.items()))))
         return self._of(self._names, {key: 1.0})
 
     def __add__(self, other: object) -> ParametricQuasiPolynomial:
@@ -311,7 +304,7 @@ class ParametricQuasiPolynomial:
                 f"the product has more than {_MAX_TERMS} terms: keep it factored, the roots of a "
                 "product are those of its factors"
             )
-        product: _Terms = {}
+        product: Terms = {}
         for a, x in self._terms.items():
             for b, y in terms.items():
                 key = _times(a, b)
@@ -362,7 +355,10 @@ class ParametricQuasiPolynomial:
         return ParametricQuasiPolynomial._of, (self._names, self._terms)
 
     def __repr__(self) -> str:
-        return _text(self._terms, self._names)
+        return family_text(self._terms, self._names)
+
+    def _repr_latex_(self) -> str:
+        return f"${latex(repr(self))}$"
 
 
 class Parameter(ParametricQuasiPolynomial):
@@ -425,12 +421,12 @@ def parameters(names: str) -> tuple[Parameter, ...]:
     return tuple(Parameter(word) for word in words)
 
 
-def _coerced(other: object) -> tuple[tuple[str, ...], _Terms] | None:
+def _coerced(other: object) -> tuple[tuple[str, ...], Terms] | None:
     """Names and terms of an operand; None for what this algebra does not know."""
     if isinstance(other, ParametricQuasiPolynomial):
         return other._names, other._terms
     if isinstance(other, QuasiPolynomial):
-        terms: _Terms = {}
+        terms: Terms = {}
         for row, delay in zip(other.coefficients.tolist(), other.delays.tolist(), strict=True):
             for power, value in enumerate(row):
                 if value != 0.0:
@@ -452,7 +448,7 @@ def _united(left: tuple[str, ...], right: tuple[str, ...]) -> tuple[str, ...]:
     return left + tuple(name for name in right if name not in left)
 
 
-def _times(a: _Monomial, b: _Monomial) -> _Monomial:
+def _times(a: Monomial, b: Monomial) -> Monomial:
     exponents = dict(a[0])
     for name, exponent in b[0]:
         exponents[name] = exponents.get(name, 0) + exponent
@@ -462,57 +458,3 @@ def _times(a: _Monomial, b: _Monomial) -> _Monomial:
         total[name] = total.get(name, 0.0) + slope
     delay = (constant + more, tuple(sorted((n, slope) for n, slope in total.items() if slope)))
     return tuple(sorted(exponents.items())), a[1] + b[1], delay
-
-
-def _text(terms: _Terms, names: tuple[str, ...]) -> str:
-    """Write the terms down in the manner of `QuasiPolynomial`, gathered by delay."""
-    by_delay: dict[_Delay, list[tuple[_Monomial, float]]] = {}
-    for key, value in terms.items():
-        by_delay.setdefault(key[2], []).append((key, value))
-    summands = []
-    for delay in sorted(by_delay, key=lambda d: (len(d[1]), d)):
-        row = sorted(by_delay[delay], key=lambda item: _rank(item[0], names))
-        inner = [_product(value, key[0], key[1]) for key, value in row]
-        if delay == _NO_DELAY:
-            summands += inner
-            continue
-        factor = f"exp(-{_affine(delay)} s)"
-        if len(inner) > 1:
-            summands.append(f"({_joined(inner)}) {factor}")
-        else:
-            summands.append(_factored(inner[0], factor))
-    return _joined(summands) if summands else "0"
-
-
-def _rank(key: _Monomial, names: tuple[str, ...]) -> tuple[float, ...]:
-    """Order by the power of s, then high powers of the parameters first."""
-    exponents = dict(key[0])
-    return (key[1], *(-exponents.get(name, 0) for name in names))
-
-
-def _affine(delay: _Delay) -> str:
-    constant, slopes = delay
-    summands = [_product(slope, ((name, 1),), 0) for name, slope in slopes]
-    if constant or not summands:
-        summands.append(_number(constant))
-    single = len(summands) == 1 and not summands[0].startswith("-")
-    return summands[0] if single else f"({_joined(summands)})"
-
-
-def _product(coefficient: float, powers: _Powers, power: int) -> str:
-    factors = [*powers, ("s", power)] if power else list(powers)
-    text = " ".join(name if n == 1 else f"{name}^{n}" for name, n in factors)
-    return _factored(_number(coefficient), text) if text else _number(coefficient)
-
-
-def _factored(left: str, right: str) -> str:
-    """Write two factors, a leading 1 left out."""
-    return left[:-1] + right if left in ("1", "-1") else f"{left} {right}"
-
-
-def _joined(summands: list[str]) -> str:
-    return " + ".join(summands).replace("+ -", "- ")
-
-
-def _number(value: float) -> str:
-    return f"{value:.12g}"

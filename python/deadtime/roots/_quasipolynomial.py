@@ -27,6 +27,7 @@ from deadtime._base.ranges import Range
 from deadtime._base.validation import unmasked
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
+from deadtime.roots._text import joined, latex, row_text
 
 if TYPE_CHECKING:
     from deadtime.systems import Margins, TransferFunction
@@ -132,7 +133,7 @@ class QuasiPolynomial(Characteristic):
 
     @property
     def kind(self) -> Kind:
-        """Kind of equation, told after the smallest delay is factored out.
+        """Kind of equation, determined after the smallest delay is factored out.
 
         'polynomial' (one row), 'retarded' (the highest power of s without delay only), 'neutral'
         (also with delay), 'difference' (no power of s at all), or 'advanced' (the highest power
@@ -152,8 +153,11 @@ class QuasiPolynomial(Characteristic):
         return hash(((self._coefficients + 0.0).tobytes(), self._delays.tobytes()))
 
     def __repr__(self) -> str:
-        terms = [_term(row, tau) for row, tau in zip(self._coefficients, self._delays, strict=True)]
-        return " + ".join(terms).replace("+ -", "- ")
+        rows = zip(self._coefficients.tolist(), self._delays.tolist(), strict=True)
+        return joined([row_text(row, tau) for row, tau in rows])
+
+    def _repr_latex_(self) -> str:
+        return f"${latex(repr(self))}$"
 
     # Algebra
 
@@ -482,25 +486,6 @@ def _real_array(name: str, values: ArrayLike, ndim: int) -> NDArray[np.float64]:
     if array.ndim != ndim or array.size == 0:
         raise ValueError(f"{name} of shape {array.shape}: give {ndim} dimensions, none empty")
     return array.astype(np.float64, copy=False)
-
-
-def _term(row: NDArray[np.float64], tau: float) -> str:
-    parts = []
-    for power, c in enumerate(row.tolist()):
-        if c == 0.0:
-            continue
-        name = "" if power == 0 else "s" if power == 1 else f"s^{power}"
-        if name and abs(c) == 1.0:
-            parts.append(("-" if c < 0.0 else "") + name)
-        else:
-            parts.append(f"{c:.12g} {name}".rstrip())
-    text = " + ".join(parts).replace("+ -", "- ") or "0"
-    if tau == 0.0:
-        return text
-    factor = f"exp(-{tau:.12g} s)"
-    if text in ("1", "-1"):
-        return text[:-1] + factor
-    return f"({text}) {factor}" if len(parts) > 1 else f"{text} {factor}"
 
 
 s: Final = QuasiPolynomial([[0.0, 1.0]], [0.0])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.page import table, table_row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,6 +117,18 @@ class RootSet(ReadOnlyArrays):
         axes = shown_axes(ax)
         plot_root_set(axes, self, chains)
         return axes
+
+    def _repr_html_(self) -> str:
+        (a, b), (c, d) = self.region
+        more = "" if len(self) <= _SHOWN else f", {_SHOWN} of {len(self)} shown"
+        rows = [
+            table_row((f"{z:.12g}", f"{radius:.1e}", str(multiplicity)), "td", 3)
+            for z, radius, multiplicity in zip(
+                self.roots.tolist(), self.radii, self.multiplicities, strict=True
+            )
+        ]
+        caption = f"{self.counted} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g}){more}"
+        return table(("root in 1/s", "within", "multiplicity"), rows[:_SHOWN], caption)
 
     def __repr__(self) -> str:
         (a, b), (c, d) = self.region

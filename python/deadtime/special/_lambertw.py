@@ -46,7 +46,7 @@ def lambertw(
     dtype : dtype, optional
         Type of the result, complex64 or complex128; NumPy converts `z` to it first.
     threads : int, optional
-        Number of threads for large arrays; all cores unless told (see ``DEADTIME_NUM_THREADS``).
+        Number of threads for large arrays; all cores by default (see ``DEADTIME_NUM_THREADS``).
         The result does not depend on it.
     **options
         `casting`, `order`, `subok`, as for any NumPy ufunc.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
-import scipy
+from typing import TYPE_CHECKING, Literal
 
 from deadtime import _deadtime
+
+if TYPE_CHECKING:
+    import scipy
 
 __all__ = ["low_level_callable"]
 
@@ -56,6 +57,8 @@ def low_level_callable(
     >>> abs(value - (math.e - 1.0)) < 1e-12
     True
     """
+    import scipy
+
     if name not in _deadtime.__pyx_capi__:
         names = ", ".join(sorted(_deadtime.__pyx_capi__))
         raise ValueError(f"name={name!r}: give one of {names}")

@@ -1,4 +1,4 @@
-"""Calls of the native ufuncs, and what was wrong with those that NumPy refuses."""
+"""Calls of the native ufuncs, with errors that explain what NumPy refuses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["UfuncOptions", "apply", "branches", "finite", "foreign", "refuse"]
 
 
 class UfuncOptions(TypedDict, total=False):
-    """What every ufunc takes and few need."""
+    """Rarely used options of every ufunc."""
 
     casting: Literal["no", "equiv", "safe", "same_kind", "unsafe"]
     order: Literal["K", "A", "C", "F"]
@@ -65,7 +65,7 @@ _ARGUMENTS: dict[np.ufunc, dict[str, type]] = {
 
 
 def _explain(ufunc: np.ufunc, arguments: tuple[Any, ...]) -> None:
-    """Raise what is wrong with the arguments, in their own names, unless it is something else."""
+    """Raise an error that names the wrong argument; return if the arguments are right."""
     if any(foreign(values) for values in arguments):
         return
     shapes = {}
@@ -82,13 +82,13 @@ def _explain(ufunc: np.ufunc, arguments: tuple[Any, ...]) -> None:
 
 
 def foreign(values: object) -> bool:
-    """Whether the object has its own way with ufuncs, which is left to it."""
+    """Whether the object handles ufuncs itself."""
     way = getattr(type(values), "__array_ufunc__", None)
     return way is not None and way is not np.ndarray.__array_ufunc__
 
 
 def branches(k: ArrayLike) -> Any:
-    """Branches as NumPy takes them without a wrong cast: it would wrap the largest uint64."""
+    """Convert branches so that NumPy casts them correctly: it would wrap the largest uint64."""
     if type(k) is int or getattr(k, "dtype", None) is _INT64 or foreign(k):
         return k
     return _integers("k", k)

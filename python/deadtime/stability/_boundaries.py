@@ -1,4 +1,4 @@
-"""What divides a map: curves on which roots lie on the edge of stability, and chains of roots."""
+"""Boundaries of a map: curves on which roots lie on the edge of stability, and chains of roots."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def plot_boxes(ax: Axes, boxes: ProvedBoxes) -> Axes:
     )
     kinds = _kinds(boxes.unstable)
     colours = np.array(COLOURS)[kinds]
-    # Edges of small boxes would hide them.
+    # Edges would cover small boxes.
     edges: Any = "face" if len(kinds) > 3000 else "0.5"
     ax.add_collection(
         PolyCollection(

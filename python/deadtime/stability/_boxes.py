@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.progress import Progress, reported
 from deadtime._base.ranges import Range
 from deadtime._base.validation import finite, positive, real_array, thread_number, whole_number
 from deadtime.roots._family import family_of
 from deadtime.stability._intervals import (
     Floats,
     Given,
-    Progress,
     System,
     Values,
     ranges_of,
@@ -175,7 +175,7 @@ def proved_boxes(
     at: Values | None = None,
     max_boxes: int = 1_000_000,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = False,
 ) -> ProvedBoxes:
     """Divide ranges of gains and delays into boxes that are proved stable or unstable.
 
@@ -195,8 +195,8 @@ def proved_boxes(
         then; `ProvedBoxes.undecided` says how much.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
-    progress : callable, optional
-        Called now and then with the number of boxes looked at.
+    progress : bool or callable
+        True for a progress bar; or called now and then with the number of boxes looked at.
 
     Returns
     -------
@@ -243,21 +243,22 @@ def proved_boxes(
     share = finite("tol", tol)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
-    found = _deadtime.proved_boxes(
-        family_of(family, tuple(ends), at)._family,
-        ends,
-        tol=share,
-        max_boxes=whole_number("max_boxes", max_boxes),
-        threads=thread_number(threads),
-        progress=progress,
-    )
+    with reported(progress) as report:
+        found = _deadtime.proved_boxes(
+            family_of(family, tuple(ends), at)._family,
+            ends,
+            tol=share,
+            max_boxes=whole_number("max_boxes", max_boxes),
+            threads=thread_number(threads),
+            progress=report,
+        )
+        if report is not None:
+            report(len(found.parameter))
     tree: dict[str, NDArray[Any]] = {
         "parameter": found.parameter,
         "at": found.at,
         "link": found.link,
     }
-    if progress is not None:
-        progress(len(found.parameter))
     return ProvedBoxes(
         names=tuple(ends),
         ranges=ends,
@@ -277,7 +278,7 @@ def largest_stable_box(
     around: Mapping[str, SupportsFloat] | None = None,
     tol: float = 1e-3,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = False,
 ) -> dict[str, Range]:
     """Find one large box of gains and delays all of which is proved stable.
 
@@ -320,14 +321,15 @@ def largest_stable_box(
     ends = ranges_of(ranges)
     step = positive("tol", tol)
     native = family_of(family, tuple(ends), at)._family
-    found = _deadtime.largest_stable_box(
-        native,
-        ends,
-        around=None if around is None else _named("around", around, ends),
-        tol=step,
-        threads=thread_number(threads),
-        progress=progress,
-    )
+    with reported(progress) as report:
+        found = _deadtime.largest_stable_box(
+            native,
+            ends,
+            around=None if around is None else _named("around", around, ends),
+            tol=step,
+            threads=thread_number(threads),
+            progress=report,
+        )
     if found is None:
         held = "" if around is None else f" around {dict(around)}"
         raise ValueError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import SupportsFloat, TypeAlias
 
 import numpy as np
@@ -16,7 +16,6 @@ __all__ = [
     "MOST_MOVING",
     "Floats",
     "Given",
-    "Progress",
     "Range",
     "System",
     "Values",
@@ -25,17 +24,16 @@ __all__ = [
 ]
 
 Floats: TypeAlias = NDArray[np.float64]
-Progress: TypeAlias = Callable[[int], object]
 System: TypeAlias = ParametricQuasiPolynomial | ControlLoop
 Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
 Values: TypeAlias = Mapping[str, SupportsFloat]
 
-#: Boxes are made of up to this many parameters.
+#: Largest number of parameters with a range: the number of boxes grows exponentially with it.
 MOST_MOVING = 3
 
 
 def side(name: str, low: float, high: float) -> str:
-    """One range, or value, as it is printed."""
+    """Give the text of a range or a value."""
     return f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays, read_only
+from deadtime._base.page import table, table_row
+from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.ranges import Points, numbers_at
 from deadtime._base.validation import finite, thread_number
 from deadtime.loops import ControlLoop
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["MapStatus", "StabilityMap", "stability_map"]
 
 _Floats: TypeAlias = NDArray[np.float64]
-_Progress: TypeAlias = Callable[[int], object]
 
 
 class MapStatus(IntEnum):
@@ -40,7 +41,8 @@ class MapStatus(IntEnum):
     BOUNDARY = 1
     """A root, or a chain of them, lies on the boundary to working precision."""
     CHAIN = 2
-    """The chains of roots of a neutral equation lead; told only where the abscissa is computed."""
+    """The chains of roots of a neutral equation determine the abscissa; set only where that is
+    computed."""
     INFINITE = 3
     """Infinitely many unstable roots."""
     UNDECIDED = 4
@@ -262,6 +264,15 @@ class StabilityMap(ReadOnlyArrays):
         data["abscissa"].attrs["units"] = "1/s"
         return data
 
+    def _repr_html_(self) -> str:
+        numbers, cells = np.unique(self.unstable, return_counts=True)
+        names = {-1: "infinitely many", -2: "not known"}
+        rows = [
+            table_row((names.get(number, str(number)), str(count)), "td", 2)
+            for number, count in zip(numbers.tolist(), cells.tolist(), strict=True)
+        ]
+        return table(("unstable roots", "cells"), rows, repr(self).strip("<>"))
+
     def __repr__(self) -> str:
         sides = ", ".join(
             f"{name} {axis[0]:.6g} to {axis[-1]:.6g} ({len(axis)})"
@@ -281,7 +292,7 @@ def stability_map(
     damping: tuple[float, float] | None = None,
     proof: str = "curves",
     threads: int | None = None,
-    progress: _Progress | None = None,
+    progress: Progress = False,
 ) -> StabilityMap:
     """Stability over two parameters: number of unstable roots and spectral abscissa in each cell.
 
@@ -314,8 +325,9 @@ def stability_map(
         searched in each cell by itself.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
-    progress : callable, optional
-        Called now and then with the number of finished cells, and at the end with all.
+    progress : bool or callable
+        True for a progress bar; or called now and then with the number of finished cells, and at
+        the end with all.
 
     Returns
     -------
@@ -360,25 +372,20 @@ def stability_map(
         raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
     question = _Question(bool(abscissa), finite("decay", decay), damping_demand(damping), proof)
     cells = len(axes[names[0]]) * len(axes[names[1]])
-    if isinstance(family, ControlLoop) and family.is_sampled:
-        if question.damping is not None:
-            raise ValueError(
-                f"damping={question.damping}: a sampled loop is judged by a circle; ask for decay="
-            )
-        found = _map_sampled(
-            family,
-            numbers_of(family.parameters, (*names, *fixed)) | fixed,
-            names,
-            axes,
-            question.decay,
-            threads,
-            progress,
+    sampled = isinstance(family, ControlLoop) and family.is_sampled
+    if sampled and question.damping is not None:
+        raise ValueError(
+            f"damping={question.damping}: a sampled loop is judged by a circle; ask for decay="
         )
-    else:
-        known = family_of(family, names, fixed)
-        found = _map_family(known, axes, question, threads, progress)
-    if progress is not None:
-        progress(cells)
+    with reported(progress, cells) as report:
+        if isinstance(family, ControlLoop) and sampled:
+            numbers = numbers_of(family.parameters, (*names, *fixed)) | fixed
+            found = _map_sampled(family, numbers, names, axes, question.decay, threads, report)
+        else:
+            known = family_of(family, names, fixed)
+            found = _map_family(known, axes, question, threads, report)
+        if report is not None:
+            report(cells)
     unstable, alpha, status, judged = found
     return StabilityMap(
         names, axes, unstable, alpha, status, question.decay, question.damping, judged
@@ -405,10 +412,10 @@ def _map_family(
     axes: dict[str, _Floats],
     question: _Question,
     threads: int | None,
-    progress: _Progress | None,
+    report: Report | None,
 ) -> _Found:
     """Judge the members of a family."""
-    cells = family._family.map(axes, question, threads=threads, progress=progress)
+    cells = family._family.map(axes, question, threads=threads, progress=report)
     unstable, alpha = cells.unstable, cells.abscissa
     if alpha is None:
         alpha = np.broadcast_to(np.float64(np.nan), unstable.shape)
@@ -422,7 +429,7 @@ def _map_sampled(
     axes: dict[str, _Floats],
     decay: float,
     threads: int | None,
-    progress: _Progress | None,
+    report: Report | None,
 ) -> _Found:
     """Eigenvalues of the transition matrix in every cell."""
     first, second = np.meshgrid(*(axes[name] for name in names), indexing="ij")
@@ -432,10 +439,8 @@ def _map_sampled(
         if low < 0.0 or (name == "sample_time" and low == 0.0):
             raise ValueError(f"{name}={low}: delays are zero or more, sample times above zero")
     cells = values | {name: np.ravel(grid) for name, grid in grids.items()}
-    abscissa, unstable, status = sampled_grid(
-        loop.plant, loop.controller, cells, decay, threads, progress
-    )
-    unsure = (status == MapStatus.BOUNDARY) | (status == MapStatus.UNDECIDED)
-    unstable = np.where(unsure, np.int32(-2), unstable)
+    found = sampled_grid(loop.plant, loop.controller, cells, decay, threads, report)
+    unsure = (found.status == MapStatus.BOUNDARY) | (found.status == MapStatus.UNDECIDED)
+    unstable = np.where(unsure, np.int32(-2), found.unstable)
     shape = first.shape
-    return unstable.reshape(shape), abscissa.reshape(shape), status.reshape(shape), None
+    return unstable.reshape(shape), found.abscissa.reshape(shape), found.status.reshape(shape), None

@@ -17,7 +17,7 @@ __all__ = ["damping_demand", "map_axes"]
 
 _Floats: TypeAlias = NDArray[np.float64]
 
-#: More cells than a picture holds.
+#: Upper limit on the number of cells (bounds memory and time).
 _MAX_CELLS = 50_000_000
 
 

@@ -21,10 +21,10 @@ __all__ = ["plot_stability_map"]
 #: Colours for one, two, ... unstable roots; more share the last one.
 _COUNTED = 8
 
-#: Curves with fewer points than this share of the map's side carry no label.
+#: Number of points, as a share of the shorter side of the map, below which a curve has no label.
 _LABELLED = 0.15
 
-#: Labels of one picture.
+#: Largest number of labels of one picture.
 _MOST_LABELS = 8
 
 
@@ -57,7 +57,7 @@ def _shade_abscissa(
 def _shade_counts(
     ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> None:
-    """Number of unstable roots: green for none, grey for no end of them."""
+    """Number of unstable roots: green for none, grey for infinitely many."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap
 

@@ -16,7 +16,8 @@ from deadtime.stability._intervals import MOST_MOVING, System, Values
 
 __all__ = ["StabilityRadius", "stability_radius"]
 
-#: Boxes that the search for a radius looks at before it gives what it has.
+#: Upper limit on the boxes of a search for a radius (bounds memory and time); what is proved until
+#: then is the result.
 _RADIUS_BOXES = 200_000
 
 
@@ -113,7 +114,7 @@ def stability_radius(
     ranges = {}
     for name, value in values.items():
         reach = found.radius * units[name]
-        # Inwards: a sum may round to a place just outside.
+        # Rounded towards the point, so that no rounding leaves the proved box.
         low = min(math.nextafter(value - reach, math.inf), value)
         high = max(math.nextafter(value + reach, -math.inf), value)
         ranges[name] = (min(max(low, 0.0), value) if name in delays else low, high)

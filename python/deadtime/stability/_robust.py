@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,13 +13,13 @@ from numpy.typing import NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.progress import Progress, reported
 from deadtime._base.ranges import Points, Range
 from deadtime._base.validation import thread_number
 from deadtime.roots._family import family_of
 from deadtime.stability._intervals import (
     Floats,
     Given,
-    Progress,
     System,
     Values,
     ranges_of,
@@ -31,7 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RobustMap", "robust_map"]
 
-#: Boxes that one cell of a robust map is divided into before it is undecided.
+#: Upper limit on the boxes of one cell of a robust map (bounds time); a cell that needs more is
+#: undecided.
 _CELL_BOXES = 1000
 
 
@@ -105,7 +107,7 @@ def robust_map(
     *,
     at: Values | None = None,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = False,
 ) -> RobustMap:
     """Stability over two parameters, proved for every value of others in intervals.
 
@@ -123,8 +125,9 @@ def robust_map(
         Values of the other parameters; those of a loop have values, which these replace.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
-    progress : callable, optional
-        Called now and then with the number of finished cells, and at the end with all.
+    progress : bool or callable
+        True for a progress bar; or called now and then with the number of finished cells, and at
+        the end with all.
 
     Returns
     -------
@@ -153,14 +156,17 @@ def robust_map(
     twice = [name for name in held if name in axes]
     if twice:
         raise ValueError(f"{twice[0]} is an axis and has an interval: give it one of the two")
-    unstable = _deadtime.robust_map(
-        family_of(family, (*axis_names, *held), at)._family,
-        axes,
-        held,
-        max_boxes=_CELL_BOXES,
-        threads=thread_number(threads),
-        progress=progress,
-    )
-    if progress is not None:
-        progress(unstable.size)
+    known = family_of(family, (*axis_names, *held), at)
+    cells = math.prod(len(points) for points in axes.values())
+    with reported(progress, cells) as report:
+        unstable = _deadtime.robust_map(
+            known._family,
+            axes,
+            held,
+            max_boxes=_CELL_BOXES,
+            threads=thread_number(threads),
+            progress=report,
+        )
+        if report is not None:
+            report(cells)
     return RobustMap(axis_names, axes, held, unstable)

@@ -1,6 +1,7 @@
 """Linear systems with delays: transfer functions, systems of matrices, and their responses.
 
-`_transfer` and `_delay_system` are the systems, `_poles` and `_responses` what both are asked;
+`_transfer` and `_delay_system` are the systems, made of `_parts`, `_frequency_domain` and
+`_delay_matrices`; `_poles` and `_responses` hold what both are asked;
 `_margins` holds the margins of a loop; `_interchange` converts from and to
 other packages; `_realisation`, `_signals` and `_run` simulate; `_response` is the result.
 """

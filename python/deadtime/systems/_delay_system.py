@@ -6,8 +6,7 @@ r"""Linear systems with delays in state, input and output, of any order.
 With the characteristic matrix M(s) = s E + sum (s N_j - A_j) e^{-s tau_j}, the poles are the
 roots of det M, and C M^{-1} B + D = det [[M, B], [-C, D]] / det M. Values are taken from the
 matrices, for any order; roots from the expanded determinant while that is safe, and otherwise
-from factorisations of M along contours. One class, kept whole: most of the file is its
-documentation.
+from factorisations of M along contours.
 """
 
 from __future__ import annotations
@@ -15,19 +14,18 @@ from __future__ import annotations
 import operator
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from deadtime._base.frozen import equal
 from deadtime._base.ranges import OpenRange
-from deadtime._base.validation import non_negative, real_array, unmasked
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, RootSet
 from deadtime.roots._crossings import margin_of_family
 from deadtime.roots._determinant import NotExpandedError, expanded
 from deadtime.roots._family import family_of
 from deadtime.roots._matrix_roots import MatrixDeterminant
+from deadtime.systems._delay_matrices import DelayMatrices, Matrices, Matrix
 from deadtime.systems._margins import Margins
 from deadtime.systems._poles import HasPoles
 from deadtime.systems._realisation import Realisable, Realisation, of_matrices
@@ -37,12 +35,8 @@ from deadtime.systems._transfer import TransferFunction
 
 __all__ = ["DelaySystem"]
 
-Matrix = NDArray[np.float64]
-#: One matrix, without delay, or matrices by their delays in s.
-Matrices: TypeAlias = ArrayLike | Mapping[float, ArrayLike]
 
-
-class DelaySystem(HasPoles, HasResponses):
+class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     """A linear system with delays: any order, any number of inputs and outputs. Immutable.
 
     Every matrix is given as an array, which acts without delay, or as a dict of arrays by their
@@ -104,14 +98,8 @@ class DelaySystem(HasPoles, HasResponses):
     19
     """
 
-    __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N", "_expansion", "_realisation")
+    __slots__ = ("_expansion", "_realisation")
 
-    _A: dict[float, Matrix]
-    _B: dict[float, Matrix]
-    _C: dict[float, Matrix]
-    _D: dict[float, Matrix]
-    _E: Matrix
-    _N: dict[float, Matrix]
     #: The expanded determinant, or why there is none; None until asked for.
     _expansion: QuasiPolynomial | ValueError | None
     #: The form that is simulated; None until asked for.
@@ -127,184 +115,12 @@ class DelaySystem(HasPoles, HasResponses):
         E: ArrayLike | None = None,
         N: Mapping[float, ArrayLike] | None = None,
     ) -> None:
-        state = _by_delay("A", A)
-        n = len(next(iter(state.values()))) if state else 0
-        if n == 0:
-            raise ValueError("A is empty: give at least one matrix, with at least one row")
-        inputs = {} if B is None else _by_delay("B", B)
-        outputs = _by_delay("C", np.eye(n) if C is None else C)
-        direct = {} if D is None else _by_delay("D", D)
-        p = next(iter(inputs.values())).shape[1] if inputs else 0
-        if direct and not inputs:
-            p = next(iter(direct.values())).shape[1]
-        q = len(next(iter(outputs.values()))) if outputs else 0
-        derivative = _matrix("E", np.eye(n) if E is None else E)
-        if N is not None and not isinstance(N, Mapping):
-            raise TypeError("N: give a dict of matrices by their delays, which are above zero")
-        late = {} if N is None else _by_delay("N", N)
-        if any(tau == 0.0 for tau in late):
-            raise ValueError("N has a matrix with delay 0: that one is E")
-        for name, group, shape in (
-            ("A", state, (n, n)),
-            ("B", inputs, (n, p)),
-            ("C", outputs, (q, n)),
-            ("D", direct, (q, p)),
-            ("E", {0.0: derivative}, (n, n)),
-            ("N", late, (n, n)),
-        ):
-            for tau, matrix in group.items():
-                if matrix.shape != shape:
-                    raise ValueError(
-                        f"{name} with delay {tau:g} s has shape {matrix.shape}, not {shape}: A "
-                        f"has {n} rows, which is the number of states, and there are {p} inputs "
-                        f"and {q} outputs"
-                    )
-        put = object.__setattr__
-        values = (state, inputs, outputs, direct, derivative, late, None, None)
-        for name, value in zip(self.__slots__, values, strict=True):
-            put(self, name, value)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a DelaySystem does not change: cannot set {name!r}")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a DelaySystem does not change: cannot delete {name!r}")
+        super().__init__(A, B, C, D, E=E, N=N)
+        object.__setattr__(self, "_expansion", None)
+        object.__setattr__(self, "_realisation", None)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (self._A, self._B, self._C, self._D, self._E, self._N)
-
-    # What it is
-
-    @property
-    def A(self) -> dict[float, Matrix]:
-        """Matrices on the state by their delays in s; read-only arrays."""
-        return dict(self._A)
-
-    @property
-    def B(self) -> dict[float, Matrix]:
-        """Matrices on the input by their delays in s."""
-        return dict(self._B)
-
-    @property
-    def C(self) -> dict[float, Matrix]:
-        """Matrices from state to output by their delays in s."""
-        return dict(self._C)
-
-    @property
-    def D(self) -> dict[float, Matrix]:
-        """Matrices from input to output by their delays in s."""
-        return dict(self._D)
-
-    @property
-    def E(self) -> Matrix:
-        """Factor on the derivative of the state, shape (n, n)."""
-        return self._E
-
-    @property
-    def N(self) -> dict[float, Matrix]:
-        """Factors on earlier derivatives by their delays in s."""
-        return dict(self._N)
-
-    @property
-    def n_states(self) -> int:
-        """Number of components of the state."""
-        return len(self._E)
-
-    @property
-    def n_inputs(self) -> int:
-        """Number of inputs."""
-        group = self._B or self._D
-        return next(iter(group.values())).shape[1] if group else 0
-
-    @property
-    def n_outputs(self) -> int:
-        """Number of outputs."""
-        return len(next(iter(self._C.values()))) if self._C else 0
-
-    @property
-    def delays(self) -> NDArray[np.float64]:
-        """Every delay above zero, in s, ascending."""
-        groups = (self._A, self._B, self._C, self._D, self._N)
-        return np.array(sorted({tau for group in groups for tau in group} - {0.0}))
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, DelaySystem):
-            return NotImplemented
-        return equal(self._matrices(), other._matrices())
-
-    def __hash__(self) -> int:
-        return hash((self.n_states, self.n_inputs, self.n_outputs, tuple(self.delays.tolist())))
-
-    def _matrices(self) -> list[Any]:
-        return [getattr(self, name) for name in ("_A", "_B", "_C", "_D", "_E", "_N")]
-
-    def __repr__(self) -> str:
-        listed = ", ".join(f"{tau:g}" for tau in self.delays)
-        delays = f", delays {listed} s" if listed else ""
-        return (
-            f"<DelaySystem: {self.n_states} states, {self.n_inputs} inputs, "
-            f"{self.n_outputs} outputs{delays}>"
-        )
-
-    # Values
-
-    def characteristic_matrix(self, s: ArrayLike) -> NDArray[np.complex128]:
-        """Value of M(s) = s E + sum (s N_j - A_j) exp(-s tau_j).
-
-        Parameters
-        ----------
-        s : array_like of complex
-            In 1/s.
-
-        Returns
-        -------
-        ndarray of complex, shape ``(*s.shape, n, n)``
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> print(dtm.DelaySystem({0.0: [[0, 1], [-4, -0.4]]}).characteristic_matrix(1j).round(1))
-        [[ 0. +1.j -1. +0.j]
-         [ 4. +0.j  0.4+1.j]]
-        """
-        points = np.asarray(unmasked("s", s), dtype=np.complex128)
-        shape = (*points.shape, self.n_states, self.n_states)
-        late = _sum_at(self._N, points, shape) + self._E
-        return points[..., None, None] * late - _sum_at(self._A, points, shape)
-
-    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
-        """Response to sinusoidal inputs, C M^{-1} B + D at s = j omega.
-
-        Solved with the matrices as they are, for any number of states.
-
-        Parameters
-        ----------
-        omega : array_like of float
-            Frequencies in rad/s.
-
-        Returns
-        -------
-        ndarray of complex, shape (n_outputs, n_inputs, *omega.shape)
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If one of the frequencies is exactly a pole.
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> system = dtm.DelaySystem(A={0.36: -2.0}, B={0.36: 2.0})
-        >>> print(system.frequency_response([0.0, 2.0])[0, 0].round(4))
-        [1. +0.j     0.5-1.1036j]
-        """
-        points = np.asarray(1j * real_array("omega", omega), dtype=np.complex128)
-        n, p, q = self.n_states, self.n_inputs, self.n_outputs
-        inputs = _sum_at(self._B, points, (*points.shape, n, p))
-        outputs = _sum_at(self._C, points, (*points.shape, q, n))
-        direct = _sum_at(self._D, points, (*points.shape, q, p))
-        values = outputs @ np.linalg.solve(self.characteristic_matrix(points), inputs) + direct
-        return np.moveaxis(values, (-2, -1), (0, 1))
 
     # Through the expanded determinant
 
@@ -578,17 +394,6 @@ class DelaySystem(HasPoles, HasResponses):
                 raise IndexError(f"{name}={index}: the system has {size} of them, from 0")
         return i, j
 
-    @property
-    def _states(self) -> range:
-        return range(self.n_states)
-
-    def _entry(self, i: int, j: int) -> dict[tuple[int, float], float]:
-        """One entry of M by power of s and delay."""
-        entry = {(0, tau): -float(matrix[i, j]) for tau, matrix in self._A.items()}
-        entry |= {(1, tau): float(matrix[i, j]) for tau, matrix in self._N.items()}
-        entry[1, 0.0] = float(self._E[i, j])
-        return {key: value for key, value in entry.items() if value != 0.0}
-
 
 @dataclass(frozen=True, eq=False)
 class _Differentiated:
@@ -613,39 +418,7 @@ def _restored(*parts: Any) -> DelaySystem:
     return DelaySystem(A, B or None, C, D or None, E=E, N=N or None)
 
 
-def _by_delay(name: str, given: Matrices) -> dict[float, Matrix]:
-    """Matrices sorted by delay, frozen."""
-    pairs = given.items() if isinstance(given, Mapping) else [(0.0, given)]
-    found: dict[float, Matrix] = {}
-    for tau, matrix in pairs:
-        time = non_negative(f"delay of {name}", tau) + 0.0
-        found[time] = _matrix(name, matrix)
-    return dict(sorted(found.items()))
-
-
-def _matrix(name: str, given: ArrayLike) -> Matrix:
-    matrix = real_array(name, given)
-    if matrix.ndim == 0:
-        matrix = matrix.reshape(1, 1)
-    if matrix.ndim != 2:
-        raise ValueError(f"{name} has shape {matrix.shape}: give a matrix, one row for each row")
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} holds {matrix[~np.isfinite(matrix)][0]}: give finite numbers")
-    matrix = matrix.copy()
-    matrix.flags.writeable = False
-    return matrix
-
-
 def _part(
     group: Mapping[float, Matrix], i: int, j: int, sign: float = 1.0
 ) -> dict[tuple[int, float], float]:
     return {(0, t): sign * float(m[i, j]) for t, m in group.items() if m[i, j] != 0.0}
-
-
-def _sum_at(
-    group: Mapping[float, Matrix], points: NDArray[np.complex128], shape: tuple[int, ...]
-) -> NDArray[np.complex128]:
-    total = np.zeros(shape, dtype=np.complex128)
-    for tau, matrix in group.items():
-        total += np.exp(-points * tau)[..., None, None] * matrix
-    return total

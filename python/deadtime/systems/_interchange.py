@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from deadtime.roots import QuasiPolynomial
 from deadtime.roots._determinant import expanded
 
-__all__ = ["control_package", "polynomials_of_control", "polynomials_of_scipy", "rational"]
+__all__ = ["Writable", "polynomials_of_control", "polynomials_of_scipy"]
 
 Vector = NDArray[np.float64]
 
@@ -150,3 +150,56 @@ def rational(
         return total
 
     return without_delays(num), without_delays(den)
+
+
+class Writable:
+    """Base of `TransferFunction`: writing it for other packages."""
+
+    __slots__ = ()
+
+    _num: QuasiPolynomial
+    _den: QuasiPolynomial
+
+    def to_control(self, pade: int | None = None) -> Any:
+        """Write as a transfer function of python-control, which knows no delays.
+
+        Parameters
+        ----------
+        pade : int, optional
+            Replace every delay by a Padé approximant of this order; by default a system with
+            delays is refused.
+
+        Returns
+        -------
+        control.TransferFunction
+
+        Raises
+        ------
+        ImportError
+            If python-control is not installed.
+        ValueError
+            If there are delays and `pade` is None or out of its range.
+        """
+        package = control_package()
+        return package.TransferFunction(*rational(self._num, self._den, pade))
+
+    def to_scipy(self, pade: int | None = None) -> Any:
+        """Write as a transfer function of scipy.signal, which knows no delays.
+
+        Parameters
+        ----------
+        pade : int, optional
+            As in `to_control`.
+
+        Returns
+        -------
+        scipy.signal.TransferFunction
+
+        Raises
+        ------
+        ValueError
+            As in `to_control`.
+        """
+        from scipy import signal
+
+        return signal.TransferFunction(*rational(self._num, self._den, pade))

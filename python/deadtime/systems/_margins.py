@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.page import table, table_row
 from deadtime._deadtime import loop_margins
 from deadtime.roots import QuasiPolynomial
 
@@ -85,17 +86,31 @@ class Margins(ReadOnlyArrays):
             raise ValueError("the loop is not stable as it is: it has no delay margin")
         return self.delay_margin
 
-    def __repr__(self) -> str:
+    def _repr_html_(self) -> str:
         if not self.stable:
-            return "<Margins: none, the closed loop is not stable as it is>"
-        shown = (
+            return table(("the closed loop is not stable as it is",), (), "Margins")
+        rows = [
+            table_row(
+                (name, f"{value:.6g}{unit}", "" if math.isnan(omega) else f"{omega:.6g}"), "td", 3
+            )
+            for name, value, unit, omega in self._four()
+        ]
+        return table(("margin", "value", "at rad/s"), rows, "Margins")
+
+    def _four(self) -> tuple[tuple[str, float, str, float], ...]:
+        """Name, value, unit and frequency of each margin."""
+        return (
             ("gain", self.gain_margin, "", self.gain_margin_omega),
             ("gain reduction", self.gain_reduction, "", self.gain_reduction_omega),
             ("phase", self.phase_margin, "°", self.phase_margin_omega),
             ("delay", self.delay_margin, " s", self.delay_margin_omega),
         )
+
+    def __repr__(self) -> str:
+        if not self.stable:
+            return "<Margins: none, the closed loop is not stable as it is>"
         parts = []
-        for name, value, unit, omega in shown:
+        for name, value, unit, omega in self._four():
             if name == "gain reduction" and value == 0.0:
                 continue
             where = "" if math.isnan(omega) else f" at {omega:.4g} rad/s"

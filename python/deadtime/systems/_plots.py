@@ -54,7 +54,7 @@ def plot_bode(
         lower.axhline(-180.0, **REFERENCE)
         if found.stable:
             _mark_bode_margins(upper, lower, G, found)
-    # With a delay the phase falls without end; where the gain is gone it is of no interest.
+    # With a delay the phase falls without bound; show it where the gain is not negligible.
     lowest = float(phase[gain > 1e-3 * gain.max()].min()) if gain.max() > 0.0 else phase.min()
     lowest, highest = max(phase.min(), min(lowest, -270.0), -1440.0), float(phase.max())
     step = 90.0 if highest - lowest <= 900.0 else 180.0
@@ -126,7 +126,7 @@ def plot_nyquist(
                 ax.plot(point.real, point.imag, "o", color=colour, ms=5, label=name)
     if found is not None:
         ax.set_title(_in_words(found), fontsize="medium")
-    # What goes far out, to infinity with an integrator, would hide the critical point.
+    # Large values, which an integrator has at low frequencies, would hide the critical point.
     farthest = float(np.abs(values[np.isfinite(values)]).max(initial=1.0))
     reach = 2.5 if farthest > 10.0 or np.isinf(G.dcgain()) else max(1.5, 1.1 * farthest)
     _arrow(ax, values, reach)

@@ -1,4 +1,4 @@
-"""Systems in the form the native part simulates, whatever they were given as.
+"""Systems in the form that the native part simulates.
 
     x'(t) + sum N_j x'(t - tau_j) = sum A_j x(t - tau_j) + sum B_j u(t - tau_j),
     y(t) = sum C_j x(t - tau_j) + sum F_j x'(t - tau_j) + sum D_j u(t - tau_j).
@@ -9,10 +9,10 @@ w, w', ..., w^(n-1): the terms s^n e^{-s tau_j} of den make it neutral, those of
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from deadtime.roots import QuasiPolynomial
 __all__ = ["Realisable", "Realisation", "of_matrices", "of_ratio"]
 
 Group = Mapping[float, NDArray[np.float64]]
+_Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,25 +60,49 @@ class Realisable(Protocol):
         """Outputs at rest per input, shape (n_outputs, n_inputs); None where there are none."""
 
 
+@dataclass(frozen=True, eq=False)
+class SystemMatrices:
+    """A system as the native part takes it: a group is a list of matrices with their delays."""
+
+    states: int
+    inputs: int
+    outputs: int
+    A: _Terms = ()
+    N: _Terms = ()
+    B: _Terms = ()
+    C: _Terms = ()
+    F: _Terms = ()
+    D: _Terms = ()
+
+
 def _realised(
-    sizes: tuple[int, int, int],
-    *given: Group,
+    states: int,
+    inputs: int,
+    outputs: int,
+    *,
     has_states: bool,
     rest: NDArray[np.float64] | None = None,
+    **groups: Group,
 ) -> Realisation:
-    """Give the native form of A, N, B, C, F and D."""
-    states = sizes[0]
-    groups = [[(tau, matrix) for tau, matrix in group.items() if matrix.any()] for group in given]
-    memory = max((tau for i in (0, 1, 3, 4) for tau, _ in groups[i]), default=0.0)
+    """Give the native form of the groups A, N, B, C, F and D, as far as they are given."""
+    terms = {
+        name: [(tau, matrix) for tau, matrix in group.items() if matrix.any()]
+        for name, group in groups.items()
+    }
+    matrices = SystemMatrices(states, inputs, outputs, **terms)
+    delays = {name: [tau for tau, _ in group] for name, group in terms.items()}
+    reach = [tau for name in "ANCF" for tau in delays.get(name, ())]
     return Realisation(
-        LinearSystem(*sizes, *groups),
-        *sizes,
-        given[0].get(0.0, np.zeros((states, states))),
-        max((tau for group in groups for tau, _ in group), default=0.0),
-        memory,
-        bool(groups[1] or groups[4]),
-        has_states,
-        rest,
+        native=LinearSystem(matrices),
+        states=states,
+        inputs=inputs,
+        outputs=outputs,
+        A=groups.get("A", {}).get(0.0, np.zeros((states, states))),
+        longest=max((tau for group in delays.values() for tau in group), default=0.0),
+        memory=max(reach, default=0.0),
+        needs_slopes=bool(matrices.N or matrices.F),
+        has_states=has_states,
+        rest=rest,
     )
 
 
@@ -106,8 +131,8 @@ def of_matrices(
             {tau: np.asarray(np.linalg.solve(E, m), np.float64) for tau, m in group.items()}
             for group in (a, n, b)
         )
-    on_state, on_derivative = ({}, c) if differentiated else (c, {})
-    return _realised((size, inputs, outputs), a, n, b, on_state, on_derivative, d, has_states=True)
+    C, F = ({}, c) if differentiated else (c, {})
+    return _realised(size, inputs, outputs, has_states=True, A=a, N=n, B=b, C=C, F=F, D=d)
 
 
 def _singular(rank: int, size: int, is_late: bool) -> str:
@@ -147,7 +172,7 @@ def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
     lower, highest = slice(0, n), slice(n, n + 1)
     if n == 0:
         direct = rows(num, highest, 1.0 / leading)
-        return _realised((0, 1, 1), {}, {}, {}, {}, {}, direct, has_states=False, rest=np.zeros(0))
+        return _realised(0, 1, 1, has_states=False, rest=np.zeros(0), D=direct)
 
     def last_row(group: Group) -> dict[float, NDArray[np.float64]]:
         return {tau: np.vstack([np.zeros((n - 1, n)), row]) for tau, row in group.items()}
@@ -165,4 +190,4 @@ def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
     c = rows(num, lower, 1.0)
     constant = float(den.coefficients[:, 0].sum())
     rest = np.append(1.0 / constant, np.zeros(n - 1)) if constant else None
-    return _realised((n, 1, 1), a, late, {0.0: b}, c, f, {}, has_states=False, rest=rest)
+    return _realised(n, 1, 1, has_states=False, rest=rest, A=a, N=late, B={0.0: b}, C=c, F=f)

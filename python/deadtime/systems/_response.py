@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import finite, positive, real_array
+from deadtime._deadtime import LoopResponse
 from deadtime.systems._step_metrics import OneSignal
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ __all__ = ["Response"]
 
 Vector = NDArray[np.float64]
 
-#: Sensitivities that nobody asked for.
+#: The sensitivities of a response for which none were requested.
 NONE = FrozenDict()
 
 
@@ -89,18 +90,21 @@ class Response(ReadOnlyArrays):
     def _of_fresh(
         cls,
         time: Vector,
-        arrays: tuple[Vector, Vector, Vector, Vector],
+        found: LoopResponse,
         steady_state: float | None,
         dense: Callable[[Vector], Vector],
     ) -> Response:
-        """Of arrays that nobody else holds: nothing is copied or converted."""
+        """Make a response of arrays that are used nowhere else: nothing is copied or converted."""
         response = object.__new__(cls)
         fields = response.__dict__
         fields["time"] = time
-        fields["outputs"], fields["inputs"], fields["breaks"], fields["reference"] = arrays
-        for array in (time, *arrays):
+        fields["outputs"] = found.outputs
+        fields["inputs"] = found.inputs
+        fields["breaks"] = found.breaks
+        fields["reference"] = found.reference
+        for array in list(fields.values()):
             # Read-only, in a fifth of the time that `flags` takes.
-            array.setflags(False)  # type: ignore[call-arg]
+            array.setflags(False)
         fields["states"], fields["steady_state"] = None, steady_state
         fields["sensitivities"] = fields["input_sensitivities"] = NONE
         fields["_dense"] = dense

@@ -24,9 +24,10 @@ __all__ = ["Given", "impulse_response", "respond", "step_response"]
 Vector = NDArray[np.float64]
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
 
-# The default time of a step response: at first so many times the slowest constant or the longest
-# delay (at least so many seconds), doubled until the last quarter is settled or the response has
-# run away.
+# The default time of a step response is _SHORTEST times the longest of all time constants, delays
+# and _LEAST seconds. It is doubled, at most _DOUBLINGS times, until the last quarter of the _POINTS
+# outputs is within _SETTLED of the steady state, or one is farther from it than _LOST: a longer
+# first time and a smaller _SETTLED show more of a slow end and less of a fast beginning.
 _POINTS = 501
 _SHORTEST = 10.0
 _LEAST = 0.01
@@ -104,10 +105,10 @@ def respond(
         past = signals.constant(state)
     if initial_state is not None:
         state = _vector("initial_state", initial_state, model.states, "states")
-    y, x, u, breaks = model.native.simulate(times - start, state, past, slopes, source)
+    found = model.native.simulate(times - start, state, past, slopes, source)
     count = len(times)
-    outputs = y.reshape(count, model.outputs).T
-    shown = u.reshape(count, model.inputs).T
+    outputs = found.outputs.reshape(count, model.outputs).T
+    shown = found.inputs.reshape(count, model.inputs).T
     if (model.inputs, model.outputs) == (1, 1):
         outputs, shown = outputs[0], shown[0]
     arguments: dict[str, Any] = {
@@ -128,8 +129,8 @@ def respond(
         time=times,
         outputs=outputs,
         inputs=shown,
-        breaks=breaks + start,
-        states=x.reshape(count, model.states).T,
+        states=found.states.reshape(count, model.states).T,
+        breaks=found.breaks + start,
         steady_state=float(rest[0]) if rest is not None and outputs.ndim == 1 else rest,
         _dense=_Run(system, start, arguments) if len(times) > 1 else None,
     )

@@ -28,35 +28,40 @@ Vector = NDArray[np.float64]
 Blocks = NDArray[np.float64]
 Sampler = Callable[[Vector], NDArray[np.float64]]
 
-#: What lasts longer than this part of the span is seen.
+#: Shortest event of a callable that the even samples do not miss, as a part of the span: smaller
+#: finds more and calls the function more often.
 RESOLUTION = 1e-3
 
 # Values at these nodes, times the matrix, are coefficients.
-_NODES, _TRANSFORM = legendre_tables()
+_TABLES = legendre_tables()
+_NODES, _TRANSFORM = _TABLES.nodes, _TABLES.transform
 _TERMS = len(_NODES)
 
 _EPS = float(np.finfo(float).eps)
 
-# A series has ended where its last two coefficients are below this part of the largest value.
+# A series is accurate to rounding where its last two coefficients are below this part of the
+# largest value: smaller never ends, larger gives digits away.
 _ENDED = 16.0 * _EPS
 
-# Units of rounding of the time that a function may err by: it multiplies and adds as well.
+# Error of the time, as a part of it, that the values of a callable are allowed to show: it rounds
+# in its own operations.
 _UNITS = 8.0 * _EPS
 
-# What rounding of the time makes of the values, at most, as a part of how much they vary on a
-# piece: where it is more, the piece is too short to be told from a jump.
+# Upper limit of the effect of that error on the values, as a part of their variation on a piece: a
+# piece with more is so short that it cannot be distinguished from a jump.
 _BLURRED = 1e-3
 
-# A series may be off by so many times what its last coefficients may be.
+# Tolerance of the comparison of a series with samples, in units of that of its last coefficients.
 _OFF = 30.0
 
-# Points next to the ends, in units of rounding of the time.
+# Distance of the points next to the ends of a piece from them, relative to the time.
 _INSET = 4.0 * _EPS
 
-# An interval shorter than this part of the whole is not halved any more: there is a break in it.
+# Shortest interval that is halved, as a part of the whole: a shorter one holds a break.
 _SHORTEST = 1e-9
 
-# Intervals of one function, and breaks found in it.
+# Upper limits on the number of intervals of one function and of breaks found in it: they bound
+# memory and time.
 _MOST = 20_000
 _MOST_BREAKS = 1_000
 _MOST_SAMPLES = 1_000_000

@@ -1,20 +1,16 @@
-"""Transfer functions with delays: ratios of two quasi-polynomials, nothing approximated.
-
-One class, kept whole: most of the file is its documentation.
-"""
+"""Transfer functions with delays: ratios of two quasi-polynomials, nothing approximated."""
 
 from __future__ import annotations
 
-import math
 import operator
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from deadtime._base.ranges import OpenRange
-from deadtime._base.validation import non_negative, real_array, unmasked
+from deadtime._base.validation import non_negative, unmasked
 from deadtime._deadtime import ratio
 from deadtime.roots import (
     Parameter,
@@ -25,26 +21,26 @@ from deadtime.roots import (
     s,
 )
 from deadtime.roots._quasipolynomial import is_number
-from deadtime.systems._interchange import (
-    control_package,
-    polynomials_of_control,
-    polynomials_of_scipy,
-    rational,
+from deadtime.roots._text import latex
+from deadtime.systems._frequency_domain import FrequencyDomain
+from deadtime.systems._interchange import Writable, polynomials_of_control, polynomials_of_scipy
+from deadtime.systems._parts import (
+    Polynomial,
+    quasi_polynomial,
+    without_common_delay,
+    without_common_powers,
 )
-from deadtime.systems._margins import Margins, margins
 from deadtime.systems._poles import HasPoles
 from deadtime.systems._realisation import Realisable, Realisation, of_ratio
 from deadtime.systems._responses import HasResponses
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    pass
 
 __all__ = ["TransferFunction", "feedback"]
 
-Polynomial: TypeAlias = QuasiPolynomial | float | Sequence[float] | NDArray[Any]
 
-
-class TransferFunction(HasPoles, HasResponses):
+class TransferFunction(FrequencyDomain, HasPoles, HasResponses, Writable):
     """A transfer function num(s)/den(s) of two quasi-polynomials.
 
     Usually made by dividing: ``2.0 / s * delay(0.36)``. Immutable. A delay common to numerator
@@ -96,13 +92,13 @@ class TransferFunction(HasPoles, HasResponses):
     _den: QuasiPolynomial
 
     def __init__(self, num: Polynomial, den: Polynomial = 1.0, *, delay: float = 0.0) -> None:
-        n, d = _quasi_polynomial("num", num), _quasi_polynomial("den", den)
+        n, d = quasi_polynomial("num", num), quasi_polynomial("den", den)
         if not d.coefficients.any():
             raise ZeroDivisionError("den is zero: a transfer function needs one that is not")
         dead = non_negative("delay", delay)
         if dead:
             n = n * QuasiPolynomial([[1.0]], [dead])
-        n, d = _without_common_delay(n, d)
+        n, d = without_common_delay(n, d)
         object.__setattr__(self, "_num", n)
         object.__setattr__(self, "_den", d)
 
@@ -156,6 +152,9 @@ class TransferFunction(HasPoles, HasResponses):
         above = f"({num})" if _is_sum(num) else num
         below = f"({den})" if _is_sum(den) or " " in den or "-" in den else den
         return f"{above} / {below}" if den != "1" else num
+
+    def _repr_latex_(self) -> str:
+        return rf"$\frac{{{latex(repr(self._num))}}}{{{latex(repr(self._den))}}}$"
 
     # Algebra
 
@@ -221,94 +220,6 @@ class TransferFunction(HasPoles, HasResponses):
         flat = points.astype(np.complex128).ravel()
         values = ratio(self._num._native, self._den._native, flat)
         return values.reshape(points.shape) if points.ndim else complex(values[0])
-
-    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
-        """Value on the imaginary axis, G(j omega).
-
-        Parameters
-        ----------
-        omega : array_like
-            Frequencies in rad/s.
-
-        Returns
-        -------
-        ndarray of complex, shape of `omega`
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> print((2.0 / (s + 1) * delay(0.5)).frequency_response([0.0, 1.0]).round(4))
-        [2.    +0.j     0.3982-1.357j]
-        """
-        frequencies = _frequencies(omega)
-        return np.asarray(self(1j * frequencies))
-
-    def phase(self, omega: ArrayLike) -> NDArray[np.float64]:
-        """Argument of G(j omega), continuous from zero frequency on.
-
-        A single delay of the numerator or denominator enters exactly, and intervals between the
-        frequencies asked for are halved until no turn can go unseen, so the phase is right also
-        where it turns many times from one of them to the next. Where one term outweighs all
-        others the intervals grow with the frequency, up to the largest one that a double holds.
-
-        Parameters
-        ----------
-        omega : array_like
-            Frequencies in rad/s; at zero the limit from above.
-
-        Returns
-        -------
-        ndarray of float, shape of `omega`
-            In rad. It starts from a quarter turn down for each pole at zero, up for each zero
-            there, with half a turn up where the rest of the numerator is negative, down where
-            that of the denominator is. At a pole on the axis it falls by half a turn, at a zero
-            it rises.
-
-        Raises
-        ------
-        ValueError
-            Where it cannot be followed so far: no term of a neutral function outweighs the
-            others, or the product of delay and frequency is beyond 1e308.
-
-        Examples
-        --------
-        >>> from deadtime import delay, s
-        >>> print((2.0 / s * delay(0.36)).phase([1.0, 100.0]))
-        [ -1.93079633 -37.57079633]
-        """
-        frequencies = _frequencies(omega)
-        if not self._num.coefficients.any():
-            raise ValueError("the zero transfer function has no phase")
-        size = np.abs(frequencies).ravel()
-        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
-        start = np.pi * (int(a < 0.0) - int(b < 0.0) + 0.5 * (p - q))
-        phase = np.full(size.shape, start)
-        above = size > 0.0
-        phase[above] = self._num._native.argument(size[above])
-        phase[above] -= self._den._native.argument(size[above])
-        mirrored = np.where(frequencies.ravel() < 0.0, -phase, phase)
-        return np.asarray(mirrored.reshape(frequencies.shape))
-
-    def dcgain(self) -> float:
-        """Limit at zero frequency, as s comes to zero from the right.
-
-        Returns
-        -------
-        float
-            Infinite at a pole, with its sign.
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> (2.0 / (dtm.s + 4.0)).dcgain(), ((1 - dtm.delay(0.5)) / dtm.s).dcgain()
-        (0.5, 0.5)
-        """
-        if not self._num.coefficients.any():
-            return 0.0
-        (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
-        if p > q:
-            return 0.0
-        return a / b if p == q else math.copysign(math.inf, a * b)
 
     # Poles and zeros
 
@@ -385,7 +296,7 @@ class TransferFunction(HasPoles, HasResponses):
         """
         if not self._num.coefficients.any():
             return TransferFunction(0.0)
-        return TransferFunction(*_without_common_powers(self._num, self._den))
+        return TransferFunction(*without_common_powers(self._num, self._den))
 
     def _determinant(self) -> QuasiPolynomial:
         return self._den
@@ -430,133 +341,26 @@ class TransferFunction(HasPoles, HasResponses):
     def _gains_at_rest(self) -> NDArray[np.float64]:
         return np.array([[self.dcgain()]])
 
-    # As a loop gain
-
-    def _delay_margin(self) -> float:
-        return self.margin()._delay_margin()
-
-    def margin(self) -> Margins:
-        """Gain, phase and delay margin of the loop closed around this one by ``feedback(G)``.
+    def sensitivity(self) -> TransferFunction:
+        """Sensitivity S = 1/(1 + G) of the loop closed around this one.
 
         Returns
         -------
-        Margins
-            With every frequency at which the gain is one, or the phase 180 degrees, behind it.
+        TransferFunction
+            From a disturbance of the output to the output; 1 - S is ``feedback(G)``.
 
         Raises
         ------
         ValueError
-            If the gain grows with frequency, the loop gain is not causal, or its gain is one (its
-            phase 180 degrees) on a whole range of frequencies.
-
-        Notes
-        -----
-        All crossings are found, by a bound on the curvature of abs(num)^2 - abs(den)^2 and of
-        Im(num conj(den)) between the points at which they are evaluated, and a bound on the
-        frequencies that matter. Stability of the closed loop, as it is, is decided by a proved
-        count of roots.
+            If G is -1 everywhere.
 
         Examples
         --------
         >>> from deadtime import delay, s
-        >>> (1.5 * (s + 1) / (s * (s**2 + 0.5 * s + 9)) * delay(0.05)).margin()
-        <Margins: gain 2.616 at 3.559 rad/s, phase 49.19° at 3.063 rad/s, delay 0.2803 s at ...>
-        >>> (9.0 / s * delay(0.36)).margin()
-        <Margins: none, the closed loop is not stable as it is>
+        >>> (2.0 / s * delay(0.36)).sensitivity()
+        s / (s + 2 exp(-0.36 s))
         """
-        return margins(self._num, self._den)
-
-    def bode(
-        self,
-        omega: ArrayLike | None = None,
-        *,
-        margins: bool = False,
-        axes: Sequence[Axes] | None = None,
-    ) -> Sequence[Axes]:
-        """Draw gain and phase over frequency.
-
-        Parameters
-        ----------
-        omega : array_like, optional
-            Frequencies in rad/s, above zero and increasing; by default from a decade below the
-            lowest corner to a decade above the highest.
-        margins : bool, default False
-            Take this as a loop gain and mark its margins.
-        axes : sequence of two matplotlib.axes.Axes, optional
-            Where to draw gain and phase; a new figure by default.
-
-        Returns
-        -------
-        sequence of two matplotlib.axes.Axes
-
-        Raises
-        ------
-        ValueError
-            If the frequencies are no increasing ones above zero; with `margins` as in `margin`.
-        """
-        from deadtime._base.drawing import shown_rows
-        from deadtime.systems._plots import plot_bode
-
-        places = self._plotted(omega, 0.1, 10.0)
-        found = self.margin() if margins else None
-        drawn = shown_rows(axes, 2)
-        plot_bode(drawn, self, places, found)
-        return drawn
-
-    def nyquist(
-        self,
-        omega: ArrayLike | None = None,
-        *,
-        margins: bool = False,
-        ax: Axes | None = None,
-    ) -> Axes:
-        """Draw the frequency response in the complex plane, with the critical point -1.
-
-        Parameters
-        ----------
-        omega : array_like, optional
-            Frequencies in rad/s, above zero and increasing; by default far enough both ways for
-            the curve to end. The mirror image for negative ones is drawn dashed.
-        margins : bool, default False
-            Take this as a loop gain and mark its margins.
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure by default.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-
-        Raises
-        ------
-        ValueError
-            As in `bode`.
-        """
-        from deadtime._base.drawing import shown_axes
-        from deadtime.systems._plots import plot_nyquist
-
-        places = self._plotted(omega, 1e-3, 100.0)
-        found = self.margin() if margins else None
-        ax = shown_axes(ax)
-        plot_nyquist(ax, self, places, found)
-        return ax
-
-    def _plotted(self, omega: ArrayLike | None, below: float, beyond: float) -> NDArray[np.float64]:
-        """Frequencies to draw at: those given, checked, or these factors from the corners."""
-        if omega is not None:
-            given = _frequencies(omega)
-            rising = given.ndim == 1 and given.size > 1 and bool(np.all(np.diff(given) > 0.0))
-            if not rising or given[0] <= 0.0:
-                raise ValueError("omega: give at least two increasing frequencies above zero")
-            return given
-        corners: list[float] = []
-        for h in (self._num, self._den):
-            for row, tau in zip(h.coefficients, h.delays, strict=True):
-                roots = np.abs(np.roots(row[::-1]))
-                corners += roots[roots > 0.0].tolist()
-                if tau > 0.0:
-                    corners.append(1.0 / float(tau))
-        low, high = (min(corners), max(corners)) if corners else (1.0, 1.0)
-        return np.geomspace(below * low, beyond * high, 2001)
+        return feedback(1.0, self)
 
     # Other packages
 
@@ -585,29 +389,6 @@ class TransferFunction(HasPoles, HasResponses):
             If it is no such system.
         """
         return cls(*polynomials_of_control(system), delay=delay)
-
-    def to_control(self, pade: int | None = None) -> Any:
-        """Write as a transfer function of python-control, which knows no delays.
-
-        Parameters
-        ----------
-        pade : int, optional
-            Replace every delay by a Padé approximant of this order; by default a system with
-            delays is refused.
-
-        Returns
-        -------
-        control.TransferFunction
-
-        Raises
-        ------
-        ImportError
-            If python-control is not installed.
-        ValueError
-            If there are delays and `pade` is None or out of its range.
-        """
-        package = control_package()
-        return package.TransferFunction(*rational(self._num, self._den, pade))
 
     @classmethod
     def from_scipy(cls, system: Any, delay: float = 0.0) -> TransferFunction:
@@ -638,27 +419,6 @@ class TransferFunction(HasPoles, HasResponses):
         2 exp(-0.36 s) / s
         """
         return cls(*polynomials_of_scipy(system), delay=delay)
-
-    def to_scipy(self, pade: int | None = None) -> Any:
-        """Write as a transfer function of scipy.signal, which knows no delays.
-
-        Parameters
-        ----------
-        pade : int, optional
-            As in `to_control`.
-
-        Returns
-        -------
-        scipy.signal.TransferFunction
-
-        Raises
-        ------
-        ValueError
-            As in `to_control`.
-        """
-        from scipy import signal
-
-        return signal.TransferFunction(*rational(self._num, self._den, pade))
 
 
 def feedback(G: Any, H: Any = 1.0, sign: int = -1) -> TransferFunction:
@@ -728,54 +488,8 @@ def _sum(first: TransferFunction, second: TransferFunction) -> TransferFunction:
     """Over the common denominator as far as it is seen exactly: all of it, or its powers of s."""
     if first._den == second._den:
         return TransferFunction(first._num + second._num, first._den)
-    d, q = _without_common_powers(first._den, second._den)
+    d, q = without_common_powers(first._den, second._den)
     return TransferFunction(first._num * q + second._num * d, first._den * q)
-
-
-def _without_common_powers(
-    one: QuasiPolynomial, other: QuasiPolynomial
-) -> tuple[QuasiPolynomial, QuasiPolynomial]:
-    """Both divided by the highest power of s that divides every row of both exactly."""
-    k = min(one._native.powers_of_s(), other._native.powers_of_s())
-    one, other = (QuasiPolynomial._wrap(h._native.without_powers(k)) for h in (one, other))
-    return one, other
-
-
-def _quasi_polynomial(name: str, given: Polynomial) -> QuasiPolynomial:
-    if isinstance(given, QuasiPolynomial):
-        return given
-    if is_number(given):
-        return QuasiPolynomial([[float(cast(float, given))]], [0.0])
-    descending = real_array(name, cast(ArrayLike, given))
-    if descending.ndim != 1 or descending.size == 0:
-        raise ValueError(
-            f"{name} of shape {descending.shape}: give a QuasiPolynomial, a number, or the "
-            "coefficients in descending powers of s"
-        )
-    return QuasiPolynomial(descending[None, ::-1], [0.0])
-
-
-def _without_common_delay(
-    n: QuasiPolynomial, d: QuasiPolynomial
-) -> tuple[QuasiPolynomial, QuasiPolynomial]:
-    """Cancel the smallest delay, unless rounding would change another one."""
-    both = [h for h in (n, d) if h.coefficients.any()]
-    smallest = float(min(h.delays[0] for h in both))
-    times = [float(tau) for h in both for tau in h.delays]
-    if smallest == 0.0 or any(math.fsum((t, -smallest, -(t - smallest))) for t in times):
-        return n, d
-    n, d = (
-        QuasiPolynomial(h.coefficients, h.delays - smallest) if h.coefficients.any() else h
-        for h in (n, d)
-    )
-    return n, d
-
-
-def _frequencies(omega: ArrayLike) -> NDArray[np.float64]:
-    frequencies = real_array("omega", omega)
-    if not np.isfinite(frequencies).all():
-        raise ValueError("omega: give finite frequencies in rad/s")
-    return frequencies
 
 
 def _is_sum(text: str) -> bool:

@@ -1,4 +1,4 @@
-"""`design`: gains for a loop with a delay, from what is asked to what was found."""
+"""`design`: gains for a loop with a delay, from a specification to a result."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from dataclasses import replace
 from typing import Literal
 
 from deadtime.loops import PV, Controller, DerivativeFilter
-from deadtime.tuning._demands import demanded
-from deadtime.tuning._filter_choice import design_filter
-from deadtime.tuning._make import made
-from deadtime.tuning._objectives import ObjectiveName, objective_named
-from deadtime.tuning._problem import controller_template, pose, with_filter
+from deadtime.tuning._filter_choice import filter_choice
+from deadtime.tuning._made import made
+from deadtime.tuning._problem import controller_template, with_filter
 from deadtime.tuning._result import Design
+from deadtime.tuning._specification import (
+    DesignSpecification,
+    FilterSpecification,
+    ObjectiveName,
+)
 
 __all__ = ["design"]
 
@@ -83,7 +86,7 @@ def design(
     ------
     ValueError
         When the delay is not known, no gains in the ranges are stable, or none of them meet the
-        margins; the message says what was searched, or what can be had.
+        margins; the message says what was searched, or which margins are possible.
     TypeError
         When `loop` is neither a `ControlLoop` nor a plant, or `fixed` or `ranges` no mapping.
 
@@ -102,35 +105,33 @@ def design(
 
     >>> smooth = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0))
     >>> best = dtm.design(loop, controller=smooth, delay=(0.3, 0.4), gain_margin=4.0)
-    >>> best.margins.gain >= 4.0, best.proved
-    (True, ('stable', 'gain margin'))
+    >>> best.margins.gain_margin >= 4.0, best.proved
+    (True, ('stable', 'gain_margin'))
     >>> print(best.traded[0].words)
     gain margin of at least 4 holds the design back: without it ...
     """
-    if isinstance(filter, DerivativeFilter):
-        controller = with_filter(controller_template(controller), filter)
-    elif filter == "auto":
-        choice = design_filter(
-            loop,
-            controller=controller,
-            delay=delay,
-            gain=gain,
-            objective=objective,
-            fixed=fixed,
-            gain_margin=gain_margin,
-            phase_margin=phase_margin,
-            delay_margin=delay_margin,
-            ranges=ranges,
-            shape=shape,
-            amplitude=amplitude,
-            threads=threads,
-        )
+    specification = DesignSpecification(
+        controller=controller,
+        delay=delay,
+        gain=gain,
+        objective=objective,
+        fixed=fixed,
+        gain_margin=gain_margin,
+        phase_margin=phase_margin,
+        delay_margin=delay_margin,
+        ranges=ranges,
+        shape=shape,
+        amplitude=amplitude,
+        threads=threads,
+    )
+    if filter == "auto":
+        choice = filter_choice(loop, specification, FilterSpecification())
         return replace(
             choice.design, filter_choice=choice, traded=(*choice.design.traded, choice.trade)
         )
+    if isinstance(filter, DerivativeFilter):
+        template = with_filter(controller_template(controller), filter)
+        specification = replace(specification, controller=template)
     elif filter is not None:
         raise ValueError(f"filter={filter!r}: give a DerivativeFilter, 'auto' or None")
-    goal = objective_named(objective)
-    demands = demanded(gain_margin, phase_margin, delay_margin)
-    problem = pose(loop, controller, delay, gain, fixed, ranges, amplitude, threads)
-    return made(problem, goal, demands, shape)
+    return made(loop, specification)

@@ -17,42 +17,49 @@ where L is small: without a filter the noise gain is as large as the bandwidth.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import trapezoid
 
 from deadtime._base.validation import increasing, positive
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.tuning._demands import Demands, MarginEstimate, demanded
 from deadtime.tuning._exchange import best_gains
-from deadtime.tuning._make import made
-from deadtime.tuning._objectives import Objective, ObjectiveName, objective_named
+from deadtime.tuning._made import made, required_margins
+from deadtime.tuning._margin_estimate import MarginEstimate
+from deadtime.tuning._objectives import Objective, objective_named
 from deadtime.tuning._problem import Problem, Vector, controller_template, pose, with_filter
 from deadtime.tuning._result import Design, FilterChoice
 from deadtime.tuning._search import Search
+from deadtime.tuning._specification import (
+    DesignSpecification,
+    FilterSpecification,
+    ObjectiveName,
+)
 from deadtime.tuning._survey import Survey, surveyed
 from deadtime.tuning._worst import fine
 
-__all__ = ["design_filter", "noise_gain"]
+__all__ = ["design_filter", "filter_choice", "noise_gain"]
 
-#: Corners that are tried, from and to in units of one over delay, lag and half a sample.
+#: Number of corners tried, and the slowest and fastest in units of 1/(delay + lag + half a sample).
+#: Each corner costs a design.
 _CORNERS = 11
 _SLOWEST, _FASTEST = 2.0, 200.0
 
-#: A continuous loop has no sampling rate: its noise reaches so far beyond the fastest corner.
+#: Bandwidth of the noise of a continuous loop, which has no sampling rate, as a multiple of the
+#: fastest corner.
 _BEYOND = 10.0
 
-#: Halvings of the interval between two corners in which the chosen one lies.
+#: Halvings of the interval between two corners: each costs a design and halves the error.
 _HALVINGS = 5
 
-#: Points of the integral over the noise, from this part of the bandwidth on.
+#: Points of the integral over the noise, and its lower end as a fraction of the bandwidth.
 _POINTS = 4000
 _LOWEST = 1e-5
 
-#: Points of the map along each gain: many maps are drawn.
+#: Points of the map along each gain, for one, two and three free gains: fewer than for one design,
+#: since many maps are computed.
 _SIDE = {1: 201, 2: 41, 3: 15}
 
 
@@ -82,7 +89,7 @@ def design_filter(
 
     Parameters
     ----------
-    loop : ControlLoop
+    loop : ControlLoop or a plant
         As in `design`.
     controller : Controller or class of one
         With a derivative: `PV`, `PD` or `PID`.
@@ -125,43 +132,61 @@ def design_filter(
     >>> choice.noise_gain < choice.ideal_noise_gain
     True
     """
-    goal = objective_named(objective)
-    if goal.name == "overshoot":
+    specification = DesignSpecification(
+        controller=controller,
+        delay=delay,
+        gain=gain,
+        objective=objective,
+        fixed=fixed,
+        gain_margin=gain_margin,
+        phase_margin=phase_margin,
+        delay_margin=delay_margin,
+        ranges=ranges,
+        shape=shape,
+        amplitude=amplitude,
+        threads=threads,
+    )
+    wanted = FilterSpecification(loss, noise, command_noise, omegas, damping, bandwidth)
+    return filter_choice(loop, specification, wanted)
+
+
+def filter_choice(
+    loop: object, specification: DesignSpecification, wanted: FilterSpecification
+) -> FilterChoice:
+    """Check the arguments, design with every corner, and choose."""
+    if objective_named(specification.objective).name == "overshoot":
         raise ValueError(
             "objective='overshoot': it can be none with any filter; choose by 'abscissa', "
             "'damping' or 'settling_time'"
         )
-    if (noise is None) != (command_noise is None) and command_noise is not None:
+    if wanted.noise is None and wanted.command_noise is not None:
         raise ValueError("command_noise without noise: give the standard deviation of both")
-    template = controller_template(controller)
-    demands = demanded(gain_margin, phase_margin, delay_margin)
-
-    def posed(corner: float | None) -> Problem:
-        smooth = None if corner is None else DerivativeFilter(corner, damping)
-        made_of = with_filter(template, smooth)
-        return pose(loop, made_of, delay, gain, fixed, ranges, amplitude, threads)
-
-    ideal_problem = posed(None)
-    corners = _corners(ideal_problem, omegas)
-    white = _bandwidth(ideal_problem.loop, bandwidth, float(corners[-1]))
-    sides = shape or [_SIDE[len(ideal_problem.free)]] * len(ideal_problem.free)
-    ideal = made(ideal_problem, goal, demands, sides)
-    task = _Task(posed, goal, demands, white, tuple(sides), surveyed(ideal_problem, sides))
+    template = controller_template(specification.controller)
+    specification = replace(specification, controller=with_filter(template, None))
+    ideal_problem = pose(loop, specification)
+    if specification.shape is None:
+        free = len(ideal_problem.free)
+        specification = replace(specification, shape=(_SIDE[free],) * free)
+    corners = _corners(ideal_problem, wanted.omegas)
+    bandwidth = _bandwidth(ideal_problem.loop, wanted.bandwidth, float(corners[-1]))
+    ideal = made(loop, specification)
+    survey = surveyed(ideal_problem, specification.shape)
+    task = _Task(loop, specification, wanted.damping, bandwidth, survey)
     # From the fastest corner down, each from the gains of the one before: they change slowly.
     gains = np.array([ideal.gains[name] for name in ideal_problem.free])
     tried: list[_Tried] = []
     for corner in corners[::-1]:
         tried.insert(0, task.tried(float(corner), gains))
         gains = tried[0].gains
-    if noise is not None and command_noise is not None:
-        most = positive("command_noise", command_noise) / positive("noise", noise)
-        rule = f"the fastest with a command noise of at most {command_noise:g}"
+    if wanted.noise is not None and wanted.command_noise is not None:
+        most = positive("command_noise", wanted.command_noise) / positive("noise", wanted.noise)
+        rule = f"the fastest with a command noise of at most {wanted.command_noise:g}"
         omega = _fastest(task, corners, tried, most)
     else:
-        worst = positive("loss", loss)
-        rule = f"the slowest that loses at most {100 * worst:g} %"
-        omega = _slowest(task, corners, tried, ideal, worst)
-    chosen = made(posed(omega), goal, demands, sides)
+        loss = positive("loss", wanted.loss)
+        rule = f"the slowest that loses at most {100 * loss:g} %"
+        omega = _slowest(task, corners, tried, ideal, loss)
+    chosen = made(loop, task.specified(omega))
     return FilterChoice(
         omega=omega,
         rule=rule,
@@ -169,12 +194,12 @@ def design_filter(
         ideal=ideal,
         omegas=corners,
         values=np.array([one.value for one in tried]),
-        noise_gains=np.array([one.noise for one in tried]),
+        noise_gains=np.array([one.noise_gain for one in tried]),
         value=chosen.value,
-        noise_gain=noise_gain(chosen.loop, white),
-        ideal_noise_gain=noise_gain(ideal.loop, white),
-        bandwidth=white,
-        noise=noise,
+        noise_gain=noise_gain(chosen.loop, bandwidth),
+        ideal_noise_gain=noise_gain(ideal.loop, bandwidth),
+        bandwidth=bandwidth,
+        noise=wanted.noise,
     )
 
 
@@ -183,15 +208,15 @@ def noise_gain(loop: ControlLoop, bandwidth: float) -> float:
     omega = np.geomspace(_LOWEST * bandwidth, bandwidth, _POINTS)
     feedback = loop.controller.transfer_function().frequency_response(omega)
     squared = np.abs(feedback / (1.0 + loop.frequency_response(omega))) ** 2
-    return float(np.sqrt(trapezoid(squared, omega) / bandwidth))
+    return float(np.sqrt(np.trapezoid(squared, omega) / bandwidth))
 
 
 @dataclass(frozen=True)
 class _Tried:
-    """What the best gains with one corner come to."""
+    """The objective, the noise gain and the best gains with one corner."""
 
     value: float
-    noise: float
+    noise_gain: float
     gains: Vector
 
 
@@ -199,27 +224,36 @@ class _Tried:
 class _Task:
     """Everything but the corner."""
 
-    posed: Callable[[float | None], Problem]
-    objective: Objective
-    demands: Demands
+    loop: object
+    specification: DesignSpecification
+    damping: float
     bandwidth: float
-    shape: tuple[int, ...]
     survey: Survey
 
+    @property
+    def objective(self) -> Objective:
+        return objective_named(self.specification.objective)
+
+    def specified(self, corner: float) -> DesignSpecification:
+        """The design with one corner of the filter."""
+        ideal = controller_template(self.specification.controller)
+        smooth = with_filter(ideal, DerivativeFilter(corner, self.damping))
+        return replace(self.specification, controller=smooth)
+
     def tried(self, corner: float, start: Vector) -> _Tried:
-        """Design with one corner from the gains of another; NaN where none meet the demands."""
-        problem = self.posed(corner)
+        """Design with one corner from the gains of another; NaN where none meet the margins."""
+        problem = pose(self.loop, self.specified(corner))
         alone = len(start) == 1
         try:
             # A map over one gain costs next to nothing.
-            survey = surveyed(problem, self.shape) if alone else self.survey
+            survey = surveyed(problem, self.specification.shape) if alone else self.survey
             search = Search(problem, self.objective, survey, MarginEstimate(problem))
-            found = best_gains(search, self.demands, None if alone else start)
+            required = required_margins(self.specification)
+            found = best_gains(search, required, None if alone else start)
         except ValueError:
             return _Tried(math.nan, math.nan, start)
         value = self.objective.value(problem, found.gains, [*fine(problem), found.worst])
-        noise = noise_gain(problem.at(found.gains), self.bandwidth)
-        return _Tried(value, noise, found.gains)
+        return _Tried(value, noise_gain(problem.at(found.gains), self.bandwidth), found.gains)
 
 
 def _corners(problem: Problem, omegas: ArrayLike | None) -> Vector:
@@ -261,7 +295,7 @@ def _slowest(
     if not kept:
         lost = [task.objective.lost(one.value, ideal.value) for one in tried]
         if not np.isfinite(lost).any():
-            raise ValueError("no corner has gains that meet the demands: ask for less")
+            raise ValueError("no corner has gains with the required margins: require less")
         raise ValueError(
             f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %: the "
             f"least is {100 * np.nanmin(lost):.3g} %; allow for more loss, or give faster omegas"
@@ -278,12 +312,12 @@ def _slowest(
 
 def _fastest(task: _Task, corners: Vector, tried: Sequence[_Tried], most: float) -> float:
     """The fastest corner with no more noise, between the corners tried too."""
-    kept = [i for i, one in enumerate(tried) if one.noise <= most]
+    kept = [i for i, one in enumerate(tried) if one.noise_gain <= most]
     if not kept:
         raise ValueError(
             f"no corner from {corners[0]:.4g} rad/s has a noise gain of {most:.4g} or less: the "
-            f"least is {np.nanmin([one.noise for one in tried]):.4g}; allow for more noise, give "
-            "slower omegas, or smaller gains"
+            f"least is {np.nanmin([one.noise_gain for one in tried]):.4g}; allow for more noise, "
+            "give slower omegas, or smaller gains"
         )
     last = kept[-1]
     if last == len(corners) - 1:
@@ -291,5 +325,7 @@ def _fastest(task: _Task, corners: Vector, tried: Sequence[_Tried], most: float)
     low, high, start = float(corners[last]), float(corners[last + 1]), tried[last].gains
     for _ in range(_HALVINGS):
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if task.tried(middle, start).noise <= most else (low, middle)
+        low, high = (
+            (middle, high) if task.tried(middle, start).noise_gain <= most else (low, middle)
+        )
     return low

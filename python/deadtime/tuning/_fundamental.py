@@ -16,29 +16,29 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
-from deadtime.loops._model import LoopModel
+from deadtime.loops._model import LoopModel, LoopRun
 
 __all__ = ["Fundamental", "states_at"]
 
 Vector = NDArray[np.float64]
 
-#: Cells in a delay at least, and in the fastest time constant of plant and controller.
+#: Least number of cells in a delay, cells in the fastest time constant, and most cells in a delay:
+#: more cells make the bounds tighter and cost time in proportion.
 _CELLS = 8
 _FASTEST = 6.0
 _MOST_CELLS = 512
 
-#: Grid points that are held at once.
+#: Upper limit on the number of grid points (bounds memory).
 _MOST_POINTS = 400_000
-
-_NONE = np.empty(0)
 
 
 class Fundamental:
     """The unit responses of one loop, simulated as far as they are asked for."""
 
     def __init__(self, model: LoopModel, delay: float) -> None:
+        from scipy.linalg import expm
+
         self.model, self.delay = model, delay
         n = len(model.B)
         undelayed = model.A + np.outer(model.B, model.K)
@@ -66,7 +66,7 @@ class Fundamental:
         return np.array([*np.abs(away[:, 0, -1]), late.sum() * self.h, late.max()])
 
     def bounds(self, delays: int) -> tuple[Vector, Vector, Vector] | None:
-        """Q, and the rows of R for output and command, of a period of so many delays."""
+        """Q, and the rows of R for output and command, of a period of `delays` delays."""
         model, cells = self.model, self.cells
         n, count = len(model.B), delays * cells
         if count > _MOST_POINTS // (n + 1):
@@ -145,11 +145,9 @@ def states_at(
     limit: float | None,
 ) -> Vector:
     """Every state of a continuous loop after a step, nothing under way at time 0."""
-    step = np.zeros(1), np.array([amplitude]), _NONE, 0.0
+    run = LoopRun(start, command=0.0, reference=amplitude)
     found = [
-        replace(model, C=row, D=0.0)
-        .native(delay, None, limit)
-        .simulate(times, _NONE, start, 0.0, 0.0, *step)[0]
+        replace(model, C=row, D=0.0).native(delay, None, limit).outputs(times, run)
         for row in np.eye(len(model.B))
     ]
     return np.array(found)

@@ -3,11 +3,11 @@
 abscissa       Re of the rightmost pole.
 damping        the smallest damping ratio -Re s/abs(s) of the dominant poles, those that decay at
                most three times as fast as the slowest (a delay always leaves fast poles with little
-               damping, which nobody sees). It is 1 over whole ranges of gains, so the abscissa
+               damping, which do not show). It is 1 over whole ranges of gains, so the abscissa
                decides where it is equal.
 settling_time  of the step of the reference, with hold and limit, simulated exactly; the longest
                for the gains themselves and for gains half a percent beside them. The settling
-               time jumps where a peak leaves the band, and the best one is had next to such a
+               time jumps where a peak leaves the band, and the shortest one lies next to such a
                jump: gains that are rounded to three digits would fall over it.
 overshoot      of the same steps; up to a tenth of a percent counts as none, and the settling time
                decides where it is equal.
@@ -18,7 +18,7 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Literal, TypeAlias, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -26,42 +26,42 @@ from deadtime.loops import ControlLoop, sweep
 from deadtime.loops._model import rest_of
 from deadtime.tuning._problem import Problem, Scenario, Vector
 from deadtime.tuning._settling import BAND, proved_step
+from deadtime.tuning._specification import ObjectiveName
 
-__all__ = ["NEVER", "Objective", "ObjectiveName", "dominant_damping", "objective_named"]
+__all__ = ["NEVER", "Objective", "dominant_damping", "objective_named"]
 
-ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
-
-#: What a loop costs that is unstable or does not settle, so that the search turns away from it.
+#: Cost of a loop that is unstable or does not settle: above every other cost.
 NEVER = 1e6
 
-#: Gains so far beside those that are judged are judged with them: what rounding to three digits
-#: may do.
+#: Relative distance of the neighbouring gains that are judged with the gains themselves: the
+#: largest change by rounding to three digits.
 _ROUNDING = 0.005
 
-#: The band the search for the settling time keeps to: a little narrower than the 2 % that are
-#: reported, for what lies between the gains and the delays that are tried.
+#: Settling band of the search: a little narrower than the 2 % that are reported, as a margin for
+#: what lies between the gains and delays that are tried.
 SEARCH_BAND = 0.0195
 
-#: Poles that decay at most so many times as fast as the slowest are dominant; of a continuous loop
-#: so many are looked at.
+#: Poles that decay at most this many times as fast as the slowest one are dominant.
 DOMINANT = 3.0
+#: Poles of a continuous loop among which the dominant ones are sought.
 _POLES = 8
 
-#: Weight of the abscissa, in units of the loop's delay and lag, where the damping decides.
+#: Weight of the abscissa, in units of 1/(delay + lag), where the damping is equal.
 _TIE = 1e-3
 
-#: Overshoot that counts as none, %, and what more of it costs in settling times of a second.
+#: Overshoot in % that counts as none, and the cost of each further percent in seconds of settling
+#: time.
 NO_OVERSHOOT = 0.1
 _OVERSHOOT_WEIGHT = 10.0
 
 
 class Objective(ABC):
-    """A cost of a loop, and the figure it stands for."""
+    """A cost of a loop, and the value that is reported for it."""
 
     name: ObjectiveName
-    #: Whether loops are simulated: many at once then cost little more than one.
+    #: Whether loops are simulated; many at once then cost little more than one.
     simulated = False
-    #: How far costs may differ and be the same, relatively.
+    #: Relative difference of costs that counts as none.
     tolerance = 1e-6
 
     @abstractmethod
@@ -73,7 +73,7 @@ class Objective(ABC):
         """The figure itself, at its worst over the scenarios."""
 
     def coarse(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
-        """The costs of the gains alone, where their neighbours count as well and make it dear."""
+        """Costs of the gains without their neighbours, which take less time."""
         return self.costs(problem, points, scenarios)
 
     def proved(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
@@ -241,7 +241,7 @@ def _figures(
         settling=band,
         threads=problem.threads,
     )
-    # An output that the limit keeps from its rest is not settled, though it may stand still.
+    # An output that the limit keeps away from its rest has not settled, even if it is constant.
     loop = problem.loop
     limit = np.inf if loop.limit is None else loop.limit
     _, command = rest_of(loop.plant, loop.controller, loop.parameters | values)

@@ -94,7 +94,7 @@ def _settled(design: Design, end: float) -> float:
 
 
 def _loop_bode(axes: tuple[Axes, Axes], loop: ControlLoop) -> None:
-    loop.bode(axes=axes)
+    loop.bode(ax=axes)
     axes[0].set_xlim(axes[1].get_xlim())
     axes[0].title.set_fontsize("small")
     axes[0].set_ylabel("loop gain")

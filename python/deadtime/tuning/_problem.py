@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from deadtime._base.ranges import Range, interval
 from deadtime._base.validation import finite, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
+from deadtime.tuning._specification import DesignSpecification
 from deadtime.tuning._stabilising import candidate_ranges
 
 __all__ = [
@@ -27,10 +28,10 @@ __all__ = [
 
 Vector: TypeAlias = NDArray[np.float64]
 
-#: Values of the numbers of the loop that are not known.
+#: Values of the unknown numbers of a loop, by name.
 Scenario: TypeAlias = dict[str, float]
 
-#: More free gains than a controller here has would need a search that knows no map.
+#: Most free gains: those of PID. More would need a search without a map.
 _MOST_FREE = 3
 
 
@@ -69,7 +70,7 @@ class Problem:
         return self.loop.replace(**self.named(gains), **(scenario or {}))
 
     def scenarios(self, points: int) -> tuple[Scenario, ...]:
-        """Every combination of so many values of each number that is not known."""
+        """Every combination of `points` values of each unknown number."""
         values = [
             np.linspace(low, high, points) if low < high else [low]
             for low, high in self.intervals.values()
@@ -96,21 +97,15 @@ class Problem:
         return (low, 0.5 * (low + high), high) if low < high else (low,)
 
 
-def pose(
-    loop: object,
-    controller: type[Controller] | Controller,
-    delay: float | Range | None,
-    gain: float | Range | None,
-    fixed: Mapping[str, float] | None,
-    ranges: Mapping[str, Range] | None,
-    amplitude: float,
-    threads: int | None,
-) -> Problem:
-    """Check what a design was asked for."""
-    template = controller_template(controller)
+def pose(loop: object, specification: DesignSpecification) -> Problem:
+    """Check the arguments of a design, and state its problem."""
+    template = controller_template(specification.controller)
+    delay, gain, ranges = specification.delay, specification.gain, specification.ranges
     if not isinstance(loop, ControlLoop):
         loop, delay = _around(loop, template, delay)
-    held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
+    held = {
+        name: finite(name, value) for name, value in _mapping("fixed", specification.fixed).items()
+    }
     unknown = [name for name in held if name not in template.gains]
     if unknown:
         raise ValueError(
@@ -147,10 +142,10 @@ def pose(
         if set(given) != set(free):
             raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
         spans = ({name: interval(f"the range of {name}", given[name]) for name in free},)
-    height = finite("amplitude", amplitude)
+    height = finite("amplitude", specification.amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
-    return Problem(whole, free, spans, intervals, height, threads)
+    return Problem(whole, free, spans, intervals, height, specification.threads)
 
 
 def _around(
@@ -165,7 +160,7 @@ def _around(
 
 
 def controller_template(controller: type[Controller] | Controller) -> Controller:
-    """A controller of the wanted class; its gains are replaced throughout."""
+    """A controller of the given class, whose gains are placeholders."""
     if isinstance(controller, Controller):
         return controller
     if isinstance(controller, type) and issubclass(controller, Controller):

@@ -1,4 +1,4 @@
-"""What a design comes to: gains, what they are worth, and what they cost."""
+"""Results of a design: gains, their properties, and what the requirements cost."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.loops import ControlLoop
 from deadtime.stability import StabilityMap
-from deadtime.tuning._objectives import ObjectiveName
 from deadtime.tuning._problem import Scenario, Vector
+from deadtime.tuning._specification import ObjectiveName
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,25 +21,25 @@ __all__ = ["Design", "FilterChoice", "LeastMargins", "Trade", "figure_in_words"]
 class LeastMargins(NamedTuple):
     """Margins at their least over all that is not known; each may have its own worst scenario."""
 
-    gain: float
+    gain_margin: float
     """Factor on the loop gain."""
-    phase: float
+    phase_margin: float
     """Degrees."""
-    delay: float
+    delay_margin: float
     """Further delay, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trade(ReadOnlyArrays):
-    """What one demand costs.
+    """What one requirement costs.
 
     Attributes
     ----------
-    demand : str
-        ``"gain margin"``, ``"phase margin"``, ``"delay margin"``, ``"all margins"``,
-        ``"interval"`` (of delay and gain), ``"fixed"`` (gains) or ``"filter"``.
-    asked, had : float
-        What was asked for and what the design has; NaN where that is no number.
+    requirement : str
+        ``"gain_margin"``, ``"phase_margin"``, ``"delay_margin"``, ``"all_margins"``,
+        ``"interval"`` (of delay and gain) or ``"filter"``.
+    required, achieved : float
+        What was required and what the design has; NaN where that is no number.
     active : bool
         Whether the design is held back by it.
     without : float
@@ -48,9 +48,9 @@ class Trade(ReadOnlyArrays):
         The same as a sentence.
     """
 
-    demand: str
-    asked: float
-    had: float
+    requirement: str
+    required: float
+    achieved: float
     active: bool
     without: float
     words: str
@@ -96,10 +96,10 @@ class Design(ReadOnlyArrays):
     checked : int
         How many scenarios the objective was checked in after the search.
     proved : tuple of str
-        What of ``"stable"``, ``"gain margin"`` and ``"delay margin"`` is proved for every value
+        What of ``"stable"``, ``"gain_margin"`` and ``"delay_margin"`` is proved for every value
         in the intervals; empty for sampled loops, which are checked on the scenarios.
     traded : tuple of Trade
-        What each demand cost.
+        What each requirement cost.
     charts : tuple of StabilityMap
         Maps of the gains: for each of `delays`; of one free gain a single one, over gain and
         delay.
@@ -139,7 +139,7 @@ class Design(ReadOnlyArrays):
         return " to ".join(f"{end:g}" for end in ends)
 
     def summary(self) -> str:
-        """Gains, what they are worth and what they cost, in a few lines.
+        """Gains, their properties and what the requirements cost, in a few lines.
 
         Returns
         -------
@@ -153,7 +153,7 @@ class Design(ReadOnlyArrays):
         if self.gain is not None:
             over += f" and a gain of {self.gain[0]:g} to {self.gain[1]:g}"
         info, least = self.step_info, self.margins
-        proof = f"; proved: {', '.join(self.proved)}" if self.proved else ""
+        proof = f"; proved: {', '.join(self.proved).replace('_', ' ')}" if self.proved else ""
         settled = info["settling_time"]
         step = f"settles in {settled:.3g} s" if isfinite(settled) else "not proved to settle"
         step += f", overshoot {info['overshoot']:.2g} %, peak command {info['peak_command']:.3g}"
@@ -163,8 +163,9 @@ class Design(ReadOnlyArrays):
             f"{type(self.loop.controller).__name__}: {gains}",
             f"worst {over}: {figure_in_words(self.objective, self.value)}; spectral abscissa "
             f"{self.abscissa:.4g} 1/s, damping ratio {self.damping:.3g}",
-            f"least margins: gain {least.gain:.4g}, phase {least.phase:.4g}°, delay "
-            f"{least.delay:.4g} s ({self.checked} scenarios checked{proof})",
+            f"least margins: gain {least.gain_margin:.4g}, phase "
+            f"{least.phase_margin:.4g}°, delay {least.delay_margin:.4g} s "
+            f"({self.checked} scenarios checked{proof})",
             f"step of {self.amplitude:g}: {step}",
         ]
         lines += [trade.words for trade in self.traded]
@@ -214,7 +215,7 @@ class FilterChoice(ReadOnlyArrays):
     omegas : ndarray, shape (n,)
         Corners that were tried, rad/s.
     values : ndarray, shape (n,)
-        The objective at each, with the best gains for it; NaN where none meet the demands.
+        The objective at each, with the best gains for it; NaN where none meet the requirements.
     noise_gains : ndarray, shape (n,)
         Standard deviation of the command over that of the measurement noise, at each.
     value, noise_gain : float
@@ -249,7 +250,7 @@ class FilterChoice(ReadOnlyArrays):
 
     @property
     def trade(self) -> Trade:
-        """The choice as what was traded."""
+        """The cost of the filter, as a `Trade`."""
         return Trade("filter", self.omega, self.omega, True, self.ideal.value, self.summary())
 
     def summary(self) -> str:
@@ -272,7 +273,7 @@ class FilterChoice(ReadOnlyArrays):
         return words
 
     def plot(self) -> Figure:
-        """Draw the trade, the controller with and without the filter, the loop with its margins.
+        """Draw the costs of each corner, the controller with and without filter, and the margins.
 
         Returns
         -------

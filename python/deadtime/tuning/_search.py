@@ -1,4 +1,4 @@
-"""The best gains for given scenarios: the best cells of the map, made good by a local search.
+"""The best gains for given scenarios: the best cells of the map, improved by a local search.
 
 Every cost here has kinks, where two poles are equally far right or two delays equally bad, and the
 best gains lie on them; simulated ones also jump, where a peak leaves the settling band. So nothing
@@ -11,12 +11,12 @@ more       grids around the best point, each narrower than the one before (a map
            simplices of Nelder and Mead (1965), begun again around what they found, smaller and
            turned: a simplex that has collapsed on a kink is so freed.
 
-What is simulated is searched for the gains alone first, and in the last grids with gains half a
-percent beside them. There a gain whose axis begins at zero stays a quarter of a cell off it.
+Simulated objectives are searched for the gains alone first, and in the last grids with gains half a
+percent beside them. There a gain whose axis begins at zero stays a quarter of a cell away from it.
 
-Margins are demands, not costs: a shortfall costs many times as much as any gain in the objective,
-and becomes zero where the demands can be met. None of this proves a global minimum: the map sees
-to it, as far as its cells are close enough.
+Margins are requirements, not costs: a shortfall costs many times as much as any gain in the
+objective, and becomes zero where the requirements can be met. None of this proves a global minimum:
+the map finds it as far as its cells are close enough.
 """
 
 from __future__ import annotations
@@ -27,61 +27,68 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize, minimize_scalar
 
-from deadtime.tuning._demands import Demands, MarginEstimate
+from deadtime.tuning._margin_estimate import MarginEstimate
 from deadtime.tuning._objectives import NEVER, Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._required_margins import RequiredMargins
 from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
 
 __all__ = ["Search"]
 
-#: What a whole shortfall of a margin costs, in units of the objective.
+#: Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
+#: gain in the objective pays for a shortfall.
 _PENALTY = 50.0
 
-#: Cells whose cost is computed where the map does not hold it, with poles or by simulation.
+#: Upper limits on the cells whose cost is computed where the map does not hold it, from poles or by
+#: simulation (bound time).
 _CELLS_BY_POLES = 150
 _CELLS_SIMULATED = 450
 
-#: Cells the local search starts from, fewer where it is dear.
+#: Cells from which the local search starts; fewer where loops are simulated, and up to the third
+#: number where the neighbours of the gains cost much more than these themselves.
 _STARTS = 3
 _STARTS_SIMULATED = 2
 _MOST_STARTS = 6
 
-#: Gains whose neighbours make them so much dearer than the best cell alone send the search on.
+#: Ratio of the cost with neighbouring gains to that of the best cell above which further starts are
+#: tried.
 _MUCH = 1.15
 
-#: Simplices one after the other: how many at most, how much smaller each is, evaluations of each,
-#: to which part of its range a gain is to be known, and which part of the cost is no gain. Where
-#: roots meet, the abscissa has cusps, so that gains known to 1e-7 leave it known to 1e-3.
+#: Most simplices in sequence, ratio of their sizes, and evaluations of each.
 _SIMPLICES = 6
 _SMALLER = 0.35
 _EVALUATIONS = 150
+#: Relative accuracy of the gains, as a fraction of their ranges, and relative improvement that
+#: counts as none. Where roots meet, the abscissa has cusps, so that gains known to 1e-7 leave it
+#: known to 1e-3.
 _GAINS_KNOWN = 3e-7
 _IDLE = 1e-4
 
-#: Points along each side of a grid, half its width at first in cells of the map, how many grids
-#: (of what is simulated for the gains alone, and then with their neighbours), how much narrower
-#: each is, and how near to its middle the best point has to be for that.
+#: Points along each side of a grid, for one, two and three free gains, and half the width of the
+#: first grid in cells of the map.
 _SIDE = {1: 21, 2: 9, 3: 5}
 _REACH = 1.5
+#: Number of grids; of simulated loops, for the gains alone and then with their neighbours.
 _GRIDS = 3
 _GRIDS_SIMULATED = 8
 _GRIDS_ROUNDED = 4
+#: Ratio of the widths of two grids, and the part of the half width within which the best point must
+#: lie for the grid to become narrower.
 _NARROWER = 0.5
 _ARRIVED = 0.5
 
-#: How far beside the best gains alone the best ones with their neighbours are looked for at first,
-#: as a part of them.
+#: Relative half width of the first grid around the best gains alone in which the best ones with
+#: their neighbours are sought.
 _NEAR = 0.03
 
-#: Every so-manyeth frequency is looked at on the map.
+#: Frequency stride of the coarse margin estimate.
 _COARSE = 3
 
-#: A shortfall of margins that is none.
+#: Shortfall of the margins that counts as none.
 _MET = 1e-6
 
-#: What an unstable loop falls short by: more than every margin together.
+#: Shortfall assigned to an unstable loop: that of all three margins together.
 _UNSTABLE = 3.0
 
 #: Costs of rows of gains in scenarios.
@@ -92,59 +99,65 @@ Pair: TypeAlias = tuple[Vector, Vector]
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Everything a search for the best gains needs."""
+    """A search for the best gains: problem, objective, map and estimate of the margins."""
 
     problem: Problem
     objective: Objective
     survey: Survey
     estimate: MarginEstimate
 
-    def globally(self, scenarios: Sequence[Scenario], demands: Demands) -> Vector:
+    def globally(self, scenarios: Sequence[Scenario], required: RequiredMargins) -> Vector:
         """The best gains, from the map."""
         points, stable = self.survey.points, np.flatnonzero(self.survey.stable)
         costs = np.full(len(points), np.inf)
         short = np.zeros(len(stable))
-        if demands.asked:
-            short = demands.shortfall(self.estimate.of(points[stable], scenarios, _COARSE))
+        if required.named:
+            short = required.shortfall(self.estimate.of(points[stable], scenarios, _COARSE))
         met = stable[short <= _MET]
         if met.size:
             costs[met] = self._map_costs(met, scenarios)
             if self.objective.simulated:
-                return self._firmest(points, costs, scenarios, demands)
+                return self._firmest(points, costs, scenarios, required)
             starts = self.survey.chosen(points, costs, _STARTS)
         else:
-            # Perhaps the demands are met between the cells.
+            # Perhaps the requirements are met between the cells.
             costs[stable] = short
             starts = self.survey.chosen(points, costs, 1)
-        found = [self._by_grids(start, scenarios, demands) for start in starts]
-        best = min(found, key=lambda one: self._total(one[0], scenarios, demands))
-        return self._polished(*best, scenarios, demands)
+        found = [self._by_grids(start, scenarios, required) for start in starts]
+        best = min(found, key=lambda one: self._total(one[0], scenarios, required))
+        return self._polished(*best, scenarios, required)
 
     def _firmest(
-        self, points: Vector, costs: Vector, scenarios: Sequence[Scenario], demands: Demands
+        self,
+        points: Vector,
+        costs: Vector,
+        scenarios: Sequence[Scenario],
+        required: RequiredMargins,
     ) -> Vector:
         """The best gains with their neighbours, from more starts where those lose much by them."""
         for axes in self.survey.fringes:
             points = np.vstack([points, grid_points(axes)])
-            found = self._totals(axes, scenarios, demands, self.objective.coarse)
+            found = self._totals(axes, scenarios, required, self.objective.coarse)
             costs = np.append(costs, found)
         starts = self.survey.chosen(points, costs, _MOST_STARTS)
         best, least = starts[0], np.inf
         for i, start in enumerate(starts):
             if i >= _STARTS_SIMULATED and least <= _MUCH * costs.min():
                 break
-            gains = self._by_grids(start, scenarios, demands)[0]
-            cost = self._total(gains, scenarios, demands)
+            gains = self._by_grids(start, scenarios, required)[0]
+            cost = self._total(gains, scenarios, required)
             if cost < least:
                 best, least = gains, cost
         return np.asarray(best, dtype=np.float64)
 
-    def locally(self, start: Vector, scenarios: Sequence[Scenario], demands: Demands) -> Vector:
-        """The best gains around some."""
-        return self._polished(*self._by_grids(start, scenarios, demands), scenarios, demands)
+    def locally(
+        self, start: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
+    ) -> Vector:
+        """The best gains around a start."""
+        return self._polished(*self._by_grids(start, scenarios, required), scenarios, required)
 
     def _by_grids(
-        self, start: Vector, scenarios: Sequence[Scenario], demands: Demands
+        self, start: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
     ) -> tuple[Vector, Vector]:
         """A better point, and how far around it a better one may still be."""
         reach = _REACH * self.survey.spacing
@@ -152,7 +165,7 @@ class Search:
 
         def narrowed(judge: Judge, around: Vector, reach: Vector, grids: int) -> Pair:
             def costs(axes: list[Vector]) -> Vector:
-                return self._totals(axes, scenarios, demands, judge)
+                return self._totals(axes, scenarios, required, judge)
 
             return _by_grids(costs, around, reach, low, high, grids)
 
@@ -169,13 +182,13 @@ class Search:
         return narrowed(self.objective.costs, start, reach, _GRIDS)
 
     def _polished(
-        self, start: Vector, reach: Vector, scenarios: Sequence[Scenario], demands: Demands
+        self, start: Vector, reach: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
     ) -> Vector:
         """The best point within reach, where costs are continuous."""
         low, high = np.array(self.survey.bounds).T
 
         def cost(gains: Vector) -> float:
-            return self._total(gains, scenarios, demands)
+            return self._total(gains, scenarios, required)
 
         if self.objective.simulated:
             return start
@@ -183,25 +196,29 @@ class Search:
             return _between_neighbours(cost, start, reach, low, high)
         return _by_simplices(cost, start, 0.5 * reach, low, high)
 
-    def short(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:
-        """By how much gains fall short of the demands, by the estimate."""
-        return float(demands.shortfall(self.estimate.of(gains[None, :], scenarios))[0])
+    def short(
+        self, gains: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
+    ) -> float:
+        """By how much gains fall short of the required margins, by the estimate."""
+        return float(required.shortfall(self.estimate.of(gains[None, :], scenarios))[0])
 
-    def _total(self, gains: Vector, scenarios: Sequence[Scenario], demands: Demands) -> float:
+    def _total(
+        self, gains: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
+    ) -> float:
         """Cost of gains, shortfalls of margins included."""
         cost = self.objective.worst(self.problem, gains, scenarios)
-        if not demands.asked:
+        if not required.named:
             return cost
         # An unstable loop has crossings, which are no margins.
         stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
-        short = self.short(gains, scenarios, demands) if stable else _UNSTABLE
+        short = self.short(gains, scenarios, required) if stable else _UNSTABLE
         return cost + _PENALTY * self._scale * short
 
     def _totals(
         self,
         axes: list[Vector],
         scenarios: Sequence[Scenario],
-        demands: Demands,
+        required: RequiredMargins,
         judge: Judge,
     ) -> Vector:
         """The same of every point of a grid."""
@@ -209,9 +226,9 @@ class Search:
         late = worst_abscissa(self.problem, axes, scenarios).ravel()
         stable = np.isfinite(late)
         short = np.where(stable, 0.0, _UNSTABLE)
-        if demands.asked and stable.any():
+        if required.named and stable.any():
             estimated = self.estimate.of(points[stable], scenarios, _COARSE)
-            short[stable] = demands.shortfall(estimated)
+            short[stable] = required.shortfall(estimated)
         if self.objective.name == "abscissa":
             costs = np.where(stable, late, 0.0)
             return np.asarray(costs + _PENALTY * self._scale * short)
@@ -231,12 +248,12 @@ class Search:
         return 1.0
 
     def _map_costs(self, cells: NDArray[np.intp], scenarios: Sequence[Scenario]) -> Vector:
-        """Costs of cells of the map; of some of them, infinite for the others, where dear."""
+        """Costs of cells of the map; infinite for those left out where a cost takes long."""
         abscissa = self.survey.abscissa.ravel()[cells]
         if self.objective.name == "abscissa":
             return np.asarray(abscissa)
         most = _CELLS_SIMULATED if self.objective.simulated else _CELLS_BY_POLES
-        # A third of them the most stable ones, the others thinly.
+        # A third of them the most stable ones, the others at equal strides.
         order = np.argsort(abscissa, kind="stable")
         rest = order[most // 3 :]
         taken = np.append(order[: most // 3], rest[:: max(1, -(-rest.size * 3 // (2 * most)))])
@@ -249,6 +266,8 @@ class Search:
 def _between_neighbours(
     cost: Callable[[Vector], float], start: Vector, reach: Vector, low: Vector, high: Vector
 ) -> Vector:
+    from scipy.optimize import minimize_scalar
+
     ends = (float(max(start[0] - reach[0], low[0])), float(min(start[0] + reach[0], high[0])))
     found = minimize_scalar(
         lambda gain: cost(np.array([gain])),
@@ -289,6 +308,8 @@ def _by_grids(
 def _by_simplices(
     cost: Callable[[Vector], float], start: Vector, size: Vector, low: Vector, high: Vector
 ) -> Vector:
+    from scipy.optimize import minimize
+
     best, least, turn, idle = start, cost(start), 1.0, 0
     for _ in range(_SIMPLICES):
         corners = best + np.vstack([np.zeros(len(best)), turn * np.diag(size)])

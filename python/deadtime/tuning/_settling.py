@@ -1,4 +1,4 @@
-"""The settling time of one step, with a proof that the output stays in the band for ever after."""
+"""The settling time of one step, with a proof that the output stays in the band."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ __all__ = ["BAND", "ProvedStep", "proved_step"]
 #: Half width of the band, as a part of the step.
 BAND = 0.02
 
-#: What may still happen after the simulated time, as a part of the step: half of the overshoot
+#: Deviation that may remain after the simulated time, as a part of the step: half of the overshoot
 #: that counts as none.
 _STILL = 5e-4
 
-#: How often the time is doubled for that.
+#: Most doublings of the simulated time until the remaining deviation is that small.
 _DOUBLINGS = 6
 
 
 class ProvedStep(NamedTuple):
-    """Figures of a step for all times."""
+    """Metrics of a step, proved for all times."""
 
     settling_time: float
     """s."""

@@ -23,16 +23,19 @@ __all__ = ["Range", "StableGains", "candidate_ranges", "critical_gain", "stable_
 
 Range = tuple[float, float]
 
-#: Continuous loops are looked at up to so many turns of the delay and so many times the fastest
-#: corner of the plant; the gains that matter there bound the search.
+#: Highest frequency at which the gains of a continuous loop are sought: turns of the delay, and
+#: multiples of the fastest corner of the plant. The gains needed there bound the search.
 _TURNS = 3.0
 _CORNERS = 100.0
+#: Frequencies at which these gains are evaluated.
 _POINTS = 120
 
-#: Gains that a plant without any dynamics left (an algebraic loop) may have, as parts of the most.
+#: Part of the largest gain of a plant with direct feedthrough up to which gains are sought: beyond
+#: it chains of roots lie on the right.
 _BELOW_ALGEBRAIC = 1.0 - 1e-6
 
-#: Gains of a sampled loop that are so much smaller or larger than most are rounding.
+#: Ratio to the median below which, or above the inverse of which, a critical gain of a sampled loop
+#: counts as rounding.
 _ROUNDING = 1e-9
 
 #: Where no proportional gain is stable: frequencies, in units of one over delay and lag, at which
@@ -94,12 +97,12 @@ def critical_gain(loop: ControlLoop) -> float:
     if found.widest is None:
         raise ValueError(none_stable(loop, found))
     critical = found.critical
-    # The end of what was looked at is none of the loop.
+    # The end of the search is no critical gain of the loop.
     return critical if abs(critical) < found.most else float(np.copysign(np.inf, critical))
 
 
 def none_stable(loop: ControlLoop, found: StableGains) -> str:
-    """The sentence that says so, and how far the search went."""
+    """Error text: no gain is stable, and up to which gain was searched."""
     far = "" if np.isinf(found.most) else f" up to abs(Kp) = {found.most:.4g}"
     return (
         f"no proportional gain{far} stabilises this loop with its delay of {loop.delay:g} s: take "
@@ -124,14 +127,14 @@ def candidate_ranges(loop: ControlLoop, free: Sequence[str]) -> tuple[dict[str, 
     low, high = found.widest
     other = low if critical == high else high
     wide = _ranges(free, critical, late)
-    # Little room far from zero falls between the points of a wide map.
+    # A narrow interval far from zero falls between the points of a wide map.
     room = critical - other
     narrow = _ranges(free, 0.25 * room, late) | {"Kp": found.widest}
     return wide, {name: narrow[name] for name in free}
 
 
 def _ranges(free: Sequence[str], critical: float, late: float) -> dict[str, Range]:
-    """Around what proportional control bears: the other gains through time constants."""
+    """Ranges around the critical proportional gain; the other gains follow by time constants."""
     parts = {
         "Kp": (0.02 * critical, 1.25 * critical),
         "Ki": (0.0, 0.5 * critical / max(late, 1e-9)),
@@ -146,7 +149,7 @@ def _at(loop: ControlLoop, omega: float) -> complex:
 
 
 def _most(plain: ControlLoop, num: NDArray[np.float64], den: NDArray[np.float64]) -> float:
-    """Up to which gain a continuous loop is looked at."""
+    """Largest proportional gain that is searched for a continuous loop."""
     if len(num) == len(den):
         # Beyond that chains of roots lie on the right, however short the delay.
         return float(_BELOW_ALGEBRAIC * abs(den[0] / num[0]))
@@ -159,7 +162,7 @@ def _most(plain: ControlLoop, num: NDArray[np.float64], den: NDArray[np.float64]
     omega = np.geomspace(1e-2 * low, max(*fast, low), _POINTS)
     plant: TransferFunction = plain.plant.transfer_function()
     needed = 1.0 / np.abs(plant.frequency_response(omega))
-    # A notch needs any gain, and tells nothing.
+    # The gain needed at a notch is arbitrarily large and bounds nothing.
     return float(2.0 * needed[np.isfinite(needed) & (needed < 1e6 * np.median(needed))].max())
 
 
@@ -167,7 +170,7 @@ def _sampled_edges(plain: ControlLoop) -> list[float]:
     """Gains of either sign at which a pole of a sampled loop may be on the unit circle."""
     up, down = plain.margin().gain_margins, plain.replace(Kp=-1.0).margin().gain_margins
     every = np.append(up, -down)
-    # Where the plant has a zero or a pole on the circle, rounding makes a gain of it.
+    # A zero or pole of the plant on the unit circle gives a gain that is rounding only.
     size = np.median(np.abs(every)) if every.size else 1.0
     known = (np.abs(every) < size / _ROUNDING) & (np.abs(every) > size * _ROUNDING)
     return sorted({0.0, *every[known].tolist()})

@@ -1,4 +1,4 @@
-"""The step of a designed loop, with what its command has to do."""
+"""Metrics of the step of a designed loop and of its command."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from deadtime.tuning._settling import proved_step
 
 __all__ = ["step_info"]
 
-#: Times at which the command is looked at.
+#: Times at which the command is evaluated.
 _POINTS = 4001
 
-#: A command so close to its limit is at it.
+#: Part of the limit from which on a command counts as being at the limit.
 _AT_LIMIT = 1.0 - 1e-9
 
 

@@ -1,4 +1,4 @@
-"""The map that a search begins from: which gains are stable in every scenario, and how much."""
+"""The map from which a search begins: gains that are stable in every scenario, with abscissa."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ from deadtime.tuning._problem import Problem, Scenario, Vector
 
 __all__ = ["Survey", "charts_at", "grid_points", "surveyed", "worst_abscissa"]
 
-#: Points along each free gain, for one, two and three of them.
+#: Points of the map along each free gain, for one, two and three of them: more points find narrower
+#: stable regions and cost time in proportion to their product.
 _SHAPES = {1: (401,), 2: (61, 61), 3: (21, 21, 9)}
 
-#: A chart over one gain has the delay as its second axis: so many values, this far beyond its ends.
+#: A map over one gain has the delay as its second axis: number of delays, and how far these reach
+#: beyond the interval, as a part of its ends.
 _CHART_DELAYS = 41
 _BEYOND = 0.5
 
-#: Between zero and the first cell of a gain, at these parts of it, and for so many values of each
-#: of the other gains: an integral so small makes steps that no cell shows. Smaller ones are as good
-#: as none, and their loops take hundreds of settling times to come to rest.
+#: Further gains between zero and the first cell, as parts of it, and the points along each other
+#: gain there: an integral gain that small gives steps that no cell shows. Loops with still smaller
+#: ones take hundreds of settling times to come to rest.
 _FRINGE = np.array([0.5, 0.25])
 _FRINGE_SIDES = {1: 1, 2: 31, 3: 7}
 

@@ -1,4 +1,4 @@
-"""What a response may still do after the end of a simulation: a bound on its tail, for all times.
+"""A bound on a response for all times after the end of a simulation.
 
 About its rest a loop is linear until its command meets the limit again. At the end of the
 simulation the deviation is a vector z of sizes (the states, and the commands under way), and
@@ -19,7 +19,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from deadtime.loops import ControlLoop
 from deadtime.loops._model import LoopModel
@@ -30,20 +29,21 @@ __all__ = ["tail_bound"]
 
 Vector = NDArray[np.float64]
 
-#: Periods are doubled until what is left of the deviation is this part of it; at most so often.
+#: Part of the deviation that may be left after a period; the period is doubled until it is, at most
+#: this many times.
 _CONTRACTED = 0.6
 _DOUBLINGS = 14
 
-#: Points in each part of a sample at which the output is looked at.
+#: Points in each part of a sample at which the output is bounded: more give a tighter bound.
 _WITHIN = 16
 
-#: Condition from which on a loop has no single rest.
+#: Condition number from which on a loop has no unique rest.
 _SINGULAR = 1e13
 
-#: A delay so close to whole samples, in samples, is that many.
+#: Distance of a delay to a whole number of samples, in samples, that counts as rounding.
 _ON_SAMPLE = 1e-9
 
-#: A step of a loop without delay, in units of its fastest time constant.
+#: Step of a loop without delay, in units of its fastest time constant.
 _STEP = 0.25
 
 
@@ -105,6 +105,8 @@ def _sampled(
     loop: ControlLoop, rest: Vector, limit: float, end: float
 ) -> tuple[float, float] | None:
     """Of a sampled loop: z are states, the command that is held, and those under way."""
+    from scipy.linalg import expm
+
     model, period = loop.specification.model, cast(float, loop.sample_time)
     delay = loop.specification.known_delay
     whole = math.floor(delay / period + _ON_SAMPLE)
@@ -154,6 +156,8 @@ def _sampled(
 
 def _without_delay(model: LoopModel, away: Vector) -> tuple[float, float] | None:
     """Of a continuous loop without delay: z are the states, at the ends of short steps."""
+    from scipy.linalg import expm
+
     feedback = model.K / (1.0 - model.L)
     closed = model.A + np.outer(model.B, feedback)
     step = _STEP / max(float(np.abs(np.linalg.eigvals(closed)).max()), 1e-300)

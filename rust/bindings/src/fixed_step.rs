@@ -1,90 +1,128 @@
 //! Bindings of `deadtime::dde::fixed_step`.
 
-use deadtime::dde::Reference;
 use deadtime::dde::fixed_step::{self, Blocks, Path, Rest, Settings, Solver};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::owned;
-use crate::errors::to_python;
+use crate::loop_run::LoopRun;
 use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
-/// Output and command of a loop at every step.
-///
-/// `plant` holds A, B, C, D; `controller` F, G, H, P, p, q, M, i of the core's equations.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "one argument a setting")]
-pub(crate) fn fixed_step_run<'py>(
-    py: Python<'py>,
-    plant: (Floats<'py>, Floats<'py>, Floats<'py>, f64),
-    controller: (
-        Floats<'py>,
-        Floats<'py>,
-        Floats<'py>,
-        Floats<'py>,
-        f64,
-        f64,
-        f64,
-        f64,
-    ),
+/// The plant: x' = A x + B w, y = C x + D w.
+#[derive(FromPyObject)]
+pub(crate) struct StateSpace<'py> {
+    #[pyo3(attribute("A"))]
+    a: Floats<'py>,
+    #[pyo3(attribute("B"))]
+    b: Floats<'py>,
+    #[pyo3(attribute("C"))]
+    c: Floats<'py>,
+    #[pyo3(attribute("D"))]
+    d: f64,
+}
+
+/// The controller: x' = A x + B y + E r, u = C x + p y + q y' + M r, and an impulse where r jumps.
+#[derive(FromPyObject)]
+pub(crate) struct ControllerEquations<'py> {
+    #[pyo3(attribute("A"))]
+    a: Floats<'py>,
+    #[pyo3(attribute("B"))]
+    b: Floats<'py>,
+    #[pyo3(attribute("E"))]
+    e: Floats<'py>,
+    #[pyo3(attribute("C"))]
+    c: Floats<'py>,
+    p: f64,
+    q: f64,
+    #[pyo3(attribute("M"))]
+    m: f64,
+    impulse: f64,
+}
+
+/// What surrounds the two, and how the run is made.
+#[derive(FromPyObject)]
+pub(crate) struct FixedStepSettings {
     delay: f64,
-    delay_path: &str,
+    delay_path: String,
     limit: Option<f64>,
     sample_steps: Option<usize>,
-    solver: &str,
+    solver: String,
     step: f64,
     steps: usize,
-    state: Floats<'py>,
-    output: f64,
-    command: f64,
-    reference: (f64, Floats<'py>, Floats<'py>),
-) -> PyResult<(Vector<'py>, Vector<'py>)> {
-    let solver = Solver::named(solver).ok_or_else(|| {
-        let names: Vec<&str> = Solver::NAMED.iter().map(|(name, _)| *name).collect();
-        PyValueError::new_err(format!(
-            "solver={solver:?}: give one of {}",
-            names.join(", ")
-        ))
-    })?;
+    initial_output: f64,
+}
+
+/// Output and command of a loop at every step.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct FixedStepResponse {
+    outputs: Py<PyArray1<f64>>,
+    inputs: Py<PyArray1<f64>>,
+}
+
+/// Run a loop in fixed steps.
+#[pyfunction]
+pub(crate) fn fixed_step_run(
+    py: Python<'_>,
+    plant: StateSpace<'_>,
+    controller: ControllerEquations<'_>,
+    run: LoopRun<'_>,
+    settings: FixedStepSettings,
+) -> PyResult<FixedStepResponse> {
     let blocks = Blocks {
-        plant_matrix: owned(&plant.0)?,
-        plant_input: owned(&plant.1)?,
-        plant_output: owned(&plant.2)?,
-        plant_direct: plant.3,
-        controller_matrix: owned(&controller.0)?,
-        controller_input: owned(&controller.1)?,
-        controller_reference: owned(&controller.2)?,
-        controller_output: owned(&controller.3)?,
-        proportional: controller.4,
-        derivative: controller.5,
-        reference: controller.6,
-        reference_derivative: controller.7,
-    };
-    let settings = Settings {
-        delay,
-        path: match delay_path {
-            "command" => Path::Command,
-            _ => Path::Measurement,
-        },
-        limit,
-        sample_steps,
-        solver,
-        step,
-        steps,
+        plant_matrix: owned(&plant.a)?,
+        plant_input: owned(&plant.b)?,
+        plant_output: owned(&plant.c)?,
+        plant_direct: plant.d,
+        controller_matrix: owned(&controller.a)?,
+        controller_input: owned(&controller.b)?,
+        controller_reference: owned(&controller.e)?,
+        controller_output: owned(&controller.c)?,
+        proportional: controller.p,
+        derivative: controller.q,
+        reference: controller.m,
+        reference_derivative: controller.impulse,
     };
     let rest = Rest {
-        state: owned(&state)?,
-        output,
-        command,
+        state: run.state()?,
+        output: settings.initial_output,
+        command: run.command,
     };
-    let reference = Reference::new(reference.0, owned(&reference.1)?, owned(&reference.2)?)
-        .map_err(|error| to_python(py, error))?;
+    let reference = run.reference()?;
+    let settings = settings.read()?;
     let (outputs, inputs) = run_here(py, |task| {
         fixed_step::run(&blocks, &settings, &rest, &reference, task)
     })?;
-    Ok((outputs.into_pyarray(py), inputs.into_pyarray(py)))
+    Ok(FixedStepResponse {
+        outputs: outputs.into_pyarray(py).unbind(),
+        inputs: inputs.into_pyarray(py).unbind(),
+    })
+}
+
+impl FixedStepSettings {
+    fn read(&self) -> PyResult<Settings> {
+        let solver = Solver::named(&self.solver).ok_or_else(|| {
+            let names: Vec<&str> = Solver::NAMED.iter().map(|(name, _)| *name).collect();
+            PyValueError::new_err(format!(
+                "solver={:?}: give one of {}",
+                self.solver,
+                names.join(", ")
+            ))
+        })?;
+        let path = match self.delay_path.as_str() {
+            "command" => Path::Command,
+            _ => Path::Measurement,
+        };
+        Ok(Settings {
+            delay: self.delay,
+            path,
+            limit: self.limit,
+            sample_steps: self.sample_steps,
+            solver,
+            step: self.step,
+            steps: self.steps,
+        })
+    }
 }

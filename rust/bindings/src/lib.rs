@@ -7,11 +7,13 @@ mod dde;
 mod errors;
 mod fixed_step;
 mod frequency;
+mod loop_run;
 mod matrix;
 mod pointers;
 mod quasipoly;
 mod roots;
 mod runtime;
+mod sampled;
 mod solver;
 mod special;
 mod stability;
@@ -31,9 +33,9 @@ mod _deadtime {
         stability_radius,
     };
     #[pymodule_export]
-    use super::dde::{PyLinearLoop, on_samples, sampled_abscissa_grid};
+    use super::dde::{LoopResponse, PyLinearLoop, on_samples};
     #[pymodule_export]
-    use super::fixed_step::fixed_step_run;
+    use super::fixed_step::{FixedStepResponse, fixed_step_run};
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
@@ -46,24 +48,29 @@ mod _deadtime {
     #[pymodule_export]
     use super::roots::{Certificate, Contour, Monotone, RootSet, Segment, Sensitivity};
     #[pymodule_export]
-    use super::runtime::{spin, thread_count};
+    use super::sampled::{SampledCells, sampled_abscissa_grid};
     #[pymodule_export]
-    use super::solver::{DelayPieces, DelayRun, solve_delay_equation};
+    use super::solver::{DelayPieces, DelayRun, solve_dde};
     #[pymodule_export]
     use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]
     use super::stability::{MapBoundary, MapCells, PyFamily};
     #[pymodule_export]
-    use super::sweeps::{loop_sensitivities, sweep_figures, sweep_responses};
+    use super::sweeps::{
+        LoopSensitivities, SweepMetrics, SweepResponses, loop_sensitivities, sweep_metrics,
+        sweep_responses,
+    };
     #[pymodule_export]
-    use super::systems::{PyLinearSystem, PySignal, legendre_tables};
+    use super::systems::{
+        LegendreTables, LinearSystemResponse, PyLinearSystem, PySignal, legendre_tables,
+    };
     #[pymodule_export]
     use super::ufunc::limit_threads;
     #[pymodule_export]
     use super::wire::{
-        at_read, at_write, configuration_read, configuration_write, doubles_read, doubles_write,
-        loop_packet_read, loop_packet_write, navdata_full, navdata_layouts, navdata_read,
-        navdata_write,
+        AtCommand, Navdata, NavdataLayout, NavdataOption, PyLoopPacket, at_read, at_write,
+        configuration_read, configuration_write, doubles_read, doubles_write, loop_packet_read,
+        loop_packet_write, navdata_full, navdata_layouts, navdata_read, navdata_write,
     };
     use pyo3::prelude::*;
 

@@ -311,30 +311,3 @@ fn sensible(name: &str, threads: usize) -> PyResult<usize> {
         "{name}={threads}: give a whole number from 1 to {MAX_THREADS}, or None for all cores"
     )))
 }
-
-/// Number of threads that kernels use.
-#[pyfunction]
-#[pyo3(signature = (threads=None))]
-pub(crate) fn thread_count(threads: Option<usize>) -> PyResult<usize> {
-    Ok(pool(threads)?.threads)
-}
-
-/// Keep the pool busy for a while: a stand-in for a long kernel in tests of this file.
-#[pyfunction]
-#[pyo3(signature = (seconds, threads=None, progress=None))]
-pub(crate) fn spin(
-    py: Python<'_>,
-    seconds: f64,
-    threads: Option<usize>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<u64> {
-    run(py, threads, progress.as_ref(), move |task| {
-        let start = std::time::Instant::now();
-        while start.elapsed().as_secs_f64() < seconds {
-            task.check()?;
-            std::hint::spin_loop();
-            task.advance(1);
-        }
-        Ok(task.done())
-    })
-}

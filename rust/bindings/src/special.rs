@@ -1,7 +1,5 @@
 //! Bindings of `deadtime::lambertw`: the table of its ufuncs, and calls with plain numbers.
 
-use std::time::Duration;
-
 use deadtime::lambertw::block;
 use num_complex::{Complex32, Complex64};
 use pyo3::prelude::*;
@@ -69,19 +67,6 @@ ufunc! {
     (a0: f64, a1: f64, delay: f64, k: i64) -> (s: Complex64) = block::dde_root;
 }
 
-ufunc! {
-    /// Wait as many seconds for each element: a stand-in for long work in tests of ufuncs.
-    Nap = c"nap", 1 -> 1;
-    (seconds: f64) -> (waited: f64) = nap;
-}
-
-fn nap(seconds: &[f64], waited: &mut [f64]) {
-    for (waited, seconds) in waited.iter_mut().zip(seconds) {
-        std::thread::sleep(Duration::from_secs_f64(*seconds));
-        *waited = *seconds;
-    }
-}
-
 pub(crate) fn add_ufuncs(module: &Bound<'_, PyModule>) -> PyResult<()> {
     add::<Lambertw>(module)?;
     add::<Lambertw0>(module)?;
@@ -90,8 +75,7 @@ pub(crate) fn add_ufuncs(module: &Bound<'_, PyModule>) -> PyResult<()> {
     add::<WrightOmega>(module)?;
     add::<LambertwDerivative>(module)?;
     add::<LambertwOffset>(module)?;
-    add::<DdeRoots>(module)?;
-    add::<Nap>(module)
+    add::<DdeRoots>(module)
 }
 
 /// W_k(z) of two plain numbers; None where they are anything else, which is the ufunc's work.

@@ -2,139 +2,173 @@
 
 use deadtime::dde::ensemble::{self, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
-use deadtime::dde::{Criteria, Reference};
+use deadtime::dde::{Criteria, Metrics};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::arrays::{column, in_order, owned};
-use crate::errors::to_python;
+use crate::arrays::{column, in_order};
+use crate::loop_run::LoopRun;
 use crate::runtime::{run, run_here};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Table<'py> = Bound<'py, PyArray2<f64>>;
-type Outcomes<'py> = Bound<'py, PyArray1<u8>>;
 
-/// Figures of step responses from rest, a row a set, and what became of each set.
-#[pyfunction]
-#[pyo3(signature = (states, rows, amplitude, is_ahead, steady, span, settling, rise, threads=None,
-    progress=None))]
-#[expect(clippy::too_many_arguments, reason = "the sets and what is measured")]
-pub(crate) fn sweep_figures<'py>(
-    py: Python<'py>,
+type Metric = fn(&Metrics) -> f64;
+
+/// The metrics of a response by the names that Python shows.
+const METRICS: [(&str, Metric); 9] = [
+    ("rise_time", |metrics| metrics.rise_time),
+    ("settling_time", |metrics| metrics.settling_time),
+    ("peak_time", |metrics| metrics.peak_time),
+    ("overshoot", |metrics| metrics.overshoot),
+    ("undershoot", |metrics| metrics.undershoot),
+    ("settling_min", |metrics| metrics.settling_min),
+    ("settling_max", |metrics| metrics.settling_max),
+    ("peak", |metrics| metrics.peak),
+    ("steady_state", |metrics| metrics.steady_state),
+];
+
+/// Loops of one structure, a row a loop, and the step of their reference.
+#[derive(FromPyObject)]
+pub(crate) struct LoopSets<'py> {
     states: usize,
     rows: Floats<'py>,
     amplitude: f64,
     is_ahead: bool,
-    steady: Floats<'py>,
+}
+
+impl LoopSets<'_> {
+    fn read<'a>(&self, rows: &'a [f64]) -> Sets<'a> {
+        Sets {
+            states: self.states,
+            rows,
+            amplitude: self.amplitude,
+            is_ahead: self.is_ahead,
+        }
+    }
+}
+
+/// The metrics of step responses from rest, and what became of each loop.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct SweepMetrics {
+    metrics: Py<PyDict>,
+    status: Py<PyArray1<u8>>,
+}
+
+/// Step responses from rest, a row a loop, and what became of each.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct SweepResponses {
+    outputs: Py<PyArray2<f64>>,
+    status: Py<PyArray1<u8>>,
+}
+
+/// Derivatives of outputs and inputs by parameters, a row a parameter.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct LoopSensitivities {
+    outputs: Py<PyArray2<f64>>,
+    inputs: Py<PyArray2<f64>>,
+}
+
+/// Measure step responses of `span` seconds.
+#[pyfunction]
+#[pyo3(signature = (sets, *, steady_state, span, settling, rise, threads=None, progress=None))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "keywords with the names of the public function"
+)]
+pub(crate) fn sweep_metrics<'py>(
+    py: Python<'py>,
+    sets: LoopSets<'py>,
+    steady_state: Floats<'py>,
     span: f64,
     settling: f64,
     rise: (f64, f64),
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(Table<'py>, Outcomes<'py>)> {
-    let (rows, steady) = (in_order(&rows)?, in_order(&steady)?);
-    let sets = Sets {
-        states,
-        rows: &rows,
-        amplitude,
-        is_ahead,
-    };
+) -> PyResult<SweepMetrics> {
+    let (rows, steady) = (in_order(&sets.rows)?, in_order(&steady_state)?);
+    let sets = sets.read(&rows);
     let criteria = Criteria { rise, settling };
     let found = run(py, threads, progress.as_ref(), |task| {
         ensemble::metrics(&sets, &steady, span, &criteria, task)
     })?;
-    let figures = column(&found, |(figures, _)| figures.to_array())?;
-    let outcomes = column(&found, |(_, outcome)| *outcome as u8)?;
-    let figures = figures.into_flattened().into_pyarray(py);
-    let figures = figures.reshape([found.len(), 9])?;
-    Ok((figures, outcomes.into_pyarray(py)))
+    let metrics = PyDict::new(py);
+    for (name, metric) in METRICS {
+        let values = column(&found, |(metrics, _)| metric(metrics))?;
+        metrics.set_item(name, values.into_pyarray(py))?;
+    }
+    let status = column(&found, |(_, outcome)| *outcome as u8)?;
+    Ok(SweepMetrics {
+        metrics: metrics.unbind(),
+        status: status.into_pyarray(py).unbind(),
+    })
 }
 
-/// Step responses from rest at given times after the start, a row a set, and what became of each.
+/// Step responses at times after the start.
 #[pyfunction]
-#[pyo3(signature = (states, rows, amplitude, is_ahead, times, threads=None, progress=None))]
-#[expect(clippy::too_many_arguments, reason = "the sets and what is asked for")]
+#[pyo3(signature = (sets, time, *, threads=None, progress=None))]
 pub(crate) fn sweep_responses<'py>(
     py: Python<'py>,
-    states: usize,
-    rows: Floats<'py>,
-    amplitude: f64,
-    is_ahead: bool,
-    times: Floats<'py>,
+    sets: LoopSets<'py>,
+    time: Floats<'py>,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(Table<'py>, Outcomes<'py>)> {
-    let (rows, times) = (in_order(&rows)?, in_order(&times)?);
-    let sets = Sets {
-        states,
-        rows: &rows,
-        amplitude,
-        is_ahead,
-    };
+) -> PyResult<SweepResponses> {
+    let (rows, times) = (in_order(&sets.rows)?, in_order(&time)?);
+    let sets = sets.read(&rows);
     let (outputs, found) = run(py, threads, progress.as_ref(), |task| {
         ensemble::responses(&sets, &times, task)
     })?;
-    let outcomes = column(&found, |outcome| *outcome as u8)?;
-    let outputs = outputs
-        .into_pyarray(py)
-        .reshape([found.len(), times.len()])?;
-    Ok((outputs, outcomes.into_pyarray(py)))
+    let status = column(&found, |outcome| *outcome as u8)?;
+    let shape = [found.len(), times.len()];
+    Ok(SweepResponses {
+        outputs: outputs.into_pyarray(py).reshape(shape)?.unbind(),
+        status: status.into_pyarray(py).unbind(),
+    })
 }
 
-/// Slopes of outputs and inputs with respect to parameters, a row a parameter.
-#[pyfunction]
-#[pyo3(signature = (
-    states, row, row_slopes, state, state_slopes, command, command_slopes, ahead, output_times,
-    input_times, reference_before, reference_times, reference_values, command_history, sample_phase
-))]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "a loop, the start of a run, its reference, and slopes"
-)]
-pub(crate) fn loop_sensitivities<'py>(
-    py: Python<'py>,
-    states: usize,
+/// A loop and its start as derivatives by parameters, a row a parameter.
+#[derive(FromPyObject)]
+pub(crate) struct LoopSlopes<'py> {
     row: Floats<'py>,
     row_slopes: Floats<'py>,
-    state: Floats<'py>,
     state_slopes: Floats<'py>,
-    command: f64,
     command_slopes: Floats<'py>,
-    ahead: Floats<'py>,
-    output_times: Floats<'py>,
-    input_times: Floats<'py>,
-    reference_before: f64,
-    reference_times: Floats<'py>,
-    reference_values: Floats<'py>,
-    command_history: Floats<'py>,
-    sample_phase: f64,
-) -> PyResult<(Table<'py>, Table<'py>)> {
-    let (row, row_slopes) = (in_order(&row)?, in_order(&row_slopes)?);
-    let (state, state_slopes) = (in_order(&state)?, in_order(&state_slopes)?);
-    let (command_slopes, ahead) = (in_order(&command_slopes)?, in_order(&ahead)?);
-    let (output_times, input_times) = (in_order(&output_times)?, in_order(&input_times)?);
-    let history = in_order(&command_history)?;
-    let reference = Reference::new(
-        reference_before,
-        owned(&reference_times)?,
-        owned(&reference_values)?,
-    )
-    .map_err(|error| to_python(py, error))?;
+    output_lead_slopes: Floats<'py>,
+}
+
+/// Derivatives of outputs and inputs by parameters, at times since the start of the run.
+#[pyfunction]
+pub(crate) fn loop_sensitivities<'py>(
+    py: Python<'py>,
+    slopes: LoopSlopes<'py>,
+    run: LoopRun<'py>,
+    output_time: Floats<'py>,
+    input_time: Floats<'py>,
+) -> PyResult<LoopSensitivities> {
+    let (row, row_slopes) = (in_order(&slopes.row)?, in_order(&slopes.row_slopes)?);
+    let (state, history) = (run.state()?, run.command_history()?);
+    let state_slopes = in_order(&slopes.state_slopes)?;
+    let command_slopes = in_order(&slopes.command_slopes)?;
+    let ahead = in_order(&slopes.output_lead_slopes)?;
+    let (output_times, input_times) = (in_order(&output_time)?, in_order(&input_time)?);
+    let reference = run.reference()?;
     let of = Sloped {
-        states,
+        states: state.len(),
         row: &row,
         row_slopes: &row_slopes,
         state: &state,
         state_slopes: &state_slopes,
-        command,
+        command: run.command,
         command_slopes: &command_slopes,
         ahead: &ahead,
     };
+    let phase = run.sample_phase;
     let (outputs, inputs) = run_here(py, |task| {
         sensitivity::sensitivities(
             &of,
             &history,
-            sample_phase,
+            phase,
             &reference,
             &output_times,
             &input_times,
@@ -142,13 +176,12 @@ pub(crate) fn loop_sensitivities<'py>(
         )
     })?;
     let count = command_slopes.len();
-    let outputs = outputs
-        .into_pyarray(py)
-        .reshape([count, output_times.len()])?;
-    Ok((
-        outputs,
-        inputs
-            .into_pyarray(py)
-            .reshape([count, input_times.len()])?,
-    ))
+    let table = |values: Vec<f64>, times: usize| {
+        let table = values.into_pyarray(py).reshape([count, times])?;
+        Ok::<_, PyErr>(table.unbind())
+    };
+    Ok(LoopSensitivities {
+        outputs: table(outputs, output_times.len())?,
+        inputs: table(inputs, input_times.len())?,
+    })
 }

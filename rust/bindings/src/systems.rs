@@ -8,12 +8,10 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use crate::arrays::{in_order, owned};
-use crate::errors::to_python;
+use crate::arrays::{converted, in_order, owned};
 use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
 /// A function of time by pieces, each a Legendre series.
 #[pyclass(frozen, module = "deadtime._deadtime", name = "Signal")]
@@ -26,12 +24,7 @@ impl PySignal {
     /// `series` has the shape (pieces, columns, coefficients); `breaks` numbers the pieces that
     /// start with a break.
     #[new]
-    fn new(
-        py: Python<'_>,
-        edges: Floats<'_>,
-        series: Floats<'_>,
-        breaks: Vec<usize>,
-    ) -> PyResult<Self> {
+    fn new(edges: Floats<'_>, series: Floats<'_>, breaks: Vec<usize>) -> PyResult<Self> {
         let made = match series.shape() {
             [_, width, terms] => Signal::new(
                 *width,
@@ -42,18 +35,55 @@ impl PySignal {
             ),
             _ => Err(Error::argument("the series of a signal have three axes")),
         };
-        made.map(|inner| Self { inner })
-            .map_err(|error| to_python(py, error))
+        converted(made).map(|inner| Self { inner })
     }
 }
 
 /// Gauss nodes, and the matrix that takes values at them (first axis) to Legendre coefficients.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct LegendreTables {
+    nodes: Py<PyArray1<f64>>,
+    transform: Py<PyArray2<f64>>,
+}
+
 #[pyfunction]
-pub(crate) fn legendre_tables(py: Python<'_>) -> PyResult<(Vector<'_>, Bound<'_, PyArray2<f64>>)> {
+pub(crate) fn legendre_tables(py: Python<'_>) -> PyResult<LegendreTables> {
     let (nodes, transform) = system::legendre_tables();
     let size = nodes.len();
     let transform = transform.into_pyarray(py).reshape([size, size])?;
-    Ok((nodes.into_pyarray(py), transform))
+    Ok(LegendreTables {
+        nodes: nodes.into_pyarray(py).unbind(),
+        transform: transform.unbind(),
+    })
+}
+
+/// The sizes of a system, and its matrices with the delay of each.
+#[derive(FromPyObject)]
+struct SystemMatrices<'py> {
+    states: usize,
+    inputs: usize,
+    outputs: usize,
+    #[pyo3(attribute("A"))]
+    a: Terms<'py>,
+    #[pyo3(attribute("N"))]
+    n: Terms<'py>,
+    #[pyo3(attribute("B"))]
+    b: Terms<'py>,
+    #[pyo3(attribute("C"))]
+    c: Terms<'py>,
+    #[pyo3(attribute("F"))]
+    f: Terms<'py>,
+    #[pyo3(attribute("D"))]
+    d: Terms<'py>,
+}
+
+/// The response of a system at some times, one time after the other.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct LinearSystemResponse {
+    outputs: Py<PyArray1<f64>>,
+    states: Py<PyArray1<f64>>,
+    inputs: Py<PyArray1<f64>>,
+    breaks: Py<PyArray1<f64>>,
 }
 
 /// The system x' + sum N x'(t - tau) = sum A x(t - tau) + sum B u(t - tau),
@@ -77,64 +107,45 @@ fn terms(given: &Terms<'_>) -> PyResult<Vec<Term>> {
 
 #[pymethods]
 impl PyLinearSystem {
-    /// Every group is a list of pairs of a delay and a matrix.
     #[new]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one argument a symbol of the equations"
-    )]
-    fn new(
-        py: Python<'_>,
-        states: usize,
-        inputs: usize,
-        outputs: usize,
-        a: Terms<'_>,
-        n: Terms<'_>,
-        b: Terms<'_>,
-        c: Terms<'_>,
-        f: Terms<'_>,
-        d: Terms<'_>,
-    ) -> PyResult<Self> {
+    fn new(matrices: SystemMatrices<'_>) -> PyResult<Self> {
         let equations = SystemEquations {
-            states,
-            inputs,
-            outputs,
-            state: terms(&a)?,
-            derivative: terms(&n)?,
-            input: terms(&b)?,
-            output: terms(&c)?,
-            output_derivative: terms(&f)?,
-            direct: terms(&d)?,
+            states: matrices.states,
+            inputs: matrices.inputs,
+            outputs: matrices.outputs,
+            state: terms(&matrices.a)?,
+            derivative: terms(&matrices.n)?,
+            input: terms(&matrices.b)?,
+            output: terms(&matrices.c)?,
+            output_derivative: terms(&matrices.f)?,
+            direct: terms(&matrices.d)?,
         };
-        LinearSystem::new(equations)
-            .map(|inner| Self { inner })
-            .map_err(|error| to_python(py, error))
+        converted(LinearSystem::new(equations)).map(|inner| Self { inner })
     }
 
-    /// Outputs, states and inputs at the times, one time after the other, and the breaking points.
-    #[pyo3(signature = (times, state, history, slopes, inputs))]
+    /// The response at times since the start, from a state with its history.
     fn simulate<'py>(
         &self,
         py: Python<'py>,
-        times: Floats<'py>,
+        time: Floats<'py>,
         state: Floats<'py>,
         history: &PySignal,
-        slopes: Option<&PySignal>,
+        history_derivative: Option<&PySignal>,
         inputs: &PySignal,
-    ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, Vector<'py>)> {
-        let times = in_order(&times)?;
+    ) -> PyResult<LinearSystemResponse> {
+        let times = in_order(&time)?;
         let past = Past {
             state: owned(&state)?,
             history: history.inner.clone(),
-            slopes: slopes.map(|signal| signal.inner.clone()),
+            slopes: history_derivative.map(|signal| signal.inner.clone()),
         };
         let (system, inputs) = (&self.inner, &inputs.inner);
         let found = run_here(py, |task| system.simulate(past, inputs, &times, task))?;
-        Ok((
-            found.outputs.into_pyarray(py),
-            found.states.into_pyarray(py),
-            found.inputs.into_pyarray(py),
-            found.breaks.into_pyarray(py),
-        ))
+        Ok(LinearSystemResponse {
+            outputs: found.outputs.into_pyarray(py).unbind(),
+            states: found.states.into_pyarray(py).unbind(),
+            inputs: found.inputs.into_pyarray(py).unbind(),
+            breaks: found.breaks.into_pyarray(py).unbind(),
+        })
     }
 }

@@ -1,5 +1,5 @@
-//! Wire formats: bytes to tuples and back. What is wrong with bytes is a `PacketError`, what cannot
-//! be written a `ValueError`.
+//! Wire formats: bytes to what they say, and back. What is wrong with bytes is a `PacketError`, what
+//! cannot be written a `ValueError`.
 
 use crate::errors::own;
 use deadtime_wire::at::{self, Command};
@@ -21,13 +21,21 @@ fn unwritable(what: &str, error: &impl std::fmt::Display) -> PyErr {
 }
 
 /// A command as its name on the wire and its arguments; "OTHER" with name and arguments.
-type Spoken<'py> = (String, Bound<'py, PyTuple>);
+type Encoded<'py> = (String, Bound<'py, PyTuple>);
+
+/// A command of a datagram.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct AtCommand {
+    sequence: u32,
+    name: &'static str,
+    arguments: Py<PyAny>,
+}
 
 /// The bytes of commands with the sequence numbers `first`, `first + 1`, …
 #[pyfunction]
 pub(crate) fn at_write<'py>(
     py: Python<'py>,
-    commands: Vec<Spoken<'py>>,
+    commands: Vec<Encoded<'py>>,
     first: u32,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let commands: Vec<Command> = commands.iter().map(command).collect::<PyResult<_>>()?;
@@ -39,7 +47,7 @@ fn unit(value: f64) -> PyResult<Unit> {
     Unit::new(value).map_err(|fault| unwritable("command", &fault))
 }
 
-fn command((name, arguments): &Spoken<'_>) -> PyResult<Command> {
+fn command((name, arguments): &Encoded<'_>) -> PyResult<Command> {
     Ok(match name.as_str() {
         "REF" => {
             let (take_off, emergency) = arguments.extract()?;
@@ -99,22 +107,23 @@ fn command((name, arguments): &Spoken<'_>) -> PyResult<Command> {
     })
 }
 
-/// Sequence number, name and arguments of each command of a datagram.
+/// The commands of a datagram.
 #[pyfunction]
-pub(crate) fn at_read<'py>(
-    py: Python<'py>,
-    datagram: &[u8],
-) -> PyResult<Vec<(u32, &'static str, Bound<'py, PyAny>)>> {
+pub(crate) fn at_read(py: Python<'_>, datagram: &[u8]) -> PyResult<Vec<AtCommand>> {
     at::read(datagram)
         .into_iter()
         .map(|(sequence, command)| {
-            let (name, arguments) = spoken(py, command)?;
-            Ok((sequence, name, arguments))
+            let (name, arguments) = decoded(py, command)?;
+            Ok(AtCommand {
+                sequence,
+                name,
+                arguments: arguments.unbind(),
+            })
         })
         .collect()
 }
 
-fn spoken(py: Python<'_>, command: Command) -> PyResult<(&'static str, Bound<'_, PyAny>)> {
+fn decoded(py: Python<'_>, command: Command) -> PyResult<(&'static str, Bound<'_, PyAny>)> {
     Ok(match command {
         Command::Ref {
             take_off,
@@ -162,8 +171,33 @@ fn spoken(py: Python<'_>, command: Command) -> PyResult<(&'static str, Bound<'_,
     })
 }
 
-/// Header, state, sequence number and vision word of navdata.
-type Words = (u32, u32, u32, u32);
+/// A packet of navdata.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct Navdata {
+    header: u32,
+    state: u32,
+    sequence: u32,
+    vision: u32,
+    options: Vec<Py<NavdataOption>>,
+    checksum_matches: bool,
+}
+
+/// An option of navdata: the values of its fields where they are known, in their order.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct NavdataOption {
+    tag: u16,
+    body: Py<PyBytes>,
+    values: Option<Py<PyTuple>>,
+}
+
+/// An option whose fields are known; `length` is without tag and size.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct NavdataLayout {
+    tag: u16,
+    length: usize,
+    name: &'static str,
+    fields: Vec<&'static str>,
+}
 
 /// Values of the fields of an option, as Python's numbers.
 fn numbers<'py>(py: Python<'py>, values: &[Value]) -> PyResult<Bound<'py, PyTuple>> {
@@ -174,39 +208,41 @@ fn numbers<'py>(py: Python<'py>, values: &[Value]) -> PyResult<Bound<'py, PyTupl
     PyTuple::new(py, objects.collect::<Result<Vec<_>, _>>()?)
 }
 
-/// An option: its tag, its bytes, the values of its fields where they are known.
-type Told<'py> = (u16, Bound<'py, PyBytes>, Option<Bound<'py, PyTuple>>);
-
-/// Head, options and whether the checksum matches; with `verify` one that does not is an error.
+/// Read a packet; with `verify` a checksum that does not match is an error.
 #[pyfunction]
-pub(crate) fn navdata_read<'py>(
-    py: Python<'py>,
-    packet: &[u8],
-    verify: bool,
-) -> PyResult<(Words, Vec<Told<'py>>, bool)> {
+pub(crate) fn navdata_read(py: Python<'_>, packet: &[u8], verify: bool) -> PyResult<Navdata> {
     let read = navdata::read(packet, verify).map_err(|error| unreadable(py, "navdata", &error))?;
     let options = read.options.iter().map(|option| {
         let values = option.values();
         let values = values.map(|values| numbers(py, &values)).transpose()?;
-        Ok((option.tag, PyBytes::new(py, option.bytes), values))
+        let option = NavdataOption {
+            tag: option.tag,
+            body: PyBytes::new(py, option.bytes).unbind(),
+            values: values.map(Bound::unbind),
+        };
+        Py::new(py, option)
     });
-    let head = read.head;
-    let words = (head.header, head.state, head.sequence, head.vision);
-    Ok((
-        words,
-        options.collect::<PyResult<_>>()?,
-        read.checksum_matches,
-    ))
+    Ok(Navdata {
+        header: read.head.header,
+        state: read.head.state,
+        sequence: read.head.sequence,
+        vision: read.head.vision,
+        options: options.collect::<PyResult<_>>()?,
+        checksum_matches: read.checksum_matches,
+    })
 }
 
 /// The packet of a head and options; values are written over the bytes of their option.
 #[pyfunction]
+#[pyo3(signature = (options, *, header, state, sequence, vision))]
 pub(crate) fn navdata_write<'py>(
     py: Python<'py>,
-    head: Words,
     options: Vec<(u16, Vec<u8>, Option<Bound<'py, PyTuple>>)>,
+    header: u32,
+    state: u32,
+    sequence: u32,
+    vision: u32,
 ) -> PyResult<Bound<'py, PyBytes>> {
-    let (header, state, sequence, vision) = head;
     let head = Head {
         header,
         state,
@@ -243,20 +279,16 @@ fn value(object: &Bound<'_, PyAny>) -> PyResult<Value> {
     }
 }
 
-/// Tag, length without tag and size, name and fields of every option whose fields are known.
+/// Every option whose fields are known.
 #[pyfunction]
-pub(crate) fn navdata_layouts() -> Vec<(u16, usize, &'static str, Vec<&'static str>)> {
-    LAYOUTS
-        .iter()
-        .map(|layout| {
-            (
-                layout.tag,
-                layout.length,
-                layout.name,
-                layout.fields.to_vec(),
-            )
-        })
-        .collect()
+pub(crate) fn navdata_layouts() -> Vec<NavdataLayout> {
+    let layouts = LAYOUTS.iter().map(|layout| NavdataLayout {
+        tag: layout.tag,
+        length: layout.length,
+        name: layout.name,
+        fields: layout.fields.to_vec(),
+    });
+    layouts.collect()
 }
 
 /// Tag and length, without tag and size, of every option of a full packet.
@@ -294,33 +326,51 @@ pub(crate) fn configuration_write<'py>(
     Ok(PyBytes::new(py, &dump))
 }
 
-/// Sequence, sent, echo_sequence, echo_sent, held, value, reference and flags of a loop's packet.
-type LoopFields = (u32, f64, u32, f64, f64, f64, f64, u32);
-
-/// The fields of a loop's packet.
-#[pyfunction]
-pub(crate) fn loop_packet_read(py: Python<'_>, packet: &[u8]) -> PyResult<LoopFields> {
-    let found = loop_packet::read(packet);
-    let found = found.map_err(|error| unreadable(py, "packet of a loop", &error))?;
-    Ok((
-        found.sequence,
-        found.sent,
-        found.echo_sequence,
-        found.echo_sent,
-        found.held,
-        found.value,
-        found.reference,
-        found.flags,
-    ))
+/// What travels between the two ends of a loop over UDP.
+#[pyclass(frozen, get_all, name = "LoopPacket", module = "deadtime._deadtime")]
+pub(crate) struct PyLoopPacket {
+    sequence: u32,
+    sent: f64,
+    echo_sequence: u32,
+    echo_sent: f64,
+    held: f64,
+    value: f64,
+    reference: f64,
+    flags: u32,
 }
 
-/// The bytes of a loop's packet.
+/// Read a packet of a loop.
 #[pyfunction]
-pub(crate) fn loop_packet_write<'py>(
-    py: Python<'py>,
-    fields: LoopFields,
-) -> PyResult<Bound<'py, PyBytes>> {
-    let (sequence, sent, echo_sequence, echo_sent, held, value, reference, flags) = fields;
+pub(crate) fn loop_packet_read(py: Python<'_>, packet: &[u8]) -> PyResult<PyLoopPacket> {
+    let found = loop_packet::read(packet);
+    let found = found.map_err(|error| unreadable(py, "packet of a loop", &error))?;
+    Ok(PyLoopPacket {
+        sequence: found.sequence,
+        sent: found.sent,
+        echo_sequence: found.echo_sequence,
+        echo_sent: found.echo_sent,
+        held: found.held,
+        value: found.value,
+        reference: found.reference,
+        flags: found.flags,
+    })
+}
+
+/// The bytes of a packet of a loop.
+#[pyfunction]
+#[pyo3(signature = (*, sequence, sent, echo_sequence, echo_sent, held, value, reference, flags))]
+#[expect(clippy::too_many_arguments, reason = "the fields of a packet, by name")]
+pub(crate) fn loop_packet_write(
+    py: Python<'_>,
+    sequence: u32,
+    sent: f64,
+    echo_sequence: u32,
+    echo_sent: f64,
+    held: f64,
+    value: f64,
+    reference: f64,
+    flags: u32,
+) -> PyResult<Bound<'_, PyBytes>> {
     let packet = LoopPacket {
         flags,
         sequence,
@@ -336,7 +386,7 @@ pub(crate) fn loop_packet_write<'py>(
     Ok(PyBytes::new(py, &bytes))
 }
 
-/// So many bare doubles.
+/// Read `count` bare doubles.
 #[pyfunction]
 pub(crate) fn doubles_read(py: Python<'_>, packet: &[u8], count: usize) -> PyResult<Vec<f64>> {
     let values = loop_packet::read_doubles(packet, count);

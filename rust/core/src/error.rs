@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use crate::memory::in_words;
+use crate::memory::readable_size;
 
 /// Every error of the kernel. The message states what was wrong and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -29,9 +29,9 @@ pub enum Error {
 
     /// Memory that could not be allocated.
     #[error(
-        "{what} needs {} of memory, which the system does not give: ask for less at once, or raise \
+        "{what} needs {} of memory, which is not available: ask for less at once, or raise \
          the limit",
-        in_words(*bytes)
+        readable_size(*bytes)
     )]
     Memory {
         /// Purpose of the memory.
@@ -58,7 +58,7 @@ pub enum Error {
     /// A root lies on the contour, or too close to it to decide its side.
     #[error(
         "a root lies on the contour near {:?}{:+?}i, or closer to it than double precision can \
-         tell: move the edge of the region by more than {distance:.1e}",
+         resolve: move the edge of the region by more than {distance:.1e}",
         place.re, place.im
     )]
     Contour {

@@ -138,7 +138,7 @@ where
 }
 
 /// A size in readable units.
-pub(crate) fn in_words(bytes: u64) -> String {
+pub(crate) fn readable_size(bytes: u64) -> String {
     const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
     let mut size = bytes as f64 / 1024.0;
     let mut unit = UNITS[0];
@@ -161,7 +161,7 @@ mod tests {
         let found = filled("the test", 0.0, 1 << 58);
         assert_eq!(
             found.unwrap_err().to_string(),
-            "the test needs 2048.000 PiB of memory, which the system does not give: ask for less \
+            "the test needs 2048.000 PiB of memory, which is not available: ask for less \
              at once, or raise the limit"
         );
         assert!(reserved::<f64>("the test", usize::MAX).is_err());

@@ -1,4 +1,4 @@
-//! Little-endian numbers at an offset, or nothing where the bytes end.
+//! Little-endian numbers at an offset; `None` where the bytes end.
 
 /// The `N` bytes from `at` on.
 pub(crate) fn array<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {

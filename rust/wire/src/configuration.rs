@@ -3,13 +3,13 @@
 use crate::error::{Error, Fault};
 use std::collections::HashMap;
 
-/// The most bytes that are taken for a configuration: several times what the drone's settings take.
+/// Upper limit on the bytes of a configuration: several times the size of the drone's settings.
 pub const LIMIT: usize = 16_384;
 
 /// The settings in their order, keys with their section.
 ///
-/// Blank lines and spaces around key and value are no fault, nor is a setting that is there twice
-/// with the same value.
+/// Blank lines, spaces around key and value, and a setting that occurs twice with the same value
+/// are accepted.
 ///
 /// # Errors
 ///
@@ -59,7 +59,7 @@ fn setting(line: &str) -> Option<(&str, &str)> {
     (is_key(key) && !value.contains(char::is_control)).then_some((key, value))
 }
 
-/// Whether a text is a section and a key, without blanks.
+/// Is a text a section and a key, without blanks?
 fn is_key(key: &str) -> bool {
     let parts = key.split_once(':');
     let whole = parts.is_some_and(|(section, name)| !section.is_empty() && !name.is_empty());

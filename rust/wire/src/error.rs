@@ -1,11 +1,11 @@
-//! What can be wrong with bytes, and with what is to become bytes.
+//! Errors of reading and writing.
 
 use std::fmt;
 
-/// Something wrong, and the byte at which it is.
+/// A fault, and the byte at which it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Error {
-    /// What is wrong, with the value.
+    /// The fault, with the value.
     pub fault: Fault,
     /// Offset from the first byte of what was read, or of what would have been written.
     pub offset: usize,
@@ -15,77 +15,77 @@ pub struct Error {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The bytes end before what has to be there.
+    /// The bytes end too early.
     Short {
-        /// How many bytes are there.
+        /// Number of bytes.
         length: usize,
-        /// How many it takes at least.
+        /// Least number of bytes needed.
         needed: usize,
     },
-    /// A size that is not the one this format has.
+    /// A size that does not belong to this format.
     Length {
-        /// How many bytes are there.
+        /// Number of bytes.
         length: usize,
-        /// How many there have to be.
+        /// Required number of bytes.
         wanted: usize,
     },
-    /// More bytes than one packet may hold.
+    /// More bytes than a packet may hold.
     Long {
-        /// How many bytes there are.
+        /// Number of bytes.
         length: usize,
-        /// How many there may be.
+        /// Upper limit.
         limit: usize,
     },
-    /// The first four bytes are those of no known format.
+    /// The first four bytes belong to no known format.
     Header(u32),
-    /// An option of navdata that is smaller than its own head, or that ends beyond the packet.
+    /// An option of navdata that is smaller than its own head, or ends beyond the packet.
     OptionSize {
-        /// Which option.
+        /// Its tag.
         tag: u16,
-        /// The size it gives itself.
+        /// The size that it states.
         size: usize,
         /// The bytes left from its head to the end of the packet.
         left: usize,
     },
     /// Navdata without a checksum as its last option.
     NoChecksum,
-    /// The checksum is another one than that of the bytes before it.
+    /// The checksum differs from that of the bytes before it.
     Checksum {
-        /// What the packet says.
+        /// The checksum that the packet states.
         stated: u32,
         /// The sum of its bytes.
         summed: u32,
     },
-    /// A tag that navdata options cannot have: it is that of the checksum.
+    /// A tag that is reserved for the checksum.
     Tag(u16),
-    /// A number that has to be finite and is not.
+    /// A number that is not finite.
     NotFinite {
-        /// What it is called.
+        /// Its name.
         name: &'static str,
         /// Its value.
         value: f64,
     },
-    /// A number outside of what its place on the wire can hold or may say.
+    /// A number outside the range of its field.
     Range {
-        /// What it is called.
+        /// Its name.
         name: &'static str,
         /// Its value.
         value: f64,
     },
-    /// A sign that cannot stand in this text.
+    /// A character that is not allowed in this text.
     Sign {
-        /// What the text is called.
+        /// Name of the text.
         name: &'static str,
         /// The byte.
         byte: u8,
     },
-    /// A name that is no name, or that of a command which has a type of its own.
+    /// A name that is invalid, or that of a command with a type of its own.
     Name(String),
     /// Bytes that are no UTF-8 text.
     Text,
     /// A line of the configuration without "section:key = value".
     Line,
-    /// A key of the configuration that is given twice, with two values.
+    /// A key of the configuration that occurs twice, with two values.
     Twice(String),
     /// The configuration does not end with a NUL byte.
     NoEnd,

@@ -1,8 +1,9 @@
 //! Wire formats: the AR.Drone 2.0's commands, navdata and configuration, and a loop's UDP packets.
 //!
-//! Bytes come from a network, so a reader takes any: it never panics, never reads past the end,
-//! and its work grows linearly with the number of bytes. What it gives out is checked: a command's
-//! value is finite and in [-1, 1] by its type. Writers refuse what no reader may see.
+//! Bytes come from a network, so that a reader accepts any input: it never panics, never reads past
+//! the end, and its work grows linearly with the number of bytes. Its results are checked: the
+//! value of a command is finite and in [-1, 1] by its type. Writers refuse everything that readers
+//! refuse.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -9,7 +9,7 @@
 //! | 32 | f64 | between receiving the one that is answered and sending this one, s |
 //! | 40, 48 | f64 | value, reference |
 //!
-//! Little-endian, 56 bytes. A compatible end that knows no heads sends bare doubles instead.
+//! Little-endian, 56 bytes. An end without this header sends bare doubles instead.
 
 use crate::bytes::{array, f64_at, u32_at};
 use crate::error::{Error, Fault};
@@ -22,15 +22,15 @@ pub const LENGTH: usize = 56;
 /// One packet; all its numbers are finite.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LoopPacket {
-    /// Bits whose meaning the two ends agree upon.
+    /// Bits with a meaning that the two ends agree upon.
     pub flags: u32,
     /// Number of the packet, counted from 1.
     pub sequence: u32,
     /// Number of the packet that this one answers, 0 for none.
     pub echo_sequence: u32,
-    /// When it was sent, s of its sender's clock.
+    /// Time of sending, in s of its sender's clock.
     pub sent: f64,
-    /// When the answered one was sent, s of that one's sender's clock.
+    /// Time at which the answered packet was sent, in s of its sender's clock.
     pub echo_sent: f64,
     /// Time between receiving the answered one and sending this one, s, not negative.
     pub held: f64,
@@ -41,7 +41,7 @@ pub struct LoopPacket {
 }
 
 impl LoopPacket {
-    /// What has to hold of every packet.
+    /// Check the conditions of every packet.
     fn check(&self) -> Result<(), Error> {
         let numbers = [
             ("sent", self.sent, 16),
@@ -67,7 +67,7 @@ impl LoopPacket {
 ///
 /// # Errors
 ///
-/// Another length or header, a number that is not finite, a time held that is negative.
+/// Another length or header, a number that is not finite, or a negative holding time.
 pub fn read(packet: &[u8]) -> Result<LoopPacket, Error> {
     let length = packet.len();
     let wrong = Fault::Length {
@@ -104,7 +104,7 @@ pub fn read(packet: &[u8]) -> Result<LoopPacket, Error> {
 ///
 /// # Errors
 ///
-/// A number that is not finite, a time held that is negative.
+/// A number that is not finite, or a negative holding time.
 ///
 /// ```
 /// use deadtime_wire::loop_packet::{self, LoopPacket};
@@ -132,7 +132,7 @@ pub fn write(packet: &LoopPacket) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// Reads bare doubles, so many and no more.
+/// Reads exactly `count` bare doubles.
 ///
 /// # Errors
 ///

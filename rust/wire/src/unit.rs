@@ -1,4 +1,4 @@
-//! A share of what a vehicle may do.
+//! Values of a motion, as shares of a limit.
 
 use crate::error::Fault;
 
@@ -7,7 +7,7 @@ use crate::error::Fault;
 pub struct Unit(f32);
 
 impl Unit {
-    /// No demand.
+    /// No motion.
     pub const ZERO: Self = Self(0.0);
 
     /// The number in single precision.
@@ -32,7 +32,7 @@ impl Unit {
         Ok(Self(value as f32))
     }
 
-    /// The number of these 32 bits, clipped to [-1, 1]; nothing for NaN and the infinities.
+    /// The number with these 32 bits, clipped to [-1, 1]; `None` for NaN and the infinities.
     pub fn from_bits(bits: u32) -> Option<Self> {
         let value = f32::from_bits(bits);
         value.is_finite().then(|| Self(value.clamp(-1.0, 1.0)))

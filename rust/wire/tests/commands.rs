@@ -1,4 +1,4 @@
-//! Commands as drones and their clients are known to exchange them.
+//! Commands as drones and their clients exchange them.
 
 #![allow(clippy::unwrap_used)]
 
@@ -109,7 +109,7 @@ fn malformed_commands_are_left_out_and_their_neighbours_kept() {
             "{broken}"
         );
     }
-    // Its end lies beyond what the drone reads.
+    // Its end lies beyond the limit of the drone.
     let datagram = format!("AT*REF=1,512\rAT*LED=2,{}\rAT*COMWDG=3\r", "9".repeat(1002));
     assert_eq!(at::read(datagram.as_bytes()), [(1, reference(true, false))]);
     // Beyond the range, but finite: clipped.

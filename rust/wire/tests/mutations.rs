@@ -32,9 +32,9 @@ impl Random {
     }
 }
 
-/// Bytes that mean something to one reader or another.
+/// Bytes with a meaning for one of the readers.
 const TELLING: &[u8] = b"\x00\x01\x03\x04\x08\x7f\x80\xff\r\n\",=*:- 09";
-/// Words that do.
+/// Words with a meaning for one of the readers.
 const WORDS: &[&[u8]] = &[
     b"AT*PCMD=1,1,0,0,2139095040,0\r",
     b"AT*REF=1,",
@@ -80,7 +80,7 @@ fn damage(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
                 let from = random.below(other.len());
                 bytes.splice(at.., other[from..].iter().copied());
             }
-            // A size that lies, where options have theirs.
+            // A wrong size, where options have theirs.
             _ if length > 20 => {
                 let at = 16 + 2 * random.below((length - 18) / 2);
                 let size = random.next() as u16 >> random.below(16);
@@ -92,7 +92,7 @@ fn damage(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     bytes.truncate(20_000);
 }
 
-/// A checksum that is right: otherwise few damaged packets would be read to their end.
+/// Corrects the checksum; otherwise few damaged packets would be read to their end.
 fn repair(packet: &mut [u8]) {
     if let Some(end) = packet.len().checked_sub(8) {
         let sum: u32 = packet[..end].iter().map(|&byte| u32::from(byte)).sum();
@@ -106,7 +106,7 @@ fn wanted() -> usize {
     asked.and_then(|text| text.parse().ok()).unwrap_or(250_000)
 }
 
-/// Reads damaged packets, `check` holding of each whether it is taken or not.
+/// Reads damaged packets; `check` has to hold for each, whether it is accepted or not.
 fn survey<T>(
     name: &str,
     corpus: &[Vec<u8>],
@@ -130,7 +130,7 @@ fn survey<T>(
         taken += usize::from(check(&bytes));
         let time = time_of(&bytes);
         if time > longest {
-            // Again, a few times: the machine may have done something else in between.
+            // The time is measured a few times, because the machine may have been busy.
             let time = (0..9).fold(time, |least, _| least.min(time_of(&bytes)));
             if time > longest {
                 (longest, size) = (time, bytes.len());
@@ -139,7 +139,7 @@ fn survey<T>(
     }
     let all = wanted();
     println!("{name}: {taken} of {all} damaged packets taken, longest {longest:?} ({size} bytes)");
-    // A survey that nothing or everything passes has not looked at much.
+    // A survey that accepts nothing, or everything, tests little.
     assert!(taken > all / 100 && taken < all, "{name}: {taken} of {all}");
 }
 

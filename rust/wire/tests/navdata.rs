@@ -1,4 +1,4 @@
-//! Navdata: what is where in a packet, what may differ, and what is no packet.
+//! Navdata: the places of fields in a packet, permitted variations, and invalid packets.
 
 #![allow(clippy::unwrap_used)]
 
@@ -100,7 +100,7 @@ fn the_clock_has_seconds_and_microseconds() {
         Clock { time }.write(&mut body).unwrap();
         assert_eq!(body, word.to_le_bytes(), "{time}");
     }
-    // More than a million microseconds: read as they are, and left as they are.
+    // More than a million microseconds: read and written unchanged.
     let body = ((5u32 << 21) | 1_200_000).to_le_bytes();
     let clock = Clock::read(&body).unwrap();
     assert_eq!(clock.time, 6.2);

@@ -21,6 +21,7 @@ __all__ = [
     "checked_names",
     "embedded",
     "excited",
+    "independent_samples",
     "lag_name",
     "standard_errors",
 ]
@@ -120,8 +121,7 @@ def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: 
         return
     samples = float(misfit.size)
     if fitted > MOSTLY_EXPLAINED * constant:
-        rho = min(0.99, max(0.0, autocorrelation))
-        samples *= (1.0 - rho) / (1.0 + rho)
+        samples = independent_samples(misfit.size, autocorrelation)
     freedom = max(1.0, samples - numbers - 1)
     ratio = (constant - fitted) / numbers * freedom / fitted
     if not ratio > 0.0 or special.fdtrc(numbers, freedom, ratio) > F_TEST_LEVEL:
@@ -131,6 +131,12 @@ def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: 
             "% of its variance, as much as for noise alone; check columns, signs and gains, "
             "choose a window with a step, or record a larger one"
         )
+
+
+def independent_samples(samples: int, autocorrelation: float) -> float:
+    """Number of independent samples that hold as much information as autocorrelated ones."""
+    rho = min(0.99, max(0.0, autocorrelation))
+    return samples * (1.0 - rho) / (1.0 + rho)
 
 
 def embedded(cov: Array, loose: list[int], size: int) -> Array:

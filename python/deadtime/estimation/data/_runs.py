@@ -36,8 +36,9 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
         raise ValueError("no recording was given: give one, or a list of them")
     number = len(recordings)
     loops = list(loop) if isinstance(loop, (list, tuple)) else [loop] * number
-    one_for_all = not isinstance(window, (tuple, list)) or (is_range(window) and len(window) == 2)
-    windows: list[Any] = [window] * number if one_for_all else list(window or ())
+    windows: list[Any] = [window] * number
+    if isinstance(window, (tuple, list)) and not (is_range(window) and len(window) == 2):
+        windows = list(window)
     for name, given in (("loop", loops), ("window", windows)):
         if len(given) != number:
             raise ValueError(

@@ -16,16 +16,21 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import RecordingError
 from deadtime.estimation.data._evidence import excited
+from deadtime.estimation.data._excitation import start_and_span
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
 from deadtime.systems import Response
 
-__all__ = ["SimulatedRecording"]
+__all__ = ["SimulatedRecording", "shortest_time"]
 
 Array = NDArray[np.float64]
 
 #: Longest window, in samples of the recording and of the loop (bounds the time of a fit).
 MOST_SAMPLES = 50_000
+
+#: Shortest delay and lag of a continuous loop, as a share of the window and of the time between two
+#: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
+SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
 #: Relative step of difference quotients: of the parameter, the time between two samples, or the
 #: excitation.
@@ -136,6 +141,12 @@ class SimulatedRecording:
     def residuals(self, values: Mapping[str, float], start: float) -> Array:
         """Recorded minus simulated output."""
         return self.recording.output - self.output(values, start)
+
+
+def shortest_time(window: Recording) -> float:
+    """Shortest delay and lag of a continuous loop that are searched, s."""
+    _, span = start_and_span(window)
+    return min(SHORTEST_OF_WINDOW * span, SHORTEST_OF_SAMPLE * window.sample_time)
 
 
 def _of_the_loop(values: Mapping[str, float]) -> dict[str, float]:

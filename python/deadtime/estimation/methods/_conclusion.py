@@ -22,6 +22,7 @@ from deadtime.estimation.data._evidence import (
     embedded,
     standard_errors,
 )
+from deadtime.estimation.data._excitation import ROUNDING
 from deadtime.estimation.data._runs import Run
 from deadtime.estimation.fit._joint import JointModel
 from deadtime.estimation.fit._least_squares import Minimum, Model, ProfileCost, minimise
@@ -50,9 +51,6 @@ MIXTURE = 5.138 / 3.841
 
 #: Relative distance to a bound below which a parameter counts as being on it.
 AT_BOUND = 1e-4
-
-#: Residuals below this share of the output's range count as rounding.
-EXACT = 1e-9
 
 
 def without_vanishing(model: Model, found: Minimum) -> Minimum:
@@ -126,7 +124,7 @@ def concluded(
     for output, piece, weight in zip(outputs, pieces, _weights(model), strict=True):
         check_response(output, piece / weight, count, whiteness.autocorrelation)
     exact = all(
-        float(np.max(np.abs(piece))) <= EXACT * weight * float(np.ptp(output))
+        float(np.max(np.abs(piece))) <= ROUNDING * weight * float(np.ptp(output))
         for piece, output, weight in zip(pieces, outputs, _weights(model), strict=True)
     )
     white = embedded(white_covariance(jacobian[:, loose], residuals), loose, len(labels))

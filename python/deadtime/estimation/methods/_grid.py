@@ -37,7 +37,7 @@ from deadtime.estimation.data._excitation import (
     start_and_span,
 )
 from deadtime.estimation.data._runs import Run
-from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime.estimation.methods._method import Method, check_initial_output
 
@@ -47,10 +47,6 @@ Array = NDArray[np.float64]
 
 #: Points of the grid besides zero, and its ends as shares of the window.
 POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
-
-#: Shortest delay and lag of a continuous loop, as a share of the window and of the time between two
-#: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
-SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
 #: Local minima of the curve that are refined; the lowest is taken.
 REFINED = 3
@@ -206,7 +202,7 @@ class _Problem:
         """Shortest delay and lag of the search."""
         if self.simulated.loop.is_sampled:
             return 0.0
-        return min(self.span * SHORTEST_OF_WINDOW, self.sample * SHORTEST_OF_SAMPLE)
+        return shortest_time(self.simulated.recording)
 
     def grid(self) -> Array:
         """Delays from the shortest on, spaced geometrically."""

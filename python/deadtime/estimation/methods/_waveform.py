@@ -34,9 +34,9 @@ from deadtime.estimation.data._evidence import (
     checked_names,
     excited,
 )
-from deadtime.estimation.data._excitation import check_excitation, start_and_span
+from deadtime.estimation.data._excitation import ROUNDING, check_excitation, start_and_span
 from deadtime.estimation.data._runs import Run
-from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
 from deadtime.estimation.fit._joint import solve_jointly
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
@@ -55,19 +55,12 @@ NoisePath = Literal["auto", "recording", "loop"]
 DELAY_POINTS = 24
 GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
 
-#: Shortest delay and lag of a continuous loop, as a share of the window and of the time between two
-#: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
-SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
-
 #: Shortest lag of a sampled loop, as a share of the time between two samples; shorter ones
 #: overflow.
 LEAST_LAG = 1e-6
 
 #: Bound of the residuals of simulations that diverge, in units of the excitation.
 LARGEST_MISFIT = 1e3
-
-#: Residuals below this share of the excitation count as rounding.
-ROUNDING = 1e-9
 
 #: Noise is taken to be in the recording alone where its log likelihood is larger by this (a factor
 #: of 20). Larger values prefer the innovations more often.
@@ -179,8 +172,7 @@ class _Model(ModelOfOne):
     def _shortest(self) -> float:
         if self.simulated.loop.is_sampled:
             return LEAST_LAG * self.simulated.recording.sample_time
-        between = self.simulated.recording.sample_time
-        return min(SHORTEST_OF_WINDOW * self.span, SHORTEST_OF_SAMPLE * between)
+        return shortest_time(self.simulated.recording)
 
     def ends(self, label: str) -> Ends:
         tenth, shortest = 0.1 * self.span, self._shortest

@@ -1,1 +1,1 @@
-"""What an experiment will tell, before it is run."""
+"""Bounds and Monte Carlo simulations of planned experiments."""

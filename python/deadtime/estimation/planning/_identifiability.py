@@ -10,7 +10,7 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.processes import Progress
+from deadtime._base.progress import Progress
 from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import method_of
 from deadtime.estimation.data._evidence import VEHICLE_PARAMETERS, checked_names
@@ -128,8 +128,7 @@ class Identifiability(ReadOnlyArrays):
             one for few runs. They are started anew, so a script that asks for them keeps what it
             does under ``if __name__ == "__main__":``.
         progress : bool or callable
-            True for a progress bar (needs ``deadtime[cli]``); or called with the numbers of
-            runs that are done and of all runs.
+            True for a progress bar; or called now and then with the number of runs done.
 
         Returns
         -------

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.processes import Progress, shared_out
+from deadtime._base.processes import shared_out
+from deadtime._base.progress import Progress
 from deadtime._base.validation import whole_number
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import DelayEstimate

@@ -1,4 +1,4 @@
-"""The AR.Drone 2.0: its commands, its navdata, its configuration, and a link to fly it by."""
+"""The AR.Drone 2.0: its commands, its navdata, its configuration, and a link to fly it."""
 
 from deadtime.links.ardrone2.client import ARDrone2
 from deadtime.links.ardrone2.configuration import parse_configuration, write_configuration

@@ -27,52 +27,52 @@ from deadtime.links.vehicle import VehicleState
 
 __all__ = ["ARDrone2"]
 
-#: How long the first navdata, and leaving bootstrap, may take, s.
+#: Longest wait for the first navdata, and for the end of bootstrap, s.
 FIRST_NEWS = 5.0
 
-#: How long taking off may take until the drone holds its height, and landing, s.
+#: Longest duration of a take-off until the drone holds its height, and of a landing, s.
 TAKING_OFF, LANDING = 15.0, 20.0
 
-#: How often the link is looked at while nothing else is waited for, s.
+#: Time between two checks of the link while nothing else is waited for, s.
 LOOKING = 0.1
 
-#: How long the drone is given to measure what level is, s.
+#: Time for the drone to calibrate its level, s.
 TRIMMING = 0.3
 
-#: How long nothing may come while landing, s: by then the drone's own watchdog lands it.
+#: Longest silence while landing, s: the watchdog of the drone lands it within this time.
 SILENT_LANDING = 3.0
 
-#: News that are by so much younger than what was sent show what came of it, s.
+#: Navdata sent this long after a command show its effect, s.
 ANSWERED = 1.0
 
-#: How long the drone is given to confirm a toggle of the emergency, s, and how often the datagram
-#: is sent: copies have the same number, and the drone carries out one.
+#: Time for the drone to confirm a toggle of the emergency, s, and number of copies of the datagram:
+#: copies have the same number, and the drone executes one.
 TOGGLING, COPIES = 5.0, 3
 
 
 class ARDrone2:
     """A link to an AR.Drone 2.0, or to an emulator of one.
 
-    As an asynchronous context manager it connects on entry, and lands and closes on the way out,
-    whatever the reason. Connecting tells the drone to be on the ground and never takes off.
+    As an asynchronous context manager it connects on entry, and lands and closes on exit, also by
+    an exception. Connecting commands the drone to stay on the ground and never takes off.
 
     Parameters
     ----------
     host : str
         Address of the drone.
     limits : Limits, optional
-        What it is kept within. Largest climb and height are set in the drone, too, as far as it
-        takes them, and put back to what they were when the link is closed.
+        Limits of its flights. Largest climb and height are set in the drone too, as far as it
+        accepts them, and restored when the link is closed.
     full : bool
-        All of navdata, 200 times a second, with vertical speed and the setpoint that is followed;
-        otherwise the 15 small ones.
+        Full navdata, 200 times a second, with vertical speed and its setpoint; otherwise short
+        ones, 15 times a second.
     navdata_port, command_port, control_port : int
         5554, 5556 and 5559 on a drone.
 
     Raises
     ------
     ValueError
-        If a port is none.
+        If a port is not from 1 to 65535.
 
     Examples
     --------
@@ -99,7 +99,7 @@ class ARDrone2:
         }
         for name, port in ports.items():
             if not 1 <= port <= 65535:
-                raise ValueError(f"{name}={port} is no port: give 1 to 65535")
+                raise ValueError(f"{name}={port}: give a port from 1 to 65535")
         self.host = host
         self.limits = Limits() if limits is None else limits
         self.full = full
@@ -112,19 +112,19 @@ class ARDrone2:
         self._link = self._new_link()
 
     def _new_link(self) -> Connection:
-        """Both directions from their beginning: what an earlier link has heard is no news."""
+        """A new connection: the state of an earlier one does not count."""
         link = Connection(self.host, *self._ports, self.limits)
         self._sender, self._reader = link.sender, link.reader
         return link
 
     @property
     def statistics(self) -> LinkStatistics:
-        """What has come since it was connected last."""
+        """Statistics of the navdata since the last connection."""
         return self._reader.statistics
 
     @property
     def vz_max(self) -> float:
-        """Vertical speed that a command of 1 stands for, as read back from the drone, m/s.
+        """Vertical speed for a command of 1, read back from the drone, m/s.
 
         Raises
         ------
@@ -132,18 +132,20 @@ class ARDrone2:
             If it is not connected.
         """
         if self._vz_max is None:
-            raise LinkError(f"{self.host} is not connected: what a command means is not known")
+            raise LinkError(
+                f"{self.host} is not connected, so the scale of its commands is unknown"
+            )
         return self._vz_max
 
     # Connecting
 
     async def connect(self) -> None:
-        """Wake the drone up, set its limits and read them back.
+        """Request navdata, set the limits of the drone and read them back.
 
         Raises
         ------
         LinkError
-            If it does not answer, or does not hold what it was told.
+            If it does not answer, or does not keep a setting.
         """
         if self._link.is_open:
             raise LinkError(f"{self.host} is connected already")
@@ -175,18 +177,18 @@ class ARDrone2:
     # Flying
 
     async def take_off(self) -> None:
-        """Leave the ground; returns when the drone holds its height.
+        """Take off; returns when the drone holds its height.
 
         Raises
         ------
         LinkError
-            If it is not connected, not on the ground, in an emergency, low on battery, falls silent
-            or does not come up in 15 s; it is then told to land.
+            If it is not connected, not on the ground, in an emergency, low on battery, sends
+            nothing, or is not up within 15 s; it is then commanded to land.
         """
         speed = self.vz_max
         state = await self.state()
         if state.emergency:
-            raise LinkError(f"{self.host} is in emergency: look at it, then clear_emergency()")
+            raise LinkError(f"{self.host} is in emergency: check it, then call clear_emergency()")
         if not state.landed:
             raise LinkError(f"{self.host} is not on the ground: land it first")
         if state.battery is not None and state.battery < self.limits.min_battery:
@@ -196,8 +198,8 @@ class ARDrone2:
             )
         if self.limits.max_climb > speed:
             raise LinkError(
-                f"max_climb = {self.limits.max_climb:g} m/s is more than the drone's largest "
-                f"vertical speed of {speed:g} m/s: ask for less"
+                f"max_climb = {self.limits.max_climb:g} m/s exceeds the drone's largest "
+                f"vertical speed of {speed:g} m/s: give a smaller one"
             )
         self._link.send(FlatTrim())
         asked = self._link.now
@@ -205,8 +207,8 @@ class ARDrone2:
         late = self._link.now - asked - TRIMMING
         if late > self.limits.command_age:
             raise LinkError(
-                f"this program stood still for {late:.2f} s just before {self.host} would have "
-                "taken off: what was seen of it is old; take off again"
+                f"this program was paused for {late:.2f} s just before the take-off of "
+                f"{self.host}, so its last known state is old: take off again"
             )
         self._asked_up = self._link.now
         self._sender.fly()
@@ -233,13 +235,13 @@ class ARDrone2:
         Raises
         ------
         LinkError
-            If the drone fell silent or began to count anew, another client commands it, or the
+            If the drone sends nothing or restarted its count, another client commands it, or the
             flight has ended without `land`, as of `command`.
         """
         if not self._link.is_open:
             raise LinkError(f"{self.host} is not connected")
         if self._reader.newest is None and not await self._link.until(_tells_state, FIRST_NEWS):
-            raise LinkError(f"no state of {self.host} within {FIRST_NEWS:g} s")
+            raise LinkError(f"no state from {self.host} within {FIRST_NEWS:g} s")
         self._check_link()
         state = self._reader.newest
         assert state is not None
@@ -248,7 +250,7 @@ class ARDrone2:
     def _check_link(self) -> None:
         if self._link.failure is not None:
             raise LinkError(
-                f"what listens to {self.host} has failed: {self._link.failure}"
+                f"the listener of {self.host} has failed: {self._link.failure}"
             ) from self._link.failure
         self._check_wish()
         if self._sender.rival is not None:
@@ -259,14 +261,14 @@ class ARDrone2:
             raise LinkError(self._link.forgotten)
 
     def _check_wish(self) -> None:
-        """Refuse to go on with a flight that has ended by itself."""
+        """Raise if the flight has ended without `land`."""
         self._link.age()
         if self._sender.expired is not None:
             self._link.send()  # it says to land
             raise FlightAbortedError(self._sender.expired)
 
     def command(self, climb: float) -> float:
-        """Ask for a vertical speed; it is sent at once and repeated while it is young.
+        """Command a vertical speed; it is sent at once and repeated until it is too old.
 
         Parameters
         ----------
@@ -276,29 +278,29 @@ class ARDrone2:
         Returns
         -------
         float
-            What was sent, m/s: 0 while nothing tells yet whether the drone still flies after a
-            pause of this program.
+            The speed that was sent, m/s: 0 while it is unknown whether the drone still flies after
+            a pause of this program.
 
         Raises
         ------
         ValueError
             If `climb` is not finite.
         LinkError
-            If the drone was not told to take off, or if the flight has ended without `land`: no
-            command came, this program stood still, the drone landed or obeyed another client.
+            If the drone has not taken off, or if the flight has ended without `land`: without
+            commands, by a pause of this program, by a landing, or by another client.
         """
-        wanted = finite("climb", climb)
+        requested = finite("climb", climb)
         if self._sender.expired is None and not self._sender.guarded:
             raise LinkError(f"{self.host} is not in the air: take off before commanding it")
         self._check_wish()
         most = min(self.limits.max_climb, self.vz_max)
-        share = UnitCommand.saturated(max(-most, min(most, wanted)) / self.vz_max)
+        share = UnitCommand.saturated(max(-most, min(most, requested)) / self.vz_max)
         sent = self._sender.climb(share, self._link.now)
         self._link.send()
         return float(sent) * self.vz_max
 
     def hover(self) -> None:
-        """Ask for no motion; like a command it is good for a short while, then the drone lands.
+        """Command no motion; like a command this is valid for a short time, then the drone lands.
 
         Raises
         ------
@@ -310,13 +312,13 @@ class ARDrone2:
         self._link.send()
 
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
-        """Call `listener` with every state from now on; None: no longer.
+        """Register `listener` for every state; None removes it.
 
-        If it raises, it is not called again, and the next `state` raises `LinkError` from that.
+        If it raises, it is removed, and the next `state` raises `LinkError` from that error.
         """
         self._link.listener = listener
 
-    # Coming down
+    # Landing
 
     async def land(self) -> None:
         """Land; returns when the drone is on the ground.
@@ -324,8 +326,8 @@ class ARDrone2:
         Raises
         ------
         LinkError
-            If it does not say so in 20 s, or says nothing for 3 s: by then its own watchdog lands
-            it. It is told to land as long as the link is open.
+            If it does not report this within 20 s, or sends nothing for 3 s, in which its own
+            watchdog lands it. It is commanded to land as long as the link is open.
         """
         self._sender.land()
         if not self._link.is_open or self._reader.newest is None:
@@ -336,29 +338,29 @@ class ARDrone2:
             silent = self._link.silent
             if silent > SILENT_LANDING:
                 raise LinkError(
-                    f"nothing heard of {self.host} for {silent:.1f} s while landing: its own "
-                    "watchdog lands it 2 s after the last command it heard"
+                    f"nothing received from {self.host} for {silent:.1f} s while landing: its own "
+                    "watchdog lands it 2 s after the last command it received"
                 )
             if self._link.now > deadline:
-                raise LinkError(f"{self.host} has not landed in {LANDING:g} s")
+                raise LinkError(f"{self.host} has not landed within {LANDING:g} s")
 
     def _is_down(self, navdata: Navdata) -> bool:
-        """Whether a drone is down, by news that would show that it has begun to take off."""
+        """Whether a drone is down, by navdata new enough to show the beginning of a take-off."""
         sent = self._link.news_sent
         return on_ground(navdata) and sent is not None and sent >= self._asked_up + ANSWERED
 
     async def close(self) -> None:
-        """Land if in the air, put the drone's settings back, and end the link; may be called twice.
+        """Land if in the air, restore the settings of the drone, and close the link.
 
         Raises
         ------
         LinkError
-            As `land` does; the link is closed all the same.
+            As `land` does; the link is closed nevertheless.
 
         Warns
         -----
         RuntimeWarning
-            If it has landed and does not take its settings back.
+            If it has landed and its settings could not be restored.
         """
         try:
             await _uninterrupted(self._end())
@@ -377,22 +379,22 @@ class ARDrone2:
             warnings.warn(kept, RuntimeWarning, stacklevel=2)
 
     async def cut_motors(self) -> None:
-        """Stop the motors at once, whatever the height: the drone falls.
+        """Stop the motors at once, at any height: the drone falls.
 
-        For a drone that is about to hurt somebody. Landing never does this. The drone is told once,
-        and again only if what it says 1 s later still shows its motors on.
+        For a drone that is about to hurt somebody; landing never does this. The command is sent
+        once, and again only if navdata sent 1 s later still show its motors on.
 
         Raises
         ------
         LinkError
-            If the drone does not say within 5 s that it did.
+            If the drone does not confirm this within 5 s.
         """
         self._sender.land()
         if not await self._toggled(lambda navdata: navdata.emergency):
-            raise LinkError(f"{self.host} does not confirm that its motors are cut")
+            raise LinkError(f"{self.host} does not confirm that its motors are off")
 
     async def clear_emergency(self) -> None:
-        """Bring a drone on the ground from emergency back to normal.
+        """Reset the emergency of a drone on the ground.
 
         Raises
         ------
@@ -401,25 +403,27 @@ class ARDrone2:
         """
         self._sender.land()
         if not await self._toggled(lambda navdata: not navdata.emergency):
-            raise LinkError(f"{self.host} stays in emergency: check its motors and its level")
+            raise LinkError(
+                f"{self.host} stays in emergency: check its motors and that it stands level"
+            )
 
-    async def _toggled(self, wanted: Callable[[Navdata], bool]) -> bool:
-        """Toggle between emergency and normal until the drone says that it is as wanted.
+    async def _toggled(self, requested: Callable[[Navdata], bool]) -> bool:
+        """Toggle between emergency and normal until the drone reports the requested state.
 
         The drone has one signal for both directions, so a second one too early would undo the
-        first. It is sent again only after news that must have been written long after the first,
-        and still show the old state.
+        first. It is repeated only after navdata that were sent long after the first and still show
+        the old state.
         """
         link = self._link
         deadline = link.now + TOGGLING
-        while not await link.until(wanted, 0.0):
+        while not await link.until(requested, 0.0):
             self._sender.cut = True
             link.send(copies=COPIES)
             toggled = link.now
-            while not await link.until(wanted, LOOKING):
+            while not await link.until(requested, LOOKING):
                 if link.now > deadline:
                     return False
-                # What waited in the socket during a pause of this program is no news, either.
+                # Packets that waited in the socket during a pause of this program are old too.
                 since = max(toggled, self._sender.resumed)
                 if link.news_sent is not None and link.news_sent >= since + ANSWERED:
                     break
@@ -458,7 +462,7 @@ def _tells_state(navdata: Navdata) -> bool:
 
 
 async def _uninterrupted(landing: Any) -> None:
-    """See a landing to its end, which comes in bounded time, and only then be cancelled."""
+    """Complete a landing, which takes a bounded time, before a cancellation takes effect."""
     task = asyncio.ensure_future(landing)
     interrupted = False
     while not task.done():

@@ -56,14 +56,14 @@ class _Motion(_Command):
 
 @dataclass(frozen=True)
 class Ref(_Command):
-    """``AT*REF``: be in the air, or on the ground. A state, to be sent again and again.
+    """``AT*REF``: be in the air, or on the ground. A state that is sent repeatedly.
 
     Attributes
     ----------
     take_off : bool
         In the air while set, landed while not.
     emergency : bool
-        When it becomes set, motors are cut; or an emergency ends.
+        When it becomes set, the motors stop, or an emergency ends.
     """
 
     wire_name: ClassVar[str] = "REF"
@@ -73,7 +73,7 @@ class Ref(_Command):
 
 @dataclass(frozen=True)
 class Move(_Motion):
-    """``AT*PCMD``: a motion, in shares of what the drone is configured to do at most.
+    """``AT*PCMD``: a motion, as shares of the configured largest ones.
 
     Attributes
     ----------
@@ -96,20 +96,20 @@ class Move(_Motion):
     flag: int = 1
 
 
-#: The motion that is none.
+#: No motion.
 Hover = Move(flag=0)
 
 
 @dataclass(frozen=True)
 class MoveFrom(_Motion):
-    """``AT*PCMD_MAG``: a motion relative to a heading that the sender knows; 1 is half a turn.
+    """``AT*PCMD_MAG``: a motion relative to the heading of the sender; 1 is half a turn.
 
     Attributes
     ----------
     roll, pitch, gaz, yaw : UnitCommand
         As of `Move`.
     heading, accuracy : UnitCommand
-        The sender's heading, and how well it knows it.
+        Heading of the sender, and its accuracy.
     flag : int
         As of `Move`.
     """
@@ -126,7 +126,7 @@ class MoveFrom(_Motion):
 
 @dataclass(frozen=True)
 class Config(_Command):
-    """``AT*CONFIG``: one setting; the next one only after the drone's acknowledgement."""
+    """``AT*CONFIG``: one setting; the next one is sent after the acknowledgement of the drone."""
 
     wire_name: ClassVar[str] = "CONFIG"
     key: str
@@ -135,7 +135,7 @@ class Config(_Command):
 
 @dataclass(frozen=True)
 class ConfigIds(_Command):
-    """``AT*CONFIG_IDS``: for whom the next setting is, 8 hexadecimal digits each."""
+    """``AT*CONFIG_IDS``: identifiers for the next setting, 8 hexadecimal digits each."""
 
     wire_name: ClassVar[str] = "CONFIG_IDS"
     session: str
@@ -145,7 +145,7 @@ class ConfigIds(_Command):
 
 @dataclass(frozen=True)
 class Control(_Command):
-    """``AT*CTRL``: 4 asks for the configuration, 5 acknowledges, 6 asks for the identifiers."""
+    """``AT*CTRL``: 4 requests the configuration, 5 acknowledges, 6 requests the identifiers."""
 
     wire_name: ClassVar[str] = "CTRL"
     mode: int
@@ -175,7 +175,7 @@ class Calibrate(_Command):
 
 @dataclass(frozen=True)
 class Other(_Command):
-    """Any other name, with its arguments as they stand between the commas, quotes included."""
+    """Any other command, with its arguments as text between commas, quotes included."""
 
     wire_name: ClassVar[str] = "OTHER"
     name: str
@@ -216,16 +216,16 @@ def encode(commands: Iterable[Command], first: int) -> bytes:
 def decode(datagram: bytes) -> list[tuple[int, Command]]:
     r"""Read the commands of a datagram, each with its sequence number, in their order.
 
-    A malformed command is left out, as the drone ignores it: one without a carriage return or line
+    A malformed command is skipped, as the drone ignores it: one without a carriage return or line
     feed at its end or not within the first 1024 bytes, with arguments missing or of another kind.
-    Finite values of a motion are clipped to [-1, 1]; a motion with any other is left out.
+    Finite values of a motion are clipped to [-1, 1]; a motion with other values is skipped.
 
     Examples
     --------
     >>> decode(b"AT*REF=1,512\rAT*PCMD=2,1,0,0,nonsense,0\r")
     [(1, Ref(take_off=True, emergency=False))]
     """
-    return [(number, _command(name, arguments)) for number, name, arguments in at_read(datagram)]
+    return [(read.sequence, _command(read.name, read.arguments)) for read in at_read(datagram)]
 
 
 def _command(name: str, arguments: tuple[Any, ...]) -> Command:

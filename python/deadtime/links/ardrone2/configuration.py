@@ -1,4 +1,4 @@
-"""The drone's settings as it sends them on TCP 5559: text lines, and a NUL byte at the end."""
+"""The settings of the drone as sent on TCP 5559: text lines, and a NUL byte at the end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def parse_configuration(dump: bytes) -> dict[str, str]:
     ------
     PacketError
         If the NUL at the end is missing or something follows it, a line is not of the form
-        ``section:key = value``, a key has two different values, or it is no text at all.
+        ``section:key = value``, a key has two different values, or it is no text.
 
     Examples
     --------
@@ -32,7 +32,7 @@ def write_configuration(settings: Mapping[str, str]) -> bytes:
     Raises
     ------
     ValueError
-        If a key is no ``section:key``, or a value would not be read as it is: it holds control
+        If a key is no ``section:key``, or a value would be read differently: it contains control
         characters, or blanks at its ends.
 
     Examples

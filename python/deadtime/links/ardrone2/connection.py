@@ -1,4 +1,4 @@
-"""The two sockets to a drone, and the task that keeps talking to it."""
+"""The two sockets to a drone, and the task that sends to it continuously."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from deadtime.links.vehicle import VehicleState
 
 __all__ = ["LOST", "Connection"]
 
-#: How long nothing may come until the link counts as lost, s.
+#: Silence after which the link counts as lost, s.
 LOST = 1.0
 
-#: What wakes the drone's navdata.
+#: The packet that requests navdata.
 WAKE_UP = b"\x01\x00\x00\x00"
 
-#: How often the wake-up is sent again while nothing comes, s.
+#: Time between two requests while nothing is received, s.
 WAKE_AGAIN = 0.2
 
-#: Last words to a drone when the link closes, in case some are lost.
-LAST_WORDS = 3
+#: Copies of the landing command when the link closes, in case some are lost.
+FINAL_COPIES = 3
 
 
 class Connection:
-    """Packets to one drone and from it; what they mean is for its reader and its sender.
+    """Packets to and from one drone; its reader and its sender interpret them.
 
     Parameters
     ----------
@@ -40,18 +40,18 @@ class Connection:
     navdata_port, command_port : int
         Its UDP ports.
     limits : Limits
-        How old a command may get, and how fast a height may change.
+        Limits of the age of commands and of the change of the height.
 
     Attributes
     ----------
     reader : NavdataReader
-        What has come in.
+        Reads what is received.
     sender : CommandSender
-        What goes out.
+        Makes what is sent.
     listener : callable or None
         Called with every state.
     failure : Exception or None
-        What it raised, if it did; it is then no longer called.
+        The error of the listener, which is then removed.
     """
 
     def __init__(self, host: str, navdata_port: int, command_port: int, limits: Limits) -> None:
@@ -69,7 +69,7 @@ class Connection:
 
     @property
     def is_open(self) -> bool:
-        """Whether datagrams go out."""
+        """Whether the link is open."""
         return self._cycle is not None
 
     @property
@@ -79,18 +79,18 @@ class Connection:
 
     @property
     def forgotten(self) -> str:
-        """What is said when the drone has begun to count anew."""
+        """Message for a drone whose numbers have restarted."""
         return (
-            f"{self.host} began to count anew, so it has forgotten this client: land, and connect "
+            f"{self.host} restarted its count, so it has dropped this client: land, and connect "
             "again"
         )
 
     @property
     def unheard(self) -> str:
-        """What is said when nothing has been heard for too long."""
+        """Message for a drone that sends nothing."""
         return (
-            f"nothing heard of {self.host} for {self.silent:.1f} s: it is off or out of reach, or "
-            "another client commands this drone and is sent its navdata"
+            f"nothing received from {self.host} for {self.silent:.1f} s: it is off or out of "
+            "reach, or another client commands this drone and receives its navdata"
         )
 
     @property
@@ -100,22 +100,22 @@ class Connection:
 
     @property
     def silent(self) -> float:
-        """How long nothing was heard, s."""
+        """Time since the last packet, s."""
         heard = self.reader.heard
         return 0.0 if heard is None else self.now - heard
 
     async def open(self) -> None:
-        """Open the sockets and begin to talk: to be on the ground, until told otherwise.
+        """Open the sockets and begin to send: the command to be on the ground, until changed.
 
         Raises
         ------
         LinkError
-            If there is no way to the host, or the connection is open.
+            If the host cannot be reached, or the connection is open.
         """
         if self.is_open:
             raise LinkError(f"{self.host} is connected already")
         try:
-            # Connected to the drone: the system hands on what comes from there alone.
+            # Connected sockets receive packets of the drone only.
             self._navdata = await self._socket(self.navdata_port, self.take)
             self._commands = await self._socket(self.command_port, lambda packet: None)
         except OSError as error:
@@ -128,23 +128,23 @@ class Connection:
 
     async def _socket(self, port: int, take: Callable[[bytes], None]) -> asyncio.DatagramTransport:
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-            lambda: _Door(take, self.reader.refuse), remote_addr=(self.host, port)
+            lambda: _PeerFilter(take, self.reader.refuse), remote_addr=(self.host, port)
         )
         return transport
 
     def shut(self) -> None:
-        """Tell the drone to land, and close the sockets."""
+        """Command the drone to land, and close the sockets."""
         if self._cycle is not None:
             self._cycle.cancel()
-            # Cancelled before it began, the task would not say its last words.
-            self._say_last_words()
+            # A task that is cancelled before it starts would not send the landing command.
+            self._send_landing()
         for transport in (self._navdata, self._commands):
             if transport is not None:
                 transport.close()
         self._cycle = self._navdata = self._commands = None
 
     async def _keep_sending(self) -> None:
-        """A datagram each cycle, the wake-up while nothing comes."""
+        """Send a datagram each cycle, and the request for navdata while nothing is received."""
         try:
             while self._navdata is not None:
                 quiet = self.reader.heard is None or self.silent > WAKE_AGAIN
@@ -154,16 +154,16 @@ class Connection:
                 self.send()
                 await asyncio.sleep(CYCLE)
         finally:
-            # Reached also when the program ends without having closed the link.
-            self._say_last_words()
+            # Also executed when the program ends without closing the link.
+            self._send_landing()
 
-    def _say_last_words(self) -> None:
+    def _send_landing(self) -> None:
         self.sender.land()
-        for _ in range(LAST_WORDS):
+        for _ in range(FINAL_COPIES):
             self.send()
 
     def send(self, *more: Command, copies: int = 1) -> None:
-        """Send the next datagram now, so many times; `more` is said once, in it."""
+        """Send the next datagram now in so many copies; `more` is added to this one only."""
         if self._commands is None or self._commands.is_closing():
             return
         self.age()
@@ -174,13 +174,13 @@ class Connection:
             self._commands.sendto(datagram)
 
     def age(self) -> None:
-        """Let what is too old by now lapse."""
+        """Let commands expire that are too old."""
         self.sender.age(self.now)
-        if self.silent > LOST:  # it may have landed: commands may not reach it, either
+        if self.silent > LOST:  # it may have landed: commands may not reach it either
             self.sender.give_up(self.unheard)
 
     def take(self, packet: bytes) -> None:
-        """Take in a packet of the drone."""
+        """Process a packet of the drone."""
         reader = self.reader
         before, restarts = reader.navdata, reader.restarts
         state = reader.accept(packet, self.now)
@@ -194,11 +194,11 @@ class Connection:
         try:
             self.listener(state)
         except Exception as error:
-            # Here nobody could catch it; whoever flies is told with the next state.
+            # Nobody could catch the error here: the next `state` raises it.
             self.listener, self.failure = None, error
 
     async def until(self, holds: Callable[[Navdata], bool], timeout: float) -> bool:
-        """Wait until navdata are so; False if they are not before the timeout, s."""
+        """Wait until the condition holds of the navdata; False after the timeout, s."""
         deadline = self.now + timeout
         while True:
             navdata = self.reader.navdata
@@ -216,8 +216,8 @@ class Connection:
                 return False
 
 
-class _Door(asyncio.DatagramProtocol):
-    """Lets in what comes from the address and port that the socket is connected to."""
+class _PeerFilter(asyncio.DatagramProtocol):
+    """Passes on datagrams from the address and port that the socket is connected to."""
 
     def __init__(self, take: Callable[[bytes], None], refuse: Callable[[], None]) -> None:
         self._take, self._refuse = take, refuse
@@ -233,4 +233,4 @@ class _Door(asyncio.DatagramProtocol):
             self._take(data)
 
     def error_received(self, exc: Exception) -> None:
-        """A refused datagram is like a lost one: the silence that follows says it."""
+        """A refused datagram counts as lost; the following silence is detected."""

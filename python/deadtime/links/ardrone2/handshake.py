@@ -1,7 +1,7 @@
-"""The configuration of the drone: set one key after the other, and read back what it then holds.
+"""Configuration of the drone: set one key after the other, and read the settings back.
 
 The drone acknowledges a CONFIG by setting a bit of its state, COMMAND_MASK, which the client clears
-by CTRL 5 before the next. What came of it is in the dump on TCP, which CTRL 4 asks for.
+by CTRL 5 before the next. The resulting settings are in the dump on TCP, which CTRL 4 requests.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ __all__ = ["Handshake", "check_configuration"]
 #: Modes of CTRL.
 SEND_CONFIGURATION, ACKNOWLEDGE = 4, 5
 
-#: How long an acknowledgement may take, how often a key is sent again, and how often CTRL 5, s.
+#: Longest wait for an acknowledgement, s, number of attempts for a key, and time between two CTRL
+#: 5, s.
 ANSWER, TRIES, AGAIN = 0.5, 5, 0.05
 
-#: How long the dump may take, s; how often it is asked for; and how long it may be, bytes.
+#: Longest wait for the dump, s; number of requests for it; and its largest size, bytes.
 DUMP, DUMP_TRIES, LONGEST_DUMP = 2.0, 3, 65536
 
 Send = Callable[[Command], None]
@@ -39,7 +40,8 @@ class Handshake:
     send : callable
         Sends a command, once.
     until : callable
-        Waits until navdata are so, or for so many seconds; tells whether they are.
+        Waits until a condition on the navdata holds, or for so many seconds; returns whether it
+        does.
     """
 
     def __init__(self, name: str, send: Send, until: Until) -> None:
@@ -82,7 +84,7 @@ class Handshake:
         Raises
         ------
         LinkError
-            If it does not come.
+            If it does not arrive.
         """
         problem = ""
         for _ in range(DUMP_TRIES):
@@ -92,10 +94,10 @@ class Handshake:
             except asyncio.LimitOverrunError:
                 problem = f"no end within {LONGEST_DUMP} bytes"
             except (OSError, EOFError, ValueError) as error:  # among them TimeoutError
-                problem = str(error) or f"nothing came for {DUMP:g} s"
+                problem = str(error) or f"nothing received for {DUMP:g} s"
         raise LinkError(
             f"{self._name} does not send its configuration on TCP port {port} ({problem}): without "
-            "reading it back its limits are not known, so it is not flown"
+            "reading it back its limits are unknown, so it cannot be flown"
         )
 
     async def _dump(self, host: str, port: int) -> bytes:
@@ -107,27 +109,27 @@ class Handshake:
             writer.close()
 
 
-def check_configuration(name: str, held: Mapping[str, str], wanted: Mapping[str, str]) -> None:
-    """Refuse a drone that does not hold what it was told.
+def check_configuration(name: str, held: Mapping[str, str], requested: Mapping[str, str]) -> None:
+    """Refuse a drone that does not keep a setting.
 
     Raises
     ------
     LinkError
-        With the key, and what it holds instead.
+        With the key, and its value.
     """
-    for key, value in wanted.items():
+    for key, value in requested.items():
         found = held.get(key)
         if found is None or not _same(found, value):
             shown = "nothing" if found is None else found
             raise LinkError(
-                f"{name} was told {key} = {value} and reads back {shown}: it is not flown with "
-                "limits that it does not keep"
+                f"{name} was set to {key} = {value} and reads back {shown}: it cannot be flown "
+                "with limits that it does not keep"
             )
 
 
-def _same(found: str, wanted: str) -> bool:
-    """Whether two values are the same number, or the same word."""
+def _same(found: str, requested: str) -> bool:
+    """Whether two values are the same number, or the same text."""
     try:
-        return abs(float(found) - float(wanted)) <= 1e-6 * abs(float(wanted))
+        return abs(float(found) - float(requested)) <= 1e-6 * abs(float(requested))
     except ValueError:
-        return found.strip().upper() == wanted.strip().upper()
+        return found.strip().upper() == requested.strip().upper()

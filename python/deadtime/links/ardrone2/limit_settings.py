@@ -1,4 +1,4 @@
-"""The drone's own limits: set to what is asked for, read back, and put back after the flight."""
+"""Limits in the drone: set and read back before a flight, and restored after it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from deadtime.links.safety import Limits
 
 __all__ = ["LimitSettings"]
 
-#: What the drone takes as its largest vertical speed, mm/s, and as its largest height, mm.
+#: Ranges of the drone for its largest vertical speed, mm/s, and its largest height, mm.
 VZ_MAX, ALTITUDE_MAX = (200, 2000), (500, 5000)
 
-#: How long putting its settings back may take, s.
+#: Longest time for restoring the settings, s.
 PUTTING_BACK = 3.0
 
 
@@ -32,7 +32,7 @@ class LimitSettings:
     Attributes
     ----------
     vz_max : float or None
-        Vertical speed that a command of 1 stands for, as read back, m/s.
+        Vertical speed for a command of 1, as read back, m/s.
     """
 
     def __init__(self, host: str) -> None:
@@ -46,7 +46,7 @@ class LimitSettings:
         Raises
         ------
         LinkError
-            If the drone does not hold what it was told.
+            If the drone does not keep a setting.
         """
         host = self._host
         handshake = Handshake(host, link.send, link.until)
@@ -55,20 +55,20 @@ class LimitSettings:
         before = await handshake.read_back(host, control_port)
         climb = math.ceil(1e3 * limits.max_climb - 1e-6)
         height = round(1e3 * limits.max_height)
-        wanted = {
+        requested = {
             "control:control_vz_max": str(min(max(climb, VZ_MAX[0]), VZ_MAX[1])),
             "control:altitude_max": str(min(max(height, ALTITUDE_MAX[0]), ALTITUDE_MAX[1])),
         }
-        for key, value in wanted.items():
+        for key, value in requested.items():
             if before.get(key, value) != value:
                 self._before[key] = before[key]
             await handshake.set(key, value)
         held = await handshake.read_back(host, control_port)
-        check_configuration(host, held, demo | wanted)
+        check_configuration(host, held, demo | requested)
         self.vz_max = 1e-3 * float(held["control:control_vz_max"])
 
     async def put_back(self, link: Connection) -> str | None:
-        """Set what was changed to what it was, if the drone is down; say what was not."""
+        """Restore the changed settings if the drone is down; warn of those that could not be."""
         before, self._before = self._before, {}
         navdata = link.reader.navdata
         handshake = Handshake(self._host, link.send, link.until)
@@ -81,4 +81,4 @@ class LimitSettings:
         if not before:
             return None
         kept = ", ".join(f"{key} = {value}" for key, value in before.items())
-        return f"could not be put back in {self._host} to what it was before: {kept}"
+        return f"could not be restored in {self._host}: {kept}"

@@ -1,8 +1,8 @@
-"""Navdata: what the drone says of itself, UDP 5554.
+"""Navdata: the reports of the drone, UDP 5554.
 
-A packet is a head, options and a checksum. Firmwares add options and lengthen them; they are read
-by the sizes that they give themselves. `Navdata.options` keeps the bytes of all of them, so that
-what was read is written again bit by bit; known fields are written over those bytes.
+A packet is a header, options and a checksum. Firmware versions add options and lengthen them; each
+is read by the size it states. `Navdata.options` keeps the bytes of all options, so that a packet
+that was read can be written again bit by bit; known fields overwrite those bytes.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ HEADER = 0x55667788
 
 #: Every option of a full packet of 2190 bytes, all zero.
 FULL_OPTIONS: Options = tuple((tag, bytes(length)) for tag, length in navdata_full())
-#: The options of a short packet of 500 bytes, all zero: fields of `Demo` and the camera's findings.
+#: The options of a short packet of 500 bytes, all zero: fields of `Demo` and the detections of the
+#: camera.
 DEMO_OPTIONS: Options = tuple(option for option in FULL_OPTIONS if option[0] in (0, 16))
 
 
@@ -110,16 +111,16 @@ class Navdata:
     Attributes
     ----------
     state : int
-        Bits of `State`; the properties name those that matter.
+        Bits of `State`; properties name the important ones.
     sequence : int
         Number of the packet, counted from 1 after a connection.
     vision : int
-        Whether the camera's findings are defined.
+        Whether the detections of the camera are defined.
     clock : float, optional
-        The drone's clock, s. It starts again after 2048 s; later times are written so.
+        The drone's clock, s. It wraps after 2048 s; later times are written modulo 2048 s.
     demo, raw_measures, physical_measures, references, rc_references, pwm, altitude, \
 video_stream, pressure, kalman_pressure, wifi
-        The options whose fields are known, None where they are not in the packet or too short.
+        The options whose fields are known, None where the packet does not contain them in full.
     options : tuple of (int, bytes)
         Tag and bytes of every option, the known ones among them, in the order of the packet. To
         build a packet of the drone's sizes give `FULL_OPTIONS` or `DEMO_OPTIONS`.
@@ -181,7 +182,7 @@ video_stream, pressure, kalman_pressure, wifi
     def climb_setpoint(self) -> float | None:
         """The vertical speed that the drone follows, m/s, up positive, where it says a finite one.
 
-        The echo of the commands that have reached it.
+        The echo of the commands that have arrived.
         """
         return None if self.pwm is None else _finite(self.pwm.vz_ref)
 
@@ -226,20 +227,20 @@ _KINDS: dict[str, Any] = {
 _FIELDS: dict[int, tuple[str, Any]] = {1: ("clock", float)} | {
     kind.tag: (name, kind) for name, kind in _KINDS.items()
 }
-_LENGTHS = {tag: length for tag, length, _, _ in navdata_layouts()}
+_LENGTHS = {layout.tag: layout.length for layout in navdata_layouts()}
 
 
 def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
     """Read a packet of navdata.
 
-    Of an option that is there twice the first counts.
+    If an option occurs twice, the first one is used.
 
     Parameters
     ----------
     packet : bytes
         One datagram.
     checksum : bool, optional
-        Refuse a packet whose checksum does not match; otherwise `Navdata.checksum_matches` tells.
+        Refuse a packet whose checksum does not match; otherwise see `Navdata.checksum_matches`.
 
     Raises
     ------
@@ -258,26 +259,28 @@ def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
     Traceback (most recent call last):
     deadtime._base.errors.PacketError: navdata: the last option is no checksum, at byte 164
     """
-    (header, state, sequence, vision), read, matches = navdata_read(packet, checksum)
+    read = navdata_read(packet, checksum)
     known: dict[str, Any] = {}
-    for tag, _, values in read:
+    options = []
+    for option in read.options:
+        tag, values = option.tag, option.values
+        options.append((tag, option.body))
         if tag in _FIELDS and _FIELDS[tag][0] not in known:
             name, kind = _FIELDS[tag]
             known[name] = None if values is None else kind(*values)
-    options = tuple((tag, body) for tag, body, _ in read)
     return Navdata(
-        state,
-        sequence,
-        vision,
-        options=options,
-        header=header,
-        checksum_matches=matches,
+        state=read.state,
+        sequence=read.sequence,
+        vision=read.vision,
+        options=tuple(options),
+        header=read.header,
+        checksum_matches=read.checksum_matches,
         **known,
     )
 
 
 def build_navdata(navdata: Navdata) -> bytes:
-    """Write a packet of navdata, with the checksum that is right for it.
+    """Write a packet of navdata with its checksum.
 
     The options of `navdata.options` come first and in their order, with the known fields written
     over their bytes; then, by tag, those that are only in fields. None leaves bytes as they are.
@@ -297,8 +300,8 @@ def build_navdata(navdata: Navdata) -> bytes:
         (tag, body, fields.pop(tag, None)) for tag, body in navdata.options
     ]
     options += [(tag, bytes(_LENGTHS[tag]), fields[tag]) for tag in sorted(fields)]
-    head = (navdata.header, navdata.state, navdata.sequence, navdata.vision)
+    head = {name: getattr(navdata, name) for name in ("header", "state", "sequence", "vision")}
     try:
-        return navdata_write(head, options)
+        return navdata_write(options, **head)
     except OverflowError as error:
         raise ValueError(f"a word of the head {head}, or a tag: {error}") from None

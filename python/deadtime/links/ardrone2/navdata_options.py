@@ -1,4 +1,4 @@
-"""The parts of navdata whose fields are known, in SI units; signs and names as the drone has them.
+"""The options of navdata with known fields, in SI units, with the signs and names of the drone.
 
 The fields stand in the order of the native tables, which say where in the bytes they are.
 """
@@ -25,7 +25,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Demo:
-    """What every packet holds after the handshake.
+    """The option of every packet after the handshake.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class PhysicalMeasures:
 
 @dataclass(frozen=True)
 class References:
-    """What the drone is asked for: `ui_theta` and `ui_phi` echo the motion that was commanded.
+    """References of the drone: `ui_theta` and `ui_phi` echo the commanded motion.
 
     `ui_time` is the word of the drone's clock as a number, and no time of a command; `ui_seq` is
     0 on this drone.
@@ -112,7 +112,7 @@ class References:
 
 @dataclass(frozen=True)
 class RcReferences:
-    """What a remote control asks for; all 0 on this drone."""
+    """References of a remote control; all 0 on this drone."""
 
     tag: ClassVar[int] = 8
     pitch: int = 0
@@ -154,7 +154,7 @@ class AltitudeOption:
     altitude_vz : float
         Vertical speed, m/s, **down** positive.
     altitude_raw : float
-        What the ultrasound says, m; new every 40 ms.
+        Height of the ultrasound, m; new every 40 ms.
     """
 
     tag: ClassVar[int] = 10

@@ -1,10 +1,9 @@
-"""From navdata packets to states of the vehicle, believing no more of them than one can.
+"""Turn navdata packets into states of the vehicle, after checks of their plausibility.
 
-A packet counts if its checksum holds, its sequence number is above the last one by no more than the
-time that has passed allows, the drone's clock does not run backwards and its height has not jumped.
-Numbers begin anew only when the drone says that it is in bootstrap, or that it had lost its
-client and nothing was heard of it for a while: then its configuration is no longer ours, which
-whoever holds the link is told.
+A packet is accepted if its checksum is right, its sequence number is above the last one by no more
+than the elapsed time allows, the clock of the drone does not go back and its height does not jump.
+Its numbers restart only when the drone reports bootstrap, or the loss of its client after a
+silence: its configuration may then be another one, which is reported to the owner of the link.
 """
 
 from __future__ import annotations
@@ -31,13 +30,13 @@ __all__ = [
 #: The drone's clock counts its seconds in 11 bits.
 CLOCK_TURN = 2048.0
 
-#: Packets a second that are believed, with room for a burst: the drone sends 200.
+#: Largest plausible number of packets a second, with bursts: the drone sends 200.
 MOST_PACKETS, BURST = 1000.0, 100
 
-#: How long nothing is heard before numbers may begin anew after a com watchdog, s.
+#: Silence after which numbers may restart following a communication watchdog, s.
 SILENCE = 0.5
 
-#: How long a state tells of messages that were lost, s.
+#: Time for which a state reports lost messages, s.
 RECENT = 1.0
 
 #: Control states, the upper half of the word that navdata has for them.
@@ -45,7 +44,7 @@ FLYING, HOVERING = 3, 4
 TAKING_OFF, CLIMBING, LANDING = 6, 7, 8
 
 
-#: Bits of the drone's state with which it is not to be flown on, as of `VehicleState.fault`.
+#: Bits of the drone's state that end a flight, in the words of `VehicleState.fault`.
 FAULTS = {
     State.ULTRASOUND_DEAF: "its ultrasound is deaf",
     State.MOTORS_PROBLEM: "a motor does not turn as it should",
@@ -59,26 +58,26 @@ FAULTS = {
 
 @dataclass(frozen=True)
 class LinkStatistics:
-    """What came over the link.
+    """Statistics of the packets from a drone.
 
     Attributes
     ----------
     packets : int
-        All that arrived from the drone's address.
+        All packets from the address of the drone.
     states : int
-        Those that were believed and hold a state.
+        Accepted packets with a state.
     missing : int
-        Numbers that were left out and have not come later.
+        Sequence numbers that never arrived.
     duplicates, reordered : int
-        Repeated ones, and ones that came after a later one; neither is used.
+        Repeated packets, and packets that arrived after a later one; neither is used.
     broken : int
-        Not navdata, cut short, or with a wrong checksum.
+        Not navdata, truncated, or with a wrong checksum.
     implausible : int
-        With a sequence number, a clock or a height that cannot be.
+        With an impossible sequence number, clock or height.
     foreign : int
         From another address or port.
     restarts : int
-        How often the drone began to count anew.
+        How often the numbers of the drone restarted.
     longest_gap : float
         Longest time between two states, s.
     rate : float
@@ -104,22 +103,22 @@ class NavdataReader:
     Parameters
     ----------
     max_jump : float
-        Fastest change of the height that is believed, m/s.
+        Largest plausible rate of change of the height, m/s.
 
     Attributes
     ----------
     newest : VehicleState or None
         The newest state.
     navdata : Navdata or None
-        The packet it is from; also one of bootstrap, which holds no state.
+        Its packet; also one of bootstrap, which has no state.
     heard : float or None
-        When the last believed packet arrived, s.
+        Arrival of the last accepted packet, s.
     sent : float or None
-        When that packet was sent, s: by the drone's clock, set by the packet that took the shortest
-        way. It is later than the truth by the length of that way, which cannot be measured from one
-        end. None where the packet does not tell the drone's clock.
+        Time at which that packet was sent, s: by the clock of the drone, synchronised by the
+        fastest packet. It is too late by the delay of that packet, which cannot be measured from
+        one end. None where the packet does not hold the clock.
     restarts : int
-        How often the drone began to count anew.
+        How often the numbers of the drone restarted.
     """
 
     def __init__(self, max_jump: float = 5.0) -> None:
@@ -137,30 +136,30 @@ class NavdataReader:
 
     @property
     def statistics(self) -> LinkStatistics:
-        """What came until now."""
+        """The statistics until now."""
         rate = 0.0
         if self._first is not None and self.newest is not None and self.newest.time > self._first:
             rate = (self._counts.states - 1) / (self.newest.time - self._first)
         return replace(self._counts, restarts=self.restarts, rate=rate)
 
     def refuse(self) -> None:
-        """Count a packet from elsewhere."""
+        """Count a packet from another address."""
         self._count(foreign=1)
 
     def accept(self, packet: bytes, now: float) -> VehicleState | None:
-        """Take a packet in.
+        """Process a packet.
 
         Parameters
         ----------
         packet : bytes
-            As it arrived.
+            The received bytes.
         now : float
-            When, s.
+            Arrival, s.
 
         Returns
         -------
         VehicleState or None
-            The state it tells, which is then `newest`; None if it tells none or is not believed.
+            Its state, which is then `newest`; None if it has none or is not accepted.
         """
         self._count(packets=1)
         try:
@@ -187,7 +186,7 @@ class NavdataReader:
         return self._taken(navdata, clock, now)
 
     def _follows(self, navdata: Navdata, last: int, now: float) -> bool:
-        """Whether a packet is the next one, or the first of a new count."""
+        """Whether a packet follows the last one, or is the first of a new count."""
         silent = now - (self.heard if self.heard is not None else now)
         if navdata.sequence > last:
             if navdata.sequence - last <= BURST + MOST_PACKETS * silent:
@@ -203,19 +202,19 @@ class NavdataReader:
         if navdata.sequence == last:
             self._count(duplicates=1)
         else:
-            # One of those that were counted as missing when the later one came.
+            # It was counted as missing when a later one arrived.
             self._count(reordered=1, missing=-1 if self._counts.missing else 0)
         return False
 
     def _unwrapped(self, clock: float | None) -> float | None:
-        """The drone's clock without its turns."""
+        """The clock of the drone without its wraps."""
         if clock is None or self._clock is None:
             return clock
         ahead = (clock - self._clock) % CLOCK_TURN
         return self._clock + (ahead if ahead < 0.5 * CLOCK_TURN else ahead - CLOCK_TURN)
 
     def _passed(self, clock: float | None, now: float) -> float | None:
-        """Time since the last state by the clock that ran on more; None if one ran backwards."""
+        """Time since the last state, the larger of both clocks; None if one went back."""
         passed = 0.0 if self.newest is None else now - self.newest.time
         if clock is None or self._clock is None:
             return max(passed, 0.0)
@@ -251,40 +250,40 @@ class NavdataReader:
 
 
 def phase_of(navdata: Navdata) -> int | None:
-    """The control state, None where the packet does not say it."""
+    """The control state, None where the packet does not hold it."""
     return None if navdata.demo is None else navdata.demo.major
 
 
 def on_ground(navdata: Navdata) -> bool:
-    """Whether a drone is down, and not on its way up.
+    """Whether a drone is on the ground, and not taking off.
 
-    One that has forgotten its client says no more than whether it flies.
+    A drone that has dropped its client reports only whether it flies.
     """
     in_air = (FLYING, HOVERING, TAKING_OFF, CLIMBING, LANDING)
     return not navdata.flying and phase_of(navdata) not in in_air
 
 
 def unasked_end(navdata: Navdata, left_ground: bool) -> str | None:
-    """Why a drone that is asked to fly comes down or stays down; None while it does not.
+    """Why a drone that is commanded to fly lands or does not take off; None while it flies.
 
     Parameters
     ----------
     navdata : Navdata
     left_ground : bool
-        Whether it was in the air since it was asked to take off.
+        Whether it has been in the air since the take-off command.
     """
     if navdata.emergency:
         return "the vehicle reports an emergency"
     if navdata.communication_lost:
-        return "the vehicle has heard no command for 2 s, and lands by itself"
+        return "the vehicle has received no command for 2 s, and lands by itself"
     if phase_of(navdata) != LANDING and not (left_ground and on_ground(navdata)):
         return None
     fault = _fault_of(navdata)
     if fault is not None:
         return f"the vehicle lands by itself: {fault}"
     return (
-        "the vehicle lands without having been told so from here, and reports no fault: most "
-        "likely another client commands this drone"
+        "the vehicle lands without a command from here, and reports no fault: most likely "
+        "another client commands this drone"
     )
 
 
@@ -302,7 +301,7 @@ def _state_of(navdata: Navdata, clock: float | None, now: float, missing: int) -
         vehicle_time=clock,
         climb=navdata.climb,
         climb_setpoint=navdata.climb_setpoint,
-        # NaN is no angle that a watch would let pass.
+        # A NaN makes the watch end the flight.
         roll=math.nan if navdata.roll is None else navdata.roll,
         pitch=math.nan if navdata.pitch is None else navdata.pitch,
         battery=navdata.battery,

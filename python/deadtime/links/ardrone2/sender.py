@@ -1,14 +1,14 @@
-"""What is sent to the drone, cycle by cycle: a wish to fly or to land, and a motion that ages.
+"""The datagrams to the drone: a request to fly or to land, and a motion that expires.
 
-The drone wants to hear something every 30 ms. A motion that is older than `Limits.command_age`
-becomes hovering; when none has come for `Limits.landing_after`, landing.
+The drone expects a datagram every 30 ms. A motion that is older than `Limits.command_age` becomes
+hovering; without a new one for `Limits.landing_after` the drone lands.
 
-All of it happens in the event loop of the controller. When that has stood still, the drone may have
-landed meanwhile, and to repeat the wish of before would ask it to take off. So nothing repeats that
-wish: after a pause longer than `Limits.command_age` datagrams say to hover, and nothing of flying
-or landing, until navdata that were sent after the pause tell that the drone flies. After one longer
-than the drone's own watchdog they say to land, and also when the drone says that it is down, lands
-by itself, or obeys another client. Only `CommandSender.fly` asks to fly.
+All of it happens in the event loop of the controller. If that was paused, the drone may have landed
+meanwhile, and repeating the request to fly would make it take off. Therefore the request is not
+repeated: after a pause longer than `Limits.command_age`, datagrams command hovering and neither
+flying nor landing, until navdata that were sent after the pause show that the drone flies. After a
+pause longer than the watchdog of the drone they command landing; so they do when the drone reports
+that it is down, lands by itself, or obeys another client. Only `CommandSender.fly` requests to fly.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ __all__ = ["CYCLE", "CommandSender"]
 #: Time between two datagrams, s.
 CYCLE = 0.03
 
-#: Without a command for so long the drone lands by itself, s.
+#: Time without a command after which the drone lands by itself, s.
 WATCHDOG = 2.0
 
-#: Numbers of REF that are kept, to be recognised in navdata: those of the last half minute.
+#: Kept numbers of REF, to recognise them in navdata: those of the last half minute.
 KEPT = 1024
 
 
@@ -40,22 +40,22 @@ class CommandSender:
     Parameters
     ----------
     limits : Limits
-        The ages of a command.
+        Limits of the age of a command.
 
     Attributes
     ----------
     in_air : bool
-        Whether the drone is asked to be in the air.
+        Whether the drone is commanded to be in the air.
     guarded : bool
-        Whether a command that does not come lands the drone: in flight, not while taking off.
+        Whether missing commands land the drone: in flight, not while taking off.
     cut : bool
-        Whether the next datagram asks to toggle between emergency and normal.
+        Whether the next datagram toggles between emergency and normal.
     expired : str or None
-        Why the drone was asked to land without anybody having said so.
+        Why the drone was commanded to land without `land`.
     rival : str or None
-        How another client was noticed.
+        How another client was detected.
     resumed : float
-        When datagrams went out again after the last pause, s; minus infinity before any.
+        First datagram after the last pause, s; minus infinity before any pause.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -70,40 +70,40 @@ class CommandSender:
         self._given = 0.0
         self._next = 1
         self._sent: float | None = None
-        self._in_doubt = False
+        self._uncertain = False
         self._left_ground = False
         self._refs: deque[int] = deque(maxlen=KEPT)
         self._echo = 0
 
     def fly(self) -> None:
-        """Ask for taking off, hovering."""
+        """Command take-off, then hovering."""
         self.in_air, self.guarded, self.expired, self._move = True, False, None, Hover
-        self._in_doubt = self._left_ground = False
+        self._uncertain = self._left_ground = False
 
     def guard(self, now: float) -> None:
-        """From now on commands grow old, if the wish to fly still stands."""
+        """Let commands expire from now on, if the drone is still commanded to fly."""
         self.guarded, self._given = self.in_air, now
 
     def land(self) -> None:
-        """Ask for landing."""
-        self.in_air, self.guarded, self._move, self._in_doubt = False, False, Hover, False
+        """Command landing."""
+        self.in_air, self.guarded, self._move, self._uncertain = False, False, Hover, False
 
     def give_up(self, reason: str) -> None:
-        """Ask for landing although nobody has said so; the first reason is kept."""
+        """Command landing without `land`; the first reason is kept."""
         if self.in_air:
             self.land()
             self.expired = reason
 
     def climb(self, share: UnitCommand, now: float) -> UnitCommand:
-        """Ask for a share of the largest vertical speed; tell what is sent, 0 while in doubt."""
+        """Command a share of the largest vertical speed; return what is sent, 0 while uncertain."""
         self.age(now)
         self._given = now
-        moves = self.guarded and not self._in_doubt
+        moves = self.guarded and not self._uncertain
         self._move = Move(gaz=share) if moves else Hover
         return self._move.gaz
 
     def hover(self, now: float) -> None:
-        """Ask for no motion."""
+        """Command no motion."""
         self.age(now)
         self._move, self._given = Hover, now
 
@@ -117,12 +117,12 @@ class CommandSender:
         alive : bool
             Whether to reset the drone's watchdog.
         more : sequence of Command
-            What else to say, once.
+            Further commands for this datagram.
         """
         self.age(now)
         self._sent = now
         commands: list[Command] = []
-        if not self._in_doubt:
+        if not self._uncertain:
             commands.append(Ref(take_off=self.in_air, emergency=self.cut))
             self._refs.appendleft(self._next)
             self.cut = False
@@ -134,24 +134,24 @@ class CommandSender:
         return encode(commands, first)
 
     def age(self, now: float) -> None:
-        """Let what is too old by now lapse."""
+        """Let commands expire that are too old."""
         self._notice_pause(now)
         if not self.in_air:
             return
         most = self.limits.landing_after
-        if self._in_doubt and now - self.resumed > most:
+        if self._uncertain and now - self.resumed > most:
             self.give_up(
-                f"nothing that the vehicle sent after a pause of this program has come for {most:g}"
-                " s: the vehicle was told to land"
+                f"no message sent after a pause of this program has been received for {most:g}"
+                " s: the vehicle was commanded to land"
             )
         age = now - self._given
         if self.guarded and age > self.limits.command_age:
             self._move = Hover
         if self.guarded and age > most:
-            self.give_up(f"no command for {age:.2f} s: the vehicle was told to land")
+            self.give_up(f"no command for {age:.2f} s: the vehicle was commanded to land")
 
     def _notice_pause(self, now: float) -> None:
-        """Repeat no wish of before a pause in which the vehicle may have landed."""
+        """Do not repeat a request from before a pause in which the vehicle may have landed."""
         pause = 0.0 if self._sent is None else now - self._sent
         if pause <= min(max(self.limits.command_age, 3.0 * CYCLE), WATCHDOG):
             return
@@ -159,11 +159,11 @@ class CommandSender:
         self._move = Hover
         if pause > WATCHDOG:
             self.give_up(
-                f"this program stood still for {pause:.2f} s, in which the vehicle's own watchdog "
-                f"lands it ({WATCHDOG:g} s): the vehicle was told to land"
+                f"this program was paused for {pause:.2f} s, in which the vehicle's own watchdog "
+                f"lands it ({WATCHDOG:g} s): the vehicle was commanded to land"
             )
         else:
-            self._in_doubt = self.in_air
+            self._uncertain = self.in_air
 
     def received(self, navdata: Navdata, sent: float | None) -> None:
         """Compare the request to fly with what the drone reports.
@@ -180,17 +180,17 @@ class CommandSender:
         ended = self.rival or unasked_end(navdata, self._left_ground)
         if ended is not None:
             self.give_up(ended)
-        # The drone warns when it has heard nothing for 50 ms; if it does not, and said so after the
-        # pause, it has heard what came after the pause.
+        # The drone warns after 50 ms without a command; without this warning in navdata from after
+        # the pause, it has received commands after the pause.
         elif sent is not None and sent > self.resumed and not navdata.com_watchdog:
-            self._in_doubt = False
+            self._uncertain = False
 
     def _look_for_others(self, navdata: Navdata) -> None:
-        """Compare the number of the last REF that the drone carried out with those sent here.
+        """Compare the number of the last REF that the drone executed with those sent here.
 
-        Of one client it never goes back; what it is before the first of this one says nothing.
+        For one client it never goes back; before the first one of this client it has no meaning.
         """
-        if navdata.bootstrap:  # it has forgotten everybody
+        if navdata.bootstrap:  # it has dropped all clients
             self._echo = 0
         if navdata.video_stream is None:
             return
@@ -199,6 +199,6 @@ class CommandSender:
             self._echo = number
         elif self._echo:
             self.rival = (
-                f"another client commands this drone: it has carried out REF number {number}, which"
+                f"another client commands this drone: it has executed REF number {number}, which"
                 " was not sent from here. End the other client, and connect again"
             )

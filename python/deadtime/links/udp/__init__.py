@@ -1,8 +1,8 @@
-"""A control loop over UDP: plant, controller, and a relay that stands for the network between.
+"""A control loop over UDP: plant, controller, and a relay that emulates the network.
 
 The integrator of section 2.1 of Armah & Yi on one computer, its controller on another. Every packet
 carries a number, its time, and the number and time of the one it answers, so that the round trip
-is measured while the loop runs. All parts work in the running event loop, real or virtual;
+is measured during the run. All parts run in the current event loop, in real or virtual time;
 ``python -m deadtime.links.udp`` runs each as a process of its own.
 """
 

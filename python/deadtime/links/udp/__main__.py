@@ -1,8 +1,8 @@
 """``python -m deadtime.links.udp controller|relay|plant``: each part as a process of its own.
 
-Each says where it listens in one line of JSON when it is ready, and what happened in another when
-it ends: after its time, by Ctrl-C or SIGTERM, or with whoever started it. Nothing but the base of
-the package is needed, so that either end can run on a small computer.
+Each prints its address as a line of JSON when it is ready, and its report as another one when it
+ends: after its time, by Ctrl-C or SIGTERM, or with its parent process. No extras are needed, so
+that either end can run on a small computer.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ async def _run_plant(given: argparse.Namespace) -> None:
             _say(report=plant.report().to_dict())
 
 
-#: From the plant to the controller, and back.
+#: From the plant to the controller, and from the controller to the plant.
 PATHS = ("forward_path", "return_path")
 
 LOOPBACK = ("127.0.0.1", 0)
@@ -156,7 +156,7 @@ def _address(text: str) -> Address:
 def _time(text: str) -> float:
     time = float(text)
     if not time > 0.0:
-        raise argparse.ArgumentTypeError(f"{text} s is no time to run for: give more than zero")
+        raise argparse.ArgumentTypeError(f"{text} s: give a time above zero")
     return time
 
 
@@ -173,7 +173,7 @@ def _parser() -> argparse.ArgumentParser:
         "--every", action="store_true", help="answer every measurement, for a jitter buffer"
     )
 
-    relay = parts.add_parser("relay", help="stands for the network between")
+    relay = parts.add_parser("relay", help="emulates the network between them")
     relay.set_defaults(run=_run_relay)
     relay.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
     relay.add_argument("--to", type=_address, required=True, help="the controller")
@@ -192,7 +192,7 @@ def _parser() -> argparse.ArgumentParser:
         )
     relay.add_argument("--seed", type=int, default=0, help="of delays and losses")
 
-    plant = parts.add_parser("plant", help="an integrator that samples and obeys")
+    plant = parts.add_parser("plant", help="an integrator with sampled output")
     plant.set_defaults(run=_run_plant)
     plant.add_argument(
         "--controller", type=_address, required=True, help="the controller, or a relay"
@@ -213,7 +213,7 @@ def _parser() -> argparse.ArgumentParser:
         part.add_argument(
             "--until-input-ends",
             action="store_true",
-            help="end when standard input does, as whoever started this does",
+            help="end at the end of standard input, that is with the parent process",
         )
     for part in (controller, plant):
         part.add_argument("--limit", type=float, default=20.0, help="largest size of the command")
@@ -225,8 +225,8 @@ def _parser() -> argparse.ArgumentParser:
             type=int,
             nargs=2,
             metavar=("IN", "OUT"),
-            help="speak in bare doubles as Simulink does, so many in a datagram from the other end "
-            "and to it",
+            help="use plain doubles as Simulink does: their number in a datagram from and to the "
+            "other end",
         )
     return parser
 

@@ -1,8 +1,8 @@
-"""The end with the controller: it answers the newest measurement, at once.
+"""The controller's end of the loop: it answers the newest measurement at once.
 
-Safety: a measurement that is not finite or older than the last one is not answered, the answer is
-within the limit. When measurements stop coming, the plant is told to be safe, in case the way to it
-still works, for a while; then the controller falls silent and is ready for another plant.
+Safety: a measurement that is not finite or older than the last one is not answered, and the answer
+is within the limit. Without measurements the controller sends the safe command for some time, in
+case the return path still works; then it stops and accepts another plant.
 """
 
 from __future__ import annotations
@@ -31,35 +31,36 @@ __all__ = ["Controller", "ControllerOptions", "ControllerReport"]
 #: Columns of the controller's recording.
 COLUMNS = ("time_s", "reference", "output", "command", "measured_s")
 
-#: Times the watchdog's that the safe command is repeated, and how often in each.
+#: Duration for which the safe command is repeated, in watchdog times, and repetitions in each.
 REPEATED, EACH = 4, 10
 
 
 @dataclass(frozen=True)
 class ControllerOptions:
-    """The controller's end, as a description: command = gain (reference - output).
+    """Options of the controller's end: command = gain (reference - output).
 
     Parameters
     ----------
     gain : float
-        Of the controller, 1/s for an integrator.
+        Gain of the controller, 1/s for an integrator.
     listen : (str, int)
-        Where to listen; port 0 takes a free one.
+        Address for receiving; port 0 takes a free one.
     plant : (str, int) or None
-        Who is answered; None: whoever sends a measurement first, until they fall silent.
+        The plant that is answered; None for the first sender of a measurement, until it is silent.
     limit : float
         Largest size of the command.
     watchdog : float
         Longest time without a measurement, s.
     safe : float
-        The command that is sent when the watchdog bites; a plant that reads its flag applies the
-        one that it has declared itself.
+        The command that is sent when the watchdog trips; a plant that reads its flag applies its
+        own safe command.
     every : bool
-        Answer every measurement, as a plant with a jitter buffer needs it; else the newest alone.
+        Answer every measurement, as a plant with a jitter buffer requires; otherwise the newest
+        only.
     recording : Path or None
         CSV file, written row by row.
     doubles : (int, int) or None
-        Speak in bare doubles, so many from the plant and to it.
+        Use plain doubles: their number from the plant and to it.
     """
 
     gain: float
@@ -82,7 +83,7 @@ class ControllerOptions:
 
 @dataclass(frozen=True, eq=False)
 class ControllerReport:
-    """What happened at the controller; recording and times are those of the last 100 000.
+    """Report of the controller; recording and times are those of the last 100 000 packets.
 
     Attributes
     ----------
@@ -93,14 +94,14 @@ class ControllerReport:
     answered : int
         Measurements that were answered.
     drained : int
-        Measurements that were left for a newer one that was there already.
+        Measurements that were skipped for a newer one.
     trips : int
-        How often measurements stopped coming.
+        How often the watchdog tripped.
     largest_command : float
         Largest size.
     recording : Recording or None
-        Time by this clock from the first measurement on, reference, output as it was received,
-        command as it was sent; None where the run was too short.
+        Time by this clock from the first measurement on, reference, received output, sent
+        command; None if the run was too short.
     """
 
     link: LinkReport
@@ -121,7 +122,7 @@ class ControllerReport:
 
 
 class Controller:
-    """A controller at work: ``async with Controller(options) as controller``."""
+    """A running controller: ``async with Controller(options) as controller``."""
 
     def __init__(self, options: ControllerOptions) -> None:
         self.options = options
@@ -150,18 +151,21 @@ class Controller:
     async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if self._watchdog is not None:
             self._watchdog.cancel()
-        self._send_safe()  # told now, the plant need not wait for its watchdog
+        self._send_safe()  # so that the plant need not wait for its watchdog
         self._stack.close()
         if kind is None:
             self._endpoint.check()
 
     async def running(self, time: float) -> None:
-        """Work for so long, s; raises what it cannot work on with, such as a full disk."""
+        """Run for `time` seconds.
+
+        Raises errors that stop the loop, for example `OSError` when the disk is full.
+        """
         await self._endpoint.running(time)
 
     @property
     def address(self) -> Address:
-        """Where the controller listens."""
+        """The address of the controller."""
         return self._endpoint.address
 
     def _take(self, batch: list[tuple[LoopPacket, float]]) -> None:
@@ -174,15 +178,15 @@ class Controller:
             elif packet.sequence > self._newest:
                 fresh.append((packet, read))
             else:
-                statistics.came_late(self._behind(packet))
+                statistics.came_late(self._lateness(packet))
         if not fresh:
             return
         packet, read = max(fresh, key=lambda one: one[0].sequence)
         self._drained += len(fresh) - 1
         self._answer(packet, read)
 
-    def _behind(self, packet: LoopPacket) -> float:
-        """How much older than the last one that was answered a measurement is."""
+    def _lateness(self, packet: LoopPacket) -> float:
+        """By how much a measurement is older than the last answered one, s."""
         return max(0.0, self._last[0].sent - packet.sent) if self._last is not None else 0.0
 
     def _answer(self, packet: LoopPacket, read: float) -> None:
@@ -204,10 +208,10 @@ class Controller:
             self._newest, self._last = packet.sequence, (packet, read)
         if self._watchdog is not None:
             self._watchdog.cancel()
-        self._watchdog = self._loop.call_later(self.options.watchdog, self._bite, 0)
+        self._watchdog = self._loop.call_later(self.options.watchdog, self._trip, 0)
 
     def _send(self, command: float, packet: LoopPacket, read: float, flags: int = 0) -> float:
-        """Send a command in answer to a measurement; the time at which it was."""
+        """Send a command in answer to a measurement; return the time."""
         now = self._loop.time()
         self._sequence += 1
         self._endpoint.send(
@@ -228,21 +232,21 @@ class Controller:
         if self._last is not None:
             self._send(self.options.safe, *self._last, flags=SAFE)
 
-    def _bite(self, times: int) -> None:
-        """Measurements stopped coming: say so for a while, then be ready for another plant."""
+    def _trip(self, times: int) -> None:
+        """Send the safe command for some time, then accept another plant."""
         if times == 0:
             self._trips += 1
-            self._newest = 0  # the same plant may start anew
+            self._newest = 0  # the same plant may restart
         if times == REPEATED * EACH:
             self._last, self._watchdog = None, None
             self._endpoint.forget_peer()
             return
         self._send_safe()
         again = self.options.watchdog / EACH
-        self._watchdog = self._loop.call_later(again, self._bite, times + 1)
+        self._watchdog = self._loop.call_later(again, self._trip, times + 1)
 
     def report(self) -> ControllerReport:
-        """What happened until now."""
+        """The report until now."""
         recording = None
         times = [row[0] for row in self._rows]
         if len(self._rows) >= MINIMUM_SAMPLES:

@@ -67,7 +67,7 @@ class Normal:
 
 @dataclass(frozen=True)
 class _Queued:
-    """A shortest delay with a wait on top of it: its numbers, checked."""
+    """A shortest delay plus a random wait, with checked parameters."""
 
     least: float
     mean: float
@@ -77,12 +77,14 @@ class _Queued:
         non_negative("least", self.least)
         positive("deviation", self.deviation)
         if not self.mean > self.least:
-            raise ValueError(f"mean={self.mean} is not above least={self.least}: give a longer one")
+            raise ValueError(
+                f"mean={self.mean} is not above least={self.least}: give a larger mean"
+            )
 
 
 @dataclass(frozen=True)
 class ShiftedGamma(_Queued):
-    """A shortest delay, and a gamma-distributed wait on top of it, as queues make it.
+    """A shortest delay plus a gamma-distributed wait, as in queues.
 
     Parameters
     ----------
@@ -103,7 +105,7 @@ class ShiftedGamma(_Queued):
 
 @dataclass(frozen=True)
 class LogNormal(_Queued):
-    """A shortest delay, and a log-normally distributed wait on top of it, with its long tail.
+    """A shortest delay plus a log-normally distributed wait, which has a long tail.
 
     Parameters
     ----------

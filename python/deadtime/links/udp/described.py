@@ -1,4 +1,4 @@
-"""Networks, policies and options in words: as options of a command, as JSON, and back."""
+"""Networks, policies and options as command-line arguments and JSON, and back."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ __all__ = [
     "policy_of",
 ]
 
-#: Kinds of delays and policies by the names that options have for them.
+#: Names of delays and policies in options.
 DELAYS = ("normal", "gamma", "lognormal")
 POLICIES = ("newest", "drop-late", "hold", "jitter-buffer")
 
 KINDS = {"constant": Constant, "normal": Normal, "gamma": ShiftedGamma, "lognormal": LogNormal}
 
-#: Part of the mean delay that is the shortest one, where a distribution has such.
+#: Shortest delay of a distribution that has one, as a share of the mean.
 LEAST = 0.8
 
 
 def delays_of(kind: str, mean: float, deviation: float) -> Delays:
-    """One-way delays of this kind; constant ones where there is no deviation."""
+    """One-way delays of this kind; constant ones without deviation."""
     if kind not in DELAYS:
         raise ValueError(f"the delays {kind!r} are none of {', '.join(DELAYS)}")
     if deviation == 0.0:
@@ -58,7 +58,7 @@ def network_of(
     duplication: float = 0.0,
     ordered: bool = False,
 ) -> Network:
-    """One direction of a network, by the numbers that options give.
+    """One direction of a network, from the numbers of options.
 
     Parameters
     ----------
@@ -68,11 +68,11 @@ def network_of(
     delay, jitter : float
         Mean and standard deviation of the one-way delay, s.
     loss : float
-        Part of the packets that are lost.
+        Share of lost packets.
     burst : float
-        Mean number of packets that are lost together; 1 loses each by itself.
+        Mean number of packets lost in a row; 1 for independent losses.
     duplication : float
-        Part of the packets that arrive twice.
+        Share of packets that arrive twice.
     ordered : bool
         Whether no packet overtakes another.
 
@@ -98,13 +98,13 @@ def policy_of(name: str, number: float | None = None) -> Policy:
     name : str
         ``"newest"``, ``"drop-late"``, ``"hold"`` or ``"jitter-buffer"``.
     number : float, optional
-        Its time in s, or how many samples are held.
+        Its time in s, or the number of held samples.
     """
     if name not in POLICIES:
         raise ValueError(f"the policy {name!r} is none of {', '.join(POLICIES)}")
     if name == "newest":
         if number is not None:
-            raise ValueError(f"the policy 'newest' takes no number, {number:g} was given")
+            raise ValueError(f"the policy 'newest' takes no number: leave {number:g} out")
         return NewestWins()
     if number is None:
         what = "a number of samples" if name == "hold" else "a time in s"
@@ -117,7 +117,7 @@ def policy_of(name: str, number: float | None = None) -> Policy:
 
 
 def plain(value: Any) -> Any:
-    """The value with None in place of what JSON has no word for."""
+    """The value with None in place of numbers that JSON cannot represent."""
     if isinstance(value, dict):
         return {key: plain(one) for key, one in value.items()}
     if isinstance(value, (list, tuple)):
@@ -134,12 +134,12 @@ def network_text(network: Network) -> str:
         if type(network.delay) is made:
             words["delay"]["kind"] = kind
     if isinstance(words["delay"], dict) and "kind" not in words["delay"]:
-        raise ValueError(f"the delays {network.delay} have no name that another process knows")
+        raise ValueError(f"the delays {network.delay} cannot be given to another process")
     return json.dumps(words)
 
 
 def network_from(text: str) -> Network:
-    """The network that `network_text` put into words."""
+    """The network of a text from `network_text`."""
     try:
         words = json.loads(text)
         if isinstance(words["delay"], dict):
@@ -163,7 +163,7 @@ def policy_words(policy: Policy) -> tuple[str, float | None]:
         return "drop-late", policy.older_than
     if isinstance(policy, JitterBuffer):
         return "jitter-buffer", policy.delay
-    raise ValueError(f"{policy} has no name that another process knows")
+    raise ValueError(f"{policy} cannot be given to another process")
 
 
 def arguments_of(options: ControllerOptions | RelayOptions | PlantOptions) -> list[str]:
@@ -188,6 +188,6 @@ def arguments_of(options: ControllerOptions | RelayOptions | PlantOptions) -> li
             to = "to" if isinstance(options, RelayOptions) and name == "controller" else name
             arguments += [f"--{to}", f"{host}:{port}"]
         else:
-            # In one word: a negative number would be taken for another option.
+            # As one argument: a negative number would be parsed as another option.
             arguments += [f"--{name}={value}"]
     return arguments

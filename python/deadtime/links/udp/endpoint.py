@@ -1,4 +1,4 @@
-"""One UDP socket that speaks with one other, and reads what comes in batches."""
+"""A UDP endpoint with one peer, which processes received packets in batches."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Any, cast
 
 from deadtime._base.errors import LinkError, PacketError
 from deadtime.links.addresses import Address, canonical, for_socket, is_loopback
-from deadtime.links.udp.judgement import REMEMBERED, Judgement, Verdict
+from deadtime.links.udp.classifier import REMEMBERED, Classifier, Verdict
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.statistics import LinkStatistics
 from deadtime.links.udp.wires import SAFE, Wire
 
 __all__ = ["Endpoint", "Socket", "open_socket", "resolved", "speaking_to"]
 
-#: Packets of a batch that is still waiting for the last one; a flood must not keep it waiting.
+#: Largest batch, so that a flood does not delay its processing.
 LARGEST_BATCH = 64
 
 
 class Socket(asyncio.DatagramProtocol):
-    """A UDP socket of the running loop that hands on what comes, and the `canonical` sender."""
+    """A UDP socket of the running loop that passes on datagrams with the `canonical` sender."""
 
     def __init__(self, receive: Callable[[bytes, Address], None]) -> None:
         self._receive = receive
@@ -39,11 +39,11 @@ class Socket(asyncio.DatagramProtocol):
         self._receive(data, (canonical(addr[0]), addr[1]))
 
     def error_received(self, exc: Exception) -> None:
-        """Called by asyncio: nobody listens there (yet), which the watchdogs see to."""
+        """Called by asyncio: nobody listens (yet), which the watchdogs handle."""
 
     @property
     def address(self) -> Address:
-        """Where this socket listens."""
+        """The address of this socket."""
         assert self._transport is not None
         host, port = self._transport.get_extra_info("sockname")[:2]
         return host, port
@@ -71,18 +71,18 @@ async def open_socket(receive: Callable[[bytes, Address], None], address: Addres
         ) from None
     if not is_loopback(address[0]):
         print(
-            f"listening on {address[0]}: whoever reaches this port from outside can speak to it",
+            f"listening on {address[0]}: every host that reaches this port can send to it",
             file=sys.stderr,
         )
     return socket
 
 
 def speaking_to(address: Address) -> Address:
-    """Where a socket listens that speaks to a numeric address: no wider than it has to."""
-    there = ipaddress.ip_address(address[0])
-    if there.is_loopback:  # a socket on the loopback cannot send elsewhere
-        return ("127.0.0.1" if there.version == 4 else "::1"), 0
-    return ("0.0.0.0" if there.version == 4 else "::"), 0
+    """The narrowest address to bind a socket that sends to a numeric address."""
+    target = ipaddress.ip_address(address[0])
+    if target.is_loopback:  # a socket on the loopback cannot send elsewhere
+        return ("127.0.0.1" if target.version == 4 else "::1"), 0
+    return ("0.0.0.0" if target.version == 4 else "::"), 0
 
 
 async def resolved(address: Address) -> Address:
@@ -95,7 +95,7 @@ async def resolved(address: Address) -> Address:
     """
     host, port = address
     if port == 0:
-        raise LinkError(f"nobody can be reached at port 0 of {host}: give the port it listens on")
+        raise LinkError(f"port 0 of {host} cannot receive: give the port it listens on")
     try:
         ipaddress.ip_address(host)
     except ValueError:
@@ -114,22 +114,21 @@ async def resolved(address: Address) -> Address:
 
 
 class Endpoint:
-    """The socket of one end of the loop: checked peer, decoded and judged packets, in batches.
+    """The socket of one end of the loop: checks the peer, decodes and classifies packets.
 
     Parameters
     ----------
     wire : Wire
-        How packets are on the wire.
+        The wire format.
     take : callable
-        Called with the packets of a batch and the times at which they were read. A batch is what
-        came in until a pass of the event loop brought nothing more.
+        Called with the packets of a batch and the times at which they were read. A batch ends with
+        a pass of the event loop in which nothing arrived.
     peer : (str, int), optional
-        The other end. Without, it is whoever sends the first packet that is one.
+        The other end; by default the sender of the first valid packet.
     answers_only : bool
-        Take answers to what this end has sent, and no other packets. Bare doubles answer nothing
-        that could be told, and are all taken.
+        Accept answers to packets of this end only. Plain doubles have no echo and are all accepted.
     remembered : int
-        How many of the packets sent can be answered.
+        Number of sent packets that can be answered.
     """
 
     def __init__(
@@ -142,7 +141,7 @@ class Endpoint:
         remembered: int = REMEMBERED,
     ) -> None:
         self.statistics = LinkStatistics()
-        self._judgement = Judgement(remembered)
+        self._classifier = Classifier(remembered)
         self._answers_only = answers_only and wire.has_times
         self._wire, self._take = wire, take
         self._fixed_peer = peer
@@ -161,24 +160,24 @@ class Endpoint:
 
     @property
     def address(self) -> Address:
-        """Where this end listens."""
+        """The address of this end."""
         if self._socket is None:
             raise LinkError("the endpoint is not open: call open() first")
         return self._socket.address
 
     def forget_peer(self) -> None:
-        """Be ready for another peer, or for the same one started anew."""
+        """Accept another peer, or the same one after a restart."""
         self.peer = self._fixed_peer
         self.statistics.restart()
 
     def send(self, packet: LoopPacket) -> None:
         """Send a packet to the peer, if there is one."""
-        self._judgement.sent(packet.sequence, packet.sent)
+        self._classifier.sent(packet.sequence, packet.sent)
         if self._socket is not None and self.peer is not None:
             self._socket.send(self._wire.encode(packet), self.peer)
 
     def close(self) -> None:
-        """Close the socket; what has come and was not taken yet is left."""
+        """Close the socket and drop the current batch."""
         if self._socket is not None:
             self._socket.close()
             self._closed.set()
@@ -190,14 +189,14 @@ class Endpoint:
         self.close()
 
     async def running(self, time: float) -> None:
-        """Wait for so long, s, or until the endpoint fails; raises the error then."""
+        """Wait for `time` seconds, or until the endpoint fails; raises its error then."""
         with suppress(TimeoutError):
             async with asyncio.timeout(None if math.isinf(time) else time):
                 await self._closed.wait()
         self.check()
 
     def check(self) -> None:
-        """Raise the error that the endpoint failed by, if it did."""
+        """Raise the error of the endpoint, if it has failed."""
         if self._failure is not None:
             raise self._failure
 
@@ -213,7 +212,7 @@ class Endpoint:
         except PacketError:
             self.statistics.invalid += 1
             return
-        verdict = self._judgement.of(packet, now)
+        verdict = self._classifier.of(packet, now)
         answers = verdict is Verdict.ANSWER
         if verdict is Verdict.IMPOSSIBLE or (self._answers_only and not answers):
             self.statistics.invalid += 1
@@ -230,10 +229,10 @@ class Endpoint:
             self._hand_over()
 
     def _look_again(self, before: int) -> None:
-        """Hand the batch over once a whole pass of the event loop added nothing to it.
+        """Process the batch once a whole pass of the event loop added nothing to it.
 
-        A selector loop reads one datagram of a socket in each pass, after the callbacks that were
-        due: only the second look has seen what was there to be read.
+        A selector loop reads one datagram of a socket in each pass, after the due callbacks, so
+        only the second check sees all waiting datagrams.
         """
         if not self._batch:
             return
@@ -247,5 +246,5 @@ class Endpoint:
         try:
             self._take(batch)
         except Exception as error:
-            # In a callback of the event loop it would be printed and forgotten.
+            # In a callback the event loop would only print the error.
             self.fail(error)

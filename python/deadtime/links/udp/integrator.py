@@ -1,9 +1,9 @@
-"""The plant of the loop: an integrator, with a lag where wanted, exact between changes of command.
+"""The plant of the loop: an integrator with optional lag, exact between changes of the command.
 
     lag v' + v = gain w,    y' = v.
 
-With w held over a time h, and e = exp(-h/lag), both are known in closed form; a run has no error
-of integration, however unevenly the commands arrive.
+With w held over a time h, and e = exp(-h/lag), both have a closed form, so a run has no error of
+integration for any times of the commands.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ class HeldIntegrator:
         non_negative("lag", self.lag)
 
     def advance(self, time: float, command: float) -> None:
-        """Let so much time pass, s, under this command."""
-        wanted = self.gain * command
+        """Advance by a time, s, under this command."""
+        requested = self.gain * command
         if self.lag == 0.0:
-            self.velocity = wanted
-            self.output += wanted * time
+            self.velocity = requested
+            self.output += requested * time
             return
-        missing = self.velocity - wanted
+        missing = self.velocity - requested
         decayed = -math.expm1(-time / self.lag)
-        self.output += wanted * time + missing * self.lag * decayed
-        self.velocity = wanted + missing * (1.0 - decayed)
+        self.output += requested * time + missing * self.lag * decayed
+        self.velocity = requested + missing * (1.0 - decayed)

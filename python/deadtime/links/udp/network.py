@@ -1,9 +1,9 @@
-"""What a network does to packets: delay, loss, repetition, another order, a rate, blackouts.
+"""Model of a network: delay, loss, repetition, reordering, limited rate, blackouts.
 
-`Network` describes it; `Network.path` is one direction of it, with random numbers of its own. The
-delays, the losses and the repetitions have a generator each, so that another loss leaves the delays
-of the packets as they were. A path is told when a packet comes in and says what comes out and
-when; it knows no sockets and no clock.
+`Network` describes it; `Network.path` is one direction with its own random numbers. Delays, losses
+and repetitions have separate generators, so that another loss does not change the delays of other
+packets. A path computes from the arrival of a packet what leaves and when; it has no sockets and no
+clock.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ __all__ = ["Bursts", "Network", "Path"]
 
 @dataclass(frozen=True)
 class Bursts:
-    """Losses that come together (Gilbert 1960, Elliott 1963): a good state and a bad one.
+    """Bursts of losses (Gilbert 1960, Elliott 1963): a good state and a bad one.
 
     Parameters
     ----------
     begin, end : float
-        Probabilities, a packet, of going from the good state to the bad one and back.
+        Probabilities for each packet of a change from the good state to the bad one, and back.
     good, bad : float
         Probabilities of losing a packet in each state.
 
@@ -51,18 +51,18 @@ class Bursts:
 
     @property
     def mean(self) -> float:
-        """Part of the packets that are lost in the long run."""
+        """Long-run share of lost packets."""
         bad = self.begin / (self.begin + self.end) if self.begin else 0.0
         return self.good + bad * (self.bad - self.good)
 
     @staticmethod
     def of(loss: float, length: float) -> Bursts:
-        """The bursts of `length` packets on average that lose this part of all packets."""
+        """Bursts of `length` packets on average that lose this share of all packets."""
         _probability("loss", loss)
         if loss >= 1.0:
-            raise ValueError(f"loss={loss}: give less than 1, all is lost else")
+            raise ValueError(f"loss={loss}: give a number below 1")
         if not finite("length", length) >= 1.0:
-            raise ValueError(f"length={length}: a burst is one packet at least")
+            raise ValueError(f"length={length}: give at least 1")
         end = 1.0 / length
         begin = end * loss / (1.0 - loss)
         if begin > 1.0:
@@ -74,7 +74,7 @@ class Bursts:
 
 @dataclass(frozen=True)
 class Network:
-    """One direction of a network, as a description.
+    """Options of one direction of a network.
 
     Parameters
     ----------
@@ -85,15 +85,15 @@ class Network:
     duplication : float
         Probability that a packet arrives a second time, with a delay of its own.
     ordered : bool
-        Whether a packet waits for those sent before it, as in one queue; without, they overtake.
+        Whether packets stay in order, as in one queue; otherwise they may overtake each other.
     rate : float or None
-        Bytes a second that pass, one packet after the other.
+        Largest rate in bytes a second, one packet after the other.
     queue : float
         Longest wait for the rate, s; a packet that would wait longer is dropped.
     blackouts : tuple of (float, float)
-        Times between which nothing passes, s after the start of the path.
+        Intervals in which nothing passes, s after the start of the path.
     reversed_groups : int
-        So many packets are kept and passed on in reversed order; 1 is none.
+        Packets are collected in groups of this size and passed on in reversed order; 1 for none.
     """
 
     delay: Delays | float = 0.0
@@ -118,7 +118,7 @@ class Network:
         for start, stop in self.blackouts:
             if not finite("blackout", start) < finite("blackout", stop):
                 raise ValueError(
-                    f"the blackout ({start}, {stop}) s is empty: the start comes first"
+                    f"the blackout ({start}, {stop}) s is empty: give the start before the end"
                 )
 
     def path(self, seed: int | str) -> Path:
@@ -133,16 +133,16 @@ def _probability(name: str, value: float) -> None:
 
 @dataclass
 class Path:
-    """One direction of a network at work.
+    """One direction of a network during a run.
 
     Attributes
     ----------
     network : Network
         Its description.
     seed : int or str
-        What its random numbers follow from.
+        Seed of its random numbers.
     sent, lost, dropped, duplicated : int
-        Packets that came in, that were lost, for which the queue was too long, that came twice.
+        Packets that were sent, lost, dropped because the queue was too long, and duplicated.
 
     Examples
     --------
@@ -164,14 +164,14 @@ class Path:
     _kept: list[bytes] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        given = self.network.delay
-        self._delay = Constant(float(given)) if isinstance(given, (int, float)) else given
+        delay = self.network.delay
+        self._delay = Constant(float(delay)) if isinstance(delay, (int, float)) else delay
         self._delays = random.Random(f"{self.seed} delays")
         self._losses = random.Random(f"{self.seed} losses")
         self._copies = random.Random(f"{self.seed} copies")
 
     def send(self, now: float, packet: bytes) -> list[tuple[float, bytes]]:
-        """What arrives because of this packet, and when; `now` is s since the path's start."""
+        """The packets that leave because of this one, and their times, s since the start."""
         self.sent += 1
         lost = self._loses()
         if lost or any(start <= now < stop for start, stop in self.network.blackouts):
@@ -196,7 +196,7 @@ class Path:
         return released
 
     def counts(self) -> dict[str, int]:
-        """Packets by what became of them."""
+        """Numbers of packets by their fate."""
         names = ("sent", "lost", "dropped", "duplicated")
         return {name: getattr(self, name) for name in names}
 
@@ -209,7 +209,7 @@ class Path:
         return self._losses.random() < (loss.bad if self._bad else loss.good)
 
     def _through_the_queue(self, now: float, size: int) -> float | None:
-        """When the last byte has left, or None where the packet does not fit into the queue."""
+        """Time at which the last byte has left; None if the queue is too long."""
         if self.network.rate is None:
             return now
         begins = max(now, self._free)

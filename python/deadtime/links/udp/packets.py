@@ -1,4 +1,4 @@
-"""What travels between the plant and the controller of a loop over UDP."""
+"""The packets between the plant and the controller of a loop over UDP."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["LoopPacket", "decode_doubles", "encode_doubles"]
 
 @dataclass(frozen=True)
 class LoopPacket:
-    """A sample on its way to the controller, or a command on its way back: 56 bytes.
+    """A sample for the controller, or a command for the plant: 56 bytes.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class LoopPacket:
     reference : float
         The reference.
     flags : int
-        32 bits, whose meaning the two ends agree upon.
+        32 bits, defined by the two ends.
 
     Examples
     --------
@@ -59,7 +59,7 @@ class LoopPacket:
             If a number is not finite, `held` is negative, or an integer has more than 32 bits.
         """
         try:
-            return loop_packet_write(tuple(vars(self).values()))
+            return loop_packet_write(**vars(self))
         except OverflowError as error:
             raise ValueError(f"{self}: {error}") from None
 
@@ -72,11 +72,21 @@ class LoopPacket:
         PacketError
             If it has another length or header, or a number in it is not finite.
         """
-        return cls(*loop_packet_read(packet))
+        found = loop_packet_read(packet)
+        return cls(
+            sequence=found.sequence,
+            sent=found.sent,
+            echo_sequence=found.echo_sequence,
+            echo_sent=found.echo_sent,
+            held=found.held,
+            value=found.value,
+            reference=found.reference,
+            flags=found.flags,
+        )
 
 
 def encode_doubles(values: Iterable[float]) -> bytes:
-    """Write bare little-endian doubles, as Simulink's UDP blocks send them.
+    """Write plain little-endian doubles, as Simulink's UDP blocks send them.
 
     Raises
     ------
@@ -87,7 +97,7 @@ def encode_doubles(values: Iterable[float]) -> bytes:
 
 
 def decode_doubles(data: bytes, count: int) -> tuple[float, ...]:
-    """Read `count` bare little-endian doubles.
+    """Read `count` plain little-endian doubles.
 
     Raises
     ------

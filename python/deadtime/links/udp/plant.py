@@ -1,9 +1,9 @@
-"""The end with the plant: it samples, sends what it measures and does what comes back.
+"""The plant's end of the loop: it samples, sends its output and applies commands.
 
-Safety: a command is finite and within the limit or it is not applied; it is newer than the one in
-force and answers a measurement no older than the watchdog's time; when none comes for that time,
-the declared safe command is applied until one does. The watchdog runs here, where the plant is, so
-that nothing at the other end or between needs to work for it.
+Safety: a command is applied only if it is finite, within the limit, newer than the one in force,
+and answers a measurement no older than the watchdog time. Without such a command for that time, the
+safe command is applied until one arrives. The watchdog runs at the plant, so it does not depend on
+the network or the controller.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from contextlib import ExitStack
 
 from deadtime.links.addresses import Address
 from deadtime.links.journal import Journal
+from deadtime.links.udp.classifier import REMEMBERED
 from deadtime.links.udp.endpoint import Endpoint
 from deadtime.links.udp.integrator import HeldIntegrator
-from deadtime.links.udp.judgement import REMEMBERED
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.statistics import KEPT, Percentiles
@@ -37,9 +37,9 @@ async def run_plant(options: PlantOptions) -> PlantReport:
     Raises
     ------
     LinkError
-        When there is no such address, or no socket to be had.
+        When the address does not exist, or no socket can be opened.
     OSError
-        When the recording cannot be written; the safe command is in force by then.
+        When the recording cannot be written; the safe command is in force then.
     """
     async with Plant(options) as plant:
         await plant.running()
@@ -47,12 +47,12 @@ async def run_plant(options: PlantOptions) -> PlantReport:
 
 
 class Plant:
-    """A plant at work: ``async with Plant(options) as plant``."""
+    """A running plant: ``async with Plant(options) as plant``."""
 
     def __init__(self, options: PlantOptions) -> None:
         self.options = options
         self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
-        # Whatever is answered in time, and longer, to tell what is late from what cannot be.
+        # More than can be answered in time, to distinguish late answers from impossible ones.
         self._endpoint = Endpoint(
             self._wire,
             self._take,
@@ -101,16 +101,16 @@ class Plant:
         self._stack.close()
 
     async def running(self) -> None:
-        """Work for as long as the options say; raises what it cannot work on with."""
+        """Run for the duration of the options; raises errors that stop the loop."""
         await self._endpoint.running(self.options.duration)
 
     @property
     def address(self) -> Address:
-        """Where the plant receives."""
+        """The address of the plant."""
         return self._endpoint.address
 
     def _pass_time(self, now: float) -> None:
-        """Bring the plant, and the account of the command's age, up to now."""
+        """Advance the plant and the mean age of the command to now."""
         before, self._clock = self._clock, max(now, self._clock)
         self._model.advance(self._clock - before, self._command)
         self._largest_output = max(self._largest_output, abs(self._model.output))
@@ -121,10 +121,10 @@ class Plant:
             self._oldest = max(self._oldest, new)
 
     def _sample(self) -> None:
-        """Measure, send and record, and see to the next time."""
+        """Measure, send and record, and schedule the next measurement."""
         try:
             self._measure()
-        except Exception as error:  # such as a full disk: without samples there is no loop
+        except Exception as error:  # for example a full disk: without samples the loop has to stop
             self._endpoint.fail(error)
             self._make_safe()
             return
@@ -140,7 +140,7 @@ class Plant:
         now = self._loop.time()
         self._pass_time(now)
         elapsed = now - self._started
-        # What was meant for the time of the step comes there but for rounding.
+        # The time of the step may be missed by rounding.
         stepped = elapsed >= self.options.rest - 1e-9
         reference = self.options.amplitude if stepped else 0.0
         output = self._model.output
@@ -171,9 +171,9 @@ class Plant:
             self._judge(packet, read)
 
     def _judge(self, packet: LoopPacket, read: float) -> None:
-        """Apply a command, now or later, or leave it."""
+        """Apply a command now, later or not at all."""
         statistics = self._endpoint.statistics
-        # The plant's own numbers order what comes: a controller that was started anew has new ones.
+        # Commands are ordered by the numbers of the plant: a restarted controller has new numbers.
         number = packet.echo_sequence if self._wire.has_times else packet.sequence
         age = read - packet.echo_sent if self._wire.has_times else 0.0
         if packet.flags & SAFE:
@@ -201,7 +201,7 @@ class Plant:
             self._apply_after(wait, packet, number)
 
     def _behind(self, age: float) -> float:
-        """How much older than the command in force one of this age is."""
+        """By how much a command of this age is older than the one in force, s."""
         return max(0.0, age - (self._loop.time() - self._stamp)) if self._ages else 0.0
 
     def _apply_after(self, wait: float, packet: LoopPacket, number: int) -> None:
@@ -239,17 +239,17 @@ class Plant:
         self._watchdog = self._loop.call_later(self.options.watchdog, self._bite)
 
     def _let_go(self) -> None:
-        """The last command has held long enough."""
+        """End the hold of the last command."""
         self._pass_time(self._loop.time())
         self._command, self._stamp = 0.0, math.nan
 
     def _bite(self) -> None:
-        """No command came in time: be safe, and ready for a controller that was started anew."""
+        """Apply the safe command, and accept a restarted controller."""
         self._endpoint.forget_peer()
         self._make_safe()
 
     def _make_safe(self) -> None:
-        """Apply the safe command that this end has declared, whatever the other one has."""
+        """Apply the safe command of this end."""
         now = self._loop.time()
         self._pass_time(now)
         for timer in (self._hold, *self._waiting):
@@ -262,7 +262,7 @@ class Plant:
             self._trips += 1
 
     def report(self) -> PlantReport:
-        """What happened until now."""
+        """The report until now."""
         self._pass_time(self._loop.time())
         since = self._clock if self._safe_since is None else self._safe_since
         recording = None

@@ -1,4 +1,4 @@
-"""The end with the plant: what it is told, and what it tells at its end."""
+"""Options and report of the plant's end of the loop."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ __all__ = ["PlantOptions", "PlantReport"]
 
 @dataclass(frozen=True)
 class PlantOptions:
-    """The plant's end, as a description.
+    """Options of the plant's end.
 
     Parameters
     ----------
     controller : (str, int)
-        Where the controller listens, or a relay in its place.
+        Address of the controller, or of a relay.
     listen : (str, int)
-        Where to receive; port 0 takes a free one.
+        Address for receiving; port 0 takes a free one.
     gain, lag : float
         Of the integrator; the lag in s.
     sample_time : float
         Time between two measurements, s.
     duration : float
-        How long to run, s.
+        Duration of the run, s.
     rest, amplitude : float
-        When the reference steps from 0, s, and to what.
+        Time of the step of the reference from 0, s, and its size.
     limit : float
         Largest size of the command.
     policy : Policy
-        What is done with late commands.
+        Treatment of late commands.
     watchdog : float
         Longest time without a command, and largest age of one, s.
     safe : float
-        The command that is applied when the watchdog bites.
+        The command that is applied when the watchdog trips.
     recording : Path or None
         CSV file, written row by row.
     doubles : (int, int) or None
-        Speak in bare doubles, so many from the controller and to it.
+        Use plain doubles: their number from the controller and to it.
     """
 
     controller: Address
@@ -68,12 +68,12 @@ class PlantOptions:
         if self.watchdog <= self.sample_time:
             raise ValueError(
                 f"watchdog={self.watchdog} s is no longer than sample_time={self.sample_time} s: "
-                "it would bite between any two commands; give a longer one"
+                "it would trip between any two commands; give a longer one"
             )
         buffer = self.policy
         if isinstance(buffer, JitterBuffer) and buffer.delay > self.watchdog:
             raise ValueError(
-                f"{buffer} makes every command older than watchdog={self.watchdog} s bears: give a "
+                f"{buffer} makes every command older than watchdog={self.watchdog} s: give a "
                 "shorter delay or a longer watchdog"
             )
         non_negative("rest", self.rest)
@@ -82,14 +82,14 @@ class PlantOptions:
             raise ValueError(f"safe={self.safe} is beyond limit={self.limit}: give a smaller one")
         if self.doubles is not None and self.policy.needs_times:
             raise ValueError(
-                f"{self.policy} needs time stamps, which bare doubles do not have: use NewestWins "
+                f"{self.policy} needs time stamps, which plain doubles do not have: use NewestWins "
                 "or HoldThenZero"
             )
 
 
 @dataclass(frozen=True, eq=False)
 class PlantReport:
-    """What happened at the plant; recording, arrivals and times are those of the last 100 000.
+    """Report of the plant; recording, arrivals and times are those of the last 100 000 packets.
 
     Attributes
     ----------
@@ -98,14 +98,14 @@ class PlantReport:
     period : Percentiles
         Time between two measurements, s.
     overruns : int
-        Measurements left out because the process woke up too late for them.
+        Measurements skipped because the process woke up too late for them.
     applied : int
         Commands that were applied.
     age : float
-        Age of the measurement behind the command in force, on average over time, s: the delay
-        of the loop, measured. NaN without time stamps.
+        Mean over time of the age of the measurement on which the command in force is based, s: the
+        measured delay of the loop. NaN without time stamps.
     oldest : float
-        Largest age that a command in force reached, s.
+        Largest age of a command in force, s.
     age_when_applied : Percentiles
         Age at the moment a command is applied, s.
     trips, safe_time : int, float
@@ -113,10 +113,10 @@ class PlantReport:
     largest_command, largest_output : float
         Largest sizes.
     arrivals : tuple of (int, float)
-        Number of each measurement that was answered, and when after it the answer came, s; empty
-        without time stamps.
+        Number of each answered measurement, and the time until its answer arrived, s; empty without
+        time stamps.
     recording : Recording or None
-        Time, reference, output and the command in force; None where the run was too short.
+        Time, reference, output and the command in force; None if the run was too short.
     """
 
     link: LinkReport

@@ -1,7 +1,7 @@
-"""What the plant does with commands that come late, and with none.
+"""Policies of the plant for late and missing commands.
 
-A policy is asked how long a command is to wait before it is applied, by the age of the measurement
-it answers. Whatever it says, a command that is older than one in force is never applied.
+A policy decides how long a command waits before it is applied, by the age of the measurement that
+it answers. A command that is older than the one in force is never applied.
 """
 
 from __future__ import annotations
@@ -16,40 +16,40 @@ __all__ = ["DropLate", "HoldThenZero", "JitterBuffer", "NewestWins", "Policy"]
 
 
 class Policy(Protocol):
-    """What is done with a command by the age of the measurement it answers."""
+    """Treatment of a command by the age of the measurement that it answers."""
 
     @property
     def needs_times(self) -> bool:
-        """Whether it works only where packets carry time stamps."""
+        """Whether the policy requires packets with time stamps."""
 
     @property
     def holds(self) -> int | None:
-        """Sample times that a command without a successor holds; None: until the watchdog."""
+        """Sample times for which the last command holds; None until the watchdog."""
 
     @property
     def oldest(self) -> float:
-        """Largest age that it bears, s."""
+        """Largest accepted age, s."""
 
     def wait(self, age: float) -> float | None:
-        """How long the command is to wait, s; None if it is late and not to be applied."""
+        """Wait before the command is applied, s; None if it is too late."""
 
 
 @dataclass(frozen=True)
 class NewestWins:
-    """A command is applied as it comes, unless a newer one was."""
+    """Apply a command on arrival, unless a newer one was applied."""
 
     needs_times: ClassVar[bool] = False
     holds: ClassVar[int | None] = None
     oldest: ClassVar[float] = math.inf
 
     def wait(self, age: float) -> float | None:
-        """No time."""
+        """No wait."""
         return 0.0
 
 
 @dataclass(frozen=True)
 class DropLate:
-    """A command that answers a measurement older than this is not applied.
+    """Do not apply commands that answer too old a measurement.
 
     Parameters
     ----------
@@ -66,22 +66,22 @@ class DropLate:
 
     @property
     def oldest(self) -> float:
-        """Largest age that it bears, s."""
+        """Largest accepted age, s."""
         return self.older_than
 
     def wait(self, age: float) -> float | None:
-        """No time, or None when it is too old."""
+        """No wait, or None for a command that is too old."""
         return 0.0 if age <= self.older_than else None
 
 
 @dataclass(frozen=True)
 class HoldThenZero:
-    """The last command holds for so many sample times; then the command is zero.
+    """Hold the last command for some sample times; then apply zero.
 
     Parameters
     ----------
     samples : int
-        How many.
+        Number of sample times.
     """
 
     samples: int
@@ -93,20 +93,20 @@ class HoldThenZero:
 
     @property
     def holds(self) -> int | None:
-        """Sample times that a command without a successor holds."""
+        """Sample times for which the last command holds."""
         return self.samples
 
     def wait(self, age: float) -> float | None:
-        """No time."""
+        """No wait."""
         return 0.0
 
 
 @dataclass(frozen=True)
 class JitterBuffer:
-    """Every command waits until its measurement has one age: a random delay becomes a constant one.
+    """Apply every command at the same age of its measurement, which makes the delay constant.
 
-    Commands that come later than that are not applied. The constant is the price: no command is
-    earlier than the late ones that one still wants to have.
+    Later commands are not applied. The constant delay is as long as that of the latest commands
+    that are still applied.
 
     Parameters
     ----------
@@ -123,11 +123,11 @@ class JitterBuffer:
 
     @property
     def oldest(self) -> float:
-        """Largest age that it bears, s."""
+        """Largest accepted age, s."""
         return self.delay
 
     def wait(self, age: float) -> float | None:
-        """What is left of the delay, or None when nothing is."""
+        """The rest of the delay, or None for a command that is too late."""
         left = self.delay - age
-        # An age that is the delay but for rounding is in time.
+        # An age equal to the delay up to rounding is in time.
         return max(0.0, left) if left >= -1e-9 else None

@@ -19,8 +19,8 @@ from deadtime.links.udp.trial import ENDS, Trial
 
 __all__ = ["part", "run_processes"]
 
-#: A process is ready, or has ended, after so many seconds, or something is wrong with it.
-PATIENCE = 30.0
+#: Longest time until a process is ready, and until it has ended, s.
+TIMEOUT = 30.0
 
 
 class Part:
@@ -28,7 +28,7 @@ class Part:
 
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
         self.name = name
-        # Not a pipe of Popen's, whose `communicate` closes it at once.
+        # Not a pipe of Popen, because `communicate` closes that at once.
         its_end, self._parent_watch = os.pipe()
         self.process = subprocess.Popen(
             [sys.executable, "-m", "deadtime.links.udp", name, "--until-input-ends", *arguments],
@@ -40,15 +40,15 @@ class Part:
         os.close(its_end)
 
     def address(self) -> Address:
-        """Where it listens, once it is ready."""
+        """Its address, once it is ready."""
         assert self.process.stdout is not None
-        # A process that says nothing is ended, which ends the line, too.
-        giving_up = threading.Timer(PATIENCE, self.process.kill)
-        giving_up.start()
+        # A process that prints nothing is killed, which ends the read.
+        timer = threading.Timer(TIMEOUT, self.process.kill)
+        timer.start()
         try:
             line = self.process.stdout.readline()
         finally:
-            giving_up.cancel()
+            timer.cancel()
         if not line:
             _, said = self.process.communicate()
             raise LinkError(f"the {self.name} did not start: {_last_line(said)}")
@@ -56,7 +56,7 @@ class Part:
         return ready["host"], ready["port"]
 
     def report(self, within: float) -> dict[str, Any]:
-        """What it says at its end, which comes within so many seconds."""
+        """Its report at its end, which has to be within so many seconds."""
         try:
             out, said = self.process.communicate(timeout=within)
         except subprocess.TimeoutExpired:
@@ -71,19 +71,19 @@ class Part:
         return found
 
     def end(self) -> None:
-        """End it, if it has not ended yet."""
+        """End the process, if it still runs."""
         self.process.kill()
         self.process.communicate()
         os.close(self._parent_watch)
 
 
 def _last_line(said: str) -> str:
-    return said.strip().splitlines()[-1] if said.strip() else "it said nothing"
+    return said.strip().splitlines()[-1] if said.strip() else "it printed no error"
 
 
 @contextmanager
 def part(name: str, arguments: Sequence[str]) -> Iterator[Part]:
-    """Start a process of the loop; it has ended when the context has, or when this process has."""
+    """Start a process of the loop; it ends with the context, or with this process."""
     started = Part(name, arguments)
     try:
         yield started
@@ -99,14 +99,14 @@ def run_processes(trial: Trial, folder: Path, *, stem: str = "") -> dict[str, di
     trial : Trial
         What to run.
     folder : Path
-        Where both ends write what they record, as ``<stem>plant.csv`` and ``<stem>controller.csv``.
+        Folder for the recordings of both ends, ``<stem>plant.csv`` and ``<stem>controller.csv``.
     stem : str
         Beginning of the names of the files.
 
     Returns
     -------
     dict of str to dict
-        What happened at the ``plant`` and the ``controller``, as of `PlantReport.to_dict` and
+        Reports of the ``plant`` and the ``controller``, from `PlantReport.to_dict` and
         `ControllerReport.to_dict`, with None in place of NaN.
 
     Raises
@@ -120,9 +120,9 @@ def run_processes(trial: Trial, folder: Path, *, stem: str = "") -> dict[str, di
         controller = stack.enter_context(part("controller", arguments_of(options)))
         between = arguments_of(trial.relay_options(controller.address()))
         relay = stack.enter_context(part("relay", between))
-        wanted = trial.plant_options(relay.address(), files["plant"])
-        plant = stack.enter_context(part("plant", arguments_of(wanted)))
-        reports = {"plant": plant.report(trial.duration + PATIENCE)}
+        plant_options = trial.plant_options(relay.address(), files["plant"])
+        plant = stack.enter_context(part("plant", arguments_of(plant_options)))
+        reports = {"plant": plant.report(trial.duration + TIMEOUT)}
         controller.process.terminate()
-        reports["controller"] = controller.report(PATIENCE)
+        reports["controller"] = controller.report(TIMEOUT)
     return reports

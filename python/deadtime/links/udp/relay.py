@@ -1,7 +1,7 @@
-"""A relay that stands for the network between plant and controller.
+"""A relay that emulates the network between plant and controller.
 
-It listens for the plant and speaks to the controller from a port of its own; what passes is
-delayed, lost, repeated and reordered by a `Path` in each direction. Nothing that passes is read.
+It listens for the plant and sends to the controller from a port of its own. Packets are delayed,
+lost, repeated and reordered by a `Path` in each direction; their contents are not read.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from deadtime.links.udp.network import Network, Path
 
 __all__ = ["Relay", "RelayOptions"]
 
-#: Packets under way at most; what comes beyond is dropped.
-MOST_UNDER_WAY = 10_000
+#: Most packets in transit; further ones are dropped (bounds memory).
+MOST_IN_TRANSIT = 10_000
 
-#: After so much silence the relay takes the next plant that comes, s.
+#: Silence of the plant after which another one is accepted, s.
 IDLE = 2.0
 
 
 @dataclass(frozen=True)
 class RelayOptions:
-    """A relay, as a description.
+    """Options of a relay.
 
     Parameters
     ----------
     controller : (str, int)
-        Where the controller listens.
+        Address of the controller.
     forward_path, return_path : Network
-        From the plant to the controller, and back.
+        Network from the plant to the controller, and back.
     seed : int
-        What all delays and losses follow from.
+        Seed of all delays and losses.
     listen : (str, int)
-        Where to listen for the plant; port 0 takes a free one.
+        Address for the plant; port 0 takes a free one.
     """
 
     controller: Address
@@ -49,14 +49,14 @@ class RelayOptions:
 
 
 class Relay:
-    """A relay at work: ``async with Relay(options) as relay``, then send to ``relay.address``.
+    """A running relay: ``async with Relay(options) as relay``, then send to ``relay.address``.
 
     Attributes
     ----------
     forward_path, return_path : Path
-        What became of the packets.
+        The two directions, with counts of their packets.
     overflowed : int
-        Packets that were dropped because 10 000 were under way.
+        Packets that were dropped because 10 000 were in transit.
     """
 
     def __init__(self, options: RelayOptions) -> None:
@@ -64,7 +64,7 @@ class Relay:
         self.forward_path: Path = options.forward_path.path(f"{options.seed} there")
         self.return_path: Path = options.return_path.path(f"{options.seed} back")
         self.overflowed = 0
-        self._under_way: list[tuple[float, int, bytes, bool]] = []
+        self._in_transit: list[tuple[float, int, bytes, bool]] = []
         self._number = itertools.count()
         self._timer: asyncio.TimerHandle | None = None
         self._plant: Address | None = None
@@ -108,24 +108,24 @@ class Relay:
 
     def _pass_on(self, path: Path, now: float, data: bytes, forward: bool) -> None:
         for arrival, packet in path.send(now - self._started, data):
-            if len(self._under_way) >= MOST_UNDER_WAY:
+            if len(self._in_transit) >= MOST_IN_TRANSIT:
                 self.overflowed += 1
                 continue
             entry = (self._started + arrival, next(self._number), packet, forward)
-            heapq.heappush(self._under_way, entry)
+            heapq.heappush(self._in_transit, entry)
         self._wait()
 
     def _wait(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self._under_way:
-            self._timer = self._loop.call_at(self._under_way[0][0], self._deliver)
+        if self._in_transit:
+            self._timer = self._loop.call_at(self._in_transit[0][0], self._deliver)
 
     def _deliver(self) -> None:
-        due = max(self._loop.time(), self._under_way[0][0])  # a timer may fire a rounding early
-        while self._under_way and self._under_way[0][0] <= due:
-            _, _, packet, forward = heapq.heappop(self._under_way)
+        due = max(self._loop.time(), self._in_transit[0][0])  # a timer may fire early by rounding
+        while self._in_transit and self._in_transit[0][0] <= due:
+            _, _, packet, forward = heapq.heappop(self._in_transit)
             if forward:
                 self._rear.send(packet, self._controller)
             elif self._plant is not None:

@@ -1,13 +1,13 @@
-"""What a stream of packets tells about the network: measured, not estimated.
+"""Measured statistics of the network from a stream of packets.
 
-Every packet echoes the number and the time stamp of the one it answers, and says how long that was
-held before the answer left. With the four times of such an exchange (sent t0, received there t1,
+Every packet echoes the number and the time stamp of the one it answers, and states how long that
+was held before the answer. With the four times of such an exchange (sent t0, received there t1,
 answered there t2, received here t3; t0 and t3 by this clock, t1 and t2 by the other)
 
     round trip = (t3 - t0) - (t2 - t1),
 
-whatever the clocks show. How it divides into the two ways cannot be measured; but no way is
-shorter than nothing, and that bounds the offset between the clocks, and with it each way.
+independent of the offset of the clocks. Its division into the two directions cannot be measured;
+but neither delay is negative, which bounds the offset of the clocks, and with it each delay.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from deadtime.links.udp.judgement import REMEMBERED
+from deadtime.links.udp.classifier import REMEMBERED
 from deadtime.links.udp.packets import LoopPacket
 
 __all__ = [
@@ -32,24 +32,24 @@ __all__ = [
     "histogram",
 ]
 
-#: Packets whose times are kept, the newest: an end may run for days.
+#: Number of newest packets whose times are kept (bounds memory in runs of days).
 KEPT = 100_000
 
-#: Width of a bin at least, s: no clock tells less.
+#: Smallest width of a bin, s: the resolution of clocks.
 NARROWEST = 1e-6
 
-#: Part by which each packet moves the running jitter (RFC 3550, section 6.4.1).
+#: Weight of each packet in the running jitter (RFC 3550, section 6.4.1).
 JITTER_PART = 1.0 / 16.0
 
 
 @dataclass(frozen=True)
 class Percentiles:
-    """A sample of times in six numbers, s; NaN where there are none.
+    """Summary of a sample of times, s; NaN for an empty one.
 
     Attributes
     ----------
     count : int
-        How many.
+        Number of values.
     mean, p50, p95, p99, largest : float
         Mean, median, percentiles and maximum, s.
     """
@@ -63,7 +63,7 @@ class Percentiles:
 
     @staticmethod
     def of(values: Sequence[float]) -> Percentiles:
-        """Those of a sample."""
+        """The summary of a sample."""
         if not len(values):
             return Percentiles(0, *[math.nan] * 5)
         p50, p95, p99, largest = np.percentile(values, [50.0, 95.0, 99.0, 100.0]).tolist()
@@ -83,13 +83,13 @@ def histogram(values: Sequence[float], bins: int = 20) -> tuple[list[float], lis
 class ClockOffset:
     """Offset of another clock against this one, from the four times of many exchanges.
 
-    As in MAVLink's TIMESYNC, but with its bound: ``there = here + offset``. Each exchange says that
-    the offset is at most ``t1 - t0`` and at least ``t2 - t3``; what all of them leave is kept. A
-    clock that drifts makes the bounds meet: count over minutes, not over days.
+    As in MAVLink's TIMESYNC, but with a bound: ``other clock = this clock + offset``. Each exchange
+    shows that the offset is at most ``t1 - t0`` and at least ``t2 - t3``; the intersection is kept.
+    With a drifting clock it becomes empty: use it over minutes, not days.
 
     Examples
     --------
-    The other clock is 100 s ahead; 3 ms go there and 1 ms comes back:
+    The other clock is 100 s ahead; the delays are 3 ms to it and 1 ms back:
 
     >>> from deadtime.links.udp import ClockOffset
     >>> clock = ClockOffset()
@@ -102,13 +102,13 @@ class ClockOffset:
     least: float = -math.inf
 
     def add(self, t0: float, t1: float, t2: float, t3: float) -> None:
-        """Take in an exchange: sent, received there, answered there, received here."""
+        """Add an exchange: sent, received there, answered there, received here."""
         self.most = min(self.most, t1 - t0)
         self.least = max(self.least, t2 - t3)
 
     @property
     def offset(self) -> float:
-        """The middle of what is possible, s; NaN before the first exchange."""
+        """The middle of the possible offsets, s; NaN before the first exchange."""
         return 0.5 * (self.most + self.least) if math.isfinite(self.most) else math.nan
 
     @property
@@ -119,28 +119,29 @@ class ClockOffset:
 
 @dataclass(frozen=True)
 class LinkReport:
-    """What one end saw of the stream that came to it.
+    """Statistics of the packets that one end received.
 
     Attributes
     ----------
     received : int
         Packets that were read, duplicates included.
     lost : int
-        Sequence numbers below the highest that never came.
+        Sequence numbers below the highest that never arrived.
     duplicates, reordered : int
-        Packets that came again; packets that came after one sent later.
+        Packets that arrived again; packets that arrived after a later one.
     late : int
-        Packets that came too late to be used: overtaken, or refused by the policy.
+        Packets that arrived too late to be used: overtaken, or refused by the policy.
     foreign, invalid : int
-        Datagrams from another address; datagrams that are no packets, or say what cannot be.
+        Datagrams from another address; datagrams that are no packets, or have impossible values.
     round_trip : Percentiles
         Round trips, without the time an answer was held, s.
     held : Percentiles
-        Time between the arrival of a packet there and the answer, s.
+        Time between the arrival of a packet at the other end and its answer, s.
     lateness : Percentiles
-        How much older than the newest one in use late packets were, or than the policy bears, s.
+        By how much late packets were older than the newest one in use, or than the policy accepts,
+        s.
     jitter : float
-        Running mean of the change of the way here from packet to packet (RFC 3550), s.
+        Running mean of the change of the delay to this end from packet to packet (RFC 3550), s.
     forward_delay, return_delay : (float, float)
         Bounds of the mean one-way delay to the other end and from it, s.
     offset, offset_uncertainty : float
@@ -169,9 +170,9 @@ class LinkReport:
 
     @property
     def loss(self) -> float:
-        """Part of the packets sent that never came."""
-        came = self.received - self.duplicates
-        return self.lost / (self.lost + came) if self.lost + came else 0.0
+        """Share of the sent packets that never arrived."""
+        arrived = self.received - self.duplicates
+        return self.lost / (self.lost + arrived) if self.lost + arrived else 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
@@ -203,17 +204,17 @@ class LinkStatistics:
     _highest: int = -1
     _missed: int = 0
     _unique: int = 0
-    _may_begin_anew: bool = False
+    _may_restart: bool = False
 
     def __post_init__(self) -> None:
         self._order: deque[int] = deque()
         self._seen: set[int] = set()
 
     def restart(self) -> None:
-        """Be ready for sequence numbers that begin anew: the other end may have done so, too."""
-        self._may_begin_anew = True
+        """Accept restarted sequence numbers: the other end may have restarted."""
+        self._may_restart = True
 
-    def _begin_anew(self) -> None:
+    def _restart_count(self) -> None:
         self._missed = self._lost()
         self._first, self._highest, self._unique = None, -1, 0
         self._order.clear()
@@ -224,11 +225,11 @@ class LinkStatistics:
         return self._missed + max(0, expected - self._unique)
 
     def arrived(self, packet: LoopPacket) -> bool:
-        """Take in a packet; False if it is a duplicate."""
+        """Count a packet; False if it is a duplicate."""
         self.received += 1
-        if self._may_begin_anew and packet.sequence <= self._highest:
-            self._begin_anew()
-        self._may_begin_anew = False
+        if self._may_restart and packet.sequence <= self._highest:
+            self._restart_count()
+        self._may_restart = False
         if packet.sequence in self._seen:
             self.duplicates += 1
             return False
@@ -249,7 +250,7 @@ class LinkStatistics:
             self._seen.discard(self._order.popleft())
 
     def exchanged(self, packet: LoopPacket, now: float) -> None:
-        """Take in the times of a packet that was judged to answer one of this end."""
+        """Add the times of a packet that answers one of this end."""
         received_there = packet.sent - packet.held
         forward, returning = received_there - packet.echo_sent, now - packet.sent
         if self._return:
@@ -258,17 +259,17 @@ class LinkStatistics:
         self._forward.append(forward)
         self._return.append(returning)
         self.held.append(packet.held)
-        # Not the sum of both ways, in which a far-off clock would leave its rounding.
+        # Not the sum of both delays, which has the rounding error of a large clock offset.
         self.round_trips.append((now - packet.echo_sent) - packet.held)
         self.clock.add(packet.echo_sent, received_there, packet.sent, now)
 
     def came_late(self, by: float) -> None:
-        """Take in that a packet could not be used, being late by so much."""
+        """Count a packet that could not be used, with its lateness in s."""
         self.late += 1
         self.lateness.append(by)
 
     def report(self) -> LinkReport:
-        """All of it."""
+        """The statistics until now."""
         nothing = (math.nan, math.nan)
         most, least = self.clock.most, self.clock.least
         forward = float(np.mean(self._forward)) if self._forward else math.nan
@@ -285,7 +286,7 @@ class LinkStatistics:
             held=Percentiles.of(self.held),
             lateness=Percentiles.of(self.lateness),
             jitter=self._jitter,
-            # The way there is what the clocks show less the offset, which is between two bounds.
+            # A delay is the difference of the clocks minus the offset, which is between two bounds.
             forward_delay=(forward - most, forward - least) if self._forward else nothing,
             return_delay=(returning + least, returning + most) if self._return else nothing,
             offset=self.clock.offset,

@@ -1,4 +1,4 @@
-"""One run of the whole loop in one event loop: plant, relay and controller beside each other."""
+"""`run_trial`: run plant, relay and controller in one event loop."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from deadtime.links.udp.relay import Relay, RelayOptions
 
 __all__ = ["Trial", "TrialReport", "run_trial"]
 
-NOWHERE = ("127.0.0.1", 0)
+UNUSED_ADDRESS = ("127.0.0.1", 0)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A run of the loop, as a description.
+    """Options of a run of the loop.
 
     Parameters
     ----------
     gain : float
         Of the controller, 1/s.
     forward_path, return_path : Network
-        From the plant to the controller, and back.
+        Network from the plant to the controller, and back.
     seed : int
-        What all delays and losses follow from.
+        Seed of all delays and losses.
     sample_time : float
         Time between two measurements, s.
     duration : float
-        How long the loop runs, s; the reference steps after `rest`.
+        Duration of the run, s; the reference steps after `rest`.
     rest : float
         Time before the step, s.
     plant_gain, lag : float
@@ -45,9 +45,9 @@ class Trial:
     policy : Policy
         What the plant does with late commands.
     watchdog : float
-        Longest silence either side bears, s.
+        Longest silence that both ends accept, s.
     safe : float
-        The command that is applied then.
+        The command that is applied after such a silence.
     """
 
     gain: float
@@ -66,12 +66,12 @@ class Trial:
 
     def __post_init__(self) -> None:
         positive("gain", self.gain)
-        # What is wrong with the rest is said now, not when the loop runs.
-        self.plant_options(NOWHERE)
+        # Check the other options now, not when the loop runs.
+        self.plant_options(UNUSED_ADDRESS)
         self.controller_options()
 
     def controller_options(self, recording: Path | None = None) -> ControllerOptions:
-        """The controller's part, on a free port of this computer."""
+        """Options of the controller, on a free port of this computer."""
         return ControllerOptions(
             gain=self.gain,
             limit=self.limit,
@@ -82,13 +82,13 @@ class Trial:
         )
 
     def relay_options(self, controller: tuple[str, int]) -> RelayOptions:
-        """The network's part, on a free port of this computer."""
+        """Options of the relay, on a free port of this computer."""
         return RelayOptions(controller, self.forward_path, self.return_path, self.seed)
 
     def plant_options(
         self, controller: tuple[str, int], recording: Path | None = None
     ) -> PlantOptions:
-        """The plant's part, on a free port of this computer."""
+        """Options of the plant, on a free port of this computer."""
         return PlantOptions(
             controller=controller,
             gain=self.plant_gain,
@@ -106,14 +106,14 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class TrialReport:
-    """What happened at both ends.
+    """Reports of both ends.
 
     Attributes
     ----------
     plant : PlantReport
-        At the plant.
+        Report of the plant.
     controller : ControllerReport
-        At the controller.
+        Report of the controller.
     """
 
     plant: PlantReport
@@ -136,13 +136,13 @@ async def run_trial(
     Parameters
     ----------
     trial : Trial
-        What to run.
+        Options of the run.
     folder : Path, optional
-        Where both ends write what they record, as ``<stem>plant.csv`` and ``<stem>controller.csv``.
+        Folder for the recordings of both ends, ``<stem>plant.csv`` and ``<stem>controller.csv``.
     stem : str
         Beginning of the names of the files.
     meanwhile : callable, optional
-        Called when all is ready to run, to do something to the loop while it runs.
+        Called before the run starts, to change the loop during the run.
 
     Returns
     -------
@@ -150,12 +150,12 @@ async def run_trial(
 
     Examples
     --------
-    Two ways of 50 ms, in virtual time:
+    Both directions with 50 ms, in virtual time:
 
     >>> from deadtime.links import virtual_time
     >>> from deadtime.links.udp import Network, Trial, run_trial
-    >>> way = Network(delay=0.05)
-    >>> report = virtual_time.run(run_trial(Trial(gain=8.0, forward_path=way, return_path=way)))
+    >>> path = Network(delay=0.05)
+    >>> report = virtual_time.run(run_trial(Trial(gain=8.0, forward_path=path, return_path=path)))
     >>> round(report.plant.link.round_trip.p50, 6), round(report.plant.age, 6)
     (0.1, 0.105)
     """

@@ -1,8 +1,8 @@
-"""The two ways a loop packet can be on the wire: with its times, or as bare numbers.
+"""The two wire formats of a loop packet: with time stamps, or as plain doubles.
 
-Simulink's UDP blocks send doubles one after the other, without a header. Such a packet says neither
-when it was sent nor what it answers; it is numbered here in the order of arrival, and no round
-trip can be measured from it.
+Simulink's UDP blocks send doubles one after the other, without a header. Such a packet has
+neither a time nor the number it answers; it is numbered in the order of arrival, and gives no round
+trip.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_double
 
 __all__ = ["SAFE", "Doubles", "Stamped", "Wire"]
 
-#: Flag of a packet that holds the controller's safe command, not an answer.
+#: Flag of a packet with the safe command of the controller, which is no answer.
 SAFE = 1
 
 
 class Wire(Protocol):
-    """How packets become bytes, and bytes packets."""
+    """A wire format of loop packets."""
 
     has_times: ClassVar[bool]
 
@@ -28,7 +28,7 @@ class Wire(Protocol):
         """Bytes of a packet."""
 
     def decode(self, data: bytes) -> LoopPacket:
-        """The packet in these bytes; PacketError if they are none."""
+        """The packet in these bytes; raises PacketError if there is none."""
 
 
 @dataclass
@@ -42,13 +42,13 @@ class Stamped:
         return packet.encode()
 
     def decode(self, data: bytes) -> LoopPacket:
-        """The packet in these bytes; PacketError if they are none."""
+        """The packet in these bytes; raises PacketError if there is none."""
         return LoopPacket.decode(data)
 
 
 @dataclass
 class Doubles:
-    """Bare little-endian doubles, as Simulink's UDP blocks send them.
+    """Plain little-endian doubles, as Simulink's UDP blocks send them.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class Doubles:
         return encode_doubles(values + [0.0] * (self.outgoing - len(values)))
 
     def decode(self, data: bytes) -> LoopPacket:
-        """The packet in these bytes; PacketError if they are none."""
+        """The packet in these bytes; raises PacketError if there is none."""
         values = decode_doubles(data, self.incoming)
         self._count += 1
         reference = values[1] if len(values) > 1 else 0.0

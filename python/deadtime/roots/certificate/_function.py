@@ -22,13 +22,13 @@ __all__ = ["Enclosure", "ExactFunction", "above", "affordable", "exponential_abo
 # Binary digits kept below the size of a value; doubles have 53.
 _DIGITS = 120
 
-# Digits of enclosures where only an inequality with a wide margin is asked for.
+# Digits of enclosures that only have to decide an inequality with a wide margin.
 _FEW = 128
 
 # Order of Taylor polynomials next to several roots.
 _ORDER = 8
 
-# More digits than that make nothing true that is not so with them.
+# Upper limit on the digits: an inequality that is undecided with these is refused.
 _MOST_DIGITS = 1 << 14
 
 # Binary digits of all powers of a point together, one power for each coefficient; and the same for

@@ -2,13 +2,12 @@
 #![allow(unsafe_code)]
 
 use std::ffi::c_void;
-use std::ops::Range;
 
 use deadtime::dde::spectral::{Columns, Equation};
 use deadtime::{Error, Task};
 use pyo3::prelude::*;
 
-use super::callback::Callbacks;
+use super::callback::Failing;
 
 /// t, y, z (delay, component), dz likewise, dy, user data.
 type Function =
@@ -72,41 +71,8 @@ impl Equation for CompiledEquation {
     }
 }
 
-/// A compiled right-hand side with events or changes in Python.
-pub(super) struct WithEvents<'py> {
-    compiled: CompiledEquation,
-    callbacks: Callbacks<'py>,
-}
-
-impl<'py> WithEvents<'py> {
-    pub(super) fn new(compiled: CompiledEquation, callbacks: Callbacks<'py>) -> Self {
-        Self {
-            compiled,
-            callbacks,
-        }
-    }
-
-    pub(super) fn into_failure(self) -> Option<PyErr> {
-        self.callbacks.failure
-    }
-}
-
-impl Equation for WithEvents<'_> {
-    fn slope(&mut self, at: Columns<'_>, out: &mut [f64], task: &Task) -> Result<(), Error> {
-        self.compiled.slope(at, out, task)
-    }
-
-    fn events(
-        &mut self,
-        t: f64,
-        y: &[f64],
-        which: Range<usize>,
-        out: &mut [f64],
-    ) -> Result<(), Error> {
-        self.callbacks.events(t, y, which, out)
-    }
-
-    fn change(&mut self, jump: usize, t: f64, y: &mut [f64]) -> Result<(), Error> {
-        self.callbacks.change(jump, t, y)
+impl Failing for CompiledEquation {
+    fn failure(&mut self) -> Option<PyErr> {
+        None
     }
 }

@@ -4,10 +4,9 @@ use deadtime::Error;
 use deadtime::dde::breaks::BreakingPoint;
 use deadtime::dde::history::{History, Piece};
 use deadtime::dde::spectral::{Problem, approximate};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::callback::{numbers, shown};
+use super::numbers::{finite, numbers};
 use crate::errors::to_python;
 
 /// Error of the history as a part of the tolerance.
@@ -120,11 +119,9 @@ fn sample(name: &str, function: &Bound<'_, PyAny>, time: f64, out: &mut [f64]) -
              components"
         )
     })?;
-    match out.iter().find(|value| !value.is_finite()) {
-        None => Ok(()),
-        Some(value) => Err(PyValueError::new_err(format!(
-            "{name} is {} at t={time}: give finite values from t0 minus the largest delay to t0",
-            shown(*value)
-        ))),
-    }
+    finite(out, |value| {
+        format!(
+            "{name} is {value} at t={time}: give finite values from t0 minus the largest delay to t0"
+        )
+    })
 }

@@ -14,6 +14,24 @@
 
 use super::scalar::Scalar;
 
+/// Share of the norm below which a scaling of balancing is made.
+const BALANCED: f64 = 0.95;
+
+/// Least size of a row or column in balancing, as a share of the diagonal.
+const LEAST_SIDE: f64 = 0.125;
+
+/// Largest exponent of a scaling.
+const MOST_EXPONENT: f64 = 500.0;
+
+/// Largest ‖A‖₁ h for which the series is summed without doubling.
+const REACH: f64 = 0.5;
+
+/// Number of terms: 0.5^17/17! is below 1e-19.
+const TERMS: u32 = 17;
+
+/// Upper limit on the rounds of balancing; few are needed for few states.
+const ROUNDS: usize = 100;
+
 /// Φ and the Γ_i of one step length.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Propagator<S = f64> {
@@ -115,12 +133,6 @@ impl<S: Scalar> Propagator<S> {
     }
 }
 
-/// Largest ‖A‖₁ h for which the series is summed without doubling.
-const REACH: f64 = 0.5;
-
-/// Number of terms: 0.5^17/17! is below 1e-19.
-const TERMS: u32 = 17;
-
 /// Number of halvings that bring `size` below [`REACH`].
 fn doublings(size: f64) -> i32 {
     let mut count = 0;
@@ -159,9 +171,6 @@ pub(crate) fn multiply_add<S: Scalar>(a: &[S], x: &[S], out: &mut [S]) {
     }
 }
 
-/// Upper limit on the rounds of balancing; few are needed for few states.
-const ROUNDS: usize = 100;
-
 /// ‖D⁻¹ A D‖₁, the largest column sum, with D of `balanced`.
 pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
     norm(&balanced(a, n).0, n)
@@ -176,7 +185,7 @@ pub(crate) fn balanced<S: Scalar>(a: &[S], n: usize) -> (Vec<f64>, Vec<i32>) {
     let mut a: Vec<f64> = a.iter().map(|a| a.value()).collect();
     let mut exponents = vec![0; n];
     let diagonal = (0..n).fold(0.0_f64, |most, i| most.max(a[i * n + i].abs()));
-    let floor = (0.125 * diagonal).max(f64::MIN_POSITIVE);
+    let floor = (LEAST_SIDE * diagonal).max(f64::MIN_POSITIVE);
     for _ in 0..ROUNDS {
         let mut settled = true;
         for i in 0..n {
@@ -193,9 +202,9 @@ pub(crate) fn balanced<S: Scalar>(a: &[S], n: usize) -> (Vec<f64>, Vec<i32>) {
             let (column, row) = (column.max(floor), row.max(floor));
             let exponent = (0.5 * libm::log2(row / column))
                 .round()
-                .clamp(-500.0, 500.0);
+                .clamp(-MOST_EXPONENT, MOST_EXPONENT);
             let factor = libm::exp2(exponent);
-            if column * factor + row / factor >= 0.95 * (column + row) {
+            if column * factor + row / factor >= BALANCED * (column + row) {
                 continue;
             }
             settled = false;

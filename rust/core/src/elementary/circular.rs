@@ -2,18 +2,18 @@
 //!
 //! y = n P + r with P = π/32, |r| ≤ 0.0492; sin y = S + (C sin r + S (cos r − 1)) with S, C the
 //! sine and cosine of n P from the table, S = S₁ + S₂ within 2⁻¹⁰⁶; cos y is the same 16 on.
-//! *Reduction, |y| < 2²⁰.* |n| < 2²⁴; P = P₁ + P₂ + P₃ with P₁, P₂ of 29 bits (multiples of 2⁻³² and
-//! 2⁻⁶¹), |P₃| < 2⁻⁶³: n P₁, n P₂ are exact. y is a multiple of 2⁻⁵⁷ unless n = 0, y − n P₁ below
-//! 2⁻⁴: exact. Each of the next two differences, below 2⁻⁴, loses 2⁻⁵⁸; the rest is below 2⁻⁹⁰.
-//! r is within 2⁻⁵⁷ = 0.063 u. For larger y (Payne and Hanek 1983, in integers): y = M 2^E, and M
-//! times 192 bits of the fraction of 2^E/(2π) gives the fraction of a turn within 2⁻¹³⁹; its first
-//! 64 bits, cut off, are within 2⁻⁶⁴ turns = 2⁻⁶¹·³ rad; made a double and multiplied by 2π/2⁶⁴
-//! they lose 3 u |r| = 0.15 u. Either way r is within 0.16 u, as are its sine and cosine.
-//! *Series.* sin r to r⁷ is cut by |r|⁹/9! < 0.045 u, cos r − 1 to r⁸ by |r|¹⁰/10! < 0.001 u. Rounding
-//! costs sin r at most 1.02 u |r| = 0.051 u and, times C, another 0.05 u; cos r − 1, at most
-//! 0.00121, less than 0.005 u with the product by S.
-//! *Result.* The two inner sums, below 0.06, lose 0.06 u together; the last sum, below 1 but for
-//! rounding, u/2. In all 0.16 + 0.045 + 0.001 + 0.101 + 0.005 + 0.06 + 0.5 < 0.9 u.
+//! *Reduction, |y| < 2²⁰.* |n| < 2²⁴; P = P₁ + P₂ + P₃ with P₁, P₂ of 29 bits (multiples of 2⁻³²
+//! and 2⁻⁶¹), |P₃| < 2⁻⁶³: n P₁, n P₂ are exact. y is a multiple of 2⁻⁵⁷ unless n = 0, y − n P₁
+//! below 2⁻⁴: exact. Each of the next two differences, below 2⁻⁴, loses 2⁻⁵⁸; the rest is below
+//! 2⁻⁹⁰. r is within 2⁻⁵⁷ = 0.063 u. For larger y (Payne and Hanek 1983, in integers): y = M 2^E,
+//! and M times 192 bits of the fraction of 2^E/(2π) gives the fraction of a turn within 2⁻¹³⁹; its
+//! first 64 bits, cut off, are within 2⁻⁶⁴ turns = 2⁻⁶¹·³ rad; made a double and multiplied by
+//! 2π/2⁶⁴ they lose 3 u |r| = 0.15 u. Either way r is within 0.16 u, as are its sine and cosine.
+//! *Series.* sin r to r⁷ is cut by |r|⁹/9! < 0.045 u, cos r − 1 to r⁸ by |r|¹⁰/10! < 0.001 u.
+//! Rounding costs sin r at most 1.02 u |r| = 0.051 u and, times C, another 0.05 u; cos r − 1, at
+//! most 0.00121, less than 0.005 u with the product by S. *Result.* The two inner sums, below 0.06,
+//! lose 0.06 u together; the last sum, below 1 but for rounding, u/2. In all 0.16 + 0.045 + 0.001 +
+//! 0.101 + 0.005 + 0.06 + 0.5 < 0.9 u.
 
 use super::nearest::nearest;
 use super::tables::{INVERSE_TURN, SINES};

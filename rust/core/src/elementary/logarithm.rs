@@ -2,9 +2,9 @@
 //!
 //! x = 2^e f with √½ ≤ f < √2 (to rounding), z = (f − 1)/(f + 1), |z| < 0.1716, log f = 2 artanh z.
 //! f − 1 is exact, f + 1 and the quotient lose u each: z is within 2.01 u |z|. The series to z¹⁹ is
-//! cut by 2|z|²¹/21 · 1.04 < 0.08 u. Rounding its part behind the first term (below 0.004) costs 0.05 u,
-//! the sum u |log f|: in all 0.35 · 3.1 u + 0.13 u < 1.3 u. e ln 2 loses 2.1 u |e ln 2|, and
-//! |e ln 2| ≤ |log x| + 0.347; the last sum u |log x|: less than 2.1 u + 3.2 u |log x|.
+//! cut by 2|z|²¹/21 · 1.04 < 0.08 u. Rounding its part behind the first term (below 0.004) costs
+//! 0.05 u, the sum u |log f|: in all 0.35 · 3.1 u + 0.13 u < 1.3 u. e ln 2 loses 2.1 u |e ln 2|,
+//! and |e ln 2| ≤ |log x| + 0.347; the last sum u |log x|: less than 2.1 u + 3.2 u |log x|.
 
 use std::f64::consts::{LN_2, SQRT_2};
 

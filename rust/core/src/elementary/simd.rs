@@ -1,5 +1,5 @@
-//! [`exp`](super::exp) and [`sin_cos`](super::sin_cos) in lanes: the operations of `exponential` and
-//! `circular` in their order, hence their bits and their bounds.
+//! [`exp`](super::exp) and [`sin_cos`](super::sin_cos) in lanes: the operations of `exponential`
+//! and `circular` in their order, hence their bits and their bounds.
 //!
 //! Entries of tables are read lane by lane. Where one argument needs the longer branch of these
 //! functions, all lanes are computed one by one, which gives the others the same bits.
@@ -12,7 +12,8 @@ use crate::simd::{Real, Simd};
 /// Largest argument for which the power of two needs no second factor.
 const LARGEST_EXPONENT: f64 = 700.0;
 
-/// The entry n + `ahead` of a table in each lane, modulo its length, a power of two; `carried` is n + [`ROUNDER`].
+/// The entry n + `ahead` of a table in each lane, modulo its length, a power of two; `carried` is
+/// n + [`ROUNDER`].
 #[inline(always)]
 fn fetched<S: Simd, const N: usize>(
     carried: Real<S>,

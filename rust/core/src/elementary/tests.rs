@@ -120,7 +120,7 @@ proptest! {
 }
 
 #[test]
-fn two_words_stay_within_the_proved_bounds() {
+fn double_doubles_stay_within_the_proved_bounds() {
     let bound = 8.0 * U * U;
     let mut worst = 0.0f64;
     let mut count = 0;
@@ -147,10 +147,10 @@ fn two_words_stay_within_the_proved_bounds() {
 
 proptest! {
     #[test]
-    fn two_word_arguments_obey_the_addition_theorems(
+    fn double_double_arguments_obey_the_addition_theorems(
         x in -300.0f64..300.0, y in -1e6f64..1e6, small in -1.0f64..1.0,
     ) {
-        // e^(x + t) = e^x e^t, the small part being the second word of the sum.
+        // e^(x + t) = e^x e^t, where the small part is the low word of the sum.
         let tiny = small * 1e-17 * x.abs().max(1e-3);
         let both = DoubleDouble::difference(x, -tiny);
         let product = precise::exp(x.into()) * precise::exp(tiny.into());
@@ -164,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn arithmetic_of_two_words_stays_within_its_bounds(
+    fn double_double_arithmetic_stays_within_its_bounds(
         a in -1e3f64..1e3, b in -1e3f64..1e3, c in 1e-3f64..1e3,
     ) {
         // (a + b)² c = a² c + 2 a b c + b² c: every operation has its part.

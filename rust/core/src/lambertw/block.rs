@@ -176,7 +176,7 @@ impl Kernel<3, 3> for Derivative {
     }
 }
 
-/// `slope[i]`, the derivative of W_k[i] at `z[i]`.
+/// `slope[i]`, the derivative of `W_k[i]` at `z[i]`.
 pub fn lambertw_derivative(z: &[Complex64], k: &[i64], slope: &mut [Complex64]) {
     by_branch(&Derivative, z, k, slope, far_derivative);
 }

@@ -1,4 +1,4 @@
-//! Which way an element goes, so that its neighbours in a vector can be those that go the same.
+//! Elements sorted by the branch of code that they need.
 //!
 //! A vector executes every branch that one of its lanes needs. Sorting a block by branch avoids
 //! this; no bit of a result depends on it.
@@ -17,7 +17,7 @@ const FIELD: u32 = 16;
 /// 0: no step follows; 1: rational starting value; 2: starting value from the logarithm; 3: from
 /// two steps on it.
 #[inline(always)]
-fn route(z: Complex64, k: i64) -> u8 {
+fn code_branch(z: Complex64, k: i64) -> u8 {
     let (along, across, shifted) = (z.re.abs(), z.im.abs(), (z.re + INVERSE_E).abs());
     let largest = if along > across { along } else { across };
     let distance = if shifted > across { shifted } else { across };
@@ -35,14 +35,14 @@ fn route(z: Complex64, k: i64) -> u8 {
 
 /// The order in which the elements of a block are processed.
 pub(super) struct Order<const W: usize> {
-    routes: [u8; W],
+    branches: [u8; W],
     indices: [u16; W],
 }
 
 impl<const W: usize> Order<W> {
     pub(super) fn new() -> Self {
         Self {
-            routes: [0; W],
+            branches: [0; W],
             indices: [0; W],
         }
     }
@@ -54,7 +54,7 @@ impl<const W: usize> Order<W> {
         // Examine some of them: a few elements of another branch cost less than sorting.
         let mut seen = [0; 4];
         for (z, k) in z.iter().zip(k).step_by(SAMPLED) {
-            if let Some(count) = seen.get_mut(usize::from(route(*z, *k))) {
+            if let Some(count) = seen.get_mut(usize::from(code_branch(*z, *k))) {
                 *count += 1;
             }
         }
@@ -62,18 +62,18 @@ impl<const W: usize> Order<W> {
         if 8 * most >= 7 * seen.iter().sum::<usize>() {
             return false;
         }
-        for (place, (z, k)) in self.routes.iter_mut().zip(z.iter().zip(k)) {
-            *place = route(*z, *k);
+        for (place, (z, k)) in self.branches.iter_mut().zip(z.iter().zip(k)) {
+            *place = code_branch(*z, *k);
         }
-        let routes = self.routes.get(..length).unwrap_or_default();
+        let branches = self.branches.get(..length).unwrap_or_default();
         let mut counts = 0_u64;
-        for way in routes {
-            counts += 1 << (u32::from(*way) * FIELD);
+        for branch in branches {
+            counts += 1 << (u32::from(*branch) * FIELD);
         }
         // Start of each branch: the sum of the counts before it.
         let mut next = (counts << FIELD) + (counts << (2 * FIELD)) + (counts << (3 * FIELD));
-        for (i, way) in (0..).zip(routes) {
-            let shift = u32::from(*way) * FIELD;
+        for (i, branch) in (0..).zip(branches) {
+            let shift = u32::from(*branch) * FIELD;
             let position = (next >> shift) as u16;
             if let Some(place) = self.indices.get_mut(usize::from(position)) {
                 *place = i;
@@ -106,9 +106,9 @@ mod tests {
         let mut sorted = indices.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, (0..200).collect::<Vec<_>>());
-        let routes: Vec<_> = indices.iter().map(|&i| route(z[i], k[i])).collect();
-        assert!(routes.is_sorted());
-        assert_eq!((routes[0], routes[199]), (0, 3));
+        let branches: Vec<_> = indices.iter().map(|&i| code_branch(z[i], k[i])).collect();
+        assert!(branches.is_sorted());
+        assert_eq!((branches[0], branches[199]), (0, 3));
         assert!(!order.sort(&z[180..], &[5; 20]));
     }
 }

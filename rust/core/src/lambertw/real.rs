@@ -1,9 +1,9 @@
 //! The two real branches, on real arguments.
 //!
 //! The same starting values and the same last step as for complex arguments, with half the
-//! operations and no angle. W_0 lives on [-1/e, inf), W_-1 on [-1/e, 0). The double next to -1/e
-//! lies 1.2e-17 below it; it counts as -1/e, where both are -1; the results are NaN from the next
-//! double on. Error: 0.54 ulp.
+//! operations and no angle. W_0 is defined on [-1/e, inf), W_-1 on [-1/e, 0). The double next to
+//! -1/e lies 1.2e-17 below it; it counts as -1/e, where both are -1; the results are NaN from the
+//! next double on. Error: 0.54 ulp.
 
 use crate::simd::{Real, Simd};
 

@@ -130,10 +130,10 @@ pub(super) fn fritsch_step<S: Simd>(w: Complex<S>, r: Complex<S>) -> Complex<S> 
 
 /// What to add to `w`, which may be small, given `d = z e^-w - w`.
 ///
-/// With eta = d/w, r = log(1 + eta) and u = 1 + w, the solution moves by w (r/u + r^2/(2 u^3) + (1
-/// - 2 w) r^3/(6 u^5) + (6 w^2 - 8 w + 1) r^4/(24 u^7) + …), the Taylor series of dw/dr = w/u. In
-/// powers of eta this is d/u times a cubic whose coefficients are polynomials in v = 1/u. All of
-/// them, and both divisions, are computed before d is known.
+/// With eta = d/w, r = log(1 + eta) and u = 1 + w, the solution moves by
+/// w (r/u + r^2/(2 u^3) + (1 - 2 w) r^3/(6 u^5) + (6 w^2 - 8 w + 1) r^4/(24 u^7) + …), the Taylor
+/// series of dw/dr = w/u. In powers of eta this is d/u times a cubic whose coefficients are
+/// polynomials in v = 1/u. All of them, and both divisions, are computed before d is known.
 #[inline(always)]
 pub(super) fn correction<S: Simd>(w: Complex<S>, d: Complex<S>) -> Complex<S> {
     let v = w.shifted(1.0).inverse();

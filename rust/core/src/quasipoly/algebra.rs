@@ -27,6 +27,20 @@ fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
     product
 }
 
+/// Sort rows by their delays, and give delays that agree to 4 ulp the same value: they are one sum
+/// in different orders.
+pub(crate) fn equate_close_delays(rows: &mut [(Vec<f64>, f64)]) {
+    rows.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut last = f64::NEG_INFINITY;
+    for (_, delay) in rows {
+        if *delay - last <= SAME_DELAY * *delay {
+            *delay = last;
+        } else {
+            last = *delay;
+        }
+    }
+}
+
 impl QuasiPolynomial {
     /// The constant function.
     ///
@@ -145,15 +159,7 @@ impl QuasiPolynomial {
         }
         let rounded = |h: &Self| h.delays.iter().any(|delay| *delay > 0.0);
         if rounded(self) && rounded(other) {
-            rows.sort_by(|a, b| a.1.total_cmp(&b.1));
-            let mut last = f64::NEG_INFINITY;
-            for (_, delay) in &mut rows {
-                if *delay - last <= SAME_DELAY * *delay {
-                    *delay = last;
-                } else {
-                    last = *delay;
-                }
-            }
+            equate_close_delays(&mut rows);
         }
         Self::from_rows(rows)
     }

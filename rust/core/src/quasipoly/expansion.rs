@@ -33,7 +33,8 @@ impl QuasiPolynomial {
     /// h around `s` without its largest exponential: h(s + t) = e^(−(s + t) τ) Σ a_k tᵏ, in
     /// double-double arithmetic.
     ///
-    /// The error bounds are infinite or NaN where an exponential of the others leaves double precision.
+    /// The error bounds are infinite or NaN where an exponential of the others leaves double
+    /// precision.
     ///
     /// ```
     /// # use deadtime::quasipoly::QuasiPolynomial;

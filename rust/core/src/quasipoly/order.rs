@@ -59,7 +59,7 @@ impl Dyadic {
 }
 
 impl QuasiPolynomial {
-    /// The multiplicity of 0 as a root, exactly, as far as `most`.
+    /// The multiplicity of 0 as a root, exactly, up to `most`.
     ///
     /// ```
     /// # use deadtime::quasipoly::QuasiPolynomial;

@@ -16,8 +16,8 @@ pub struct RootSet {
     pub multiplicities: Vec<u32>,
     /// Radii of the discs, 1/s.
     pub radii: Vec<f64>,
-    /// Is the disc one point to working precision? `false` for a multiple root or cluster whose disc
-    /// is wider than 1e-12 of its distance from 0.
+    /// Is the disc one point to working precision? `false` for a multiple root or cluster whose
+    /// disc is wider than 1e-12 of its distance from 0.
     pub resolved: Vec<bool>,
     /// Number of roots in `region`, with multiplicity, by the argument principle; equal to the
     /// sum of the multiplicities.

@@ -9,6 +9,13 @@ use pulp::{Arch, Scalar128b, Simd, WithSimd};
 /// Results do not depend on it; it is used for comparisons.
 const VARIABLE: &str = "DEADTIME_INSTRUCTIONS";
 
+static CHOSEN: LazyLock<Instructions> = LazyLock::new(|| {
+    let wanted = std::env::var(VARIABLE).unwrap_or_default();
+    let available = Instructions::available();
+    let named = available.iter().find(|set| set.name() == wanted);
+    *named.or(available.first()).unwrap_or(&Instructions::Plain)
+});
+
 /// Instruction sets the kernels are compiled for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Instructions {
@@ -21,13 +28,6 @@ pub(crate) enum Instructions {
     /// Plain arithmetic; the fused multiply-add in software where the machine has none.
     Plain,
 }
-
-static CHOSEN: LazyLock<Instructions> = LazyLock::new(|| {
-    let wanted = std::env::var(VARIABLE).unwrap_or_default();
-    let available = Instructions::available();
-    let named = available.iter().find(|set| set.name() == wanted);
-    *named.or(available.first()).unwrap_or(&Instructions::Plain)
-});
 
 impl Instructions {
     /// The instruction sets of this machine, the widest first.

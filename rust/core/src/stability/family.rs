@@ -8,10 +8,7 @@
 //! negative only by rounding errors is zero.
 
 use crate::Error;
-use crate::quasipoly::QuasiPolynomial;
-
-/// Relative difference of delays below which they are merged.
-const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
+use crate::quasipoly::{QuasiPolynomial, equate_close_delays};
 
 /// Upper limit on a power of s or of a parameter. A larger one is most likely a typing error.
 const MAX_POWER: u32 = 1000;
@@ -19,7 +16,7 @@ const MAX_POWER: u32 = 1000;
 /// Upper limit on the number of terms (bounds memory and time).
 const MAX_TERMS: usize = 100_000;
 
-/// constant + Σ `slopes`[i] · p_i.
+/// constant + Σ `slopes[i]` · p_i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Affine {
     /// Value where all parameters are zero.
@@ -127,7 +124,7 @@ impl Family {
         if term.exponents.len() != count || term.delay.slopes.len() != count {
             return Err(Error::argument(format!(
                 "a term has {} exponents and {} slopes of its delay for {count} parameters: give \
-                 one of each a parameter",
+                 one of each for every parameter",
                 term.exponents.len(),
                 term.delay.slopes.len()
             )));
@@ -143,7 +140,7 @@ impl Family {
         let highest = term.exponents.iter().fold(term.power, |a, b| a.max(*b));
         if highest > MAX_POWER {
             return Err(Error::argument(format!(
-                "a power of {highest}: powers up to {MAX_POWER} are taken"
+                "a power of {highest}: give powers up to {MAX_POWER}"
             )));
         }
         Ok(())
@@ -183,20 +180,13 @@ impl Family {
         if rows.is_empty() {
             return Ok(QuasiPolynomial::zero());
         }
-        rows.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let mut last = f64::NEG_INFINITY;
-        for (_, delay) in &mut rows {
-            if *delay - last <= SAME_DELAY * *delay {
-                *delay = last;
-            } else {
-                last = *delay;
-            }
-        }
+        equate_close_delays(&mut rows);
         let (coefficients, delays) = rows.into_iter().unzip();
         QuasiPolynomial::new(coefficients, delays)
     }
 
-    /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine in it.
+    /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine
+    /// in it.
     pub fn split(&self, parameter: usize) -> Option<(Self, Self)> {
         let exponent = |term: &Term| term.exponents.get(parameter).copied().unwrap_or(0);
         let part = |wanted: u32| {
@@ -258,7 +248,7 @@ impl Family {
     fn check_values(&self, values: &[f64]) -> Result<(), Error> {
         if values.len() != self.names.len() {
             return Err(Error::argument(format!(
-                "{} values for {} parameters ({}): give one value a parameter",
+                "{} values for {} parameters ({}): give one value for each parameter",
                 values.len(),
                 self.names.len(),
                 self.names.join(", ")

@@ -1,18 +1,18 @@
-//! What can be said to the drone.
+//! Commands to the drone.
 
 use crate::unit::Unit;
 
 /// One command, without its sequence number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
-    /// `REF`: take off and stay in the air, or land; it is a state, to be repeated.
+    /// `REF`: take off and stay in the air, or land. It is a state and has to be repeated.
     Ref {
         /// Bit 9: in the air while set, landed while clear.
         take_off: bool,
-        /// Bit 8: its rising edge cuts the motors, or ends an emergency.
+        /// Bit 8: its rising edge stops the motors, or ends an emergency.
         emergency: bool,
     },
-    /// `PCMD`: a motion, in shares of what the drone is set to do at most.
+    /// `PCMD`: a motion, as shares of the limits that are set in the drone.
     Move {
         /// Bit 0: move (0: hover, the rest is ignored); bit 1: combined yaw; bit 2: absolute.
         flag: i32,
@@ -25,9 +25,9 @@ pub enum Command {
         /// Clockwise positive.
         yaw: Unit,
     },
-    /// `PCMD_MAG`: a motion relative to a heading that the sender knows.
+    /// `PCMD_MAG`: a motion relative to a heading that the sender measures.
     MoveFrom {
-        /// As of [`Command::Move`].
+        /// The same as in [`Command::Move`].
         flag: i32,
         /// Right positive.
         roll: Unit,
@@ -37,9 +37,9 @@ pub enum Command {
         gaz: Unit,
         /// Clockwise positive.
         yaw: Unit,
-        /// The sender's heading, 1 being half a turn.
+        /// The sender's heading; 1 is half a turn.
         heading: Unit,
-        /// How well it knows it.
+        /// The accuracy of this heading.
         accuracy: Unit,
     },
     /// `CONFIG`: one setting.
@@ -49,7 +49,7 @@ pub enum Command {
         /// The setting, as text.
         value: String,
     },
-    /// `CONFIG_IDS`: for whom the next setting is, 8 hexadecimal digits each.
+    /// `CONFIG_IDS`: identifiers of the recipient of the next setting, 8 hexadecimal digits each.
     ConfigIds {
         /// The session.
         session: String,
@@ -58,25 +58,25 @@ pub enum Command {
         /// The application.
         application: String,
     },
-    /// `CTRL`: 4 asks for the configuration, 5 acknowledges a command, 6 asks for the identifiers.
+    /// `CTRL`: 4 requests the configuration, 5 acknowledges a command, 6 requests the identifiers.
     Control {
-        /// Which of them.
+        /// The mode.
         mode: i32,
     },
     /// `COMWDG`: the link is alive.
     Watchdog,
-    /// `FTRIM`: the drone stands level, on the ground.
+    /// `FTRIM`: the drone stands level on the ground.
     FlatTrim,
-    /// `CALIB`: turn to calibrate a device, in the air.
+    /// `CALIB`: turn in the air to calibrate a device.
     Calibrate {
         /// 0: magnetometer.
         device: i32,
     },
-    /// Any other name, with its arguments as they stand.
+    /// Any other name, with its arguments unchanged.
     Other {
         /// The name.
         name: String,
-        /// What stands between the commas after the sequence number, quotes included.
+        /// The text between the commas after the sequence number, quotes included.
         arguments: Vec<String>,
     },
 }

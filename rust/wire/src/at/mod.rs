@@ -1,7 +1,8 @@
 //! Commands to the drone: `AT*NAME=sequence,argument,…` and a carriage return, in ASCII.
 //!
-//! Several share a datagram, in their order; none spans two. A number with a fraction is written as
-//! the 32 bits of its single-precision form, read as a signed integer in decimal.
+//! A datagram holds several commands in order; no command spans two datagrams. A number with a
+//! fraction is written as the 32 bits of its single-precision form, read as a signed integer in
+//! decimal.
 
 mod command;
 mod read;
@@ -12,5 +13,5 @@ pub use command::Command;
 pub use read::read;
 pub use write::write;
 
-/// The most bytes a datagram of commands may have; of a longer one the drone reads no more.
+/// Upper limit on the bytes of a datagram of commands; the drone reads no more.
 pub const LIMIT: usize = 1024;

@@ -1,4 +1,4 @@
-//! Bytes to commands, as a drone reads them: what it cannot make sense of, it ignores.
+//! Bytes to commands, as a drone reads them: malformed commands are ignored.
 
 use super::text::{is_one_argument, is_other, printable, split};
 use super::{Command, LIMIT};
@@ -8,8 +8,8 @@ use crate::unit::Unit;
 ///
 /// A malformed command is left out: one without a carriage return or line feed at its end (its rest
 /// may be missing) or not within the first [`LIMIT`] bytes, with too few arguments or with some of
-/// another kind. Of values of a motion, finite ones are clipped to [-1, 1]; a command with any
-/// other is left out. Missing base bits of `REF` and arguments beyond those known are no fault.
+/// another kind. Finite values of a motion are clipped to [-1, 1]; a command with any other value
+/// is left out. Missing base bits of `REF` and additional arguments are accepted.
 ///
 /// ```
 /// use deadtime_wire::at::{self, Command};
@@ -91,7 +91,7 @@ fn command(line: &str) -> Option<(u32, Command)> {
     Some((sequence, command))
 }
 
-/// What is left of a line after its name.
+/// The rest of a line after its name.
 struct Arguments<'a>(Option<&'a str>);
 
 impl<'a> Arguments<'a> {
@@ -105,7 +105,7 @@ impl<'a> Arguments<'a> {
         self.next()?.trim_matches(' ').parse().ok()
     }
 
-    /// 32 bits, as a signed or an unsigned number.
+    /// 32 bits, read as a signed or an unsigned number.
     fn bits(&mut self) -> Option<u32> {
         let number: i64 = self.next()?.trim_matches(' ').parse().ok()?;
         u32::try_from(number)

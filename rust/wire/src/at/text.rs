@@ -1,4 +1,4 @@
-//! What may stand where in a command, for reader and writer.
+//! The characters that a command may hold, for reader and writer.
 
 /// Names of the commands that have a type of their own.
 const NAMES: [&str; 9] = [
@@ -13,7 +13,7 @@ const NAMES: [&str; 9] = [
     "CALIB",
 ];
 
-/// Whether a command may have this name that has no type of its own.
+/// May a command without a type of its own have this name?
 pub(super) fn is_other(name: &str) -> bool {
     let allowed = |byte: u8| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_';
     !name.is_empty() && name.bytes().all(allowed) && !NAMES.contains(&name)
@@ -23,8 +23,8 @@ pub(super) fn printable(byte: u8) -> bool {
     (b' '..=b'~').contains(&byte)
 }
 
-/// The first argument of a list, quotes included, and the rest of the list, where there is one; a
-/// comma between quotes belongs to the argument.
+/// The first argument of a list, quotes included, and the rest of the list, if any. A comma between
+/// quotes belongs to the argument.
 pub(super) fn split(list: &str) -> (&str, Option<&str>) {
     let mut inside = false;
     let end = list.bytes().position(|byte| {
@@ -37,7 +37,8 @@ pub(super) fn split(list: &str) -> (&str, Option<&str>) {
     }
 }
 
-/// Whether a text stays one argument between others: no comma but between quotes, quotes in pairs.
+/// Does a text remain one argument among others? Commas are allowed only between quotes, and quotes
+/// only in pairs.
 pub(super) fn is_one_argument(text: &str) -> bool {
     split(text).1.is_none() && text.bytes().filter(|&byte| byte == b'"').count() % 2 == 0
 }

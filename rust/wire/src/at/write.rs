@@ -6,7 +6,7 @@ use crate::error::{Error, Fault};
 use crate::unit::Unit;
 use std::fmt::Write as _;
 
-/// Bits of `REF` that are always set, in the words of the drone's guide.
+/// Bits of `REF` that are always set, according to the drone's guide.
 const REF_BASE: u32 = (1 << 18) | (1 << 20) | (1 << 22) | (1 << 24) | (1 << 28);
 
 /// A datagram of commands with the sequence numbers `first`, `first + 1`, …
@@ -109,7 +109,7 @@ fn line(text: &mut String, command: &Command, sequence: i64) -> Result<(), Error
             number(text, *device);
         }
         Command::Other { name, arguments } => {
-            // Nobody writes a motion past its type under another one.
+            // A motion cannot be written under another name than that of its type.
             if !is_other(name) {
                 return Err(Fault::Name(name.clone()).at(text.len()));
             }
@@ -154,7 +154,7 @@ fn quoted(text: &mut String, name: &'static str, value: &str) -> Result<(), Erro
     Ok(())
 }
 
-/// Refuses a byte that would end the text, the line or the datagram it stands in.
+/// Refuses a byte that would end the text, the line or the datagram.
 fn check(
     name: &'static str,
     text: &str,

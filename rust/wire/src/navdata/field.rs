@@ -1,20 +1,20 @@
 //! Kinds of numbers inside an option, each with its unit.
 //!
-//! Writing a value that is already there leaves its bytes alone: two bit patterns may stand for one
-//! value (a NaN and a quieter one, 1.2 s and 0 s with 1 200 000 µs), and what was read shall be
-//! written again as it was.
+//! Writing a value that is already stored does not change its bytes: two bit patterns may represent
+//! one value (two NaNs, or 1.2 s and 0 s with 1 200 000 µs), and what was read has to be written
+//! again unchanged.
 
 use crate::bytes::{array, put};
 
 /// A number with a unit, at an offset.
 pub(super) trait Field {
-    /// What the number is outside of the packet.
+    /// Type of the number outside the packet.
     type Value: Copy;
     /// Bytes it takes.
     const WIDTH: usize;
     /// Reads it.
     fn get(bytes: &[u8], at: usize) -> Option<Self::Value>;
-    /// Writes it; nothing when it has no place on the wire.
+    /// Writes it; fails where the field cannot represent it.
     fn put(bytes: &mut [u8], at: usize, value: Self::Value) -> Option<()>;
 }
 
@@ -34,7 +34,7 @@ macro_rules! whole {
 }
 whole!(u8, u16, i16, u32, i32);
 
-/// Whether the bytes already say what is to be written.
+/// Do the bytes already hold the value to be written?
 fn said(there: Option<f64>, value: f64) -> bool {
     there
         .is_some_and(|there| there.to_bits() == value.to_bits() || there.is_nan() && value.is_nan())

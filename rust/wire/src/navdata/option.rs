@@ -3,7 +3,7 @@
 use super::field::Field;
 use crate::error::{Error, Fault};
 
-/// The value of a field, whatever its kind.
+/// The value of a field of any kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Value {
     /// A count, a state or bits.
@@ -50,7 +50,7 @@ impl TryFrom<Value> for f64 {
 
 /// An option whose fields are known.
 pub trait Known: Sized {
-    /// What the option is, and where its fields are.
+    /// The tag of the option and the places of its fields.
     const LAYOUT: Layout;
     /// Reads the fields; nothing when the option is too short for them.
     fn read(option: &[u8]) -> Option<Self>;
@@ -62,12 +62,12 @@ pub trait Known: Sized {
     fn write(&self, option: &mut [u8]) -> Result<(), Error>;
 }
 
-/// What an option is called, and how its fields are read and written without knowing its type.
+/// The name of an option, and how its fields are read and written without knowing its type.
 #[derive(Debug, Clone, Copy)]
 pub struct Layout {
     /// The tag.
     pub tag: u16,
-    /// Bytes of the option without tag and size, in the firmware that has most of them.
+    /// Bytes of the option without tag and size, in the firmware with the longest one.
     pub length: usize,
     /// The name of the type.
     pub name: &'static str,
@@ -111,7 +111,7 @@ where
     F::put(option, at, value).ok_or_else(|| out_of_range(value.into(), name).at(at))
 }
 
-/// Takes a value for a field of the kind that it has.
+/// Converts a value to the type of a field.
 pub(super) fn take<T: TryFrom<Value, Error = f64>>(
     value: Value,
     name: &'static str,

@@ -1,6 +1,6 @@
-//! The options of navdata: which there are, how long they are, and what is where in them.
+//! The options of navdata: their tags, sizes and fields.
 //!
-//! Names of fields are those of the drone's own headers where it has a word for them.
+//! Fields have the names of the drone's own headers where these have one.
 
 use super::field::{Degrees, Field, Millidegrees, Real, Thousandths, Ticks};
 use super::option::{Known, Layout, options, put, take};
@@ -41,11 +41,11 @@ pub const FULL: &[(u16, usize)] = &[
 ];
 
 options! {
-    /// What every packet in flight holds.
+    /// The data that every packet in flight holds.
     Demo: tag 0, size 148 {
         /// Detail of the control state.
         minor: u16 as u16 = 4,
-        /// Control state: 2 landed, 3 flying, 4 hovering, 6 taking off, 7 going to its place, 8
+        /// Control state: 2 landed, 3 flying, 4 hovering, 6 taking off, 7 going to its position, 8
         /// landing.
         major: u16 as u16 = 6,
         /// Percent.
@@ -74,7 +74,7 @@ options! {
         time: f64 as Ticks = 4,
     }
 
-    /// Sensors, as they come.
+    /// Raw values of the sensors.
     RawMeasures: tag 2, size 52 {
         /// Accelerometer, counts.
         acceleration_x: u16 as u16 = 4,
@@ -94,7 +94,7 @@ options! {
         slow_rate_y: i16 as i16 = 18,
         /// mV.
         battery_voltage: u32 as u32 = 20,
-        /// m, of the ultrasound.
+        /// m, measured by ultrasound.
         height: f64 as Thousandths = 46,
         /// Of the ultrasound's echo.
         gradient: i16 as i16 = 50,
@@ -120,13 +120,13 @@ options! {
         rate_z: f64 as Degrees = 30,
     }
 
-    /// What the drone is asked for.
+    /// References of the drone's controllers.
     References: tag 6, size 88 {
-        /// As the drone has it.
+        /// In the drone's units.
         ref_theta: i32 as i32 = 4,
-        /// As the drone has it.
+        /// In the drone's units.
         ref_phi: i32 as i32 = 8,
-        /// The clock's word as a number: no time of a command.
+        /// The clock's word as a number; not the time of a command.
         ui_time: f64 as Real<1> = 64,
         /// Echo of the pitch that was commanded.
         ui_theta: f64 as Real<1> = 68,
@@ -140,7 +140,7 @@ options! {
         ui_seq: i32 as i32 = 84,
     }
 
-    /// What the remote control asks for; 0 on this drone.
+    /// Commands of the remote control; 0 on this drone.
     RcReferences: tag 8, size 24 {
         /// Counts.
         pitch: i32 as i32 = 4,
@@ -154,7 +154,7 @@ options! {
         ag: i32 as i32 = 20,
     }
 
-    /// Motors and the vertical speed they follow.
+    /// Motors, and the vertical speed that they follow.
     Pwm: tag 9, size 92 {
         /// Of 255.
         motor1: u8 as u8 = 4,
@@ -166,7 +166,7 @@ options! {
         motor4: u8 as u8 = 7,
         /// Share of the motors' command that lifts the drone's weight.
         gaz_feed_forward: f64 as Real<1> = 12,
-        /// Share for the height.
+        /// Share of the height controller.
         gaz_altitude: f64 as Real<1> = 16,
         /// Its integral.
         altitude_integral: f64 as Real<1> = 20,
@@ -182,11 +182,11 @@ options! {
         altitude_vz: f64 as Real<1000> = 8,
         /// m.
         altitude_ref: f64 as Thousandths = 12,
-        /// m, of the ultrasound, new every 40 ms.
+        /// m, measured by ultrasound, updated every 40 ms.
         altitude_raw: f64 as Thousandths = 16,
     }
 
-    /// The video that is sent, and the last command that was received.
+    /// The video stream, and the last command that was received.
     VideoStream: tag 19, size 65 {
         /// Quantiser.
         quantiser: u8 as u8 = 4,
@@ -196,7 +196,7 @@ options! {
         frame: u32 as u32 = 9,
         /// Sequence number of the last `REF` that was received.
         atcmd_ref_seq: u32 as u32 = 13,
-        /// Mean gap between those, ms.
+        /// Mean time between those, ms.
         atcmd_mean_gap: u32 as u32 = 17,
     }
 
@@ -214,7 +214,7 @@ options! {
 
     /// Height and vertical speed, filtered from ultrasound, barometer and accelerometer.
     KalmanPressure: tag 24, size 72 {
-        /// Pa or m, as the drone has it.
+        /// Pa or m, in the drone's units.
         offset_pressure: f64 as Real<1> = 4,
         /// m.
         est_z: f64 as Real<1000> = 8,
@@ -224,7 +224,7 @@ options! {
 
     /// The wireless link.
     Wifi: tag 26, size 8 {
-        /// As the drone has it.
+        /// In the drone's units.
         link_quality: u32 as u32 = 4,
     }
 }

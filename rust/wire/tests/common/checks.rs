@@ -37,7 +37,7 @@ pub(crate) fn navdata(bytes: &[u8]) -> bool {
 
 pub(crate) fn commands(bytes: &[u8]) -> bool {
     let read = at::read(bytes);
-    // The shortest command there is: AT*X=0 and its end.
+    // The shortest possible command: AT*X=0 and its end.
     assert!(read.len() * 7 <= bytes.len().min(at::LIMIT));
     for (sequence, command) in &read {
         if let Command::Move {
@@ -54,7 +54,7 @@ pub(crate) fn commands(bytes: &[u8]) -> bool {
                     .all(|unit| unit.get().abs() <= 1.0)
             );
         }
-        // Only base bits and spelt-out arguments can make it longer than it was.
+        // Only base bits and arguments written in full can make it longer than it was.
         match at::write(std::slice::from_ref(command), *sequence) {
             Ok(line) => assert_eq!(at::read(&line), [(*sequence, command.clone())]),
             Err(_) => assert!(bytes.len() > at::LIMIT - 64),
@@ -72,7 +72,7 @@ pub(crate) fn configuration(bytes: &[u8]) -> bool {
         .map(|(key, value)| key.len() + value.len() + 1)
         .sum();
     assert!(held <= bytes.len());
-    // Spaces around the sign of equality can make it longer than it was.
+    // Only spaces around the equals sign can make it longer than it was.
     match configuration::write(&settings) {
         Ok(dump) => assert_eq!(configuration::read(&dump).unwrap(), settings),
         Err(_) => assert!(bytes.len() + 3 * settings.len() > configuration::LIMIT),

@@ -1,6 +1,6 @@
-"""An AR.Drone 2.0 that is not there: its wire protocol, its states and a choice of plants.
+"""An emulated AR.Drone 2.0: its wire protocol, its states and a choice of plants.
 
-`Emulator` listens on sockets; `Drone` is the same without them.
+`Emulator` listens on sockets; `Drone` is the emulation without them.
 """
 
 from deadtime.links.ardrone2.emulator.drone import Drone, Truth

@@ -21,16 +21,16 @@ from deadtime.loops import FirstOrder, Integrator, RationalPlant
 
 __all__ = ["Airframe", "Pose"]
 
-#: How roll, pitch and turning speed follow their setpoints, s.
+#: Time constants of roll, pitch and turning speed, s.
 ATTITUDE_LAG = 0.15
 
-#: Rate at which the drag of the air takes up horizontal speed, 1/s.
+#: Rate at which air drag reduces horizontal speed, 1/s.
 DRAG = 1.0
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the drone is and how it moves; SI units, angles in rad.
+    """Position and motion of the drone; SI units, angles in rad.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Pose:
 
 
 class Airframe:
-    """Follows setpoints; knows nothing of links, states and limits.
+    """Follows setpoints, independent of links, states and limits.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Airframe:
         self.stand(0)
 
     def stand(self, time: Micros) -> None:
-        """Stand on the ground, level, with the motors off."""
+        """Be on the ground, level, with the motors off."""
         self._vertical = self._hover
         self._hover.settle(time, 0.0)
         self.setpoint = 0.0
@@ -106,13 +106,13 @@ class Airframe:
         self._heading.follow(time, turning)
 
     def settle_tilt(self, time: Micros) -> None:
-        """Tell the thrust how far the drone leans; the loop on board does not make up for it."""
+        """Pass the tilt to the thrust; the loop on board does not compensate for it."""
         if isinstance(self._vertical, ThrustMotion) and self._moved:
             roll, pitch = self._roll.at(time)[0], self._pitch.at(time)[0]
             self._vertical.tilt(time, math.cos(roll) * math.cos(pitch))
 
     def cut(self, time: Micros) -> None:
-        """Cut the motors: fall."""
+        """Stop the motors, so that the drone falls."""
         height, climb = self._vertical.at(time)
         self._fall.drop(time, height, climb)
         self._vertical, self.setpoint = self._fall, 0.0
@@ -126,7 +126,7 @@ class Airframe:
         return self._vertical.at(time)
 
     def at(self, time: Micros) -> Pose:
-        """Everything about the body at a time not before the last setpoint."""
+        """The pose at a time not before the last setpoint."""
         height, climb = self._vertical.at(time)
         if not self._moved:
             heading = self._heading.at(time)[0]

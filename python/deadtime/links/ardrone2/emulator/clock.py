@@ -1,7 +1,7 @@
-"""The drone's clock: whole microseconds since it was switched on, as its navdata have it.
+"""The clock of the drone: whole microseconds since it was switched on, as in its navdata.
 
-Every event of the emulator lies on it, so that times compare exactly and a run does not depend on
-how often, or how late, it is asked to go on.
+All events of the emulator have times of this clock, so that times compare exactly and a run does
+not depend on when it is advanced.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""TCP connections to an emulated drone: few at a time, and none in the way of the next.
+"""TCP connections to an emulated drone: few at a time, and always room for a new one.
 
-Who connects is taken in, in place of the youngest connection if all places are taken: those that
-a client keeps from its start on stay, and a crowd of idle ones leaves a place for the next. A
-connection whose host gives no sign of life is closed after a while.
+A new connection is accepted, and replaces the youngest one if all places are taken: connections
+that a client keeps from its start stay, and many idle ones leave a place for the next. A connection
+whose host is inactive is closed after a time.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from deadtime.links.addresses import canonical
 
 __all__ = ["Connection", "Door"]
 
-#: Connections to a port at a time, and what one may leave unread, bytes.
+#: Most connections to a port at a time, and most unread bytes of one.
 MOST_CONNECTIONS = 4
 MOST_UNREAD = 65536
 
-#: A connection whose host gives no sign of life for so long is closed, s.
+#: Inactivity of a host after which its connection is closed, s.
 IDLE = 30.0
 
 
 class Connection(asyncio.Protocol):
-    """A connection that is written to; what it says is not listened to."""
+    """A connection for writing; received data are ignored."""
 
     def __init__(self, door: Door) -> None:
         self._door = door
         self._transport: asyncio.Transport | None = None
         self.host = ""
-        #: When its host gave its last sign of life.
+        #: Time of the last activity of its host.
         self.heard = 0.0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -44,7 +44,7 @@ class Connection(asyncio.Protocol):
         self._door.leave(self)
 
     def write(self, data: bytes) -> None:
-        """Send something, to whoever reads what is sent."""
+        """Send data, if the client reads them."""
         if self._transport is None:
             return
         if self._transport.get_write_buffer_size() > MOST_UNREAD:
@@ -53,7 +53,7 @@ class Connection(asyncio.Protocol):
             self._transport.write(data)
 
     def end(self) -> None:
-        """Close it when all that was written is sent."""
+        """Close it after all data are sent."""
         if self._transport is not None:
             self._transport.close()
 
@@ -64,19 +64,19 @@ class Connection(asyncio.Protocol):
 
     @property
     def is_open(self) -> bool:
-        """Whether the other end is still there."""
+        """Whether the connection is open."""
         return self._transport is not None and not self._transport.is_closing()
 
 
 class Door:
-    """What a TCP port makes connections by.
+    """Accepts the connections of a TCP port.
 
     Parameters
     ----------
     answers : callable
-        Whether a host is let in.
+        Whether a host is accepted.
     welcome : callable
-        Called with each connection that is.
+        Called with each accepted connection.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class Door:
         return Connection(self)
 
     def enter(self, connection: Connection) -> None:
-        """Take a new connection in, if its host is welcome."""
+        """Accept a new connection, if its host is allowed."""
         if not self._answers(connection.host):
             connection.abort()
             return
@@ -104,13 +104,13 @@ class Door:
         self._welcome(connection)
 
     def leave(self, connection: Connection) -> None:
-        """Forget a connection."""
+        """Remove a connection."""
         timer = self._inside.pop(connection, None)
         if timer is not None:
             timer.cancel()
 
     def _look(self, connection: Connection) -> None:
-        """Close a connection that has been idle for too long, or look again."""
+        """Close a connection whose host is inactive, or check again later."""
         loop = asyncio.get_running_loop()
         end = connection.heard + IDLE
         if loop.time() >= end:
@@ -120,7 +120,7 @@ class Door:
             self._inside[connection] = loop.call_at(end, self._look, connection)  # in its old place
 
     def hear(self, host: str) -> None:
-        """A host has given a sign of life."""
+        """Note activity of a host."""
         for connection in self.of(host):
             connection.heard = asyncio.get_running_loop().time()
 

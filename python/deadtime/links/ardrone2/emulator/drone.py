@@ -1,8 +1,7 @@
-"""The emulated drone without sockets: datagrams and times go in, navdata come out.
+"""The emulated drone without sockets: datagrams and times as input, navdata as output.
 
-Everything happens at times of the drone's own clock and in one order, so that what comes out
-depends on the datagrams, their times, the options and the seed, and on nothing else: not on how
-often the drone is asked to go on, nor on when.
+All events have times of the clock of the drone and one order, so that the output depends only on
+the datagrams, their times, the options and the seed, and not on when the drone is advanced.
 """
 
 from __future__ import annotations
@@ -34,16 +33,16 @@ from deadtime.links.ardrone2.emulator.settings import IDS, Settings
 
 __all__ = ["Drone", "Truth"]
 
-#: A forgiving drone follows a motion command for so long; without a newer one it hovers.
+#: Time for which a forgiving drone follows a motion command; then it hovers.
 HOVER_AFTER: Micros = SECOND // 4
 
-#: Navdata a second of the short kind; the long kind comes at every tick.
+#: Short navdata a second; full navdata are sent at every tick.
 DEMO_RATE = 15
 
-#: Motion commands under way at most: more than these are a flood.
+#: Most motion commands in transit (bounds memory against floods).
 MOST_UNDER_WAY = 1024
 
-#: Navdata kept at most for whoever takes them.
+#: Most navdata that are kept until they are taken.
 MOST_WAITING = 4096
 
 SEND_CONFIGURATION, ACKNOWLEDGE, SEND_IDS = 4, 5, 6
@@ -53,12 +52,12 @@ NEVER: Micros = 1 << 62
 
 @dataclass(frozen=True)
 class Truth:
-    """What the emulated drone does, without noise.
+    """The true state of the emulated drone, without noise.
 
     Attributes
     ----------
     time : float
-        Of the drone's clock, s.
+        Clock of the drone, s.
     phase : Phase
     height : float
         m.
@@ -69,7 +68,8 @@ class Truth:
     battery : float
         Percent.
     emergency, link_lost, connected : bool
-        Whether the motors are cut, commands are missing for two seconds, navdata have a listener.
+        Whether the motors are stopped, commands are missing for two seconds, navdata have a
+        receiver.
     """
 
     time: float
@@ -90,14 +90,14 @@ class Drone:
     ----------
     options : EmulatorOptions
     start : float
-        Time at which it is switched on, s, of the clock that all times given to it are of.
+        Time at which it is switched on, s, by the clock of all times given to it.
 
     Attributes
     ----------
     settings : Settings
         Its configuration.
     deaf : bool
-        Set it to have the drone say that its ultrasound hears nothing.
+        Set it to make the drone report that its ultrasound receives no echo.
 
     Examples
     --------
@@ -133,44 +133,44 @@ class Drone:
         self._packets: deque[tuple[Micros, bytes, Address]] = deque(maxlen=MOST_WAITING)
         self._dumps: list[tuple[str, bytes]] = []
 
-    # What comes in.
+    # Input.
 
     def commanded(self, datagram: bytes, source: Address, now: float) -> None:
-        """Take a datagram of the command port."""
+        """Process a datagram of the command port."""
         time = self._go_on(now)
         for number, command in decode(datagram):
             begins = self._order.begins(number)
             if not self._order.accept(number, time):
                 continue
-            if begins:  # what another client wished for is no wish of this one
+            if begins:  # the requests of another client do not count for this one
                 self._ref = Ref()
             if self._listener.commanded(source, time):
                 self._sequence = 0
             self._carry_out(number, command, source, time)
 
     def woken(self, datagram: bytes, source: Address, now: float) -> None:
-        """Take a datagram of the navdata port."""
+        """Process a datagram of the navdata port."""
         time = self._go_on(now)
         if self._listener.wake(datagram, source, time):
             self._sequence, self._sent = 0, time
         if self._bootstrap and self._listener.may_answer(source, time):
             self._send(time)
 
-    # What goes out.
+    # Output.
 
     def advance(self, now: float) -> None:
-        """Let everything happen that is due by now."""
+        """Process all events until now."""
         self._go_on(now)
 
     def due(self) -> float:
-        """When something happens next if nothing comes in, s; infinite if nothing will."""
+        """Time of the next event without further input, s; infinite if there is none."""
         event = min(self._next_event()[0], self._packets[0][0] if self._packets else NEVER)
         return math.inf if event == NEVER else self._start + seconds(event)
 
     def packets(self, now: float, oldest: float = math.inf) -> list[tuple[bytes, Address]]:
-        """Take the navdata that leave by now, and whom they go to.
+        """Take the navdata to be sent by now, with their receivers.
 
-        Those that should have left more than `oldest` seconds ago are dropped, but for the newest.
+        Those due more than `oldest` seconds ago are dropped, except for the newest.
         """
         time, left = self._micros(now), []
         while self._packets and self._packets[0][0] <= time:
@@ -181,12 +181,12 @@ class Drone:
         return left
 
     def dumps(self) -> list[tuple[str, bytes]]:
-        """Take the configurations that were asked for, and by which hosts."""
+        """Take the requested configurations, with the hosts that requested them."""
         dumps, self._dumps = self._dumps, []
         return dumps
 
     def truth(self, now: float) -> Truth:
-        """What the drone does now."""
+        """The true state of the drone now."""
         time = self._go_on(now)
         pose = self._flight.airframe.at(time)
         return Truth(
@@ -217,10 +217,10 @@ class Drone:
             self._control(command.mode, source)
 
     def _refer(self, number: int, ref: Ref, time: Micros) -> None:
-        """Take the wish to be in the air or on the ground, and the emergency switch.
+        """Process the command to be in the air or on the ground, and the emergency switch.
 
-        A drone that has landed by itself takes off again in the worst case because somebody goes on
-        repeating the wish of before. For a forgiving one it has to be expressed anew.
+        In the worst case, a drone that has landed by itself takes off again when the earlier
+        request is repeated. A forgiving one needs a new request.
         """
         before, self._ref, self._ref_number = self._ref, ref, number
         flight = self._flight
@@ -245,12 +245,12 @@ class Drone:
             self._under_way.append((self._last_arrival, self._asked_for(command)))
 
     def _asked_for(self, command: Move | MoveFrom) -> Setpoints:
-        """A motion in SI units, by what the drone is configured to do at most."""
+        """A motion in SI units, scaled by the configured largest ones."""
         if not command.flag & 1:
             return HOVER
         limits = self.settings
         return (
-            # A zero with a sign is a zero.
+            # Treat -0.0 as 0.0.
             0.0 + float(command.gaz) * limits.climb_limit,
             0.0 + float(command.roll) * limits.angle_limit,
             0.0 + float(command.pitch) * limits.angle_limit,
@@ -258,7 +258,7 @@ class Drone:
         )
 
     def _configure(self, command: Config, ids: ConfigIds | None) -> None:
-        """Take a setting, and say in navdata that one was received."""
+        """Process a setting, and acknowledge it in navdata."""
         settings = self.settings
         given = None if ids is None else (ids.session, ids.user, ids.application)
         entering = command.key.startswith("custom:")
@@ -276,17 +276,17 @@ class Drone:
         elif mode in (SEND_CONFIGURATION, SEND_IDS):
             values = self.settings.values
             shown = values if mode == SEND_CONFIGURATION else {key: values[key] for key in IDS}
-            # One answer to a host at a time: more questions are no reason for more answers.
+            # One answer to a host at a time, however many requests it sends.
             if all(host != source[0] for host, _ in self._dumps):
                 self._dumps.append((source[0], write_configuration(shown)))
 
-    # What happens by itself.
+    # Events.
 
     def _micros(self, now: float) -> Micros:
         return micros(now - self._start)
 
     def _go_on(self, now: float) -> Micros:
-        """Let what is due happen, in the order of its times; the clock never goes back."""
+        """Process the due events in the order of their times; the clock never goes back."""
         until = max(self._time, self._micros(now))
         while True:
             time, happen = self._next_event()
@@ -314,7 +314,7 @@ class Drone:
 
     @property
     def _hovers_at(self) -> Micros | None:
-        """When the last motion command is too old; in the worst case it never is."""
+        """Expiry of the last motion command; never in the worst case."""
         flying = self._flight.phase is Phase.FLYING
         asked = bool(self._under_way) or (flying and not self._flight.hovering)
         if self.options.worst_case or self._moved_at is None or not asked:
@@ -326,7 +326,7 @@ class Drone:
         self._flight.follow(time, setpoint)
 
     def _hover(self, time: Micros) -> None:
-        """The last motion command is too old: forget it and those under way."""
+        """Drop the expired motion command and those in transit."""
         self._under_way.clear()
         self._flight.follow(time, HOVER)
 

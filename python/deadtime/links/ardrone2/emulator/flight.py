@@ -1,8 +1,8 @@
 """The flight of the emulated drone: its phases and what its autopilot does in each.
 
 On the ground; taking off; flying, which follows the setpoints of the link and hovers without any;
-landing; falling with the motors cut. The autopilot acts at ticks of 200 Hz, and at once on what the
-link asks for.
+landing; falling with the motors off. The autopilot acts at ticks of 200 Hz, and at once on requests
+of the link.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from deadtime.links.ardrone2.emulator.settings import Settings
 
 __all__ = ["TICK", "Flight", "Phase", "Setpoints"]
 
-#: Between two decisions of the autopilot.
+#: Time between two steps of the autopilot.
 TICK: Micros = SECOND // 200
 
-#: A take-off: motors first, then a smooth rise, then time to settle. As the vehicle does.
+#: Durations of a take-off, as of the vehicle: motors, smooth rise, settling.
 SPIN_UP: Micros = SECOND
 RISE: Micros = SECOND * 5 // 2
 TAKE_OFF: Micros = SECOND * 9 // 2
 TAKE_OFF_HEIGHT = 0.75
 
-#: How the autopilot holds heights of its own: climb per error, 1/s.
+#: Gain of the autopilot for its own heights: climb per error, 1/s.
 HEIGHT_GAIN = 3.0
 
 #: Climb of a landing, m/s.
 SINKING = -0.3
 
-#: How long a full battery flies, how much slower it drains on the ground, and when it is low: the
-#: drone says so and does not take off any more; when it is all but empty the drone lands.
+#: Flight time of a full battery, ratio of the drain on the ground, and the low charge: the drone
+#: reports it and does not take off; when nearly empty it lands.
 BATTERY_LASTS = 720.0
 IDLE_SHARE = 0.1
 LOW_BATTERY = 20.0
@@ -40,7 +40,7 @@ EMPTY_BATTERY = 3.0
 
 
 class Phase(Enum):
-    """What the drone is doing."""
+    """Phases of a flight."""
 
     LANDED = "landed"
     TAKING_OFF = "taking off"
@@ -61,7 +61,7 @@ class Flight:
     ----------
     options : EmulatorOptions
     settings : Settings
-        Whose limits hold; they may change in flight.
+        The settings with the limits; they may change in flight.
     """
 
     def __init__(self, options: EmulatorOptions, settings: Settings) -> None:
@@ -69,7 +69,7 @@ class Flight:
         self.phase = Phase.LANDED
         self.emergency = False
         self._settings = settings
-        self._wanted = HOVER
+        self._requested = HOVER
         self._since: Micros = 0
         self._charge = options.battery
         self._charged_at: Micros = 0
@@ -81,8 +81,8 @@ class Flight:
 
     @property
     def hovering(self) -> bool:
-        """Whether the drone flies and nothing is asked of it."""
-        return self.phase is Phase.FLYING and self._wanted == HOVER
+        """Whether the drone flies without a setpoint."""
+        return self.phase is Phase.FLYING and self._requested == HOVER
 
     def lifted(self, time: Micros) -> bool:
         """Whether the drone is off the ground."""
@@ -98,35 +98,35 @@ class Flight:
 
     def _enter(self, phase: Phase, time: Micros) -> None:
         self._charge, self._charged_at = self.charge(time), time
-        self.phase, self._since, self._wanted = phase, time, HOVER
+        self.phase, self._since, self._requested = phase, time, HOVER
 
     def take_off(self, time: Micros) -> None:
-        """Leave the ground, if the drone stands on it, unharmed and charged."""
+        """Take off, if the drone is on the ground, without emergency and charged."""
         if self.phase is Phase.LANDED and not self.emergency and self.charge(time) >= LOW_BATTERY:
             self._enter(Phase.TAKING_OFF, time)
             self.airframe.stand(time)
 
     def land(self, time: Micros) -> None:
-        """Go down, if in the air under control."""
+        """Land, if in the air under control."""
         if self.phase in (Phase.TAKING_OFF, Phase.FLYING):
             self._enter(Phase.LANDING, time)
             self._follow(time)
 
     def toggle_emergency(self, time: Micros) -> None:
-        """Cut the motors, or leave the emergency; a drone that falls goes on falling."""
+        """Stop the motors, or end the emergency; a falling drone keeps falling."""
         self.emergency = not self.emergency
         if self.emergency and self.airborne and self.phase is not Phase.FALLING:
             self.airframe.cut(time)
             self._enter(Phase.FALLING, time)
 
     def follow(self, time: Micros, setpoint: Setpoints) -> None:
-        """Take a setpoint of the link; it counts in flight only."""
-        if self.phase is Phase.FLYING and setpoint != self._wanted:
-            self._wanted = setpoint
+        """Set the setpoint of the link, which is followed in flight only."""
+        if self.phase is Phase.FLYING and setpoint != self._requested:
+            self._requested = setpoint
             self._follow(time)
 
     def tick(self, time: Micros) -> None:
-        """Decide what the autopilot decides every 5 ms."""
+        """Make one step of the autopilot, every 5 ms."""
         if self.phase is Phase.LANDED:
             return
         down = self.phase in (Phase.LANDING, Phase.FALLING)
@@ -141,7 +141,7 @@ class Flight:
         self._follow(time)
 
     def _follow(self, time: Micros) -> None:
-        """Give the airframe what the phase, the link and the limits make of each other."""
+        """Set the setpoints of the airframe by the phase, the link and the limits."""
         airframe = self.airframe
         if self.phase is Phase.TAKING_OFF:
             height, climb = _rising(time - self._since)
@@ -152,13 +152,13 @@ class Flight:
             airframe.lean(time, 0.0, 0.0, 0.0)
             airframe.climb_at(time, SINKING)
         elif self.phase is Phase.FLYING:
-            climb, *lean = self._wanted
+            climb, *lean = self._requested
             airframe.lean(time, *lean)
             airframe.climb_at(time, self._within_heights(time, climb))
         airframe.settle_tilt(time)
 
     def _within_heights(self, time: Micros, climb: float) -> float:
-        """The climb that does not lead out of the range of heights, slower towards its ends."""
+        """The climb limited to the range of heights, slower towards its ends."""
         lowest, highest = self._settings.heights
         fastest = self._settings.climb_limit
         height = self.airframe.height_at(time)
@@ -168,7 +168,7 @@ class Flight:
 
 
 def _rising(since: Micros) -> tuple[float, float]:
-    """Height and climb of the way up of a take-off, m and m/s."""
+    """Height and climb during a take-off, m and m/s."""
     share = min(max((since - SPIN_UP) / RISE, 0.0), 1.0)
     height = TAKE_OFF_HEIGHT * share * share * (3.0 - 2.0 * share)
     climb = TAKE_OFF_HEIGHT * 6.0 * share * (1.0 - share) / seconds(RISE)

@@ -1,9 +1,9 @@
-"""Who the drone listens to and whom it answers: sequence numbers, silence, and its one listener.
+"""Sequence numbers, silence and the one receiver of navdata of an emulated drone.
 
-Nothing authenticates anybody on this link. What an emulator can do against being used to flood
-others: answer a wake-up to its sender only, and by no more than one packet of 24 bytes until a
-valid command has come from the same host; send navdata to one address; and stop after two seconds
-without a sign of life from its host.
+This link has no authentication. So that it cannot be used to flood others, the emulator answers a
+request for navdata to its sender only, with one packet of 24 bytes until a valid command has come
+from the same host; it sends navdata to one address, and stops after two seconds without activity of
+its host.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ __all__ = ["LINK_LOST_AFTER", "Address", "Listener", "Order"]
 
 Address: TypeAlias = tuple[str, int]
 
-#: Without commands for so long the drone warns of it in its navdata (state bit 30).
+#: Time without commands after which the drone warns in its navdata (state bit 30).
 COM_WATCHDOG: Micros = 50_000
 
-#: Without commands for so long the link is lost (state bit 13): the drone lands.
+#: Time without commands after which the link is lost (state bit 13) and the drone lands.
 LINK_LOST_AFTER: Micros = 2 * SECOND
 
-#: Without a sign of life for so long navdata stop.
+#: Inactivity of the host after which navdata stop.
 LISTENER_LEAVES_AFTER: Micros = 2 * SECOND
 
-#: Wake-ups are answered no more often than this.
+#: Shortest time between two answers to requests for navdata.
 BETWEEN_ANSWERS: Micros = SECOND // 20
 
 WAKE_UP_SIZES = (1, 2, 4)
@@ -35,8 +35,8 @@ UNICAST = 1
 class Order:
     """The sequence numbers of commands, and the silence between them.
 
-    A command is executed if its number is above the last; number 1 begins anew, and so does any
-    number after the link was lost.
+    A command is executed if its number is above the last one; number 1 restarts the count, and so
+    does any number after the link was lost.
 
     Examples
     --------
@@ -47,7 +47,7 @@ class Order:
 
     def __init__(self) -> None:
         self._last: int | None = None
-        #: When the last command was accepted; None before the first.
+        #: Time of the last accepted command; None before the first.
         self.heard: Micros | None = None
         self.lost = False
 
@@ -59,18 +59,18 @@ class Order:
         return True
 
     def begins(self, number: int) -> bool:
-        """Whether this number, if it comes next, is a client's first."""
+        """Whether this number would be the first of a client."""
         return number == 0 or (number == 1 and self._last != 0)
 
     @property
     def loses_at(self) -> Micros | None:
-        """When the link is lost if nothing comes; None if it is lost already or was never there."""
+        """Time at which the link is lost without commands; None if there is no link."""
         if self.heard is None or self.lost:
             return None
         return self.heard + LINK_LOST_AFTER
 
     def lose(self) -> None:
-        """The link is lost: the next command may have any number."""
+        """Note that the link is lost: the next command may have any number."""
         self._last, self.lost = None, True
 
     def late(self, time: Micros) -> bool:
@@ -79,11 +79,11 @@ class Order:
 
 
 class Listener:
-    """The one address that navdata go to: where the host of the commands has asked for them last.
+    """The one address for navdata: that of the last request by the host of the commands.
 
-    A client is known by its host. It may have a socket for each command, and ask again from
-    another one; any command from its host is a sign of its life. Another host that asks while
-    nobody commands is kept in mind until it is clear which one does.
+    A client is identified by its host. It may use a socket for each command, and request from
+    another one; every command from its host counts as activity. Another host that requests navdata
+    while nobody commands is remembered until one of them sends commands.
     """
 
     def __init__(self) -> None:
@@ -94,7 +94,7 @@ class Listener:
         self._answered: Micros | None = None
 
     def wake(self, datagram: bytes, source: Address, time: Micros) -> bool:
-        """Take a wake-up; True if its sender has become the listener."""
+        """Process a request; True if its sender has become the receiver."""
         if len(datagram) not in WAKE_UP_SIZES or datagram[0] != UNICAST:
             return False
         if self._commander not in (None, source[0]):
@@ -107,11 +107,11 @@ class Listener:
 
     @staticmethod
     def _is_here(address: Address | None, host: str) -> bool:
-        """Whether nobody but this host has the address."""
+        """Whether no other host is the receiver."""
         return address is None or address[0] == host
 
     def may_answer(self, source: Address, time: Micros) -> bool:
-        """Whether a packet may go out in answer to a wake-up, now."""
+        """Whether a request may be answered now."""
         if source != self.address:
             return False
         if self._answered is not None and time - self._answered < BETWEEN_ANSWERS:
@@ -120,9 +120,9 @@ class Listener:
         return True
 
     def commanded(self, source: Address, time: Micros) -> bool:
-        """A command was executed: a sign of life of the host that commands.
+        """Note an executed command as activity of its host.
 
-        A listener on another host leaves: True, if so.
+        Returns True if this removes a receiver on another host.
         """
         host = source[0]
         if self._commander is None:
@@ -137,14 +137,14 @@ class Listener:
 
     @property
     def leaves_at(self) -> Micros | None:
-        """When the listener is taken to have left, if nothing comes."""
+        """Time at which the receiver is removed without activity."""
         return None if self.address is None else self._heard + LISTENER_LEAVES_AFTER
 
     def leave(self, time: Micros) -> None:
-        """The listener has left; who has waited takes its place."""
+        """Remove the receiver; a waiting host takes its place."""
         self.address, self._waiting = self._waiting, None
         self._commander, self._heard = None, time
 
     def commander_left(self) -> None:
-        """The link of the commands is lost: anybody may be the next to command."""
+        """Note that the link of the commands is lost: any host may command next."""
         self._commander = None

@@ -1,9 +1,9 @@
-r"""How an emulated vehicle moves: exactly where it is linear, in small fixed steps where it is not.
+r"""Motion of an emulated vehicle: exact where it is linear, in small fixed steps where it is not.
 
 A linear plant x' = A x + B w under a w that is constant since the last change is
 exp(M t) (x, w) with M = [[A, B], [0, 0]]. Times are whole microseconds, so exp(M t) is a product of
 exp(M 2^k us) over the set bits of t: a few dozen exponentials, made once, give every time to
-rounding, at the same cost whether it is asked for often or seldom.
+rounding, at the same cost for any sequence of evaluations.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = [
 
 PlantName: TypeAlias = Literal["kit", "paper", "real", "thrust"]
 
-#: Transport delay that belongs to each plant, s.
+#: Transport delay of each plant, s.
 DELAYS: dict[str, float] = {"kit": 0.26, "paper": 0.36, "real": 0.34, "thrust": 0.26}
 
 #: Standard gravity, m/s^2.
@@ -47,8 +47,7 @@ Row: TypeAlias = tuple[float, ...]
 class Motion(ABC):
     """A quantity that follows a setpoint, which is constant between changes.
 
-    Looking at it changes nothing: what is read at a time is the same, however often and whenever
-    it was read before.
+    Evaluation has no side effects: the value at a time does not depend on earlier evaluations.
     """
 
     @abstractmethod
@@ -86,7 +85,7 @@ class LinearMotion(Motion):
     def __init__(self, plant: Plant) -> None:
         space = plant.state_space()
         if space.D != 0.0:
-            raise ValueError(f"{plant} answers its command at once: no vehicle does")
+            raise ValueError(f"{plant} has direct feedthrough: give a strictly proper plant")
         n = len(space.B)
         self._plant = plant
         flow = np.zeros((n + 1, n + 1))
@@ -98,7 +97,7 @@ class LinearMotion(Motion):
         self._since: Micros = 0
         self._state: Row = (0.0,) * (n + 1)
         self._powers: list[tuple[Row, ...]] = []
-        # The last answer: one time is asked for by the autopilot, the sensors and the navdata.
+        # The last result: autopilot, sensors and navdata evaluate the same time.
         self._looked: tuple[Micros, Row] = (0, self._state)
 
     def settle(self, time: Micros, value: float) -> None:
@@ -139,7 +138,7 @@ class LinearMotion(Motion):
 
 
 class FreeFall(Motion):
-    """The height of what has no thrust any more; it follows no setpoint."""
+    """The height of a falling vehicle, which follows no setpoint."""
 
     def __init__(self) -> None:
         self._start: tuple[Micros, float, float] = (0, 0.0, 0.0)
@@ -153,7 +152,7 @@ class FreeFall(Motion):
         self._start = (time, height, climb)
 
     def follow(self, time: Micros, value: float) -> None:
-        """Without thrust there is nothing to follow a setpoint."""
+        """Ignored: without thrust no setpoint is followed."""
 
     def at(self, time: Micros) -> tuple[float, float]:
         """Height and climb."""
@@ -176,8 +175,8 @@ def linear_plant(name: PlantName) -> Plant:
 def _exponential(matrix: list[list[float]]) -> tuple[Row, ...]:
     """The exponential of a small matrix, by Taylor's series of a part of it and squaring.
 
-    In plain Python: threads of a BLAS can make one product of two such matrices take as long as
-    ten packets, and give other bits on another machine.
+    In plain Python: with a threaded BLAS one such product can take as long as ten packets, and
+    other machines give other bits.
     """
     size = max(sum(map(abs, row)) for row in matrix)
     squarings = max(0, math.frexp(size)[1] + 1)  # the part is below a half

@@ -1,4 +1,4 @@
-"""What an emulated drone is made of: plant, delays, noise, battery, ports."""
+"""Options of an emulated drone: plant, delays, noise, battery, ports."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ __all__ = ["LOOPBACK", "PORT_BASE", "EmulatorOptions", "ports_from"]
 
 LOOPBACK = "127.0.0.1"
 
-#: The ports of the vehicle count from here: navdata, commands and control.
+#: First port of the vehicle: navdata, commands and control.
 PORT_BASE = 5550
-#: Longer delays would need more commands and navdata under way than are kept, and navdata have no
-#: place for much more noise.
+#: Largest delays, for which commands and navdata in transit are kept, and largest noise that
+#: navdata can represent.
 LARGEST = {"delay": 100.0, "jitter": 100.0, "downlink": 20.0, "noise": 10.0}
 PORTS_FROM_BASE = {
     "ftp_port": 1,
@@ -30,12 +30,12 @@ PORTS_FROM_BASE = {
 
 @dataclass(frozen=True)
 class EmulatorOptions:
-    """What an emulated drone is made of, and where it listens.
+    """Options of an emulated drone, and where it listens.
 
     Parameters
     ----------
     plant : {"kit", "paper", "real", "thrust"}
-        How height answers the commanded climb.
+        Dynamics from the commanded climb to the height.
     delay : float, optional
         Transport delay of motion commands, s; by default that of the plant.
     jitter : float
@@ -43,8 +43,8 @@ class EmulatorOptions:
     downlink : float
         Delay of navdata, s.
     noise : float
-        Standard deviation of the measured height, m; of the measured climb it is ten times as
-        much in m/s.
+        Standard deviation of the measured height, m; for the measured climb ten times as much,
+        in m/s.
     battery : float
         Charge at the start, percent.
     seed : int
@@ -52,19 +52,18 @@ class EmulatorOptions:
     host : str
         Address to listen on.
     clients : tuple of str
-        Addresses of the hosts that are listened to and answered; without any, every host that can
-        reach the emulator. Needed where others than this machine can: nothing that they forge then
-        has it send navdata to an address that is not one of these.
+        Addresses of the accepted hosts; without any, every host that can reach the emulator.
+        Required where other machines can reach it: a forged address then cannot make it send
+        navdata to other hosts.
     navdata_port, command_port, control_port : int
         0 takes a free one.
     ftp_port, video_port : int, optional
-        Where connections for files and for the video are taken, to tell that there are none;
-        nowhere by default.
+        Ports for file and video connections, which report that there is no data; none by default.
     worst_case : bool
-        Do the worst that the vehicle may do where its behaviour is not known for certain: hold the
-        last motion until the link is lost, and take off whenever it stands and the take-off bit is
-        set. Without, be forgiving: hover 0.25 s after the last motion command, and take off when
-        the bit becomes set.
+        Do the worst where the behaviour of the vehicle is not known: hold the last motion until the
+        link is lost, and take off whenever it is on the ground and the take-off bit is set.
+        Otherwise be forgiving: hover 0.25 s after the last motion command, and take off when the
+        bit becomes set.
 
     Raises
     ------
@@ -108,7 +107,7 @@ class EmulatorOptions:
                 raise ValueError(f"{name}={value}: give no more than {largest:g}")
             object.__setattr__(self, name, value)
         if not 0.0 <= self.battery <= 100.0:
-            raise ValueError(f"battery={self.battery} is no percentage: give 0 to 100")
+            raise ValueError(f"battery={self.battery} is outside 0 to 100: give a percentage")
         if self.seed < 0:
             raise ValueError(f"seed={self.seed} is negative: give 0 or more")
         for name in PORTS_FROM_BASE:
@@ -137,10 +136,10 @@ class EmulatorOptions:
         return is_loopback(self.host)
 
     def answers(self, host: str) -> bool:
-        """Whether a host is listened to, however its address is spelled."""
+        """Whether a host is accepted, in any form of its address."""
         return not self.clients or canonical(host) in map(canonical, self.clients)
 
 
 def ports_from(base: int) -> dict[str, int]:
-    """The ports that lie as the vehicle's do, from a base on; 0 asks for free ones."""
+    """The ports of the vehicle relative to a base; 0 for free ones."""
     return {name: base and base + offset for name, offset in PORTS_FROM_BASE.items()}

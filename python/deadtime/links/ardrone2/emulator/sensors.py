@@ -1,4 +1,4 @@
-"""What the emulated drone measures, and the navdata that it tells it in.
+"""Measurements of the emulated drone, and its navdata.
 
 The noise of a time is a function of the seed and the time alone, so that it does not depend on
 which navdata are sent, or when.
@@ -37,7 +37,7 @@ from deadtime.links.ardrone2.navdata import (
 
 __all__ = ["Reading", "Sensors"]
 
-#: The ultrasound is heard so often, and up to this height, m.
+#: Period of the ultrasound, and its largest height, m.
 ECHO_EVERY: Micros = SECOND // 25
 HEARS_UP_TO = 6.0
 
@@ -51,10 +51,10 @@ FORCE_NOISE = 1.0
 #: that points down counts 2560 and tells -1 g.
 ZERO_COUNT, COUNTS_PER_G, LARGEST_COUNT = 2048, 512, 4095
 
-#: Times at once whose noise is made together.
+#: Ticks whose noise is drawn together.
 BLOCK = 1024
 
-#: Bits that are set in a drone that works.
+#: Bits that are set in a working drone.
 WORKING = (
     State.ALTITUDE_CONTROL
     | State.CAMERA_READY
@@ -81,7 +81,7 @@ TAGS = {
 #: Control states: the upper half of the word in navdata.
 DEFAULT, LANDED, FLYING, HOVERING, TAKING_OFF, GOING_UP, LANDING = 0, 2, 3, 4, 6, 7, 8
 
-#: Sent of the motors while they turn, of 255; the emulator has no better number.
+#: Reported motor speed while they turn, of 255; it is not modelled.
 TURNING = 150
 
 EMPTY_VOLTAGE, FULL_VOLTAGE = 10_500.0, 12_500.0
@@ -90,7 +90,7 @@ SEA_LEVEL, PER_METRE = 101_325.0, 12.0
 
 @dataclass(frozen=True)
 class Reading:
-    """The drone at one time: what navdata tell of. Names as in `Flight` and the link."""
+    """The drone at one time, for its navdata. Names as in `Flight` and the link."""
 
     time: Micros
     sequence: int
@@ -128,12 +128,12 @@ class _Noise:
 
 
 class Sensors:
-    """Measures with noise, and writes navdata.
+    """Measures with noise, and makes navdata.
 
     Parameters
     ----------
     options : EmulatorOptions
-        Whose noise and seed are used.
+        Options with noise and seed.
     """
 
     def __init__(self, options: EmulatorOptions) -> None:
@@ -145,7 +145,7 @@ class Sensors:
         self._climb = self._acceleration = 0.0
 
     def tick(self, time: Micros, height: float, climb: float) -> None:
-        """Feel how the climb has changed, and listen to the echo if this tick is one of those."""
+        """Measure the acceleration, and the ultrasound at its ticks."""
         self._acceleration = (climb - self._climb) / seconds(TICK)
         self._climb = climb
         if time % ECHO_EVERY == 0 and height <= HEARS_UP_TO:
@@ -159,7 +159,7 @@ class Sensors:
         return build_navdata(navdata)
 
     def _forces(self, reading: Reading) -> tuple[float, float, float]:
-        """What accelerometers feel, forward, right and down, in units of the standard gravity.
+        """Specific force forward, right and down, in units of the standard gravity.
 
         Thrust acts along the drone, drag against its speed; on the ground, the ground.
         """

@@ -1,10 +1,10 @@
 """The emulated drone on sockets: navdata and commands on UDP, the configuration on TCP.
 
-Two more ports are there to be connected to. That for files tells that there are none, and closes;
-that for the video stays silent, as that of a drone whose camera sends nothing: clients wait for
-pictures meanwhile, and some do not survive an end of the stream.
+Two more ports accept connections. That for files reports that there are none, and closes; that for
+the video sends nothing, as with a camera without pictures: some clients fail at the end of a
+stream.
 
-It runs in whatever event loop it is opened in, of real or of virtual time.
+It runs in the event loop in which it is opened, in real or virtual time.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 
 __all__ = ["Emulator"]
 
-#: Navdata that could not leave in time, because the machine was busy, are not sent later, s.
+#: Age beyond which navdata that could not be sent in time are dropped, s.
 STALE = 0.25
 
-#: A configuration that was asked for before anybody connected is kept for so long, s.
+#: Time for which a configuration requested before the connection is kept, s.
 KEPT_FOR = 1.0
 
-#: What the port for files says (RFC 959: service not available, closing control connection).
+#: Answer of the port for files (RFC 959: service not available, closing control connection).
 NO_FILES = b"421 This is an emulator: it has no files.\r\n"
 
 
 class _Port(asyncio.DatagramProtocol):
-    """Hands datagrams on; errors of replies that nobody wanted are no business of the drone."""
+    """Passes on datagrams; errors of undelivered replies are ignored."""
 
     def __init__(
         self, received: Callable[[bytes, Address], None], answers: Callable[[str], bool]
@@ -51,8 +51,8 @@ class _Port(asyncio.DatagramProtocol):
 class Emulator:
     """An emulated AR.Drone 2.0 that listens on sockets of the running event loop.
 
-    Use it as an asynchronous context manager. It answers to whoever can reach it, as the vehicle
-    does: by default that is this machine only, and where it is more, the clients that are named.
+    Use it as an asynchronous context manager. It answers every host that can reach it, as the
+    vehicle does: by default this machine only, otherwise the named clients.
 
     Parameters
     ----------
@@ -62,17 +62,17 @@ class Emulator:
     Attributes
     ----------
     drone : Drone
-        What is emulated; its `Drone.truth` is for tests and displays.
+        The emulated drone; its `Drone.truth` is for tests and displays.
     host : str
     navdata_port, command_port, control_port : int
         Where it listens, once it is open.
     ftp_port, video_port : int or None
-        Where connections for files and for the video are taken, if they are.
+        Ports for file and video connections, if there are any.
 
     Raises
     ------
     LinkError
-        On opening, if a port cannot be had.
+        On opening, if a port is not available.
 
     Examples
     --------
@@ -113,7 +113,7 @@ class Emulator:
             raise LinkError(
                 f"the emulator cannot listen on {self.host}, {self._opening} "
                 f"{getattr(self, self._opening)}: {error.strerror}; choose another, or 0 for a "
-                "free one (a port below 1024 needs the right to it)"
+                "free one (a port below 1024 needs a privilege)"
             ) from error
         return self
 
@@ -151,7 +151,7 @@ class Emulator:
         return transport
 
     async def close(self) -> None:
-        """Stop listening; safe to call twice."""
+        """Stop listening; may be called again."""
         if self._timer is not None:
             self._timer.cancel()
         for transport in (self._navdata, self._commands):
@@ -165,7 +165,7 @@ class Emulator:
         self._timer = self._navdata = self._commands = None
 
     def truth(self) -> Truth:
-        """What the drone does now, without noise."""
+        """The true state of the drone now, without noise."""
         return self.drone.truth(asyncio.get_running_loop().time())
 
     def _woken(self, datagram: bytes, source: Address) -> None:
@@ -181,7 +181,7 @@ class Emulator:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Let what is due happen and leave, and come back when the next thing is due."""
+        """Process and send what is due, and schedule the next event."""
         loop = asyncio.get_running_loop()
         if self._navdata is None or self._navdata.is_closing():
             return
@@ -202,9 +202,9 @@ class Emulator:
             reader.write(dump)
 
     def _tell(self, host: str, dump: bytes) -> None:
-        """Send a configuration to the connections of the host that asked for it.
+        """Send a configuration to the connections of the host that requested it.
 
-        Some ask first and connect then.
+        Some clients request first and connect then.
         """
         readers = self._doors["control_port"].of(host)
         for reader in readers:

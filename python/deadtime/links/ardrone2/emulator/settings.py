@@ -1,9 +1,9 @@
-"""The configuration of an emulated drone: what it takes for its keys.
+"""The configuration of an emulated drone, and the values it accepts.
 
 A number outside its range is taken as the nearest one inside; a value of the wrong kind and a key
 that can only be read change nothing. Every key of the drone is acknowledged, also where nothing
-changes: the acknowledgement says that a setting was received. Whoever sets a limit has to read it
-back. A key that the drone does not have is not acknowledged.
+changes: the acknowledgement only means that a setting was received, so a client has to read a limit
+back. An unknown key is not acknowledged.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Settings:
         self.values = {key: entry.value for key, entry in ENTRIES.items()}
 
     def set(self, key: str, value: str) -> bool:
-        """Take a value if it is one; False if the drone has no such key."""
+        """Set a value if it is valid; False if the drone has no such key."""
         if key not in ENTRIES:
             return False
         accepted = _taken(ENTRIES[key], value)
@@ -91,17 +91,17 @@ class Settings:
 
     @property
     def climb_limit(self) -> float:
-        """The climb that one unit of gaz asks for, m/s."""
+        """The climb for one unit of gaz, m/s."""
         return float(self.values["control:control_vz_max"]) / 1000.0
 
     @property
     def angle_limit(self) -> float:
-        """The roll or pitch that one unit asks for, rad."""
+        """The roll or pitch for one unit, rad."""
         return float(self.values["control:euler_angle_max"])
 
     @property
     def turn_limit(self) -> float:
-        """The turning speed that one unit of yaw asks for, rad/s."""
+        """The turning speed for one unit of yaw, rad/s."""
         return float(self.values["control:control_yaw"])
 
     @property
@@ -114,7 +114,7 @@ class Settings:
 
 
 def _taken(entry: Entry, value: str) -> str | None:
-    """What is kept of a value, None if it is refused."""
+    """The accepted value, None if it is refused."""
     value = value.strip()
     if entry.kind == "truth" and value.upper() in ("TRUE", "FALSE"):
         return value.upper()

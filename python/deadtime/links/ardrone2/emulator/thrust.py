@@ -44,7 +44,7 @@ def _rotor(motor_rpm: float) -> float:
 
 @dataclass(frozen=True)
 class Thruster:
-    """The numbers of the thrust model, by default those of an AR.Drone 2.0 with its indoor hull.
+    """Parameters of the thrust model, by default of an AR.Drone 2.0 with its indoor hull.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Thruster:
     motor_lag : float
         Time constant with which a rotor's speed follows, s.
     speed_gain : float
-        Of the loop on board, 1/s: acceleration asked for per error of the climb.
+        Gain of the loop on board, 1/s: commanded acceleration per error of the climb.
 
     Raises
     ------
@@ -141,7 +141,7 @@ class ThrustMotion(Motion):
 
     def at(self, time: Micros) -> tuple[float, float]:
         """Height and climb."""
-        # As far as the last whole step the way is the same whoever asks; the rest is not kept.
+        # Only whole steps are kept, so that the path does not depend on the times of evaluation.
         whole = time - time % STEP
         if whole > self._time:
             self._go_to(whole)
@@ -150,7 +150,7 @@ class ThrustMotion(Motion):
 
     @property
     def rotor_speed(self) -> float:
-        """Speed of a rotor when the motion was last asked for, rad/s."""
+        """Speed of a rotor at the last evaluation, rad/s."""
         return self._state[2]
 
     def _go_to(self, time: Micros) -> None:
@@ -181,10 +181,10 @@ class ThrustMotion(Motion):
         hover = model.hover_speed
         # Thrusts as accelerations, so that the mass cancels: T / m = g (Omega / Omega_hover)^2.
         asked = max(0.0, GRAVITY + model.speed_gain * (self._setpoint - climb))
-        wanted = hover * math.sqrt(asked / GRAVITY)
-        wanted = min(max(wanted, model.slowest), model.fastest)
+        requested = hover * math.sqrt(asked / GRAVITY)
+        requested = min(max(requested, model.slowest), model.fastest)
         thrust = GRAVITY * (speed / hover) ** 2
-        return climb, thrust * self._upright - GRAVITY, (wanted - speed) / model.motor_lag
+        return climb, thrust * self._upright - GRAVITY, (requested - speed) / model.motor_lag
 
 
 def _moved(state: State, rates: State, by: float) -> State:

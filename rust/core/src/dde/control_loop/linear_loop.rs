@@ -172,7 +172,7 @@ impl<S: Scalar> LinearLoop<S> {
         }
         if self.sample_time.is_none() {
             return Err(Error::argument(
-                "states that move at samples need a sample_time",
+                "states that change at samples need a sample_time",
             ));
         }
         finite("the update of a sample", &update.states)?;

@@ -1,5 +1,16 @@
 //! Metrics of a step response, and the record of a response from which they follow.
 
+/// Width of the quiet band as a share of the settling band: what remains of the band after three
+/// time constants.
+const QUIET_SHARE: f64 = 0.05;
+
+/// The output must have been in the quiet band for this share of the time between entering the
+/// settling band and the quiet band (a slow oscillation that passes through both stays a tenth),
+/// and for at least this many delays.
+const QUIET_FOR: f64 = 0.2;
+
+const QUIET_WAITS: f64 = 3.0;
+
 /// Metrics of a step response, measured between its first output and its steady state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Metrics {
@@ -37,8 +48,9 @@ impl Metrics {
         steady_state: f64::NAN,
     };
 
-    /// The fields in their order.
-    pub fn to_array(self) -> [f64; 9] {
+    /// In the order of the fields.
+    #[cfg(test)]
+    pub(crate) fn to_array(self) -> [f64; 9] {
         [
             self.rise_time,
             self.settling_time,
@@ -52,16 +64,6 @@ impl Metrics {
         ]
     }
 }
-
-/// Width of the quiet band as a share of the settling band: what remains of the band after three
-/// time constants.
-const QUIET_SHARE: f64 = 0.05;
-
-/// The output must have been in the quiet band for this share of the time between entering the
-/// settling band and the quiet band (a slow oscillation that passes through both stays a tenth),
-/// and for at least this many delays.
-const QUIET_FOR: f64 = 0.2;
-const QUIET_WAITS: f64 = 3.0;
 
 /// Definitions of rise and settling.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,7 +16,7 @@ impl Reference {
     pub fn new(before: f64, times: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         if times.len() != values.len() {
             return Err(Error::argument(format!(
-                "{} reference values for {} reference times: give one value a time",
+                "{} reference values for {} reference times: give one value for each time",
                 values.len(),
                 times.len()
             )));

@@ -22,15 +22,15 @@ const ONE_BREAK: f64 = 64.0 * f64::EPSILON;
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
     /// Output times, increasing; the first is the start of the run.
-    pub times: &'a [f64],
-    /// How much later the output is read, s: the delay, where it is in the measurement.
-    pub ahead: f64,
+    pub time: &'a [f64],
+    /// How much earlier than its measurement the output is, s: the delay, where it sits there.
+    pub output_lead: f64,
     /// The reference before its first jump.
-    pub before: f64,
+    pub reference_before: f64,
     /// Times of its jumps, increasing.
-    pub reference_times: &'a [f64],
+    pub reference_time: &'a [f64],
     /// Its values from those times on.
-    pub reference_values: &'a [f64],
+    pub reference: &'a [f64],
 }
 
 /// The response at the requested times.
@@ -54,8 +54,8 @@ impl LinearLoop {
         request: &Request<'_>,
         task: &Task,
     ) -> Result<Response, Error> {
-        increasing("time", request.times)?;
-        let Some(&first) = request.times.first() else {
+        increasing("time", request.time)?;
+        let Some(&first) = request.time.first() else {
             return Ok(Response::default());
         };
         let since = |times: &[f64]| {
@@ -65,22 +65,25 @@ impl LinearLoop {
                 .map(|time| on_sample(time - first, first, sample));
             collected(RESPONSE, moved)
         };
-        let jumps = since(request.reference_times)?;
-        let values = copied(RESPONSE, request.reference_values)?;
-        let reference = Reference::new(request.before, jumps, values)?;
-        let input_times = since(request.times)?;
+        let jumps = since(request.reference_time)?;
+        let values = copied(RESPONSE, request.reference)?;
+        let reference = Reference::new(request.reference_before, jumps, values)?;
+        let input_times = since(request.time)?;
         let later: Vec<f64>;
-        let output_times = if request.ahead == 0.0 {
+        let output_times = if request.output_lead == 0.0 {
             &input_times
         } else {
-            later = collected(RESPONSE, input_times.iter().map(|t| t + request.ahead))?;
+            later = collected(
+                RESPONSE,
+                input_times.iter().map(|t| t + request.output_lead),
+            )?;
             &later
         };
         let found = self.simulate(start, &reference, output_times, &input_times, task)?;
 
         let mut breaks = found.output_breaks;
         for t in &mut breaks {
-            *t -= request.ahead;
+            *t -= request.output_lead;
         }
         append(RESPONSE, &mut breaks, &found.input_breaks)?;
         breaks.retain(|&t| t >= 0.0);
@@ -92,11 +95,11 @@ impl LinearLoop {
             *t += first;
         }
         let absolute = Reference::new(
-            request.before,
-            copied(RESPONSE, request.reference_times)?,
-            copied(RESPONSE, request.reference_values)?,
+            request.reference_before,
+            copied(RESPONSE, request.reference_time)?,
+            copied(RESPONSE, request.reference)?,
         )?;
-        let reference = request.times.iter().map(|&t| absolute.at(t));
+        let reference = request.time.iter().map(|&t| absolute.at(t));
         Ok(Response {
             outputs: found.outputs,
             inputs: found.inputs,

@@ -10,6 +10,12 @@ pub(crate) const NEGLIGIBLE: f64 = 1e-17;
 /// fastest rate of the loop, 24 terms cost least for each unit of time.
 pub(crate) const DEGREE: usize = 24;
 
+/// Share of [`NEGLIGIBLE`] below which last coefficients are dropped.
+const TRIMMED: f64 = 1e-3;
+
+/// Rounding errors of slopes relative to those of values.
+const SLOPE_ROUNDING: f64 = 1e4;
+
 /// Σ c_j σ^j, with c_j at `offset` + `stride` j of `terms`. Even and odd powers are summed
 /// separately, because each step of one sum waits for the step before.
 #[inline]
@@ -79,9 +85,9 @@ impl<S: Scalar> Series<S> {
     /// Set `degree` to the last coefficient that is not negligible.
     pub(crate) fn trim(&mut self) {
         // Slopes have rounding errors of products with values.
-        let value = 1e-3 * NEGLIGIBLE * largest(self.terms(), S::value);
+        let value = TRIMMED * NEGLIGIBLE * largest(self.terms(), S::value);
         let slope = if S::MOVES {
-            (1e-3 * NEGLIGIBLE * largest(self.terms(), S::slope)).max(1e4 * value)
+            (TRIMMED * NEGLIGIBLE * largest(self.terms(), S::slope)).max(SLOPE_ROUNDING * value)
         } else {
             0.0
         };
@@ -127,4 +133,15 @@ fn largest<S: Scalar>(terms: &[S], read: impl Fn(S) -> f64) -> f64 {
         let size = read(c).abs();
         if size > m { size } else { m }
     })
+}
+
+#[cfg(test)]
+impl Series {
+    /// The polynomial with these coefficients.
+    pub(crate) fn of(coefficients: &[f64]) -> Self {
+        let mut out = Self::constant(0.0);
+        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
+        out.degree = coefficients.len() - 1;
+        out
+    }
 }

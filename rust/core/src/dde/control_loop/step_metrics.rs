@@ -203,13 +203,6 @@ fn range(y: &Series) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    fn series(coefficients: &[f64]) -> Series {
-        let mut out = Series::constant(0.0);
-        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
-        out.degree = coefficients.len() - 1;
-        out
-    }
-
     const CRITERIA: Criteria = Criteria {
         rise: (0.1, 0.9),
         settling: 0.02,
@@ -220,8 +213,8 @@ mod tests {
         // y = 4 t (1 − t/2) to t = 2 … back at zero, then up to one in a line.
         for sign in [1.0, -1.0] {
             let mut metrics = StepMetrics::new(0.0, 3.0, sign, CRITERIA);
-            metrics.segment(0.0, 2.0, 1.0, &series(&[0.0, 8.0 * sign, -8.0 * sign]));
-            metrics.segment(2.0, 1.0, 1.0, &series(&[0.0, sign]));
+            metrics.segment(0.0, 2.0, 1.0, &Series::of(&[0.0, 8.0 * sign, -8.0 * sign]));
+            metrics.segment(2.0, 1.0, 1.0, &Series::of(&[0.0, sign]));
             let found = metrics.metrics();
             let close = |a: f64, b: f64| (a - b).abs() < 1e-14;
             assert!(close(found.peak, 2.0) && close(found.peak_time, 1.0));
@@ -238,7 +231,7 @@ mod tests {
     #[test]
     fn what_lies_outside_the_window_does_not_count() {
         let mut metrics = StepMetrics::new(1.0, 2.0, 1.0, CRITERIA);
-        metrics.segment(0.0, 4.0, 1.0, &series(&[5.0, -8.0, 4.0]));
+        metrics.segment(0.0, 4.0, 1.0, &Series::of(&[5.0, -8.0, 4.0]));
         // 5 − 2 t + t²/4 on [1, 2]: from 3.25 down to 2.
         let found = metrics.metrics();
         assert_eq!((found.peak, found.peak_time), (3.25, 0.0));

@@ -223,7 +223,7 @@ fn the_grid_is_the_single_call() {
         b: &[1.0],
         k: &k,
         l: &[0.0],
-        scale: &[1.0],
+        gain: &[1.0],
         delay: &[0.36],
         sample_time: &[0.065],
     };

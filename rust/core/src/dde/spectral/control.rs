@@ -19,6 +19,13 @@ const NEGLIGIBLE: f64 = 0.02;
 const LONGER: f64 = 2.0;
 const SHORTER: f64 = 0.1;
 
+/// Factor on the length that the error estimate suggests.
+const SAFETY: f64 = 0.95;
+
+/// Nodes of the preferred order: their number without any digit of the tolerance, and for each
+/// digit.
+const NODES: (f64, f64) = (4.0, 1.4);
+
 /// Verdict about an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Verdict {
@@ -76,7 +83,7 @@ fn largest_of(coefficients: &[f64]) -> f64 {
 /// Factor for the length after an element with this error.
 pub(super) fn factor(error: f64, order: usize) -> f64 {
     let wanted = (0.5 / error.max(1e-300)).powf(1.0 / order as f64);
-    (0.95 * wanted).clamp(SHORTER, LONGER)
+    (SAFETY * wanted).clamp(SHORTER, LONGER)
 }
 
 /// The smallest order that is at least `wanted`, no more than `most`.
@@ -91,7 +98,7 @@ pub(super) fn preferred(rtol: f64, costly: bool) -> usize {
     let wanted = if costly {
         6.0 + 2.0 * digits
     } else {
-        4.0 + 1.4 * digits
+        NODES.0 + NODES.1 * digits
     };
     order_for(wanted.ceil() as usize, 24)
 }

@@ -44,6 +44,9 @@ const UNITS: f64 = 8.0 * f64::EPSILON;
 /// Where it is larger, the piece is too short to be distinguished from a jump.
 const BLURRED: f64 = 1e-3;
 
+/// Rounding error of a value relative to its size.
+const VALUE_ROUNDING: f64 = 1e-15;
+
 /// Pieces of a function, and the breaking points found in it.
 #[derive(Debug, Clone, Default)]
 pub struct Approximation {
@@ -291,7 +294,7 @@ fn size(coefficients: &[f64]) -> f64 {
 
 /// The tolerance, but at least the rounding error of the values.
 fn allowed(tolerance: f64, size: f64) -> f64 {
-    tolerance.max(1e-15 * size)
+    tolerance.max(VALUE_ROUNDING * size)
 }
 
 /// Are the last coefficients below the allowed size?

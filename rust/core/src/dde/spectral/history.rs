@@ -87,14 +87,14 @@ impl Piece {
 pub struct History {
     pieces: VecDeque<Piece>,
     /// Number of stored pieces before the start of the solution.
-    given: usize,
+    past_pieces: usize,
 }
 
 impl History {
     /// The given past of a solution.
     pub fn new(pieces: Vec<Piece>) -> Self {
         Self {
-            given: pieces.len(),
+            past_pieces: pieces.len(),
             pieces: pieces.into(),
         }
     }
@@ -121,7 +121,7 @@ impl History {
 
     /// The last piece of the solution itself; none before its first element is accepted.
     pub(super) fn latest(&self) -> Option<&Piece> {
-        if self.pieces.len() > self.given {
+        if self.pieces.len() > self.past_pieces {
             self.pieces.back()
         } else {
             None
@@ -147,7 +147,7 @@ impl History {
     pub(super) fn forget(&mut self, time: f64) {
         while self.pieces.len() > 1 && self.pieces.front().is_some_and(|piece| piece.end < time) {
             self.pieces.pop_front();
-            self.given = self.given.saturating_sub(1);
+            self.past_pieces = self.past_pieces.saturating_sub(1);
         }
     }
 }

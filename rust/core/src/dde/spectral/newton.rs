@@ -28,6 +28,9 @@ const CHEAP: usize = 32;
 /// Number of columns up to which the first Jacobian is evaluated to find its structure.
 const WORTH_A_LOOK: usize = 260;
 
+/// Relative difference of entries below which they are equal: the error of differences.
+const SAME_ENTRY: f64 = 1e-6;
+
 /// The current linearisation of a run.
 #[derive(Debug, Default)]
 pub(super) struct Newton {
@@ -247,5 +250,5 @@ impl Newton {
 
 /// Do two entries differ by no more than the error of differences?
 fn close(a: f64, b: f64) -> bool {
-    (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
+    (a - b).abs() <= SAME_ENTRY * a.abs().max(b.abs())
 }

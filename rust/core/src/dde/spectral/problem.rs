@@ -7,6 +7,15 @@ use super::history::History;
 use super::sparsity::Sparsity;
 use crate::{Error, Task};
 
+/// Least delay relative to the times of a run.
+const RESOLUTION: f64 = 1e-13;
+
+/// Relative rounding error by which a history may be too short.
+const HISTORY_ROUNDING: f64 = 1e-12;
+
+/// Least relative tolerance.
+const LEAST_RTOL: f64 = 1e-14;
+
 /// Arguments of the right-hand side at many nodes; the node runs fastest.
 #[derive(Debug, Clone, Copy)]
 pub struct Columns<'a> {
@@ -183,10 +192,10 @@ impl Problem {
                 "the delay {delay} is not above zero: write y itself where the delay is 0"
             ));
         }
-        let resolution = 1e-13 * self.start.abs().max(self.end.abs());
+        let resolution = RESOLUTION * self.start.abs().max(self.end.abs());
         if let Some(delay) = self.delays.iter().find(|delay| **delay <= resolution) {
             return refuse(format!(
-                "the delay {delay} vanishes beside the times of t_span in double precision: leave \
+                "the delay {delay} is lost in the rounding errors of the times of t_span: leave \
                  it out, or shift and scale time"
             ));
         }
@@ -194,7 +203,7 @@ impl Problem {
             return refuse("a delay is infinite: leave it out".to_owned());
         }
         let first = self.history.pieces().next().map(|piece| piece.start);
-        let needed = self.start - self.memory() * (1.0 - 1e-12);
+        let needed = self.start - self.memory() * (1.0 - HISTORY_ROUNDING);
         if let Some(first) = first.filter(|first| *first > needed) {
             return refuse(format!(
                 "the history starts at {first}: give it from {} on, the start minus the largest \
@@ -205,7 +214,7 @@ impl Problem {
         if let Some(value) = self.initial.iter().find(|value| !value.is_finite()) {
             return refuse(format!("y at the start is {value:?}: give finite numbers"));
         }
-        if !(self.rtol >= 1e-14 && self.rtol < 1.0) {
+        if !(self.rtol >= LEAST_RTOL && self.rtol < 1.0) {
             return refuse(format!("rtol={}: give a number from 1e-14 to 1", self.rtol));
         }
         if let Some(atol) = self
@@ -219,7 +228,7 @@ impl Problem {
         }
         if self.atol.len() != 1 && self.atol.len() != self.dim() {
             return refuse(format!(
-                "atol has {} entries for {} components: give one, or one a component",
+                "atol has {} entries for {} components: give one, or one for each component",
                 self.atol.len(),
                 self.dim()
             ));

@@ -40,6 +40,16 @@ const UNSEEN: u32 = 2;
 /// A jump of a neutral slope below this share of the tolerance is negligible.
 const FAINT: f64 = 0.02;
 
+/// Length of an element, in shortest ones, at which a right-hand side that is not finite ends the
+/// run.
+const NEAR_START: f64 = 1e3;
+
+/// Relative rounding error in dividing an interval into elements.
+const WHOLE_PARTS: f64 = 1e-10;
+
+/// Largest factor on the length after an element was rejected.
+const SHORTENED: f64 = 0.8;
+
 /// Solve to the end of the interval or a terminal event.
 pub fn solve<E: Equation + ?Sized>(
     problem: &Problem,
@@ -205,7 +215,9 @@ impl<'a> Run<'a> {
                     return Err(self.no_start());
                 }
                 Sweeps::NotFinite(node) => {
-                    if node == 0 || end - start <= 1e3 * SHORTEST * start.abs().max(end.abs()) {
+                    if node == 0
+                        || end - start <= NEAR_START * SHORTEST * start.abs().max(end.abs())
+                    {
                         return Ok(Some(Outcome::NotFinite(self.element.t[node])));
                     }
                     self.length = RETREAT * (end - start);
@@ -256,10 +268,10 @@ impl<'a> Run<'a> {
         let last = ahead >= end - 2.0 * SHORTEST * end.abs().max(start.abs());
         let stop = if last { end } else { ahead };
         let room = stop - start;
-        if room <= length * (1.0 + 1e-10) {
+        if room <= length * (1.0 + WHOLE_PARTS) {
             return stop;
         }
-        let parts = (room / length * (1.0 - 1e-10)).ceil();
+        let parts = (room / length * (1.0 - WHOLE_PARTS)).ceil();
         if parts <= EQUAL {
             return start + room / parts;
         }
@@ -289,7 +301,7 @@ impl<'a> Run<'a> {
             self.order = control::order_for(self.order + 3, self.preferred);
             self.length = length;
         } else {
-            self.length = length * control::factor(verdict.error, self.order).min(0.8);
+            self.length = length * control::factor(verdict.error, self.order).min(SHORTENED);
         }
     }
 

@@ -31,6 +31,9 @@ const NOISE: f64 = 1.0 / 32.0;
 /// Rounds of F and R: each follows rounding errors through one more integration.
 const ROUNDS: usize = 3;
 
+/// Sweeps of balancing; powers of two hardly change after a few.
+const SWEEPS: usize = 8;
+
 /// The equation and the current element.
 #[derive(Debug)]
 pub(super) struct Element {
@@ -220,9 +223,6 @@ impl Element {
         }
     }
 }
-
-/// Sweeps of balancing; powers of two hardly change after a few.
-const SWEEPS: usize = 8;
 
 /// Σ_j |a_ij| d_j/d_i, with units d of the states for which rows and columns of A have the same
 /// size (Osborne 1960): the rate at which a state follows its input, in any unit.

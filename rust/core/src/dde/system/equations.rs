@@ -109,7 +109,7 @@ impl Signal {
                 .unwrap_or(0);
             if degree > 0 && !(pair[0].is_finite() && pair[1].is_finite()) {
                 return Err(Error::argument(
-                    "a signal without end changes: only a constant may",
+                    "a piece of a signal without a finite start and end must be constant",
                 ));
             }
             let series = own

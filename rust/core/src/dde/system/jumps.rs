@@ -161,8 +161,8 @@ impl Jumps {
                 what: "the response of the system",
                 limit: MOST_KEPT as u64,
                 unit: "breaking points within the longest delay",
-                advice: "shorten the time simulated; breaks of a neutral system fade as its \
-                         delayed derivatives are weak"
+                advice: "shorten the time simulated; breaks of a neutral system become small \
+                     sooner with smaller delayed derivatives"
                     .to_owned(),
             });
         }

@@ -16,19 +16,19 @@ pub(super) const DEGREE: usize = 24;
 /// Number of coefficients, and of Gauss nodes.
 pub(super) const TERMS: usize = DEGREE + 1;
 
+static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
+
 /// One series, or values at the nodes.
 pub(super) type Series = [f64; TERMS];
 
 struct Tables {
     nodes: Series,
-    /// (2k + 1)/2 w_i P_k(ξ_i) at [i][k].
+    /// (2k + 1)/2 w_i P_k(ξ_i) at `[i][k]`.
     transform: [Series; TERMS],
     /// (2k + 1)/(k + 1) and (k + 1)/(k + 2) of Clenshaw's recurrence.
     slope: Series,
     back: Series,
 }
-
-static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
 
 impl Tables {
     fn new() -> Self {
@@ -118,7 +118,7 @@ pub(super) fn nodes() -> &'static Series {
     &TABLES.nodes
 }
 
-/// The transformation of values at the nodes to coefficients: the part of value i in c_k at [i][k].
+/// The transformation of values at the nodes to coefficients: the part of value i in c_k at `[i][k]`.
 pub(super) fn transform() -> &'static [Series; TERMS] {
     &TABLES.transform
 }

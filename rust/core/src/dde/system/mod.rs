@@ -4,9 +4,9 @@
 //!   y(t) = Σ C_j x(t − τ_j) + Σ F_j x′(t − τ_j) + Σ D_j u(t − τ_j).
 //!
 //! Method of steps on Legendre elements no longer than the smallest delay: all delayed values are
-//! known, and x′ = A_0 x + g is solved for all coefficients at once ([`solver`]). Elements end on
+//! known, and x′ = A_0 x + g is solved for all coefficients at once (`solver`). Elements end on
 //! breaking points. There the jumps of all derivatives satisfy the equation themselves; a bound on
-//! them is computed ([`jumps`]), and a break that a single polynomial represents up to rounding
+//! them is computed (`jumps`), and a break that a single polynomial represents up to rounding
 //! errors ends no element any more. Legendre series are used rather than Taylor series, because a
 //! function that has become smooth is then read across the ends of earlier elements without loss,
 //! for any ratios of the delays, and because a stiff A_0 restricts the length only while its

@@ -242,7 +242,6 @@ fn endless() -> Error {
         what: "the response of the system",
         limit: MOST_ELEMENTS,
         unit: "elements of time",
-        advice: "shorten the time simulated; a delay of almost nothing is better set to zero"
-            .to_owned(),
+        advice: "shorten the time simulated; set delays close to zero to zero".to_owned(),
     }
 }

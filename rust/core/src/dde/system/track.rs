@@ -6,20 +6,6 @@ use std::collections::VecDeque;
 use super::legendre;
 use super::legendre::{DEGREE, Series, TERMS};
 
-/// One piece: coefficient k of column j at `series[j (degree + 1) + k]`.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Piece {
-    pub(super) start: f64,
-    pub(super) end: f64,
-    pub(super) degree: usize,
-    pub(super) series: Vec<f64>,
-    /// Sizes of each column, see [`super::element`].
-    pub(super) size: Vec<Sizes>,
-    /// Exact values at the start, where they are known: the series gives them up to rounding
-    /// errors.
-    first: Vec<f64>,
-}
-
 /// Largest difference between a series through several pieces and these pieces between its nodes,
 /// as a share of the size to which their rounding errors are relative. With a smaller one, rounding
 /// errors at joints end elements, and the number of elements grows with every delay: with 1e-11 a
@@ -35,6 +21,20 @@ pub(super) const NEGLIGIBLE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 /// Kinds of sizes.
 pub(super) const KINDS: usize = 4;
+
+/// One piece: coefficient k of column j at `series[j (degree + 1) + k]`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Piece {
+    pub(super) start: f64,
+    pub(super) end: f64,
+    pub(super) degree: usize,
+    pub(super) series: Vec<f64>,
+    /// Sizes of each column, see [`super::element`].
+    pub(super) size: Vec<Sizes>,
+    /// Exact values at the start, where they are known: the series gives them up to rounding
+    /// errors.
+    first: Vec<f64>,
+}
 
 /// The size of a signal; then the sizes to which its rounding error is relative, with the rounding
 /// errors of what drives it, of what drives that, and so on.

@@ -13,6 +13,9 @@
 use crate::elementary::{exp, log};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 
+/// Upper limit on the steps of Newton's method or bisection.
+const MAX_STEPS: usize = 200;
+
 /// C_D: −∞ where there is no chain (polynomial, retarded), +∞ for an advanced equation.
 ///
 /// ```
@@ -63,7 +66,7 @@ pub fn chain_abscissa(h: &QuasiPolynomial) -> f64 {
     };
     // Newton from the left of the root of a convex falling function never oversteps it.
     let mut c = low;
-    for _ in 0..200 {
+    for _ in 0..MAX_STEPS {
         let (value, slope) = excess(c);
         if value >= 0.0 {
             low = c;

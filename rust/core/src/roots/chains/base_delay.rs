@@ -1,4 +1,5 @@
-//! Delays that are whole multiples of one base, and the difference part whose period that base gives.
+//! Delays that are whole multiples of one base, and the difference part whose period that base
+//! gives.
 
 use crate::Error;
 use crate::quasipoly::QuasiPolynomial;

@@ -17,9 +17,9 @@
 //!    kind, since each of them carries an e^(−x d). Far to the left: the same for h(−s).
 //!
 //! Inequalities are tested with a relative margin of 1e-9. It covers their rounding: sums of
-//! non-negative numbers lose u per summand, weights are upper bounds (`exp_above`) of exponents that
-//! are wrong by 746 · 3 u at most, or by what `right_edge` adds to them. `cauchy_radius` starts from
-//! a guess but ends with a radius at which the inequality itself was tested.
+//! non-negative numbers lose u per summand, weights are upper bounds (`exp_above`) of exponents
+//! that are wrong by 746 · 3 u at most, or by what `right_edge` adds to them. `cauchy_radius`
+//! starts from a guess but ends with a radius at which the inequality itself was tested.
 
 use num_complex::Complex64;
 
@@ -27,6 +27,21 @@ use super::cauchy::{MARGIN, cauchy_radius};
 use super::close_delays::radius_by_groups;
 use crate::elementary::{exp_above, log};
 use crate::quasipoly::{QuasiPolynomial, modulus};
+
+/// Upper limit on the radii tried by bound 2.
+const MAX_ROUNDS: usize = 40;
+
+/// Ratio of two radii at which bound 2 ends: the radius is at most five per cent too large.
+const LEAST_RATIO: f64 = 1.05;
+
+/// Error of an exponent that is a sum of logarithms, relative to 1 and its parts.
+const LOGARITHM_ROUNDING: f64 = 1e-14;
+
+/// First real part tried by bound 3.
+const NEAREST_EDGE: f64 = 1e-6;
+
+/// Real part at which bound 3 is given up.
+const FARTHEST_EDGE: f64 = 1e150;
 
 /// The leading term that exceeds all others together outside a disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,10 +181,10 @@ fn along_the_chains(h: &QuasiPolynomial, sigma: f64, known: f64) -> f64 {
     };
     let mut high = known;
     let mut ratio = 2.0;
-    for _ in 0..40 {
+    for _ in 0..MAX_ROUNDS {
         if holds(high / ratio) {
             high /= ratio;
-        } else if ratio < 1.05 {
+        } else if ratio < LEAST_RATIO {
             break;
         } else {
             ratio = ratio.sqrt();
@@ -204,7 +219,8 @@ pub(crate) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
         let summand = |k: usize, c: f64, gap: f64| {
             let (grown, decay) = (k as f64 * log(modulus), gap * x);
             // Each part is known to 1e-14 of 1 plus its size, even when the parts cancel.
-            let room = 1e-14 * (1.0 + k as f64 + own_degree + grown.abs() + powers.abs() + decay);
+            let room = LOGARITHM_ROUNDING
+                * (1.0 + k as f64 + own_degree + grown.abs() + powers.abs() + decay);
             c.abs() * exp_above(grown - powers - decay + room)
         };
         let lower = first.iter().rev().skip(1).rev().enumerate();
@@ -217,11 +233,11 @@ pub(crate) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
         sum * (1.0 + MARGIN) < own
     };
     // A small margin covers the rounding of the quotient.
-    let mut x = (falling * (1.0 + MARGIN)).max(1e-6);
-    while !holds(x) && x < 1e150 {
+    let mut x = (falling * (1.0 + MARGIN)).max(NEAREST_EDGE);
+    while !holds(x) && x < FARTHEST_EDGE {
         x *= 2.0;
     }
-    if x < 1e150 { x } else { f64::INFINITY }
+    if x < FARTHEST_EDGE { x } else { f64::INFINITY }
 }
 
 /// Bound 3 on the other side: no root with |Im s| ≤ `height` has a real part of this or less.

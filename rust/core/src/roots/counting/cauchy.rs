@@ -5,6 +5,12 @@ use crate::elementary::{exp, log};
 /// Relative margin, on the larger side, by which an inequality must hold.
 pub(crate) const MARGIN: f64 = 1e-9;
 
+/// Ratio of the bounds at which the bisection ends: the radius is at most one per cent too large.
+const WIDTH: f64 = 1.01;
+
+/// Factor on the first bound, which covers its rounding error.
+const ENLARGED: f64 = 1.0 + 1e-6;
+
 /// A radius beyond which `top` rⁿ > Σ `lower`_k rᵏ, at most one per cent above the least one.
 pub(crate) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
     let degree = lower.len() as f64;
@@ -23,12 +29,12 @@ pub(crate) fn cauchy_radius(top: f64, lower: &[f64]) -> f64 {
         return 0.0;
     }
     let mut low = outer / (2.0 * degree.max(1.0)) * 0.5;
-    let mut high = outer * (1.0 + 1e-6);
+    let mut high = outer * ENLARGED;
     if !exceeds(high) {
         // The coefficients span more than double precision does.
         return f64::INFINITY;
     }
-    while high > 1.01 * low {
+    while high > WIDTH * low {
         // The square root of the product is not formed, because the product leaves the range of
         // double precision.
         let middle = low.sqrt() * high.sqrt();

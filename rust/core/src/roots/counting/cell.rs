@@ -18,6 +18,9 @@ const CUTS: [f64; 9] = [
     0.4871, 0.5417, 0.4393, 0.5823, 0.3911, 0.6307, 0.3301, 0.6907, 0.2703,
 ];
 
+/// Distance stated in the error where the count is not decided, as a share of the width.
+const UNDECIDED_SHARE: f64 = 1e-3;
+
 /// A rectangle and the number of roots in it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cell {
@@ -65,7 +68,7 @@ impl Cell {
         let unit = if symmetric { PI } else { TAU };
         let count = around.revolutions(unit).ok_or(Error::Contour {
             place: Complex64::new(re.1, im.1),
-            distance: 1e-3 * (re.1 - re.0),
+            distance: UNDECIDED_SHARE * (re.1 - re.0),
         })?;
         Ok(Self {
             re,

@@ -38,6 +38,10 @@ const MARGIN: f64 = 1e-12;
 /// Upper limit on the number of segments (bounds the size of the certificate).
 const MAX_SEGMENTS: usize = 1_000_000;
 
+/// Length of the next segment tried, in lengths over which g is proved to stay away from 0; it
+/// shrinks to a quarter at most and grows by half at most.
+const STRETCH: f64 = 1.9;
+
 /// The closed path around a rectangle, anticlockwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contour {
@@ -80,10 +84,10 @@ pub struct Certificate {
     pub real: Vec<RealPart>,
 }
 
-/// [`count`](super::count), with the proof.
+/// [`count`](crate::roots::count), with the proof.
 ///
 /// # Errors
-/// As [`count`](super::count).
+/// As [`count`](crate::roots::count).
 ///
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Region, certify}};
@@ -194,7 +198,7 @@ fn line(
                 here = end;
                 span = 4.0 * radius;
             }
-            Err(reach) => span = (1.9 * reach).max(0.25 * radius).min(1.5 * radius),
+            Err(reach) => span = (STRETCH * reach).max(0.25 * radius).min(1.5 * radius),
         }
     }
     Ok(())

@@ -7,6 +7,12 @@ use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::chains::chain_abscissa;
 use crate::roots::region::Region;
 
+/// Factor on a proved radius that keeps roots off the edge itself.
+pub(crate) const EDGE_MARGIN: f64 = 1.01;
+
+/// Least radius, for functions with all roots at 0.
+pub(crate) const LEAST_RADIUS: f64 = 1e-100;
+
 /// A region whose open sides are closed by proved bounds, reduced to the upper half plane as far as
 /// symmetry allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +69,7 @@ pub(crate) fn closed_sides(
             .map(|d| d.radius)
             .ok_or_else(|| endless(h, re))?;
         // A margin keeps roots off the edge itself.
-        let radius = 1.01 * radius.max(1e-100);
+        let radius = EDGE_MARGIN * radius.max(LEAST_RADIUS);
         im = (im.0.max(-radius), im.1.min(radius));
         re = (re.0.max(-radius), re.1.min(radius));
     }

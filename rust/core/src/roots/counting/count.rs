@@ -19,7 +19,7 @@ use super::prepared::Prepared;
 use super::real_axis::survey_real;
 use super::time_scaling::TimeScaling;
 use super::turn::Turn;
-use super::winding::{Walker, is_clear};
+use super::winding::{Walker, angle_error, is_clear};
 use crate::elementary::angle;
 use crate::quasipoly::{Jet, QuasiPolynomial, modulus};
 use crate::roots::region::Region;
@@ -32,6 +32,19 @@ const SURVEY_LIMIT: u64 = 10_000;
 /// Number of radii tried for the arc that closes a half plane, each eight times the one before. At
 /// a larger radius the smaller terms have less influence.
 const FURTHER: u32 = 5;
+
+/// Factor on a radius or height that covers its rounding error.
+const ENLARGED: f64 = 1.0 + 1e-9;
+
+/// Least value at the end of the arc relative to its error, whose effect on the argument counts
+/// twice.
+const CLEAR_FACTOR: f64 = 32.0;
+
+/// Error of the change along the arc, for each degree and for each radian of delay times height.
+const ARC_ERROR: f64 = 4e-15;
+
+/// Distance stated in the error where the count is not decided, as a share of the radius.
+const UNDECIDED_SHARE: f64 = 1e-3;
 
 /// The number of roots that are not below the real axis, of `count` roots in a symmetric region of
 /// which `real` are real. The others form conjugate pairs.
@@ -129,23 +142,22 @@ pub(crate) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     let re = (sigma, f64::INFINITY);
     let Dominance { row, radius } = bounds::dominance(h, re).ok_or_else(|| endless(h, re))?;
     let degree = h.degree();
-    let radius = radius * (1.0 + 1e-9);
+    let radius = radius * ENLARGED;
     if sigma.abs() > radius {
         return Ok(if sigma > 0.0 { 0 } else { degree as u64 });
     }
     // All roots are at 0: any positive radius will do.
     let radius = if radius == 0.0 { 1.0 } else { radius };
     // Slightly outside the circle.
-    let height = |radius: f64| {
-        ((radius - sigma) * (radius + sigma)).sqrt() * (1.0 + 1e-9) + f64::MIN_POSITIVE
-    };
+    let height =
+        |radius: f64| ((radius - sigma) * (radius + sigma)).sqrt() * ENLARGED + f64::MIN_POSITIVE;
     walker.probe.refer_to(row);
     // At a larger radius the terms that are bounded only by their moduli are smaller.
     let tried =
         (0..FURTHER).map(|k| Complex64::new(sigma, height(radius * f64::from(1u32 << (3 * k)))));
     let mut jets = tried.map(|end| (end, walker.jet(end)));
     // The error of its argument enters twice.
-    let sure = |jet: &Jet| is_clear(jet) && modulus(jet.value) > 32.0 * jet.value_error;
+    let sure = |jet: &Jet| is_clear(jet) && modulus(jet.value) > CLEAR_FACTOR * jet.value_error;
     let Some((end, jet)) = jets.find(|(_, jet)| sure(jet)) else {
         return Err(super::winding::overflow(Complex64::new(
             sigma,
@@ -166,8 +178,8 @@ pub(crate) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
             - walker.probe.delay() * top,
         // A power with n factors has the error 3.3 n u, n angles 8 n u, each of the three summands
         // and the sums u. The bound allows 36 u for each.
-        slack: 1.58 * jet.value_error / modulus(jet.value)
-            + 4e-15 * (1.0 + degree as f64 + walker.probe.delay() * top),
+        slack: angle_error(jet.value_error, modulus(jet.value))
+            + ARC_ERROR * (1.0 + degree as f64 + walker.probe.delay() * top),
     };
     let (place, skipped) = descend(walker, row, end);
     let chord = walker.walk(place, Complex64::new(sigma, 0.0))?;
@@ -176,6 +188,6 @@ pub(crate) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
         .revolutions(PI)
         .ok_or(Error::Contour {
             place: Complex64::new(sigma, 0.0),
-            distance: 1e-3 * radius,
+            distance: UNDECIDED_SHARE * radius,
         })
 }

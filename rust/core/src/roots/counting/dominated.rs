@@ -13,7 +13,7 @@
 use num_complex::Complex64;
 
 use super::turn::Turn;
-use super::winding::{STEP_ERROR, Walker, is_clear};
+use super::winding::{STEP_ERROR, Walker, angle_error, is_clear};
 use crate::elementary::{angle, exp_above};
 use crate::quasipoly::modulus;
 
@@ -28,6 +28,12 @@ const WORTH: f64 = 6.0;
 const ROUNDING: f64 = 1e-14;
 
 const MAX_STEPS: usize = 100_000;
+
+/// A row whose value is below this share of its slope times the height is bounded by its slope.
+const SMALL_VALUE: f64 = 0.1;
+
+/// Covers the rounding errors of weights and of sums of moduli.
+const ENLARGED: f64 = 1.0 + 1e-9;
 
 /// A polynomial at a point: value, slope, and the same sums with moduli, up to the second
 /// derivative.
@@ -57,7 +63,7 @@ impl Row {
             slope,
             rounding: rounding * p,
             slope_rounding: 2.0 * rounding * dp,
-            bend: 2.0 * ddp * (1.0 + 1e-9),
+            bend: 2.0 * ddp * ENLARGED,
         }
     }
 
@@ -83,7 +89,7 @@ pub(crate) fn descend(
     let weights: Vec<f64> = h
         .delays()
         .iter()
-        .map(|delay| exp_above(-(delay - own_delay) * from.re) * (1.0 + 1e-9))
+        .map(|delay| exp_above(-(delay - own_delay) * from.re) * ENLARGED)
         // A weight that underflows to zero is replaced by a positive number, because the term is
         // not zero.
         .map(|weight| weight.max(f64::MIN_POSITIVE))
@@ -110,12 +116,12 @@ pub(crate) fn descend(
             slack += STEP_ERROR + f64::EPSILON * turned.abs();
         } else {
             first = Some(own.value);
-            slack += 1.58 * own.rounding / size;
+            slack += angle_error(own.rounding, size);
         }
         last = own.value;
         let step = step(&rows, leader, &weights, here.im).min(here.im);
         if step * span < WORTH {
-            slack += 1.58 * own.rounding / size;
+            slack += angle_error(own.rounding, size);
             break;
         }
         here.im -= step;
@@ -134,8 +140,8 @@ pub(crate) fn descend(
     };
     turned += excess(bottom.value, last) - excess(top.value, first);
     turned -= own_delay * (here.im - from.im);
-    slack += 1.58 * top.value_error / modulus(top.value)
-        + 1.58 * bottom.value_error / modulus(bottom.value)
+    slack += angle_error(top.value_error, modulus(top.value))
+        + angle_error(bottom.value_error, modulus(bottom.value))
         + STEP_ERROR * (4.0 + own_delay * (from.im + here.im));
     let angle = turned;
     (here, Turn { angle, slack })
@@ -159,7 +165,7 @@ fn step(rows: &[Row], leader: usize, weights: &[f64], height: f64) -> f64 {
         } else {
             a -= weight * (size + row.rounding);
             k += 0.5 * weight * row.bend;
-            if size > 0.1 * slope * height {
+            if size > SMALL_VALUE * slope * height {
                 b -= weight * (row.lean() + row.slope_rounding);
                 k += 0.5 * weight * slope * slope / size;
             } else {

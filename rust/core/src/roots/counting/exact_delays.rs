@@ -1,12 +1,12 @@
 //! Chains of roots when the delays are exact multiples of one base.
 //!
-//! The difference part D(s) = Σ b_j e^(−s d_j) is then periodic along vertical lines, a polynomial in
-//! e^(−s base). If D does not wind about 0 over a period of Re s = σ, it has no zeros right of the line, and
-//! |1/D| takes its maximum over that half plane on the line (maximum principle), where samples and a
-//! Lipschitz constant bound it. |D| ≥ δ then gives a radius beyond which δ |s|ⁿ exceeds all lower
-//! powers: right of the line no root lies beyond that radius, and only the roots of a rectangle
-//! have to be counted. Rationally independent delays have no such base, and delays close to the
-//! given ones need not have one; `chains::abscissa` has the bound for both.
+//! The difference part D(s) = Σ b_j e^(−s d_j) is then periodic along vertical lines, a polynomial
+//! in e^(−s base). If D does not wind about 0 over a period of Re s = σ, it has no zeros right of
+//! the line, and |1/D| takes its maximum over that half plane on the line (maximum principle),
+//! where samples and a Lipschitz constant bound it. |D| ≥ δ then gives a radius beyond which δ |s|ⁿ
+//! exceeds all lower powers: right of the line no root lies beyond that radius, and only the roots
+//! of a rectangle have to be counted. Rationally independent delays have no such base, and delays
+//! close to the given ones need not have one; `chains::abscissa` has the bound for both.
 
 use std::f64::consts::PI;
 
@@ -15,6 +15,7 @@ use num_complex::Complex64;
 use super::bounds::right_edge;
 use super::cauchy::cauchy_radius;
 use super::cell::Cell;
+use super::closed_region::{EDGE_MARGIN, LEAST_RADIUS};
 use super::winding::Walker;
 use crate::elementary::exp_above;
 use crate::quasipoly::{Kind, QuasiPolynomial, modulus};
@@ -26,6 +27,15 @@ const MAX_SAMPLES: u32 = 1 << 20;
 
 /// Upper limit on the bisections of the interval that holds the abscissa of the chains.
 const HALVINGS: u32 = 200;
+
+/// Largest distance to a sample in steps, with the rounding error of the places.
+const SAMPLE_SPACING: f64 = 0.51;
+
+/// Samples of the first attempt; each further one has four times as many.
+const FIRST_SAMPLES: u32 = 256;
+
+/// Covers the rounding errors of weights.
+const ENLARGED: f64 = 1.0 + 1e-9;
 
 /// Is the difference part, of period 2π/`base`, proved to have no zero with Re s ≥ `sigma`?
 fn is_free(
@@ -112,7 +122,7 @@ pub(crate) fn height_by_period(
         .sum();
     let half = PI / base;
     let mut walker = Walker::new(&difference, task);
-    let mut samples = 256;
+    let mut samples = FIRST_SAMPLES;
     while samples <= MAX_SAMPLES {
         task.check()?;
         let step = half / f64::from(samples);
@@ -124,7 +134,7 @@ pub(crate) fn height_by_period(
                 modulus(jet.value) - jet.value_error
             })
             .fold(f64::INFINITY, f64::min);
-        let bound = least - 0.51 * step * lipschitz;
+        let bound = least - SAMPLE_SPACING * step * lipschitz;
         if bound > 0.5 * least {
             return Ok(height(h, sigma, bound));
         }
@@ -139,7 +149,7 @@ fn height(h: &QuasiPolynomial, sigma: f64, bound: f64) -> Option<f64> {
     let mut lower = vec![0.0; h.degree()];
     for (row, delay) in h.terms() {
         // Right of the line each exponential is at most that on it.
-        let weight = exp_above(-(delay - first) * sigma) * (1.0 + 1e-9);
+        let weight = exp_above(-(delay - first) * sigma) * ENLARGED;
         for (sum, c) in lower.iter_mut().zip(row) {
             *sum += weight * c.abs();
         }
@@ -160,7 +170,7 @@ pub(crate) fn cell_right_of(
         return Ok(None);
     };
     // A margin keeps roots off the edge itself; the height is positive even if all roots are at 0.
-    let height = 1.01 * height.max(1e-100);
+    let height = EDGE_MARGIN * height.max(LEAST_RADIUS);
     let right = right_edge(h, height).max(sigma + height);
     Cell::new(walker, (sigma, right), (0.0, height), true).map(Some)
 }

@@ -14,6 +14,16 @@ use super::winding::{Walker, is_clear, is_finite};
 use crate::Error;
 use crate::quasipoly::{Jet, modulus};
 
+/// Positions of a cut, as shares of an interval, in the order in which they are tried.
+const CUTS: [f64; 7] = [0.4871, 0.5417, 0.4393, 0.6307, 0.3301, 0.75, 0.25];
+
+/// Covers the rounding errors of the bound on the slope.
+const ENLARGED: f64 = 1.0 + 1e-12;
+
+/// Largest share of a value, or of a slope, that its change over the interval may take. The rest
+/// covers rounding errors.
+const SHARE: f64 = 0.999;
+
 /// A part of the real axis with a proved number of roots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RealPart {
@@ -37,10 +47,6 @@ pub enum RealPart {
         bend: f64,
     },
 }
-
-/// Largest share of a value, or of a slope, that its change over the interval may take. The rest
-/// covers rounding errors.
-const SHARE: f64 = 0.999;
 
 /// The number of roots of h on the real interval `re`, at whose ends h is known not to be zero.
 /// `visit` receives the parts in ascending order. `curved` is the share of the bound on |g″| r that
@@ -74,7 +80,7 @@ pub(crate) fn survey_real(
         let slope = modulus(jet.slope);
         let trifle = TRIFLE * modulus(jet.value) / r;
         let flat = slope + jet.slope_error;
-        let mut steepest = (flat + curved * bend * r) * (1.0 + 1e-12) + trifle;
+        let mut steepest = (flat + curved * bend * r) * ENLARGED + trifle;
         let room = SHARE * modulus(jet.value) - jet.value_error;
         // Where no parts have to be stated, the tests below end the survey with less work.
         let cluster_suspected =
@@ -143,11 +149,9 @@ fn sign(walker: &mut Walker<'_>, x: f64) -> Option<bool> {
 
 /// A point between the ends at which the sign is known, with that sign.
 fn place_to_cut(walker: &mut Walker<'_>, low: f64, high: f64) -> Option<(f64, Option<bool>)> {
-    [0.4871, 0.5417, 0.4393, 0.6307, 0.3301, 0.75, 0.25]
-        .into_iter()
-        .find_map(|share| {
-            let cut = low + share * (high - low);
-            let positive = (low < cut && cut < high).then(|| sign(walker, cut))?;
-            positive.map(|_| (cut, positive))
-        })
+    CUTS.into_iter().find_map(|share| {
+        let cut = low + share * (high - low);
+        let positive = (low < cut && cut < high).then(|| sign(walker, cut))?;
+        positive.map(|_| (cut, positive))
+    })
 }

@@ -1,9 +1,9 @@
 //! Bounds by the Taylor polynomial of g, for points next to several roots.
 //!
 //! There g″ is as small as a power of the distance to the roots, but a bound by moduli does not
-//! become small. With the Taylor coefficients a_k of g at m up to the n-th, in two words, their
-//! errors e_k, and the bound R of `remainder` on the next one in the disc of radius r about m
-//! (Taylor's formula for g and for g′):
+//! become small. With the Taylor coefficients a_k of g at m up to the n-th, in double-double
+//! arithmetic, their errors e_k, and the bound R of `remainder` on the next one in the disc of
+//! radius r about m (Taylor's formula for g and for g′):
 //!     |g − g(m)| ≤ Σ_{1≤k≤n} (|a_k| + e_k) rᵏ + R rⁿ⁺¹,
 //!     |g′| ≤ Σ_{1≤k≤n} k (|a_k| + e_k) rᵏ⁻¹ + (n + 1) R rⁿ.
 //! The sums have the relative error 4n u, u = 2⁻⁵³, which MARGIN covers.
@@ -18,6 +18,12 @@ const ORDER: usize = 8;
 
 /// Covers the rounding of the sums.
 const MARGIN: f64 = 1e-12;
+
+/// Ratio of two radii that are tried.
+const SHRINKAGE: f64 = 0.7;
+
+/// Upper limit on the radii that are tried.
+const MAX_ROUNDS: usize = 60;
 
 /// Moduli of the Taylor coefficients about a point.
 pub(crate) struct TaylorBound<'a> {
@@ -87,8 +93,8 @@ impl<'a> TaylorBound<'a> {
     fn largest(&self, room: f64, most: f64, bound: impl Fn(&Self, f64) -> f64) -> f64 {
         let slope = self.sizes.first().copied().unwrap_or(f64::INFINITY);
         let first = (room / slope).min(most).max(0.0);
-        std::iter::successors(Some(first), |r| Some(0.7 * r))
-            .take(60)
+        std::iter::successors(Some(first), |r| Some(SHRINKAGE * r))
+            .take(MAX_ROUNDS)
             .find(|r| bound(self, *r) < room)
             .map_or(0.0, |r| r * (1.0 - MARGIN))
     }

@@ -68,6 +68,40 @@ const EAGER_LIMIT: u64 = 500;
 /// Upper limit on how much longer these bounds may make a step. No hints are found within a step.
 const LONGEST_GAIN: f64 = 1e6;
 
+/// Factor on a proved length that covers its rounding error.
+const ROUNDED_DOWN: f64 = 1.0 - 1e-12;
+
+/// Upper limit on the spans tried for one reach, and the factors by which they shrink: at least to
+/// this many times what was proved, at most by this share.
+const MAX_REACH_ROUNDS: usize = 40;
+
+/// The next span tried, as a multiple of the length proved with the last one.
+const GROWN: f64 = 3.0;
+
+/// Least factor between two spans.
+const LEAST_SHRINKAGE: f64 = 0.125;
+
+/// A reach below this share of what the slope alone allows indicates several roots nearby.
+const FAR_BELOW_SLOPE: f64 = 0.02;
+
+/// Spans tried with dominated terms; each is a quarter of the one before.
+const DOMINATED_ROUNDS: usize = 4;
+
+/// Length of a step, in reaches of its first point: the reach of its end has to cover the rest.
+const STRETCH: f64 = 1.9;
+
+/// Factor on the length of a step that could not be proved.
+const SHORTENED: f64 = 0.999;
+
+/// Upper limit on the lengths tried for one step.
+const MAX_STEP_ATTEMPTS: usize = 8;
+
+/// Relative rounding error of the ends of a line.
+const PLACE_ROUNDING: f64 = 1e-15;
+
+/// Upper limit on the doublings of the distance at which a line is proved to be free of roots.
+const MAX_ASIDE: usize = 200;
+
 /// Follows arg h along lines. Keeps the probe, the number of evaluations and the hints of roots
 /// nearby.
 pub(crate) struct Walker<'a> {
@@ -112,7 +146,7 @@ impl<'a> Walker<'a> {
         self.double_doubles = MAX_DOUBLE_DOUBLE;
     }
 
-    /// Check for cancellation and for the limit on evaluations, every so many evaluations.
+    /// Check for cancellation and for the limit on evaluations.
     pub(crate) fn pause(&mut self) -> Result<(), Error> {
         let spent = self.probe.evaluations();
         if spent < self.checked + CHECK_EVERY {
@@ -182,7 +216,7 @@ impl<'a> Walker<'a> {
         }
         let mut distance =
             4.0 * f64::EPSILON * modulus(place).max(f64::MIN_POSITIVE / f64::EPSILON);
-        for _ in 0..200 {
+        for _ in 0..MAX_ASIDE {
             let aside = [1.0, -1.0].map(|sign| Complex64::new(sign * distance, 0.0));
             let up = aside.map(|step| step * Complex64::I);
             if [aside, up]
@@ -207,25 +241,25 @@ impl<'a> Walker<'a> {
         let size = modulus(s);
         let mut span = most.min(room / slope);
         let mut best = 0.0f64;
-        for _ in 0..40 {
+        for _ in 0..MAX_REACH_ROUNDS {
             let bend = self.probe.curvature(size + span, along.re * span) / unit;
             let r = within(room, slope, bend);
             // Where the bound overflows nothing is known: `min` would return the span.
             if !r.is_nan() {
-                best = best.max(r.min(span) * (1.0 - 1e-12));
+                best = best.max(r.min(span) * ROUNDED_DOWN);
             }
             if best >= 0.25 * span {
                 break;
             }
             // The bound grows exponentially with the span, so that the span is reduced in steps.
-            span = (3.0 * best).max(0.125 * span);
+            span = (GROWN * best).max(LEAST_SHRINKAGE * span);
         }
         // Not where the slope alone limits the step.
         let farthest = room / slope;
         let cluster_suspected = if self.double_double_at == Some(s) {
             best < 0.5 * most.min(farthest)
         } else {
-            best * self.span < TIGHT && best < 0.02 * farthest
+            best * self.span < TIGHT && best < FAR_BELOW_SLOPE * farthest
         };
         if cluster_suspected {
             best = best.max(TaylorBound::new(&self.probe, s).reach(SHARE, most));
@@ -247,7 +281,7 @@ impl<'a> Walker<'a> {
         let unit = modulus(jet.value);
         let size = modulus(s);
         let mut span = most;
-        for _ in 0..4 {
+        for _ in 0..DOMINATED_ROUNDS {
             let place = (size + span, along.re * span);
             let Some(dominated) = self
                 .probe
@@ -259,7 +293,7 @@ impl<'a> Walker<'a> {
             let slope = ((modulus(dominated.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
             let r = within(room, slope, dominated.bend / unit);
             if r >= 0.25 * span {
-                return r.min(span) * (1.0 - 1e-12);
+                return r.min(span) * ROUNDED_DOWN;
             }
             span *= 0.25;
         }
@@ -314,7 +348,7 @@ impl<'a> Walker<'a> {
         }
         turn.slack += uncertainty(&jet);
         // Rounding errors of the points themselves, times the delay by which they are multiplied.
-        turn.slack += 1e-15 * self.probe.delay() * (from.im.abs() + to.im.abs());
+        turn.slack += PLACE_ROUNDING * self.probe.delay() * (from.im.abs() + to.im.abs());
         Ok(turn)
     }
 
@@ -330,10 +364,10 @@ impl<'a> Walker<'a> {
         let mut length = if reach >= rest {
             rest
         } else {
-            rest.min(1.9 * reach)
+            rest.min(STRETCH * reach)
         };
         let mut overflows = false;
-        for attempt in 0..8 {
+        for attempt in 0..MAX_STEP_ATTEMPTS {
             let next = if length >= rest {
                 to
             } else {
@@ -366,7 +400,7 @@ impl<'a> Walker<'a> {
                 // The reach of `here` covers the step; only rounding errors remain.
                 return Err(self.blocked(next));
             }
-            length = (0.999 * reach).min(length * 0.999);
+            length = (SHORTENED * reach).min(length * SHORTENED);
         }
         Err(if overflows {
             overflow(here)
@@ -404,8 +438,13 @@ pub(crate) fn is_clear(jet: &Jet) -> bool {
 
 /// Bound on the error of arg g.
 fn uncertainty(jet: &Jet) -> f64 {
-    // asin t ≤ (π/2) t
-    1.58 * jet.value_error / modulus(jet.value)
+    angle_error(jet.value_error, modulus(jet.value))
+}
+
+/// Bound on the error of the angle of a number of modulus `size` that is known to within `error`:
+/// asin t ≤ (π/2) t.
+pub(crate) fn angle_error(error: f64, size: f64) -> f64 {
+    1.58 * error / size
 }
 
 fn unit(value: Complex64) -> Complex64 {

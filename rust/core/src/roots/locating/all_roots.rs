@@ -40,7 +40,7 @@ pub(crate) fn add_zeros(discs: &mut Vec<Disc>, zeros: u32) {
 /// roots.
 ///
 /// # Errors
-/// As [`count`](super::count); [`Error::CountMismatch`] where double precision does not suffice
+/// As [`count`](crate::roots::count); [`Error::CountMismatch`] where double precision does not suffice
 /// to locate what was counted.
 ///
 /// ```

@@ -1,7 +1,8 @@
 //! Roots so close together that Newton's iteration cannot separate them: one disc for all of them.
 //!
-//! With the Taylor coefficients a_k of g at z up to the n-th, in two words and with their errors e_k, and a
-//! bound R on the next one in the disc of radius t, g has exactly m roots within every r ≤ t for which
+//! With the Taylor coefficients a_k of g at z up to the n-th, in double-double arithmetic and with
+//! their errors e_k, and a bound R on the next one in the disc of radius t, g has exactly m roots
+//! within every r ≤ t for which
 //!     (|a_m| − e_m) rᵐ > Σ_{k≤n, k≠m} (|a_k| + e_k) rᵏ + R rⁿ⁺¹
 //! (Pellet 1881, by Rouché's theorem against a_m (s − z)ᵐ). The inequality is tested at radii a
 //! factor of two apart, about the zero of the (m − 1)-st derivative next to z, which is the m-fold

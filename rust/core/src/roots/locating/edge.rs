@@ -34,7 +34,8 @@ pub enum Edge {
 /// As [`count`], roots on the edge being treated as `edge` says.
 ///
 /// # Errors
-/// As [`count`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be located.
+/// As [`count`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be
+/// located.
 ///
 /// ```
 /// use deadtime::{Task, quasipoly::QuasiPolynomial, roots::{Edge, Region, count_with_edge}};
@@ -62,7 +63,8 @@ pub fn count_with_edge(
 /// As [`roots`], roots on the edge being treated as `edge` says.
 ///
 /// # Errors
-/// As [`roots`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be located.
+/// As [`roots`], but [`Error::OnEdge`] for roots on the edge, where they are refused and can be
+/// located.
 pub fn roots_with_edge(
     h: &QuasiPolynomial,
     region: &Region,

@@ -27,9 +27,12 @@ const IDLE_CUTS: u32 = 8;
 /// evenly.
 const EVEN: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
+/// Starts around a cluster: angle of the first one in rad, distance as a share of the radius.
+const AROUND: (f64, f64) = (0.3, 0.7);
+
 /// Walks along lines and iterates towards roots.
 pub(crate) trait Seek: Walk {
-    /// Check for cancellation and for the limit on evaluations, every so many evaluations.
+    /// Check for cancellation and for the limit on evaluations.
     fn pause(&mut self) -> Result<(), Error>;
 
     /// Newton's iteration from `start` as long as it stays in `window`.
@@ -312,8 +315,8 @@ impl<'w, W: Seek> Search<'w, W> {
         let starts = 3 * multiplicity;
         for k in 0..starts {
             self.walker.pause()?;
-            let angle = 0.3 + TAU * f64::from(k) / f64::from(starts);
-            let start = center + Complex64::from_polar(0.7 * radius, angle);
+            let angle = AROUND.0 + TAU * f64::from(k) / f64::from(starts);
+            let start = center + Complex64::from_polar(AROUND.1 * radius, angle);
             if let Outcome::Simple(disc) = self.walker.newton(start, &window)? {
                 self.insert(disc);
             }
@@ -369,7 +372,7 @@ impl<'w, W: Seek> Search<'w, W> {
             counted,
             found: found.map(|disc| (disc.center, disc.multiplicity)).collect(),
             advice: format!(
-                "near {:e}{:+e}i double precision does not tell the roots apart; another unit of \
+                "near {:e}{:+e}i double precision does not separate the roots; another unit of \
                  time or a less expanded form of the equation may help",
                 0.5 * (cell.re.0 + cell.re.1),
                 cell.im.1

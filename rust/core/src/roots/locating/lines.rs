@@ -70,6 +70,18 @@ const SLOW_APPROACH: f64 = 0.7;
 /// Position of a line between a root and the chains, or the next root, as a share of the distance.
 const CLEARANCE: f64 = 0.3;
 
+/// Relative distance of two lines at which the search between them ends.
+const CLOSE_LINES: f64 = 1e-3;
+
+/// A line is accepted with at most this many times the wanted roots, plus the second number.
+const ENOUGH: [u64; 2] = [4, 16];
+
+/// Factor on the clearance for every abandoned line.
+const CLOSER: f64 = 0.1;
+
+/// Least shift of a line relative to its real part.
+const LEAST_MOVE: f64 = 1e-12;
+
 /// The distance from the chains at which the search ends. `step` is one over the longest delay.
 pub(crate) fn chain_margin(step: f64) -> f64 {
     CHAIN_MARGIN * step
@@ -89,7 +101,7 @@ pub(crate) fn between_lines(sigma: f64, chain: f64) -> Error {
         limit: EVALUATIONS_PER_LINE,
         unit: "evaluations on a line",
         advice: format!(
-            "no root lies right of Re s = {sigma:.6}, but what lies between that and the chains of \
+            "no root lies right of Re s = {sigma:.6}, but the roots between that line and the chains of \
              roots at Re s = {chain:.6} could not be counted; use count with both ends of im, or \
              give delays that are almost equal one value"
         ),
@@ -299,7 +311,9 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                 (few, Some(enough)) => {
                     let right = few.as_ref().map_or(f64::INFINITY, |few| few.sigma);
                     let gap = right - enough.sigma;
-                    if enough.count <= 4 * wanted + 16 || gap <= 1e-3 * enough.sigma.abs() {
+                    if enough.count <= ENOUGH[0] * wanted + ENOUGH[1]
+                        || gap <= CLOSE_LINES * enough.sigma.abs()
+                    {
                         return Ok((enough.clone(), false));
                     }
                     let step = self.step.min(0.5 * gap);
@@ -376,9 +390,9 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             .unwrap_or(f64::NEG_INFINITY);
         let free = edge - next.max(self.barrier);
         // The more lines were abandoned, the closer to the root the next one is.
-        let share = (0..self.given_up).fold(CLEARANCE, |share, _| 0.1 * share);
+        let share = (0..self.given_up).fold(CLEARANCE, |share, _| CLOSER * share);
         let sigma = edge - (share * free).min(self.step);
-        let further = line.sigma - sigma > 1e-3 * self.margin;
+        let further = line.sigma - sigma > CLOSE_LINES * self.margin;
         Ok((sigma > self.barrier && further).then_some(sigma))
     }
 
@@ -490,7 +504,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                     });
                 }
                 Err(error @ Error::Contour { distance, .. }) => {
-                    let distance = distance.max(1e-12 * sigma.abs()).max(least);
+                    let distance = distance.max(LEAST_MOVE * sigma.abs()).max(least);
                     let moved = sigma + aside * distance;
                     at = if moved > self.chain {
                         moved

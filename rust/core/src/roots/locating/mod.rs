@@ -1,8 +1,8 @@
 //! Roots found and enclosed in discs.
 //!
 //! * `newton` finds a single root and proves its disc, `clusters` does the same for several roots
-//!   that cannot be separated; `isolate` and `all_roots` find every root of a region, `edge` decides
-//!   about roots on its edge.
+//!   that cannot be separated; `isolate` and `all_roots` find every root of a region, `edge`
+//!   decides about roots on its edge.
 //! * `starts` guesses where roots of large modulus are.
 //! * `lines` searches for vertical lines with a known number of roots to their right, `rightmost`
 //!   finds the rightmost roots with them, `exact_abscissa` those of commensurate delays.

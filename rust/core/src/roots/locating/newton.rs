@@ -30,6 +30,21 @@ const ARRIVED: f64 = 0.25;
 const LEAST: f64 = 1e-150;
 const MOST: f64 = 1e150;
 
+/// Factors that cover the rounding errors of radii.
+const SHRUNK: f64 = 1.0 - 1e-9;
+
+/// The same upwards.
+const ENLARGED: f64 = 1.0 + 1e-9;
+
+/// Range of the ratio of two steps in which several roots are assumed.
+const STEADY: std::ops::Range<f64> = 0.45..0.95;
+
+/// Largest imaginary part of that ratio.
+const STEADY_TURN: f64 = 0.05;
+
+/// Upper limit on the radii of isolation that are tried.
+const MAX_ISOLATIONS: usize = 12;
+
 /// How a Newton iteration ended.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Outcome {
@@ -128,7 +143,7 @@ fn newton_in_double_double(
 /// close roots, each step is (m − 1)/m of the one before, so that m steps lead to the root.
 fn multiple(step: Complex64, before: Complex64) -> f64 {
     let ratio = step * before.conj() / before.norm_sqr();
-    let steady = (0.45..0.95).contains(&ratio.re) && ratio.im.abs() < 0.05;
+    let steady = STEADY.contains(&ratio.re) && ratio.im.abs() < STEADY_TURN;
     if steady {
         (1.0 / (1.0 - ratio.re)).round()
     } else {
@@ -172,12 +187,12 @@ fn disc_from(probe: &Probe<'_>, z: Complex64, jet: &Jet) -> Option<Disc> {
     // radius t.
     let radii = |t: f64| {
         let bend = probe.curvature_around(size + t, t);
-        let root = b * b * (1.0 - 1e-9) - 2.0 * bend * a;
+        let root = b * b * SHRUNK - 2.0 * bend * a;
         (root > 0.0).then(|| {
             let root = root.sqrt();
             (
-                2.0 * a / (b + root) * (1.0 + 1e-9),
-                ((b + root) / bend).min(t) * (1.0 - 1e-9),
+                2.0 * a / (b + root) * ENLARGED,
+                ((b + root) / bend).min(t) * SHRUNK,
             )
         })
     };
@@ -189,7 +204,7 @@ fn disc_from(probe: &Probe<'_>, z: Complex64, jet: &Jet) -> Option<Disc> {
     // The linear part exceeds the rest up to 2 b over the curvature, and this is known where the
     // disc is small.
     let mut t = b / probe.curvature_around(size, 0.0);
-    for _ in 0..12 {
+    for _ in 0..MAX_ISOLATIONS {
         match radii(t) {
             Some((least, most)) if least < most && least <= isolation => {
                 isolation = isolation.max(most);

@@ -64,7 +64,7 @@ pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, 
 /// The number of roots right of the imaginary axis and the rightmost root, with one pass along the
 /// axis for both.
 ///
-/// The first is that of [`count_right_of`](super::count_right_of) at 0, the second that of
+/// The first is that of [`count_right_of`] at 0, the second that of
 /// [`rightmost`] for one root.
 ///
 /// # Errors
@@ -205,8 +205,8 @@ pub fn spectral_abscissa(h: &QuasiPolynomial, strong: bool, task: &Task) -> Resu
 fn beyond_reach() -> Error {
     Error::argument(
         "no line that could be counted has a root to its right: the numbers of this equation \
-         differ too much in size for double precision; leave out time constants of almost \
-         nothing, or choose another unit of time",
+         differ too much in size for double precision; leave out time constants close to zero, \
+              or choose another unit of time",
     )
 }
 

@@ -86,10 +86,10 @@ fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Comp
         Outcome::Stalled(place) => {
             let many = match cluster(&mut walker.probe, place, reach) {
                 Some(disc) => format!(
-                    "{} roots lie within {:.1e} of {}, not told apart in two words of double precision",
+                    "{} roots lie within {:.1e} of {}, which double-double arithmetic does not separate",
                     disc.multiplicity, disc.radius, disc.center
                 ),
-                None => format!("the function is lost in rounding near {place}"),
+                None => format!("rounding errors exceed the function near {place}"),
             };
             Err(Error::argument(format!(
                 "the root {near} is not simple: {many}. A multiple root has no derivative, it \

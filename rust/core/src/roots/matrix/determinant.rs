@@ -7,7 +7,7 @@ use super::outer::Leading;
 use super::system::CharacteristicMatrix;
 use super::walker::{MAX_EVALUATIONS, MatrixWalker};
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::counting::{Cell, Closed};
+use crate::roots::counting::{Cell, Closed, EDGE_MARGIN};
 use crate::roots::locating::{
     Effort, Spectrum, all_discs, balances, first, half_plane_discs, leading, leads_right,
     rightmost_first,
@@ -46,7 +46,7 @@ impl<'s> Prepared<'s> {
     fn cell(&self, walker: &mut MatrixWalker<'_>, sigma: f64) -> Result<Option<Cell>, Error> {
         // A margin keeps roots off the edge itself.
         let least = LEAST_RADIUS * self.system.rate();
-        let radius = 1.01 * self.leading.radius(sigma, walker.task())?.max(least);
+        let radius = EDGE_MARGIN * self.leading.radius(sigma, walker.task())?.max(least);
         if sigma >= radius {
             return Ok(None);
         }
@@ -111,7 +111,7 @@ fn close(
             ));
         }
         let least = LEAST_RADIUS * system.rate();
-        let radius = 1.01 * Leading::new(system)?.radius(re.0, task)?.max(least);
+        let radius = EDGE_MARGIN * Leading::new(system)?.radius(re.0, task)?.max(least);
         re = (re.0.max(-radius), re.1.min(radius));
         im = (im.0.max(-radius), im.1.min(radius));
     }

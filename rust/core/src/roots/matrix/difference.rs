@@ -38,6 +38,33 @@ const MAX_WORK: f64 = 1e9;
 /// Samples of each angle, by the number of angles.
 const SAMPLES: [usize; 4] = [1, 48, 14, 8];
 
+/// First distance below the estimate at which a lower bound is tried, relative to the rates; each
+/// further one is four times as large.
+const LOWER_GAP: f64 = 1e-13;
+
+/// First distance above the estimate at which an upper bound is tried, by the number of angles.
+/// With more angles a proof close to the chains costs more.
+const UPPER_GAPS: [f64; 4] = [1e-10, 1e-5, 1e-3, 1e-2];
+
+/// Largest distance from the norm bound at which chains are searched for, in units of one over the
+/// longest delay.
+const FARTHEST: f64 = 1e3;
+
+/// Upper limit on the steps of the estimate.
+const MAX_STEPS: usize = 30;
+
+/// Step of the difference quotient, in units of one over the longest delay.
+const DIFFERENCE: f64 = 1e-4;
+
+/// Least slope of log ρ, in units of the shortest delay.
+const LEAST_SLOPE: f64 = 0.2;
+
+/// Size of log ρ at which the estimate ends.
+const ARRIVED: f64 = 1e-13;
+
+/// First and last step of the search for angles, rad.
+const ANGLE_STEPS: (f64, f64) = (0.1, 1e-7);
+
 /// The difference part of a neutral system.
 #[derive(Debug, Clone)]
 pub(super) struct Difference {
@@ -227,7 +254,7 @@ impl Difference {
         };
         let rate = 1.0 / self.longest();
         let mut lower = f64::NEG_INFINITY;
-        let mut gap = 1e-13 * (rate + guess.abs());
+        let mut gap = LOWER_GAP * (rate + guess.abs());
         while gap < 10.0 * (rate + guess.abs()) {
             let (matrix, lost) = self.at(guess - gap, &angles);
             if log_radius_below(matrix, lost) >= 0.0 {
@@ -239,11 +266,7 @@ impl Difference {
         if self.angles() > MAX_ANGLES {
             return Ok((lower, top));
         }
-        let mut gap = [1e-10, 1e-5, 1e-3, 1e-2]
-            .get(self.angles())
-            .copied()
-            .unwrap_or(0.1)
-            * rate;
+        let mut gap = UPPER_GAPS.get(self.angles()).copied().unwrap_or(0.1) * rate;
         while guess + gap < top {
             if self.inverse_bound(guess + gap, task)?.is_some() {
                 return Ok((lower, guess + gap));
@@ -258,7 +281,7 @@ impl Difference {
         let rate = 1.0 / self.longest();
         let mut best = top;
         let mut step = rate;
-        while step < 1e3 * rate {
+        while step < FARTHEST * rate {
             if self.inverse_bound(best - step, task)?.is_none() {
                 break;
             }
@@ -281,19 +304,19 @@ impl Difference {
         let rate = 1.0 / self.longest();
         let mut sigma = top;
         let mut best: Option<Vec<f64>> = None;
-        for _ in 0..30 {
+        for _ in 0..MAX_STEPS {
             let (height, angles) = self.highest(sigma, best.as_deref(), task)?;
             // The slope of log ρ lies between the delays: a step with the longest one never goes
             // too far to the left, where ρ may grow faster than linearly in the logarithm.
-            if !(height.is_finite() && sigma > top - 1e3 * rate) {
+            if !(height.is_finite() && sigma > top - FARTHEST * rate) {
                 return Ok(None);
             }
-            let (ahead, _) = self.highest_from(sigma - 1e-4 * rate, &angles);
-            let slope =
-                ((ahead - height) / (1e-4 * rate)).clamp(0.2 * self.shortest(), self.longest());
+            let (ahead, _) = self.highest_from(sigma - DIFFERENCE * rate, &angles);
+            let slope = ((ahead - height) / (DIFFERENCE * rate))
+                .clamp(LEAST_SLOPE * self.shortest(), self.longest());
             sigma += height / slope;
             best = Some(angles);
-            if height.abs() < 1e-13 {
+            if height.abs() < ARRIVED {
                 break;
             }
         }
@@ -351,8 +374,8 @@ impl Difference {
     /// Improve the angles one at a time.
     fn highest_from(&self, sigma: f64, angles: &[f64]) -> (f64, Vec<f64>) {
         let mut best = (self.log_radius(sigma, angles), angles.to_vec());
-        let mut step = 0.1;
-        while step > 1e-7 && !angles.is_empty() {
+        let mut step = ANGLE_STEPS.0;
+        while step > ANGLE_STEPS.1 && !angles.is_empty() {
             let mut improved = false;
             for k in 0..angles.len() {
                 for sign in [-1.0, 1.0] {

@@ -1,8 +1,8 @@
 //! Proved statements about det M around one point s.
 //!
 //! Row i of M is multiplied by e^(s τ_c(i)), rows and columns by powers of two (`balance`), so that
-//! nothing overflows: arg det M = arg det G − T Im s with T = Σ τ_c(i). Let R be the computed inverse
-//! of G(s), G(s) R = I − Y, |Y| ≤ α in the Frobenius norm, K a matrix and κ a number. With
+//! nothing overflows: arg det M = arg det G − T Im s with T = Σ τ_c(i). Let R be the computed
+//! inverse of G(s), G(s) R = I − Y, |Y| ≤ α in the Frobenius norm, K a matrix and κ a number. With
 //!     G(s + δ) R = (1 + κ δ)(I + Z),  Z = (−Y + δ (K − κ I) + (rest))/(1 + κ δ),
 //! as long as f ≥ |Z| stays below 1 along the step, the argument of det G changes by n arg(1 + κ δ)
 //! up to |arg det(I + Z)| ≤ |tr Z| + |tr Z²|/2 + … ≤ t − log(1 − f) − f. The trace t is bounded
@@ -11,8 +11,10 @@
 //! e^Re z), or only the part of G′ R that is free of exponentials, |e^z − 1| ≤ min(|z|, 2) g: where
 //! sE dominates that reaches far. κ = tr K/n takes out the factor that all of G has in common.
 //!
-//! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d), derived as in
-//! `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x| in the exponent); a row of products with R at most as many u more as it has entries. Both are in `loss`.
+//! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d),
+//! derived as in `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x|
+//! in the exponent); a row of products with R at most as many u more as it has entries. Both are in
+//! `loss`.
 
 use std::f64::consts::LN_2;
 
@@ -44,6 +46,19 @@ const FLOOR: f64 = 1e-150;
 
 /// Lower limit that replaces a size lost in underflow, because the size may grow along the step.
 const LEAST: f64 = 1e-150;
+
+/// Upper limit on the lengths tried for one reach.
+const MAX_ROUNDS: usize = 100;
+
+/// Residual below which the inverse is accurate enough for a step of Newton's iteration.
+const RESOLVED: f64 = 0.1;
+
+/// Ratio of the bounds of a reach at which the search for it ends.
+const CLOSE_LENGTHS: f64 = 0.9;
+
+/// Points, in units of the rate. A matrix that is not singular everywhere is regular in double
+/// precision at one of them.
+const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
 
 /// The part of one delay in one row of G, times R.
 #[derive(Debug, Clone, Copy)]
@@ -108,7 +123,7 @@ impl LocalEnclosure {
 
     /// Is the inverse accurate enough for a step of Newton's iteration?
     pub(super) fn is_resolved(&self) -> bool {
-        self.residual < 0.1
+        self.residual < RESOLVED
     }
 
     /// The same without any proof, for Newton's iteration.
@@ -198,13 +213,13 @@ impl LocalEnclosure {
                     0.5 * high
                 };
             }
-            for _ in 0..100 {
+            for _ in 0..MAX_ROUNDS {
                 if holds(guess) {
                     low = guess;
                 } else {
                     high = guess;
                 }
-                if low > 0.9 * high || high < 1e-300 {
+                if low > CLOSE_LENGTHS * high || high < 1e-300 {
                     break;
                 }
                 guess = if low == 0.0 {
@@ -490,10 +505,6 @@ fn add_multiple(row: &mut (Vec<f64>, Vec<f64>), factor: f64, (re, im): (&[f64], 
     }
 }
 
-/// Points, in units of the rate. A matrix that is not singular everywhere is regular in double
-/// precision at one of them.
-const POINTS: [(f64, f64); 4] = [(0.737, 1.171), (2.313, 0.0), (0.113, 0.219), (31.7, 17.3)];
-
 /// # Errors
 /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
 pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> {
@@ -505,8 +516,8 @@ pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> 
         return Ok(());
     }
     Err(Error::argument(
-        "the determinant of the characteristic matrix is zero for every s, or cannot be told \
-         from it: the equations do not determine the state, look for rows of E, N and A that \
+        "the determinant of the characteristic matrix is zero for every s, or too close to zero \
+         to decide: the equations do not determine the state, look for rows of E, N and A that \
          depend on one another, or for entries that differ too much in size",
     ))
 }

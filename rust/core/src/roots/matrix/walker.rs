@@ -46,6 +46,34 @@ const MOST_UNCLEAR: u32 = 5;
 /// Longest step that is tried, relative to the reach of its first point.
 const STRETCH: f64 = 1.9;
 
+/// Modulus that replaces that of points close to 0, in units of the rate of the system.
+const LEAST_SIZE: f64 = 1e-3;
+
+/// Upper limit on the distances at which a line is proved to be free of roots.
+const MAX_ASIDE: usize = 40;
+
+/// Upper limit on the lengths tried for one step.
+const MAX_STEP_ATTEMPTS: usize = 60;
+
+/// Factors on the length of steps after one that was proved and one that was not, and its least
+/// value.
+const STRETCHES: (f64, f64, f64) = (1.05, 0.9, 1.2);
+
+/// Factor on the reach for a step that could not be proved.
+const SHORTENED: f64 = 0.999;
+
+/// Range of the ratio of two steps in which a multiple root is assumed.
+const STEADY: std::ops::Range<f64> = 0.4..0.97;
+
+/// Largest relative change of that ratio.
+const STEADY_CHANGE: f64 = 0.05;
+
+/// Largest relative distance of roots that are enclosed together.
+const CLUSTER: f64 = 1e-6;
+
+/// Largest relative length of a last step that is accepted.
+const LAST_STEP: f64 = 1e-3;
+
 /// Follows arg det M along lines. Keeps the number of evaluations, the hints of roots and the discs
 /// already proved.
 pub(super) struct MatrixWalker<'a> {
@@ -116,7 +144,7 @@ impl<'a> MatrixWalker<'a> {
 
     /// The error for a line that cannot be proved to be free of roots at `place`.
     fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
-        let mut distance = 4.0 * f64::EPSILON * modulus(place).max(1e-3 * self.system.rate());
+        let mut distance = 4.0 * f64::EPSILON * modulus(place).max(LEAST_SIZE * self.system.rate());
         // The point itself may be free of roots, and the root as far away as Newton's step leads.
         if let Some(here) = LocalEnclosure::tried(self.system, place) {
             let correction = modulus(here.correction);
@@ -124,7 +152,7 @@ impl<'a> MatrixWalker<'a> {
                 distance = distance.max(2.0 * correction);
             }
         }
-        for _ in 0..40 {
+        for _ in 0..MAX_ASIDE {
             let mut clear = true;
             for step in [Complex64::ONE, -Complex64::ONE, Complex64::I] {
                 clear &= self.enclosure(place + step * distance)?.is_some();
@@ -152,7 +180,7 @@ impl<'a> MatrixWalker<'a> {
             rest.min(*stretch * reach.length)
         };
         let mut unclear = 0;
-        for _ in 0..60 {
+        for _ in 0..MAX_STEP_ATTEMPTS {
             let next = if length >= rest {
                 to
             } else {
@@ -165,13 +193,13 @@ impl<'a> MatrixWalker<'a> {
                 let gone = modulus(next - here.s) * (1.0 + 1e-12);
                 let back = ahead.reach(-along, gone);
                 if back.length + reach.length >= gone * (1.0 + 1e-9) || reach.length >= gone {
-                    *stretch = (1.05 * *stretch).min(STRETCH);
+                    *stretch = (STRETCHES.0 * *stretch).min(STRETCH);
                     // As far from the end of either reach as possible.
                     let part = reach.length / (reach.length + back.length);
                     return Ok((ahead, reach, part * gone, back));
                 }
-                *stretch = (0.9 * *stretch).max(1.2);
-                length = (0.999 * reach.length).max(0.5 * length.min(reach.length));
+                *stretch = (STRETCHES.1 * *stretch).max(STRETCHES.2);
+                length = (SHORTENED * reach.length).max(0.5 * length.min(reach.length));
             } else {
                 // Points that are free of roots exist at any distance from a root, with shorter and
                 // shorter reaches.
@@ -188,7 +216,8 @@ impl<'a> MatrixWalker<'a> {
     /// The smallest square about `z` in which the number of roots can be proved, not 0.
     fn square(&mut self, z: Complex64, most: f64) -> Result<Option<Disc>, Error> {
         let size = self.system.size() as f64;
-        let mut half = 4.0 * f64::EPSILON * size.sqrt() * modulus(z).max(1e-3 * self.system.rate());
+        let mut half =
+            4.0 * f64::EPSILON * size.sqrt() * modulus(z).max(LEAST_SIZE * self.system.rate());
         let mut growth = 3.0;
         while half < most {
             if self.enclosure(z + half)?.is_some() {
@@ -234,7 +263,7 @@ impl<'a> MatrixWalker<'a> {
         if let Some(disc) = self.known.iter().find(holds) {
             return Ok(Outcome::Simple(*disc));
         }
-        let most = 1e-6 * modulus(z).max(1e-3 * self.system.rate());
+        let most = CLUSTER * modulus(z).max(LEAST_SIZE * self.system.rate());
         if self.stalled.iter().any(|place| (place - up).norm() < most) {
             return Ok(Outcome::Stalled(z));
         }
@@ -329,7 +358,7 @@ impl Seek for MatrixWalker<'_> {
             // Next to an m-fold root steps shrink only by 1 − 1/m, so that m of them are taken at
             // once.
             let ratio = modulus(step) / modulus(last);
-            let settled = (0.4..0.97).contains(&ratio) && (ratio - slow).abs() < 0.05 * ratio;
+            let settled = STEADY.contains(&ratio) && (ratio - slow).abs() < STEADY_CHANGE * ratio;
             let fold = if settled {
                 (1.0 / (1.0 - ratio)).round()
             } else {
@@ -340,7 +369,7 @@ impl Seek for MatrixWalker<'_> {
             let next = z - step * fold;
             let small = modulus(step) <= 4.0 * f64::EPSILON * modulus(z);
             if small || !here.is_resolved() {
-                let end = if window(next) && modulus(step) < 1e-3 * modulus(z) {
+                let end = if window(next) && modulus(step) < LAST_STEP * modulus(z) {
                     next
                 } else {
                     z

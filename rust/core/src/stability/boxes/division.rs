@@ -28,6 +28,9 @@ const MOST_PARAMETERS: usize = 3;
 /// necessary at the end.
 const GROUP: usize = 128;
 
+/// What memory is requested for, in errors.
+const BOXES: &str = "the list of boxes";
+
 /// When to stop the division.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
@@ -112,7 +115,7 @@ pub fn proved_boxes(
 pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>, Error> {
     if ranges.len() != family.names().len() {
         return Err(Error::argument(format!(
-            "{} ranges for {} parameters ({}): give one range a parameter",
+            "{} ranges for {} parameters ({}): give one range for each parameter",
             ranges.len(),
             family.names().len(),
             family.names().join(", ")
@@ -162,9 +165,6 @@ pub(crate) fn reduce<'a, const D: usize>(
     reduced.refer_to_first(&whole.centre());
     Ok((reduced, whole))
 }
-
-/// What memory is requested for, in errors.
-const BOXES: &str = "the list of boxes";
 
 /// A box that is still to be judged.
 struct Waiting<const D: usize> {

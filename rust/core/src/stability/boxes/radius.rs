@@ -75,8 +75,8 @@ impl<const D: usize> Ord for Near<D> {
 /// Parameters that delays depend on stay at or above 0.
 ///
 /// # Errors
-/// [`Error::Argument`] where the member at `point` is not stable or cannot be judged, for scales that
-/// are not finite or negative, or more than three above 0; [`Error::Interrupted`].
+/// [`Error::Argument`] where the member at `point` is not stable or cannot be judged, for scales
+/// that are not finite or negative, or more than three above 0; [`Error::Interrupted`].
 pub fn stability_radius(
     family: &Family,
     point: &[f64],
@@ -86,7 +86,7 @@ pub fn stability_radius(
 ) -> Result<Radius, Error> {
     if scales.len() != point.len() {
         return Err(Error::argument(format!(
-            "{} scales for {} parameters: give one a parameter",
+            "{} scales for {} parameters: give one for each parameter",
             scales.len(),
             point.len()
         )));
@@ -215,7 +215,7 @@ impl Place<'_> {
     }
 
     /// The nearest point of a box, moved away from the point by a share of the tolerance.
-    fn beyond<const D: usize>(&self, range: &Range<D>) -> [f64; D] {
+    fn moved_outwards<const D: usize>(&self, range: &Range<D>) -> [f64; D] {
         let mut place = self.nearest(range).0;
         for (slot, index) in place.iter_mut().zip(self.varying) {
             let value = self.point.get(*index).copied().unwrap_or(0.0);
@@ -261,7 +261,7 @@ impl Place<'_> {
             task.advance(1);
             if bound > tried.0 * (1.0 + 0.25 * self.tol) || order >= tried.1 + TRY_EVERY {
                 tried = (bound, order);
-                let values = reduced.values_at(&self.beyond(&claim.range));
+                let values = reduced.values_at(&self.moved_outwards(&claim.range));
                 let known = family
                     .at(&values)
                     .map(|h| judge(&h, Specification::default(), false, task));

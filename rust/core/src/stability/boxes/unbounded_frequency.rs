@@ -12,9 +12,9 @@
 //!    2, 4, …. The former rises with w, the others fall: an inequality at W holds beyond.
 //!    (Comparing moduli of whole rows, it holds from a far smaller W than one between the terms
 //!    where chains lie close to the axis.)
-//! 3. If Σ min |b_j e_j| > max |a|, all d_j > 0 and no two of them equal, infinitely many roots lie right
-//!    of the line for every p, robustly: under arbitrarily small changes of the delays (Avellar and
-//!    Hale 1980); with one b_j that exceeds all others and a, as it stands.
+//! 3. If Σ min |b_j e_j| > max |a|, all d_j > 0 and no two of them equal, infinitely many roots lie
+//!    right of the line for every p, robustly: under arbitrarily small changes of the delays
+//!    (Avellar and Hale 1980); with one b_j that exceeds all others and a, as it stands.
 //!
 //! Inequalities are tested with a relative margin of 1e-9, far above the rounding errors of such
 //! sums.
@@ -23,6 +23,9 @@ use super::box_expansion::{BoxExpansion, ExpansionRow};
 use crate::elementary::exp;
 
 const MARGIN: f64 = 1e-9;
+
+/// Ratio of the bounds at which the bisection for the radius ends.
+const WIDTH: f64 = 1.05;
 
 /// What is proved for large |s| over a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -220,7 +223,7 @@ fn radius<const D: usize>(
             }
         }
     }
-    while high > 1.05 * low {
+    while high > WIDTH * low {
         let middle = (low * high).sqrt();
         if holds(middle) {
             high = middle;

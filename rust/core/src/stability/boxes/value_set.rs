@@ -1,6 +1,7 @@
 //! Is h(s; p) ≠ 0 for all p in a box and all s in a stretch of the edge?
 //!
-//! With centres c, s_0 and p = c + δ, s = s_0 + ηe, |δ_i| ≤ r_i, |η| ≤ ρ, |e| = 1, Taylor's theorem gives
+//! With centres c, s_0 and p = c + δ, s = s_0 + ηe, |δ_i| ≤ r_i, |η| ≤ ρ, |e| = 1, Taylor's theorem
+//! gives
 //!     h = h_0 + Σ δ_i ∂_i h + η ∂_η h + E,  |E| ≤ ½ Σ_ab x_a x_b max |∂_a ∂_b h|,  x = (r, ρ),
 //! the first part of which fills a zonotope. Its distance from 0 exceeds |E| if, for some n,
 //!     |Re n̄ h_0| − Σ_a |Re n̄ ∂_a h| x_a > |n| max |E|.
@@ -32,6 +33,19 @@ const FLOOR: f64 = 1e-150;
 
 /// No statement is made about values below this.
 const SMALLEST: f64 = 1e-140;
+
+/// Relative length of a stretch below which it is not divided.
+const FINEST: f64 = 1e-13;
+
+/// Covers the rounding errors of a bound.
+const ROOM: f64 = 1.0 + 1e-9;
+
+/// If h changes along a stretch by less than this many times what it changes over the box, and a
+/// member may have a root in the middle of the stretch, the stretch is not divided: the box is.
+const COARSE: f64 = 0.3;
+
+/// The same limit, wherever the members' roots are.
+const FINE: f64 = 0.1;
 
 /// Result of testing one stretch of the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,9 +112,6 @@ impl Stretch {
         exp(products[0].max(products[1])) * ROOM
     }
 }
-
-/// Covers the rounding errors of a bound.
-const ROOM: f64 = 1.0 + 1e-9;
 
 /// First and second order of h around the middle of a stretch.
 struct Expansion<const D: usize> {
@@ -287,7 +298,7 @@ pub(crate) fn look<const D: usize>(
     let spread: f64 = shares.iter().sum();
     let pace = own.turn.norm_sqr().sqrt() * rho;
     // Where an exponential overflows, nothing is proved.
-    let finest = rho <= 1e-13 * to || pace <= own.rounding || !own.rounding.is_finite();
+    let finest = rho <= FINEST * to || pace <= own.rounding || !own.rounding.is_finite();
     if finest || (pace < COARSE * spread && !own.is_clear(half, 0.0, rest)) {
         return Look::Wide(shares);
     }
@@ -307,10 +318,3 @@ pub(crate) fn tangent<const D: usize>(
     let own = Expansion::new(expansion, &Stretch::new(piece, t, t));
     (own.value, own.slopes, own.turn)
 }
-
-/// If h changes along a stretch by less than this many times what it changes over the box, and a
-/// member may have a root in the middle of the stretch, the stretch is not divided: the box is.
-const COARSE: f64 = 0.3;
-
-/// The same limit, wherever the members' roots are.
-const FINE: f64 = 0.1;

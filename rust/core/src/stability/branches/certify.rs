@@ -1,11 +1,11 @@
 //! The disc of the root of A + k B next to a start, one in each lane.
 //!
-//! Newton's step leads from s₀ to s₁. Let a = |h′(s₀)| − e₁, η = (|h(s₀)| + e₀)/a, and M bound |h″| within 2η of s₀.
-//! If M η ≤ a/4, then by Rouché's theorem exactly one root lies within 2η of s₀: on that circle
-//! |h′ (s − s₀)| ≥ 2aη exceeds |h(s₀)| + e₀ + M (2η)²/2 ≤ 1.5 aη. By Taylor's formula at s₀ it lies within
-//! (2Mη² + e₀ + 2 e₁ η)/a of s₁ (Kantorovich 1948), apart from the rounding error of s₁ itself. e₀
-//! and e₁ are bounds on rounding errors (`plane`), which also cover coefficients that are sums of a
-//! few rounded products.
+//! Newton's step leads from s₀ to s₁. Let a = |h′(s₀)| − e₁, η = (|h(s₀)| + e₀)/a, and M bound |h″|
+//! within 2η of s₀. If M η ≤ a/4, then by Rouché's theorem exactly one root lies within 2η of s₀:
+//! on that circle |h′ (s − s₀)| ≥ 2aη exceeds |h(s₀)| + e₀ + M (2η)²/2 ≤ 1.5 aη. By Taylor's
+//! formula at s₀ it lies within (2Mη² + e₀ + 2 e₁ η)/a of s₁ (Kantorovich 1948), apart from the
+//! rounding error of s₁ itself. e₀ and e₁ are bounds on rounding errors (`plane`), which also cover
+//! coefficients that are sums of a few rounded products.
 //!
 //! The result in a lane depends only on the start in that lane.
 
@@ -31,15 +31,15 @@ const SQUARES: std::ops::Range<f64> = 1e-280..1e300;
 /// Added to a square, this exceeds every effect of underflow.
 const TINY: f64 = 1e-300;
 
-/// The discs of the roots next to starting values.
-pub(crate) struct Certify<'a>(pub(crate) &'a Plane);
-
 /// Number of arguments: start, k, the three bounds there, the centre of these and how far starts
 /// may be from it.
 pub(crate) const ARGUMENTS: usize = 9;
 
 /// Number of values: root, radius, ds/dk. The radius is infinite where nothing is proved.
 pub(crate) const VALUES: usize = 5;
+
+/// The discs of the roots next to starting values.
+pub(crate) struct Certify<'a>(pub(crate) &'a Plane);
 
 impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
     #[inline(always)]

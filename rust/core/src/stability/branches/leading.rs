@@ -36,6 +36,12 @@ const CLOSE_TO_CHAINS: f64 = 10.0;
 /// Covers the rounding error of a distance.
 const ROOM: f64 = 1.0 + 1e-9;
 
+/// Least gap between roots, in units of the scale, into which a line is put.
+const LEAST_GAP: f64 = 1e-3;
+
+/// Distance of lines, in units of the scale, below which they are the same.
+const SAME_LINE: f64 = 1e-6;
+
 /// The counts of a row right of one line.
 struct Line {
     sigma: f64,
@@ -267,7 +273,7 @@ impl<'a> Leading<'a> {
             }
         }
         let sigma = match best {
-            Some((gap, middle)) if gap > 1e-3 * self.scale => middle,
+            Some((gap, middle)) if gap > LEAST_GAP * self.scale => middle,
             _ => first - 0.5 * self.scale,
         };
         // The further left a line is, the longer it is up to where no root can cross it.
@@ -278,7 +284,7 @@ impl<'a> Leading<'a> {
             && self
                 .lines
                 .iter()
-                .all(|line| (line.sigma - sigma).abs() > 1e-6 * self.scale))
+                .all(|line| (line.sigma - sigma).abs() > SAME_LINE * self.scale))
         .then_some(sigma)
     }
 

@@ -35,6 +35,31 @@ const MAX_DOUBLINGS: u32 = 60;
 /// Upper limit on Newton's steps for one zero.
 const MAX_ITERATIONS: u32 = 30;
 
+/// Length of the next step tried, in lengths of the last one.
+const STRIDE: f64 = 2.5;
+
+/// First points tried off the real axis, as shares of a step.
+const STARTS: [f64; 5] = [1.0, 0.7, 0.4, 0.2, 0.1];
+
+/// Bounds are computed at least this factor ahead.
+const AHEAD: f64 = 1.05;
+
+/// Length of a step, in reaches of its first point.
+const STRETCH: f64 = 1.9;
+
+/// Factors on the reach and on the length of a step that could not be proved.
+const SHORTENED: (f64, f64) = (0.999, 0.6);
+
+/// Covers the rounding errors of radii and bounds.
+const ENLARGED: f64 = 1.0 + 1e-9;
+
+/// Share of the length tried at which a length of the cubic is accepted.
+const CLOSE_LENGTHS: f64 = 0.7;
+
+/// The next length tried for the cubic: as a multiple of the last result, and at least as a share
+/// of the last trial.
+const TRIALS: (f64, f64) = (1.6, 0.125);
+
 /// A point where roots cross the line, or may cross it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Crossing {
@@ -69,8 +94,8 @@ struct Reach {
     sense: Sense,
 }
 
-/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece begin on the
-/// real axis?
+/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece
+/// begin on the real axis?
 ///
 /// `None` where the piece cannot be searched: A and B vanish together, or double precision does not
 /// suffice.
@@ -105,7 +130,7 @@ pub(crate) fn crossings(
         let Some(next) = search.advance(&here, stride) else {
             return Ok(None);
         };
-        stride = 2.5 * (next.t - here.t);
+        stride = STRIDE * (next.t - here.t);
         here = next;
     }
     Ok(None)
@@ -164,7 +189,7 @@ impl<'a> Search<'a> {
             let length = quadratic(room, -bend, -0.5 * self.bounds.third) * SHARE;
             self.record(&zero, 0.0, Some(if slope > 0.0 { -1 } else { 1 }))?;
             let limit = self.top.min(self.bounds.reach);
-            for share in [1.0, 0.7, 0.4, 0.2, 0.1] {
+            for share in STARTS {
                 let next = self.pencil.at((share * length).min(limit));
                 if self.is_clear(&next) {
                     return Some(next);
@@ -201,7 +226,7 @@ impl<'a> Search<'a> {
         let largest = self.largest();
         let excess = modulus(point.a)
             - bounds.rounding * bounds.a[0]
-            - largest * (modulus(point.b) + bounds.rounding * bounds.b[0]) * (1.0 + 1e-9);
+            - largest * (modulus(point.b) + bounds.rounding * bounds.b[0]) * ENLARGED;
         let beyond = (excess / (bounds.modulus[0] + largest * bounds.modulus[1])).min(most);
         let (length, sense) = if beyond > clear && beyond > monotone {
             (beyond, Sense::Beyond)
@@ -225,10 +250,10 @@ impl<'a> Search<'a> {
     /// be resolved.
     fn advance(&mut self, here: &Point, stride: f64) -> Option<Point> {
         let rest = self.top - here.t;
-        let bounds = self.bounds_to(here.t, 1.05 * here.t + 0.5 * self.step)?;
+        let bounds = self.bounds_to(here.t, AHEAD * here.t + 0.5 * self.step)?;
         let most = rest.min(stride).min(bounds.reach - here.t);
         let own = self.reach(here, 1.0, most, &bounds);
-        let mut length = (1.9 * own.length).min(most);
+        let mut length = (STRETCH * own.length).min(most);
         for attempt in 0..6 {
             if here.t + length <= here.t {
                 break;
@@ -250,9 +275,9 @@ impl<'a> Search<'a> {
             }
             // One reach suffices if only the sign at its end is known.
             length = if attempt == 0 {
-                0.999 * own.length
+                SHORTENED.0 * own.length
             } else {
-                0.6 * length
+                SHORTENED.1 * length
             };
         }
         self.skip(here)
@@ -269,7 +294,7 @@ impl<'a> Search<'a> {
             if end >= self.top || (self.is_clear(&next) && ahead.length > 0.25 * step) {
                 let half = 0.5 * (end - here.t);
                 let middle = self.pencil.at(here.t + half);
-                self.record(&middle, half * (1.0 + 1e-9), None)?;
+                self.record(&middle, half * ENLARGED, None)?;
                 return Some(next);
             }
             step *= 2.0;
@@ -294,7 +319,7 @@ impl<'a> Search<'a> {
             if value.abs() <= 4.0 * error[0] && slope != 0.0 {
                 // Within this distance F changes its sign if |F′| stays above half of its value
                 // here.
-                let radius = 2.0 * (value.abs() + error[0]) / slope.abs() * (1.0 + 1e-9);
+                let radius = 2.0 * (value.abs() + error[0]) / slope.abs() * ENLARGED;
                 let loss = error[1] + radius * (bend.abs() + error[2] + radius * self.bounds.third);
                 if loss < 0.5 * slope.abs() {
                     return self.record(&best, radius, jump);
@@ -320,7 +345,7 @@ impl<'a> Search<'a> {
         }
         let half = 0.5 * (high - low);
         let middle = self.pencil.at(low + half);
-        self.record(&middle, half * (1.0 + 1e-9), jump)
+        self.record(&middle, half * ENLARGED, jump)
     }
 
     /// Store the crossing within `radius` of `point`, if its k may lie in the range.
@@ -339,8 +364,7 @@ impl<'a> Search<'a> {
         }
         // −Re(A/B), and |A/B − Â/B̂| ≤ (δA + |Â/B̂| δB)/(|B̂| − δB).
         let gain = -(point.a.re * point.b.re + point.a.im * point.b.im) / (b * b);
-        let error =
-            (off_a + a / b * off_b) / (b - off_b) * (1.0 + 1e-9) + 8.0 * f64::EPSILON * a / b;
+        let error = (off_a + a / b * off_b) / (b - off_b) * ENLARGED + 8.0 * f64::EPSILON * a / b;
         let (low, high) = (gain - error, gain + error);
         if high >= self.range.0 && low <= self.range.1 {
             self.found.push(Crossing {
@@ -380,10 +404,10 @@ fn cubic(a: f64, b: f64, c: f64, d: f64, most: f64) -> f64 {
     for _ in 0..4 {
         let root = quadratic(a, b, c - d * trial);
         best = best.max(root.min(trial));
-        if root >= 0.7 * trial {
+        if root >= CLOSE_LENGTHS * trial {
             break;
         }
-        trial = (1.6 * root).max(0.125 * trial);
+        trial = (TRIALS.0 * root).max(TRIALS.1 * trial);
     }
     best
 }

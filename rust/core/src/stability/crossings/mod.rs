@@ -10,6 +10,6 @@ mod row;
 
 pub(crate) use crossing::Crossing;
 pub(crate) use one_gain::radius_of_members;
-pub use one_gain::{Place, crossings_along};
+pub use one_gain::{AxisCrossing, crossings_along};
 pub(crate) use pencil::{sizes, united};
 pub(crate) use row::{Members, Row};

@@ -29,7 +29,7 @@ const SLACK: f64 = 2.0 * f64::EPSILON;
 
 /// A value of the gain at which roots cross the imaginary axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct AxisCrossing {
     /// The gain.
     pub gain: f64,
     /// An interval that holds it.
@@ -47,8 +47,9 @@ pub struct Place {
 /// has a root on the imaginary axis, by increasing frequency. `values` holds the other parameters.
 ///
 /// # Errors
-/// [`Error::Argument`] where the family is not affine in the parameter, its leading terms do not outweigh all
-/// others in the whole range, a root stays at 0, or precision does not suffice; [`Error::Interrupted`].
+/// [`Error::Argument`] where the family is not affine in the parameter, its leading terms do not
+/// outweigh all others in the whole range, a root stays at 0, or precision does not suffice;
+/// [`Error::Interrupted`].
 ///
 /// ```
 /// use deadtime::{Task, stability::{Affine, Family, Term, crossings_along}};
@@ -72,7 +73,7 @@ pub fn crossings_along(
     parameter: usize,
     range: (f64, f64),
     task: &Task,
-) -> Result<Vec<Place>, Error> {
+) -> Result<Vec<AxisCrossing>, Error> {
     let name = family.names().get(parameter).map_or("", String::as_str);
     let mut ranges: Vec<(f64, f64)> = values.iter().map(|value| (*value, *value)).collect();
     if let Some(place) = ranges.get_mut(parameter) {
@@ -81,7 +82,7 @@ pub fn crossings_along(
     family.check_delays(&ranges)?;
     let Some((constant, slope)) = family.split(parameter) else {
         return Err(Error::argument(format!(
-            "{name} enters otherwise than as a factor of some terms"
+            "{name} does not enter only as a factor of terms"
         )));
     };
     let mut bare = values.to_vec();
@@ -116,11 +117,11 @@ pub fn crossings_along(
              imaginary axis whatever {name} is, or coefficients differ by too many decades"
         )));
     };
-    Ok(found.iter().map(place).collect())
+    Ok(found.iter().map(axis_crossing).collect())
 }
 
-fn place(crossing: &Crossing) -> Place {
-    Place {
+fn axis_crossing(crossing: &Crossing) -> AxisCrossing {
+    AxisCrossing {
         gain: crossing.gain,
         low: crossing.low,
         high: crossing.high,
@@ -181,11 +182,11 @@ pub(crate) fn radius_of_members(
              may reach the imaginary axis: choose a smaller range"
         )));
     }
-    Ok(beyond(others, excess))
+    Ok(exceeding_radius(others, excess))
 }
 
 /// A radius r with `leading` rⁿ > Σ c_j rʲ, close to the smallest one.
-fn beyond(others: &[f64], leading: f64) -> f64 {
+fn exceeding_radius(others: &[f64], leading: f64) -> f64 {
     if others.iter().all(|c| *c == 0.0) {
         return 0.0;
     }
@@ -242,14 +243,14 @@ mod tests {
             (vec![0.0, 1e200], 1e-50),
             (vec![5.0, 4.0, 3.0], 1e-3),
         ] {
-            let r = beyond(&others, leading);
+            let r = exceeding_radius(&others, leading);
             let value = |r: f64| others.iter().fold(0.0, |sum, c| (sum + c) / r);
             assert!(
                 value(r) < leading && value(0.98 * r) > 0.98 * leading,
                 "{others:?}"
             );
         }
-        assert_eq!(beyond(&[0.0, 0.0], 1.0), 0.0);
+        assert_eq!(exceeding_radius(&[0.0, 0.0], 1.0), 0.0);
     }
 
     #[test]

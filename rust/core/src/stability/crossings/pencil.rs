@@ -1,9 +1,10 @@
-//! A pencil A(s) + k B(s) on a straight line s = s₀ + c t, |c| = 1, and the function whose zeros are its crossings.
+//! A pencil A(s) + k B(s) on a straight line s = s₀ + c t, |c| = 1, and the function whose zeros
+//! are its crossings.
 //!
-//! With the delays counted from one of B's, F(t) = Im(A B*) vanishes where some real k makes
-//! A + k B zero at s, and there k = −Re(A/B) (D-subdivision: Neimark 1949). F and its first two
-//! derivatives in t come from A, A′, A″ and those of B; |F‴| ≤ A₃B₀ + 3A₂B₁ + 3A₁B₂ + A₀B₃, where A_i bounds
-//! |A⁽ⁱ⁾| by the moduli of its coefficients on a stretch of the line.
+//! With the delays counted from one of B's, F(t) = Im(A B*) vanishes where some real k makes A + k
+//! B zero at s, and there k = −Re(A/B) (D-subdivision: Neimark 1949). F and its first two
+//! derivatives in t come from A, A′, A″ and those of B; |F‴| ≤ A₃B₀ + 3A₂B₁ + 3A₁B₂ + A₀B₃, where
+//! A_i bounds |A⁽ⁱ⁾| by the moduli of its coefficients on a stretch of the line.
 //!
 //! Rounding, as derived in `quasipoly::probe`: A, A′ and A″ of degree n with m terms are within ε
 //! A_i, ε = u (12n + m + 16 + 4 d (|x| + |y|)), d the largest delay. Coefficients and delays that

@@ -398,8 +398,8 @@ struct Window {
     rises_at_zero: Option<bool>,
 }
 
-/// A quasi-polynomial whose coefficients are in modulus the largest of all members, those of the leading term
-/// the smallest; `None` where the members do not share their leading terms.
+/// A quasi-polynomial whose coefficients are in modulus the largest of all members, those of the
+/// leading term the smallest; `None` where the members do not share their leading terms.
 fn hull(a: &QuasiPolynomial, b: &QuasiPolynomial, range: (f64, f64)) -> Option<QuasiPolynomial> {
     let degree = a.degree();
     let rows = united(a, b);

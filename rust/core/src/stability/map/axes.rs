@@ -1,8 +1,8 @@
 //! The axes of a map, and the question it answers.
 
-use crate::Task;
 use crate::stability::family::Family;
 use crate::stability::specification::Specification;
+use crate::{Error, Task};
 
 /// One axis of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +11,43 @@ pub struct Axis<'a> {
     pub parameter: usize,
     /// Its values, increasing.
     pub points: &'a [f64],
+}
+
+impl Axis<'_> {
+    /// The least and the largest point; `None` where there is no point.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where a point is not finite.
+    pub(crate) fn range(&self) -> Result<Option<(f64, f64)>, Error> {
+        if let Some(point) = self.points.iter().find(|point| !point.is_finite()) {
+            return Err(Error::argument(format!(
+                "{point} on an axis: its points must be finite"
+            )));
+        }
+        let low = self.points.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = self
+            .points
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        Ok((!self.points.is_empty()).then_some((low, high)))
+    }
+}
+
+/// Check that the axes name two parameters of the family.
+///
+/// # Errors
+/// [`Error::Argument`] where they do not.
+pub(crate) fn check_parameters(family: &Family, axes: [Axis<'_>; 2]) -> Result<(), Error> {
+    let count = family.names().len();
+    let [first, second] = axes;
+    if first.parameter == second.parameter || first.parameter.max(second.parameter) >= count {
+        return Err(Error::argument(format!(
+            "axes along parameters {} and {} of {count}: a map needs two different ones",
+            first.parameter, second.parameter
+        )));
+    }
+    Ok(())
 }
 
 /// How the count of a cell is proved.

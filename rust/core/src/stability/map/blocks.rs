@@ -1,8 +1,9 @@
 //! Counts and boundaries of a map whose family is affine in neither of its parameters.
 //!
-//! The map is cut into blocks of a fixed size, so that results do not depend on the number of threads; each is
-//! divided as far as its boundaries require (`block`). The cost grows with the length of the boundaries and with the
-//! number of blocks, not of cells. Boundaries are the crossings of its rows (`row_search`), joined as those of any map.
+//! The map is cut into blocks of a fixed size, so that results do not depend on the number of
+//! threads; each is divided as far as its boundaries require (`block`). The cost grows with the
+//! length of the boundaries and with the number of blocks, not of cells. Boundaries are the
+//! crossings of its rows (`row_search`), joined as those of any map.
 
 use rayon::prelude::*;
 

@@ -12,11 +12,11 @@ const BLOCK: usize = 32;
 /// A stability map: row-major arrays, the first axis running slowest.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Chart {
-    /// See [`Cell::unstable`](super::Cell::unstable).
+    /// See [`Cell::unstable`](crate::stability::Cell::unstable).
     pub unstable: Vec<i32>,
-    /// See [`Cell::abscissa`](super::Cell::abscissa); empty if not asked for.
+    /// See [`Cell::abscissa`](crate::stability::Cell::abscissa); empty if not asked for.
     pub abscissa: Vec<f64>,
-    /// See [`Cell::status`](super::Cell::status).
+    /// See [`Cell::status`](crate::stability::Cell::status).
     pub status: Vec<CellStatus>,
 }
 

@@ -9,6 +9,18 @@
 
 use crate::stability::crossings::Crossing;
 
+/// Neighbours in the next row that are compared, on either side.
+const WINDOW: usize = 3;
+
+/// Two points further apart than this share of the range, in k or in ω relative to the largest, are
+/// not joined.
+const FARTHEST: f64 = 0.2;
+
+/// Largest gap, in lengths of their last steps, at which two arms are joined. For a parabola whose
+/// top lies less than a row, h, above the last one, by δ, the gap is 2√δ/(√(δ + h) − √δ) ≤ 2/(√2 −
+/// 1) = 4.83 steps.
+const TURN: f64 = 5.5;
+
 /// A point of a boundary.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vertex {
@@ -21,18 +33,6 @@ pub struct Vertex {
     /// Roots that cross to the right as the parameter grows, less those that cross to the left.
     pub jump: i32,
 }
-
-/// Neighbours in the next row that are compared, on either side.
-const WINDOW: usize = 3;
-
-/// Two points further apart than this share of the range, in k or in ω relative to the largest, are
-/// not joined.
-const FARTHEST: f64 = 0.2;
-
-/// Largest gap, in lengths of their last steps, at which two arms are joined. For a parabola whose
-/// top lies less than a row, h, above the last one, by δ, the gap is 2√δ/(√(δ + h) − √δ) ≤ 2/(√2 −
-/// 1) = 4.83 steps.
-const TURN: f64 = 5.5;
 
 /// A curve under construction: its last two points in (k, ω).
 struct Arm {

@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use super::axes::{Axis, Map, Proof, Question, put};
+use super::axes::{Axis, Map, Proof, Question, check_parameters, put};
 use super::blocks;
 use super::chart::Chart;
 use super::curves::{Vertex, join};
@@ -115,7 +115,8 @@ pub fn boundaries(
     }))
 }
 
-/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it cannot be formed.
+/// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it
+/// cannot be formed.
 ///
 /// # Errors
 /// As for [`map`].
@@ -188,14 +189,8 @@ impl Map<'_> {
 
 /// The number of cells, after a check of the arguments.
 fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, Error> {
-    let count = family.names().len();
+    check_parameters(family, axes)?;
     let [first, second] = axes;
-    if first.parameter == second.parameter || first.parameter.max(second.parameter) >= count {
-        return Err(Error::argument(format!(
-            "axes along parameters {} and {} of {count}: a map needs two different ones",
-            first.parameter, second.parameter
-        )));
-    }
     let cells = first.points.len().saturating_mul(second.points.len());
     if cells > MAX_CELLS {
         return Err(Error::TooMuch {
@@ -203,7 +198,7 @@ fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, 
             limit: MAX_CELLS as u64,
             unit: "cells",
             advice: format!(
-                "{} by {} is more than a picture holds: take fewer points, or several maps of \
+                "{} by {} points were requested: take fewer points, or several maps of \
                  smaller ranges",
                 first.points.len(),
                 second.points.len()
@@ -211,16 +206,9 @@ fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, 
         });
     }
     let mut ranges: Vec<(f64, f64)> = values.iter().map(|value| (*value, *value)).collect();
-    for Axis { parameter, points } in axes {
-        if let Some(point) = points.iter().find(|point| !point.is_finite()) {
-            return Err(Error::argument(format!(
-                "{point} on an axis: its points must be finite"
-            )));
-        }
-        let low = points.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if let (false, Some(range)) = (points.is_empty(), ranges.get_mut(parameter)) {
-            *range = (low, high);
+    for axis in axes {
+        if let (Some(ends), Some(range)) = (axis.range()?, ranges.get_mut(axis.parameter)) {
+            *range = ends;
         }
     }
     if cells > 0 {

@@ -4,7 +4,7 @@
 //! stable, which is proved by boxes of those others. It is not stable as soon as one unstable
 //! member is found; members at both ends and in the middle are tried first.
 
-use super::axes::Axis;
+use super::axes::{Axis, check_parameters};
 use crate::stability::boxes::{BoxExpansion, Finding, Reduced, check, find_unstable, reduce};
 use crate::stability::cell::{ENDLESS, UNKNOWN, judge};
 use crate::stability::family::Family;
@@ -26,27 +26,14 @@ pub fn robust_map(
     task: &Task,
 ) -> Result<Vec<i32>, Error> {
     let [first, second] = axes;
-    let count = family.names().len();
-    if first.parameter == second.parameter || first.parameter.max(second.parameter) >= count {
-        return Err(Error::argument(format!(
-            "axes along parameters {} and {} of {count}: a map needs two different ones",
-            first.parameter, second.parameter
-        )));
-    }
+    check_parameters(family, axes)?;
     let mut corners = ranges.to_vec();
-    for Axis { parameter, points } in axes {
-        if let Some(point) = points.iter().find(|point| !point.is_finite()) {
-            return Err(Error::argument(format!(
-                "{point} on an axis: its points must be finite"
-            )));
-        }
-        let low = points.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if points.is_empty() {
+    for axis in axes {
+        let Some(ends) = axis.range()? else {
             return Ok(Vec::new());
-        }
-        if let Some(range) = corners.get_mut(parameter) {
-            *range = (low, high);
+        };
+        if let Some(range) = corners.get_mut(axis.parameter) {
+            *range = ends;
         }
     }
     family.check_delays(&corners)?;

@@ -1,7 +1,7 @@
 //! Crossings of the edge along a row whose family need not be affine in its parameter p.
 //!
-//! The row is divided as a `block` of one direction; cells that stay open are divided further, in p, about the
-//! zeros (t, p) of h(s(t); p) on the edge that Newton's method finds there:
+//! The row is divided as a `block` of one direction; cells that stay open are divided further, in
+//! p, about the zeros (t, p) of h(s(t); p) on the edge that Newton's method finds there:
 //!     (∂_t h, ∂_p h) (δt, δp) = −h, as two real equations.
 //! All values further than CLOSE of a cell from such a zero are proved to have no roots on the
 //! edge. The clear intervals between two gaps have one count, which is made at one member, and the
@@ -27,6 +27,9 @@ const SMALL: f64 = 1e-10;
 
 /// Stretches of a cell from which a zero is searched for.
 const STARTS: usize = 3;
+
+/// Relative difference of frequencies below which two zeros are the same.
+const SAME_ZERO: f64 = 1e-6;
 
 /// A zero of h on the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -272,7 +275,7 @@ fn united(intervals: Vec<Interval>) -> Vec<Interval> {
                 for zero in zeros {
                     let same = |other: &Zero| {
                         let off = (other.omega - zero.omega).abs();
-                        off <= 1e-6 * other.omega.max(zero.omega)
+                        off <= SAME_ZERO * other.omega.max(zero.omega)
                     };
                     if !own.iter().any(same) {
                         own.push(zero);

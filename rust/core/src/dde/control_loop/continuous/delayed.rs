@@ -78,7 +78,7 @@ pub(super) fn run<S: Scalar>(
             h = S::from(expansion.trial);
             next = t + h;
         }
-        let mut w = piece.local(t, h);
+        let mut w = piece.in_local_time(t, h);
         let part = MARGIN * expansion.expand(&equations.a, &equations.b, &forcing, &x, &w, h);
         if part < MARGIN && !is_instant {
             expansion.shorten(part);

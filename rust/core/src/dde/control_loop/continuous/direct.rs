@@ -29,6 +29,9 @@ const MARGIN: f64 = 0.95;
 /// Rounding error of v, relative to the sum of its parts.
 const NOISE: f64 = 16.0 * f64::EPSILON;
 
+/// Parts of an interval at which v is compared with the limit.
+const PROBES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+
 /// Does v leave the limit that `mode` and the mode of the stretch share by more than `noise`?
 fn is_clear<S: Scalar>(
     v: &Series<S>,
@@ -37,7 +40,7 @@ fn is_clear<S: Scalar>(
     limit: f64,
     noise: f64,
 ) -> bool {
-    [0.25, 0.5, 0.75, 1.0].into_iter().any(|part| {
+    PROBES.into_iter().any(|part| {
         let sigma = stretch.start + part * (stretch.end - stretch.start);
         let v = v.at(S::from(sigma)).value();
         match (mode, stretch.mode) {

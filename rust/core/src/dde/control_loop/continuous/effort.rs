@@ -8,7 +8,7 @@ const CHECK_EVERY: u64 = 1024;
 /// Upper limit on the elements of a response (bounds time and memory).
 pub(super) const MOST_ELEMENTS: u64 = 20_000_000;
 
-/// Check for cancellation and for the limit on elements, every so many elements.
+/// Check for cancellation and for the limit on elements.
 pub(super) fn watch(elements: u64, task: &Task) -> Result<(), Error> {
     if elements.is_multiple_of(CHECK_EVERY) {
         task.check()?;
@@ -24,8 +24,6 @@ pub(super) fn endless() -> Error {
         what: "the continuous response",
         limit: MOST_ELEMENTS,
         unit: "elements of time",
-        advice: "shorten the time simulated; a delay or a lag of almost nothing is better set to \
-                 zero"
-            .to_owned(),
+        advice: "shorten the time simulated; set delays and lags close to zero to zero".to_owned(),
     }
 }

@@ -12,6 +12,12 @@ const NOTHING: f64 = 1e-280;
 /// coefficients overflow.
 const TRIAL: f64 = 16.0;
 
+/// Part of an element below which it is not shortened further.
+const SHORTEST: f64 = 1e-9;
+
+/// Largest factor of one shortening, so that the approach from above ends.
+const LEAST_SHORTENING: f64 = 0.999;
+
 /// 1/1, 1/2, …: factors of an integration.
 const PARTS: [f64; DEGREE] = {
     let mut parts = [1.0; DEGREE];
@@ -150,10 +156,10 @@ impl<S: Scalar> Expansion<S> {
                     power *= part;
                 }
                 // Steps of one thousandth end the approach from above.
-                if ratio >= 1.0 || part < 1e-9 {
+                if ratio >= 1.0 || part < SHORTEST {
                     break;
                 }
-                part *= ratio.min(0.999);
+                part *= ratio.min(LEAST_SHORTENING);
             }
         }
         part

@@ -17,9 +17,6 @@ use crate::dde::control_loop::series::Series;
 /// Upper limit on the pieces in the queue (bounds memory and time).
 const MOST_PIECES: usize = 1_000_000;
 
-/// The lowest derivative that jumps at a breaking point; [`SMOOTH`] where none does.
-pub(super) type Order = u8;
-
 /// No break.
 pub(super) const SMOOTH: Order = u8::MAX;
 
@@ -37,6 +34,9 @@ const SAME_SLOPE: f64 = 256.0 * f64::EPSILON;
 
 /// Factor by which the recorded longest length shrinks with each piece.
 const FORGET: f64 = 0.998;
+
+/// The lowest derivative that jumps at a breaking point; [`SMOOTH`] where none does.
+pub(super) type Order = u8;
 
 /// w(t) = series((t − origin)/scale) from `start` to `end`.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +63,7 @@ impl<S: Scalar> Piece<S> {
     }
 
     /// w over [t, t + h] as a polynomial in σ ∈ [0, 1].
-    pub(super) fn local(&self, t: S, h: S) -> Series<S> {
+    pub(super) fn in_local_time(&self, t: S, h: S) -> Series<S> {
         if self.series.degree == 0 {
             return self.series;
         }
@@ -79,8 +79,8 @@ impl<S: Scalar> Piece<S> {
     /// Is the other piece a continuation of this one?
     fn continues_as(&self, other: &Self) -> bool {
         let length = other.end - other.start;
-        let mine = self.local(other.start, length);
-        let theirs = other.local(other.start, length);
+        let mine = self.in_local_time(other.start, length);
+        let theirs = other.in_local_time(other.start, length);
         let (mut difference, mut largest) = (0.0, 0.0_f64);
         let (mut apart, mut steepest) = (0.0, 0.0_f64);
         for (&mine, &theirs) in mine.coefficients.iter().zip(&theirs.coefficients) {
@@ -172,8 +172,7 @@ impl<S: Scalar> Pieces<S> {
                 limit: MOST_PIECES as u64,
                 unit: "pieces of the command in one delay",
                 advice:
-                    "shorten the time simulated or the list of reference jumps, and set a lag of \
-                         almost nothing to zero"
+                    "shorten the time simulated or the list of reference jumps, and set lags close to zero to zero"
                         .to_owned(),
             });
         }

@@ -93,13 +93,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn series(coefficients: &[f64]) -> Series {
-        let mut out = Series::constant(0.0);
-        out.coefficients[..coefficients.len()].copy_from_slice(coefficients);
-        out.degree = coefficients.len() - 1;
-        out
-    }
-
     /// Π (σ − root).
     fn with_roots(roots: &[f64]) -> Series {
         let mut out = vec![1.0];
@@ -109,7 +102,7 @@ mod tests {
                 out[i] = if i > 0 { out[i - 1] } else { 0.0 } - root * out[i];
             }
         }
-        series(&out)
+        Series::of(&out)
     }
 
     fn found(u: &Series, limit: f64) -> Vec<Stretch> {
@@ -120,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_line_through_both_limits_is_cut_at_both() {
-        let modes = found(&series(&[-4.0, 8.0]), 1.0);
+        let modes = found(&Series::of(&[-4.0, 8.0]), 1.0);
         let expected = [
             (Mode::Low, 0.0, 0.375),
             (Mode::Free, 0.375, 0.625),
@@ -136,7 +129,7 @@ mod tests {
     #[test]
     fn touching_the_limit_is_no_crossing() {
         // 1 − (σ − 1/3)², up to rounding.
-        let modes = found(&series(&[1.0 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        let modes = found(&Series::of(&[1.0 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
         assert!(
             modes
                 .iter()
@@ -147,16 +140,19 @@ mod tests {
     #[test]
     fn a_peak_just_over_the_limit_is_found() {
         // 1 + 1e-12 − (σ − 1/3)² is over the limit for 2e-6 around 1/3.
-        let modes = found(&series(&[1.0 + 1e-12 - 1.0 / 9.0, 2.0 / 3.0, -1.0]), 1.0);
+        let modes = found(
+            &Series::of(&[1.0 + 1e-12 - 1.0 / 9.0, 2.0 / 3.0, -1.0]),
+            1.0,
+        );
         assert_eq!(modes.len(), 3);
         assert!((modes[1].end - modes[1].start - 2e-6).abs() < 1e-9);
     }
 
     #[test]
     fn standing_on_the_limit_is_free() {
-        assert_eq!(found(&series(&[1.0]), 1.0).len(), 1);
-        assert_eq!(found(&series(&[1.0, 1e-17, -1e-17]), 1.0).len(), 1);
-        assert_eq!(found(&series(&[1.0, -0.5]), 1.0)[0].mode, Mode::Free);
+        assert_eq!(found(&Series::of(&[1.0]), 1.0).len(), 1);
+        assert_eq!(found(&Series::of(&[1.0, 1e-17, -1e-17]), 1.0).len(), 1);
+        assert_eq!(found(&Series::of(&[1.0, -0.5]), 1.0)[0].mode, Mode::Free);
     }
 
     proptest! {
@@ -188,7 +184,7 @@ mod tests {
             coefficients in prop::collection::vec(-3.0..3.0, 1..12),
             sigmas in prop::collection::vec(0.0_f64..1.0, 40),
         ) {
-            let u = series(&coefficients);
+            let u = Series::of(&coefficients);
             let modes = found(&u, 1.0);
             prop_assert_eq!(modes[0].start, 0.0);
             prop_assert_eq!(modes[modes.len() - 1].end, 1.0);

@@ -36,7 +36,7 @@ pub struct LoopCells<'a> {
     /// L.
     pub l: &'a [f64],
     /// Factor on B.
-    pub scale: &'a [f64],
+    pub gain: &'a [f64],
     /// Delay, s.
     pub delay: &'a [f64],
     /// Sample time, s.
@@ -144,7 +144,7 @@ impl<'a> LoopCells<'a> {
             b: Rows::new("B", self.b, n, cells)?,
             k: Rows::new("K", self.k, n, cells)?,
             l: Rows::new("L", self.l, 1, cells)?,
-            scale: Rows::new("the scale of B", self.scale, 1, cells)?,
+            scale: Rows::new("the factor on B", self.gain, 1, cells)?,
             delay: Rows::new("delay", self.delay, 1, cells)?,
             sample_time: Rows::new("sample_time", self.sample_time, 1, cells)?,
         })

@@ -134,15 +134,18 @@ impl<S: Scalar> Walk<'_, S> {
         self.timing.samples as i64
     }
 
+    /// The command computed at sample `k`, and those that reach the plant before and after the
+    /// arrival within the interval that follows.
+    fn commands_of(&self, k: i64) -> [S; 3] {
+        let lag = self.lag();
+        [k, k - lag - 1, k - lag].map(|number| self.commands.at(number))
+    }
+
     /// Advance from sample `k` at time `now` to the next one.
     fn interval(&mut self, k: i64, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
-        let (before, after) = (
-            self.commands.at(k - self.lag() - 1),
-            self.commands.at(k - self.lag()),
-        );
-        let u = self.commands.at(k);
+        let [u, before, after] = self.commands_of(k);
         self.requested
             .inputs_before((now + early + late).value() - tolerance, |_| u);
         // A length that is zero but has a slope counts as well.
@@ -181,11 +184,7 @@ impl<S: Scalar> Walk<'_, S> {
     fn partial(&mut self, k: i64, into: S, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
-        let (before, after) = (
-            self.commands.at(k - self.lag() - 1),
-            self.commands.at(k - self.lag()),
-        );
-        let u = self.commands.at(k);
+        let [u, before, after] = self.commands_of(k);
         let end = now + (early + late - into);
         self.requested.inputs_before(end.value() - tolerance, |_| u);
         let mut at = now;

@@ -19,6 +19,9 @@ const REACH: f64 = 1.0;
 /// The series ends at rows this small relative to the largest one so far.
 const NEGLIGIBLE: f64 = 1e-18;
 
+/// Upper limit on the steps of one part.
+const MOST_STEPS: f64 = 1e6;
+
 /// The rows of one part.
 #[derive(Debug)]
 pub(super) struct Window {
@@ -35,7 +38,7 @@ impl Window {
     pub(super) fn new(equations: &Equations, length: f64) -> Self {
         let n = equations.states();
         let cuts = (balanced_norm(&equations.a, n) * length / REACH).ceil();
-        let steps = cuts.clamp(1.0, 1e6) as usize;
+        let steps = cuts.clamp(1.0, MOST_STEPS) as usize;
         let step = length / steps as f64;
         let mut rows = Vec::new();
         let mut rho = equations.c.clone();

@@ -1,93 +1,35 @@
-"""Margins that a design must have: estimated on a grid of frequencies, then taken exactly.
+"""Margins of thousands of loops at once, estimated on a grid of frequencies.
 
 The loop gain is linear in the gains of the controller, L = sum_i K_i L_i, so that the L_i on one
 grid of frequencies serve all gains. Between two frequencies log abs(L) and arg L are taken as
 straight lines, which gives the margins of thousands of loops in a second, to about 1e-4. What a
-design promises comes from `ControlLoop.margin`: where that is less than was asked for, the search
-is repeated with so much more asked of the estimate.
+design promises comes from `ControlLoop.margin`: where that is less than required, the search is
+repeated with the requirement on the estimate raised by what is missing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.validation import finite, positive
 from deadtime.tuning._problem import Problem, Scenario, Vector
 
-__all__ = ["Demands", "MarginEstimate", "demanded", "exact_margins"]
+__all__ = ["MarginEstimate"]
 
-#: Frequencies of the grid by their logarithm; between two of them the delay turns the phase by no
-#: more than so many radians, if that does not take too many; and how many turns they cover.
+#: Frequencies that are equally spaced in their logarithm: more of them cost time in proportion and
+#: make the estimate more accurate.
 _FREQUENCIES = 1000
+#: Turn of the phase by the delay between two frequencies, rad, and the most frequencies that this
+#: may take: beyond them a long delay is resolved more coarsely.
 _STEP = 0.3
 _MOST_FREQUENCIES = 4000
+#: Turns of the delay that the frequencies of a continuous loop cover.
 _TURNS = 8.0
 
-#: Values of the loop gain that are held in memory at once.
+#: Values of the loop gain in memory at once: bounds memory.
 _VALUES = 2_000_000
-
-
-@dataclass(frozen=True)
-class Demands:
-    """Least gain margin (a factor), phase margin in degrees and delay margin in s; 0 for none."""
-
-    gain: float = 0.0
-    phase: float = 0.0
-    delay: float = 0.0
-
-    @property
-    def asked(self) -> dict[str, float]:
-        """What is asked for, by name."""
-        every = {"gain": self.gain, "phase": self.phase, "delay": self.delay}
-        return {name: value for name, value in every.items() if value > 0.0}
-
-    @property
-    def vector(self) -> Vector:
-        return np.array([self.gain, self.phase, self.delay])
-
-    def without(self, name: str) -> Demands:
-        """The others."""
-        return replace(self, **{name: 0.0})
-
-    def times(self, factor: float) -> Demands:
-        """All of them so many times as much."""
-        return Demands(*(factor * self.vector).tolist())
-
-    def raised(self, missing: Vector) -> Demands:
-        """More by what was missing, and a little."""
-        return Demands(*(self.vector + 1.1 * missing).tolist())
-
-    def shortfall(self, margins: Vector) -> Vector:
-        """Sum of the parts by which margins (..., 3) fall short; NaN ones fall short wholly."""
-        needed = self.vector
-        with np.errstate(divide="ignore", invalid="ignore"):
-            missing = np.where(needed > 0.0, 1.0 - margins / needed, 0.0)
-        missing = np.where(np.isnan(missing), 1.0, missing)
-        return np.asarray(np.maximum(missing, 0.0).sum(axis=-1))
-
-
-def demanded(
-    gain_margin: float | None, phase_margin: float | None, delay_margin: float | None
-) -> Demands:
-    """Check what is asked for."""
-    gain = 0.0 if gain_margin is None else finite("gain_margin", gain_margin)
-    phase = 0.0 if phase_margin is None else positive("phase_margin", phase_margin)
-    late = 0.0 if delay_margin is None else positive("delay_margin", delay_margin)
-    if gain_margin is not None and not gain > 1.0:
-        raise ValueError(f"gain_margin={gain}: give a factor above 1 (6 dB are a factor of 2)")
-    if phase >= 180.0:
-        raise ValueError(f"phase_margin={phase}: give degrees below 180")
-    return Demands(gain, phase, late)
-
-
-def exact_margins(problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> Vector:
-    """Gain, phase and delay margin in each scenario, shape (scenarios, 3)."""
-    found = [problem.at(gains, one).margin() for one in scenarios]
-    return np.array([[one.gain_margin, one.phase_margin, one.delay_margin] for one in found])
 
 
 class MarginEstimate:
@@ -98,16 +40,16 @@ class MarginEstimate:
         self._omega = _frequencies(problem)
         self._kept: dict[tuple[float, ...], NDArray[np.complex128]] = {}
 
-    def of(self, points: Vector, scenarios: Sequence[Scenario], every: int = 1) -> Vector:
+    def of(self, points: Vector, scenarios: Sequence[Scenario], stride: int = 1) -> Vector:
         """Margins of each row of gains at their least over the scenarios, shape (n, 3).
 
-        Only each `every`-th frequency is looked at.
+        Only one in `stride` frequencies is used.
         """
-        omega = self._omega[::-every][::-1]
+        omega = self._omega[::-stride][::-1]
         block = max(_VALUES // len(omega), 1)
         found = np.full((len(points), 3), np.inf)
         for one in scenarios:
-            responses = self._responses(one)[:, ::-every][:, ::-1]
+            responses = self._responses(one)[:, ::-stride][:, ::-1]
             for first in range(0, len(points), block):
                 part = slice(first, first + block)
                 L = self._gains(points[part]) @ responses
@@ -146,8 +88,8 @@ def _frequencies(problem: Problem) -> Vector:
     """From far below any crossover to beyond a few turns of the delay, or half the samples."""
     loop = problem.loop
     numbers = loop.parameters
-    late = problem.intervals["delay"][1]
-    times = [late, numbers.get("lag", 0.0), abs(numbers.get("time_constant", 0.0))]
+    delay = problem.intervals["delay"][1]
+    times = [delay, numbers.get("lag", 0.0), abs(numbers.get("time_constant", 0.0))]
     times += [loop.sample_time or 0.0, 1.0 / numbers["omega"] if "omega" in numbers else 0.0]
     slowest = max(times) or 1.0
     if loop.sample_time is not None:
@@ -155,9 +97,9 @@ def _frequencies(problem: Problem) -> Vector:
     else:
         # Beyond the corner of the filter and some turns of the delay only the chains are left.
         shortest = min(time for time in (*times, slowest) if time > 0.0)
-        high = max(2.0 * np.pi * _TURNS / (late or slowest), 20.0 / shortest)
+        high = max(2.0 * np.pi * _TURNS / (delay or slowest), 20.0 / shortest)
     low = min(1e-3 / slowest, 1e-3 * high)
-    even = np.linspace(low, high, int(min(high * late / _STEP, _MOST_FREQUENCIES)) + 2)
+    even = np.linspace(low, high, int(min(high * delay / _STEP, _MOST_FREQUENCIES)) + 2)
     return np.unique(np.concatenate([np.geomspace(low, high, _FREQUENCIES), even]))
 
 
@@ -182,7 +124,7 @@ def _margins(L: NDArray[np.complex128], omega: Vector, sampled: bool) -> Vector:
     part = -first[row, place] / np.where(slope == 0.0, 1.0, slope)
     factor = np.exp(-(size[row, place] + part * grown[row, place]))
     np.minimum.at(found[:, 0], row, np.where(factor > 1.0, factor, np.inf))
-    # At half the sampling rate L is real; the chains of a neutral loop end what gain it stands.
+    # At half the sampling rate L is real; chains of roots bound the gain of a neutral loop.
     ending = (L[:, -1].real < 0.0) if sampled else np.ones(len(L), dtype=bool)
     factor = np.exp(-size[:, -1])
     beyond = np.where(ending & (factor > 1.0), factor, np.inf)

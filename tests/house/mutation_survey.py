@@ -1,0 +1,289 @@
+"""Mutation survey: which changed signs, bounds and operators of the package fail no test.
+
+    python tests/house/mutation_survey.py --mutants 200 --seed 1
+
+Each mutant is one change in one line of the numerics or of the safety rules, drawn at random. It is
+written into a copy of the package and of the tests, and the tests of its room are run until the
+first failure; a mutant that none fails, or that only the clock ends, is listed. Each one listed
+either changes nothing (say why in the review) or asks for a test. Not a part of .ci/run: 200
+mutants take an hour or two. The native module has to be in the tree, where `maturin develop`
+puts it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+import os
+import random
+import re
+import resource
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = Path("python/deadtime")
+
+#: What is mutated, and the folder of tests that runs first; others follow by what they import.
+ROOMS = {
+    "special": "special",
+    "dde": "dde",
+    "roots": "roots",
+    "systems": "systems",
+    "loops": "loops",
+    "stability": "stability",
+    "experiments": "experiments",
+    "estimation": "estimation",
+    "tuning": "tuning",
+    "links/safety.py": "links",
+    "links/ardrone2/reader.py": "links",
+    "links/ardrone2/sender.py": "links",
+    "links/ardrone2/limit_settings.py": "links",
+    "links/udp/judgement.py": "links",
+}
+#: Exit code of a run that did not come to its tests.
+BROKEN = 99
+#: Imported once for all runs.
+LIBRARIES = ("hypothesis", "mpmath", "numpy", "scipy.linalg", "scipy.optimize", "scipy.signal")
+
+#: Files of these rooms that compute nothing.
+LEFT_OUT = re.compile(r"__init__|plots|_repr|_low_level")
+
+COMPARISONS = {
+    ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
+}  # fmt: skip
+OPERATORS = {
+    ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.FloorDiv: "/", ast.Pow: "*",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change: the text between two offsets of a file, in bytes, gives way to another."""
+
+    path: Path
+    line: int
+    start: int
+    stop: int
+    text: str
+    kind: str
+
+    def apply(self, source: bytes) -> bytes:
+        return source[: self.start] + self.text.encode() + source[self.stop :]
+
+    def shown(self, source: bytes) -> str:
+        before = source.splitlines()[self.line - 1].decode().strip()
+        after = self.apply(source).splitlines()[self.line - 1].decode().strip()
+        return f"{before}\n      -> {after}"
+
+
+class Mutants(ast.NodeVisitor):
+    """All mutants of a file; annotations, docstrings and messages are no part of it."""
+
+    def __init__(self, path: Path, source: bytes) -> None:
+        self.path, self.source = path, source
+        self.found: list[Mutant] = []
+        self.lines = [0]
+        for line in source.splitlines(keepends=True):
+            self.lines.append(self.lines[-1] + len(line))
+        self.visit(ast.parse(source))
+
+    def at(self, line: int, column: int) -> int:
+        return self.lines[line - 1] + column
+
+    def begin(self, node: ast.expr) -> int:
+        return self.at(node.lineno, node.col_offset)
+
+    def end(self, node: ast.expr) -> int:
+        return self.at(node.end_lineno or 0, node.end_col_offset or 0)
+
+    def add(self, start: int, stop: int, text: str, kind: str) -> None:
+        line = self.source[:start].count(b"\n") + 1
+        self.found.append(Mutant(self.path, line, start, stop, text, kind))
+
+    def between(self, left: ast.expr, right: ast.expr, words: str, text: str, kind: str) -> None:
+        """Replace an operator between two operands; brackets may stand around it."""
+        begin, gap = self.end(left), self.source[self.end(left) : self.begin(right)]
+        at = re.search(rb"(?<![*/<>=!])" + re.escape(words.encode()) + rb"(?![*/=])", gap)
+        if at:
+            self.add(begin + at.start(), begin + at.end(), text, kind)
+
+    def visit_Compare(self, node: ast.Compare) -> None:
+        left = node.left
+        for operator, right in zip(node.ops, node.comparators, strict=True):
+            if type(operator) in COMPARISONS:
+                words = {
+                    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
+                    ast.NotEq: "!=",
+                }[type(operator)]  # fmt: skip
+                self.between(left, right, words, COMPARISONS[type(operator)], "comparison")
+            left = right
+        self.generic_visit(node)
+
+    def visit_BinOp(self, node: ast.BinOp) -> None:
+        words = {
+            ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//",
+            ast.Pow: "**",
+        }.get(type(node.op))  # fmt: skip
+        if words:
+            self.between(node.left, node.right, words, OPERATORS[type(node.op)], "operator")
+        self.generic_visit(node)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> None:
+        swaps = {ast.Add: ("+=", "-="), ast.Sub: ("-=", "+="), ast.Mult: ("*=", "/=")}
+        if type(node.op) in swaps:
+            self.between(node.target, node.value, *swaps[type(node.op)], "operator")
+        self.generic_visit(node)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> None:
+        words, other = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
+        for left, right in zip(node.values, node.values[1:], strict=False):
+            self.between(left, right, words, other, "and/or")
+        self.generic_visit(node)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> None:
+        start, stop = self.begin(node), self.begin(node.operand)
+        if isinstance(node.op, ast.Not):
+            self.add(start, stop, "", "dropped not")
+        elif isinstance(node.op, ast.USub):
+            self.add(start, start + 1, "+", "sign")
+        self.generic_visit(node)
+
+    def visit_Constant(self, node: ast.Constant) -> None:
+        value, start, stop = node.value, self.begin(node), self.end(node)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return
+        if isinstance(value, int):
+            self.add(start, stop, str(value + 1), "constant")
+            if value:
+                self.add(start, stop, str(value - 1), "constant")
+        else:
+            self.add(start, stop, f"{value + 1.0!r}" if value == 0.0 else f"{2.0 * value!r}",
+                     "constant")  # fmt: skip
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
+        if node.value is not None:
+            self.visit(node.value)
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
+        for part in (*node.args.defaults, *filter(None, node.args.kw_defaults), *node.body):
+            self.visit(part)
+
+    def visit_Raise(self, node: ast.Raise) -> None:
+        """Words of an error are not looked at."""
+
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
+        """Nor those that are shown."""
+
+
+def files() -> Iterator[Path]:
+    for room in ROOMS:
+        place = ROOT / PACKAGE / room
+        found = [place] if place.is_file() else sorted(place.rglob("*.py"))
+        yield from (path.relative_to(ROOT) for path in found if not LEFT_OUT.search(str(path.name)))
+
+
+def tests_of(path: Path) -> list[str]:
+    """The files of tests for a module: those that import it, then its room's by size."""
+    inside = str(path.relative_to(PACKAGE))
+    folder = next(tests for room, tests in ROOMS.items() if inside.startswith(room))
+    module = ".".join(path.with_suffix("").parts[1:])
+    naming, others = [], []
+    for test in (ROOT / "tests").rglob("test_*.py"):
+        text = test.read_text(encoding="utf-8")
+        if re.search(rf"\b{re.escape(module)}\b", text):
+            naming.append(test)
+        elif test.parent.name == folder:
+            others.append(test)
+    smallest = sorted(others, key=lambda test: test.stat().st_size)
+    # Doctests last: they import the module a second time, and its classes are then other ones.
+    return [*(str(test.relative_to(ROOT)) for test in (*naming, *smallest)), str(path)]
+
+
+def copied(to: Path) -> None:
+    """What the tests read: package, tests, pages and the few files at the root."""
+    skipped = shutil.ignore_patterns("target", ".git", ".venv*", "_build", "__pycache__", "dist")
+    shutil.copytree(ROOT, to, ignore=skipped, symlinks=True)
+
+
+def verdict(tree: Path, tests: list[str], seconds: int) -> tuple[str, str]:
+    """What tests say of the copy: 'survived', 'killed' by which test, or 'out of time'.
+
+    They run in a fork of this process, which has imported the libraries and not the package.
+    """
+    told = tree.parent / "told.txt"
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        code = BROKEN
+        try:
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+            os.chdir(tree)
+            # The package of the copy, not the one that is installed.
+            os.environ["PYTHONPATH"] = str(tree / "python")
+            sys.path.insert(0, str(tree / "python"))
+            stream = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            os.dup2(stream, 1)
+            os.dup2(stream, 2)
+            code = int(pytest.main(["-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]))
+            sys.stdout.flush()
+        finally:
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code < 0:
+        return "out of time", ""
+    if code == BROKEN:
+        sys.exit(told.read_text(encoding="utf-8"))
+    by = re.search(r"^(?:FAILED|ERROR) (\S+)", told.read_text(encoding="utf-8"), re.MULTILINE)
+    return ("survived", "") if code == 0 else ("killed", by[1] if by else "")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--mutants", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seconds", type=int, default=200, help="processor time for one mutant")
+    parser.add_argument("--only", metavar="ROOM", help="only files that begin so, as links/safety")
+    parser.add_argument("--at", metavar="FILE:LINE", help="all mutants of one line instead")
+    given = parser.parse_args()
+    for library in LIBRARIES:
+        importlib.import_module(library)
+    every = [one for path in files() for one in Mutants(path, (ROOT / path).read_bytes()).found]
+    if given.at:
+        name, _, line = given.at.rpartition(":")
+        chosen = [one for one in every if str(one.path).endswith(name) and one.line == int(line)]
+    else:
+        every = [one for one in every if str(one.path).startswith(f"{PACKAGE}/{given.only or ''}")]
+        chosen = random.Random(given.seed).sample(every, min(given.mutants, len(every)))
+    print(f"{len(chosen)} of {len(every)} mutants", flush=True)
+    told: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "tree"
+        copied(tree)
+        if verdict(tree, ["tests/links/test_links_safety.py"], given.seconds)[0] != "survived":
+            sys.exit("the tests fail without any change: nothing can be learnt from them")
+        for number, mutant in enumerate(chosen, 1):
+            file = tree / mutant.path
+            source = file.read_bytes()
+            file.write_bytes(mutant.apply(source))
+            found, by = verdict(tree, tests_of(mutant.path), given.seconds)
+            file.write_bytes(source)
+            told[found] += 1
+            print(f"{number:4} {found:<11} {mutant.path}:{mutant.line}  {mutant.kind}  {by}")
+            if found != "killed":
+                print(f"      {mutant.shown(source)}")
+            sys.stdout.flush()
+    decided = told["killed"] + told["survived"]
+    print(f"{told['killed']} of {decided} killed, {told['out of time']} out of time")
+
+
+if __name__ == "__main__":
+    main()
