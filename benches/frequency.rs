@@ -32,7 +32,11 @@ fn frequency(criterion: &mut Criterion) {
     let task = Task::new();
     let mut group = criterion.benchmark_group("frequency");
     let loops = [
-        ("integrator", make(&[&[2.0]], &[0.36]), QuasiPolynomial::variable()),
+        (
+            "integrator",
+            make(&[&[2.0]], &[0.36]),
+            QuasiPolynomial::variable(),
+        ),
         (
             "several_delays",
             make(&[&[0.3, 0.3], &[1.0]], &[0.1, 0.3]),
@@ -56,7 +60,11 @@ fn frequency(criterion: &mut Criterion) {
         ),
         (
             "multiples",
-            family(&[(1.0, 0, 1, 0.0, 0.0), (1.0, 0, 0, 0.0, 1.0), (1.0, 0, 0, 0.0, 2.0)]),
+            family(&[
+                (1.0, 0, 1, 0.0, 0.0),
+                (1.0, 0, 0, 0.0, 1.0),
+                (1.0, 0, 0, 0.0, 2.0),
+            ]),
         ),
     ];
     for (name, equation) in &equations {
