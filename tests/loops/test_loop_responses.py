@@ -208,7 +208,7 @@ def test_an_ideal_derivative_over_a_short_lag_without_a_delay():
 
 def test_a_delay_of_almost_nothing_is_refused_at_once():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=1e-9)
-    with pytest.raises(ValueError, match="to zero"):
+    with pytest.raises(ValueError, match="to exactly zero"):
         loop.simulate([0.0, 1.0])
 
 

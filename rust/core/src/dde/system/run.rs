@@ -242,6 +242,6 @@ fn endless() -> Error {
         what: "the response of the system",
         limit: MOST_ELEMENTS,
         unit: "elements of time",
-        advice: "shorten the time simulated; set delays close to zero to zero".to_owned(),
+        advice: "shorten the time simulated; set delays close to zero to exactly zero".to_owned(),
     }
 }
