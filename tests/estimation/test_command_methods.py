@@ -68,7 +68,7 @@ def test_other_plants_are_correlated_as_they_are():
     flight = dtm.Experiment.prbs(20.0, 0.5, 2 * TS).run(loop)
     fit = dtm.estimate_delay(flight, loop.replace(delay=None), method="gcc")
     assert 0.36 < fit.delay < 0.36 + 0.3
-    assert "not undone" in fit.message
+    assert "not inverted" in fit.message
     with pytest.raises(ValueError, match="RationalPlant"):
         dtm.estimate_delay(flight, loop, method=ARXScan(fractional=True))
 
@@ -132,15 +132,15 @@ def test_feedback_is_said():
     flight, known = fly(noise=0.01)
     fit = dtm.estimate_delay(flight, known, method="gcc")
     assert fit.details["feedback"]
-    assert "made from the output" in fit.message
-    assert "made from the output" in fit.uncalibrated
+    assert "depends on the output" in fit.message
+    assert "depends on the output" in fit.uncalibrated
     # A command that is computed from the output follows it by construction.
     fit = dtm.estimate_delay(swapped(flight, command=None), known, method="gcc")
     assert fit.details["feedback_p_value"] == 0.0
     flight, known = open_loop(1)
     fit = dtm.estimate_delay(flight, known, method="gcc")
     assert not fit.details["feedback"]
-    assert "made from the output" not in fit.message
+    assert "depends on the output" not in fit.message
 
 
 def test_noise_that_comes_back_at_once_is_not_taken_for_an_answer():

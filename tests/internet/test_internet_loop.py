@@ -268,7 +268,7 @@ def test_the_parts_say_what_is_wrong_in_one_line(capsys):
     assert "needs a time" in said("plant", "--controller", "127.0.0.1:9", "--policy", "drop-late")
     assert "--gain" in said("controller")
     assert "probability" in said("relay", "--to", "127.0.0.1:9", "--loss", "2")
-    assert "more than zero" in said("relay", "--to", "127.0.0.1:9", "--duration", "nan")
+    assert "above zero" in said("relay", "--to", "127.0.0.1:9", "--duration", "nan")
     assert "port 0" in said("plant", "--controller", "127.0.0.1:0", "--duration", "1")
 
 

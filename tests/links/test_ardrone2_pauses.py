@@ -53,7 +53,7 @@ def test_after_a_pause_beyond_the_watchdog_a_landed_drone_is_not_asked_to_take_o
             client.command(0.3)
             drone.stand_still(pause)
             went_on = now()
-            with pytest.raises(FlightAbortedError, match=rf"stood still for {pause:.0f}\."):
+            with pytest.raises(FlightAbortedError, match=rf"was paused for {pause:.0f}\."):
                 await go_on(client, going_on)
             with pytest.raises(FlightAbortedError, match="commanded to land"):
                 client.hover()
@@ -173,7 +173,7 @@ def test_a_drone_that_landed_while_the_radio_was_out_is_not_asked_to_take_off(ou
                 except FlightAbortedError as error:
                     ended = error
                 await asyncio.sleep(0.05)
-            assert "nothing heard of 127.0.0.1 for 1.0 s" in str(ended)
+            assert "nothing received from 127.0.0.1 for 1.0 s" in str(ended)
             assert drone.phase == "landed"
             later = [up for sent, up in refs(drone.told) if sent > begun + 0.05]
             assert len(later) > 10
@@ -203,7 +203,7 @@ def test_ages_run_on_while_the_machine_sleeps(monkeypatch):
         assert now() - by_loop < 1000.0
         sender.hover(clock.now())
         assert not sender.in_air
-        assert "stood still for 360" in sender.expired
+        assert "was paused for 360" in sender.expired
 
     asyncio.run(look())
 
@@ -265,7 +265,7 @@ def test_a_client_process_that_was_stopped_in_flight_lands_what_has_landed():
                 assert not any(b"AT*REF" in one and b",290718208\r" in one for one in asked)
                 assert emulated.truth().phase is Phase.LANDED
                 assert process.returncode == 1
-                assert "FlightAbortedError: this program stood still for" in error.decode()
+                assert "FlightAbortedError: this program was paused for" in error.decode()
             finally:
                 if process.returncode is None:
                     os.kill(process.pid, signal.SIGCONT)

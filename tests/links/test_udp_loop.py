@@ -520,7 +520,7 @@ def test_other_hosts_than_this_one_work_and_are_warned_of(capsys):
     assert report.recording.output[-1] == pytest.approx(1.0, abs=1e-3)
     said = capsys.readouterr().err
     assert "192.0.2.1" in said
-    assert "from outside" in said
+    assert "every host that reaches" in said
 
 
 def test_on_this_computer_nothing_is_warned_of(capsys):

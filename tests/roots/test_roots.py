@@ -185,7 +185,7 @@ def test_regions_that_cannot_be(h, where, message):
 
 @pytest.mark.parametrize("bad", [1.0, (1.0,), ("a", 1.0), (1, 2, 3), "ab"])
 def test_ranges_are_pairs(bad):
-    with pytest.raises(TypeError, match="pair"):
+    with pytest.raises(TypeError, match="give a range"):
         s.count(re=bad)
 
 
