@@ -36,9 +36,9 @@ _ROUNDING = 1e-12
 #: the number: any two that are not special values.
 _CHANGES = (0.37, 0.71)
 
-#: The fastest mode of the plant limits the steps of a delay if it turns by more than _SLOW radians in
-#: a sample. It then turns by this angle in the longest step, in radians: a larger one is faster and
-#: could miss an oscillation.
+#: The fastest mode of the plant limits the steps of a delay if it turns by more than _SLOW radians
+#: in a sample. It then turns by this angle in the longest step, in radians: a larger one is faster
+#: and could miss an oscillation.
 _SLOW = 0.5
 _STEP_OF_MODE = 0.25
 
