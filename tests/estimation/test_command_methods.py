@@ -7,9 +7,9 @@ from deadtime.estimation import GCC, ARXScan
 from deadtime.estimation.data._commands import commands_over_samples
 from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
 from deadtime.estimation.models._held_response import HeldResponse
-from flown import CASES, TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import CASES, TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 
 METHODS = ("gcc", "arx_scan")
 

@@ -9,7 +9,7 @@ from deadtime.estimation import Frequency
 from deadtime.estimation._estimate import METHODS
 from deadtime.estimation.data._input_output import InputOutput
 from deadtime.estimation.methods import _arx_scan as arx_scan
-from flown import fly
+from step_recordings import fly
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
 

@@ -4,9 +4,9 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Frequency
-from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 
 PERIOD = 5.2
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import CTA, Grid
 from deadtime.estimation.methods._cta import chebyshev_differentiation
-from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
+from step_recordings import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 
 METHODS = ("grid", "cta")
 

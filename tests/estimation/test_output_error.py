@@ -1,9 +1,9 @@
 """Output error with the logged command: on the Cramér-Rao bound, and honest about a lag."""
 
 import deadtime as dtm
-import flown
 import numpy as np
 import pytest
+import step_recordings
 from deadtime.estimation import OutputError
 from deadtime.estimation.models._held_response import HeldResponse
 from flights import flight_path
@@ -189,7 +189,7 @@ def test_a_continuous_command_is_not_taken_as_held(Kp, known):
     # 0.88 and 0.16 ms.
     errors = []
     for seed in range(40):
-        flight, loop = flown.fly(
+        flight, loop = step_recordings.fly(
             Kp=Kp, noise=0.01, seed=seed, ts=None, dt=0.01, limit=None, noise_in_loop=False
         )
         fit = dtm.estimate_delay(

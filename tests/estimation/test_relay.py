@@ -4,9 +4,9 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Relay
-from flown import TS, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import TS, fly, noise_for_output, root_mean_square, swapped
 
 
 def relay(delay=0.36, lag=0.0, ts=TS, noise=0.0, seed=0, duration=20.0, dt=0.02):

@@ -8,7 +8,7 @@ import pickle
 import deadtime as dtm
 import numpy as np
 import pytest
-from flown import fly
+from step_recordings import fly
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
 CONTINUOUS = LOOP.continuous()

@@ -16,7 +16,7 @@ from deadtime.links.ardrone2.sender import CYCLE, CommandSender
 from emulated import emulator, skip_if_too_busy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from level_drone import level
+from worst_case_drone import level
 
 
 def now():

@@ -9,7 +9,7 @@ from deadtime.links import Limits, run
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator.settings import Settings
 from emulated import client_of, connected, emulator
-from level_drone import LevelDrone, level
+from worst_case_drone import LevelDrone, level
 
 BOTH = ("control:control_vz_max", "control:altitude_max")
 

@@ -10,7 +10,7 @@ from deadtime.links.ardrone2.commands import Move, Ref, encode
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.navdata import State
 from emulated import client_of, emulator
-from level_drone import level
+from worst_case_drone import level
 
 
 async def hovering(client, turns=100):

@@ -10,7 +10,7 @@ import pytest
 from ball_count import BallCounter, OnContourError, TooManyPiecesError, precision
 from ball_survey import Package, examine
 from flint import arb
-from trouble import KINDS, trouble
+from hard_functions import KINDS, trouble
 
 CASES = {
     case["name"]: case

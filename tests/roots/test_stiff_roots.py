@@ -7,7 +7,7 @@ import deadtime as dtm
 import pytest
 from ball_survey import Package, examine
 from deadtime import delay, s
-from trouble import trouble
+from hard_functions import trouble
 
 # Coefficients up to 1e227: real or complex roots as far out as 1e69 lead; a neutral equation whose
 # leading root lies at 5e10 beside chains at 0.01.

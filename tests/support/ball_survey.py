@@ -15,7 +15,7 @@ import numpy as np
 from ball_count import EXACT_BITS, BallCounter, OnContourError, TooManyPiecesError, precision
 from deadtime._base.errors import ContourError
 from flint import arb
-from trouble import trouble
+from hard_functions import trouble
 
 # A root whose relative distance to the edge is smaller than this justifies a refusal.
 NEAR = 1e-9

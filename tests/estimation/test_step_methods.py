@@ -8,9 +8,9 @@ import pytest
 from deadtime.estimation import Decay, Graphical, Overshoot
 from deadtime.estimation.methods._decrement import loop_with_root
 from deadtime.estimation.models._held_transfer import held_transfer
-from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 
 METHODS = ("decrement", "decay", "graphical")
 

@@ -8,7 +8,7 @@ from deadtime.links import run
 from emulated import connected
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from level_drone import level
+from worst_case_drone import level
 
 
 def cut(late, uplink=0.0, clear=True):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import Frequency
 from deadtime.estimation._estimate import METHODS
-from flown import fly
+from step_recordings import fly
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
 

@@ -1,9 +1,9 @@
 """Several recordings of one vehicle, fitted by one set of numbers."""
 
 import deadtime as dtm
-import flown
 import numpy as np
 import pytest
+import step_recordings
 from deadtime.estimation.fit._joint import JointModel
 from flights import flight_path
 
@@ -11,7 +11,7 @@ TS = 0.065
 
 
 def fly(Kp, noise, seed, size=1.0, lag=0.0, limit=1.0):
-    flight, known = flown.fly(
+    flight, known = step_recordings.fly(
         gain=0.9, lag=lag, Kp=Kp, noise=noise, seed=seed, limit=limit, size=size, rest=1.0
     )
     return flight, known.replace(gain=1.0)
