@@ -93,13 +93,13 @@ def test_gains_are_bounded_before_the_delay_is_known(Kp, allowed):
 # What ends a flight
 
 
-def troubled(change, after=3.0):
+def vehicle_with(change, after=3.0):
     """A vehicle whose states are changed from a time after the take-off on."""
 
-    def trouble(state, since):
+    def change_state(state, since):
         return state if since < after else change(state)
 
-    return SimulatedVehicle(trouble=trouble)
+    return SimulatedVehicle(change_state=change_state)
 
 
 ABORTS = {
@@ -121,7 +121,7 @@ ABORTS = {
 
 @pytest.mark.parametrize("reason", ABORTS)
 def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
-    vehicle = troubled(ABORTS[reason])
+    vehicle = vehicle_with(ABORTS[reason])
     said = "tilted" if reason == "pitch is no number" else reason
     if reason == "more than 0.475 m apart":  # drifts there, so that nothing jumps
         began = []
@@ -132,14 +132,14 @@ def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
             began.append(since)
             return replace(state, height=state.height + 0.5 * (since - began[0]))
 
-        vehicle = SimulatedVehicle(trouble=drift)
+        vehicle = SimulatedVehicle(change_state=drift)
     if reason == "outside 0.2 to 3 m":
         began = []
 
         def sink(state, since):
             return state if since < 3.0 else replace(state, height=1.0 - 0.9 * (since - 3.0))
 
-        vehicle = SimulatedVehicle(trouble=sink)
+        vehicle = SimulatedVehicle(change_state=sink)
         said = "m apart|outside 0.2"
     with pytest.raises(FlightAbortedError, match=said):
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
@@ -151,7 +151,7 @@ def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
 
 def test_a_height_that_freezes_does_not_make_the_vehicle_climb_for_long(tmp_path):
     # At the base; the first step is at 5 s, and would be held until 11.5 s.
-    vehicle = troubled(lambda state: replace(state, height=1.0))
+    vehicle = vehicle_with(lambda state: replace(state, height=1.0))
     with pytest.raises(FlightAbortedError, match=r"has read 1\.000 m"):
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert columns_of(tmp_path / "flight-1-P.csv")["time_s"][-1] < 6.1
@@ -226,7 +226,7 @@ def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
     monkeypatch.setattr(_Writer, "_write", slow(_Writer._write))
     monkeypatch.setattr(journal_module.os, "fsync", slow(os.fsync))
 
-    def trouble(state, since):
+    def change_state(state, since):
         return replace(state, roll=1.0) if fails and since > 3.0 else state
 
     class Closing(SimulatedVehicle):
@@ -234,7 +234,7 @@ def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
             await super().close()
             ashore.set()
 
-    vehicle = Closing(trouble=trouble)
+    vehicle = Closing(change_state=change_state)
     flight = fly_all(lambda: vehicle, [dtm.P(1.2)], FlightPlan(), 6.5, tmp_path, 1)
     if fails:
         with pytest.raises(FlightAbortedError, match="tilted"):
@@ -291,7 +291,7 @@ def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
 
 @pytest.mark.survey
 def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
-    vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), tells_climb=False)
+    vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), reports_climb=False)
     found = fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert found.learned.split is None
     assert "does not tell" in found.learned.unsplit
@@ -319,7 +319,7 @@ def test_a_fit_that_is_not_adequate_is_said_before_its_gains_are_flown(
 
     said, flights = [], []
     random = np.random.default_rng(2)
-    vehicle = SimulatedVehicle(noise=0.001, random=random, trouble=gusts)
+    vehicle = SimulatedVehicle(noise=0.001, random=random, change_state=gusts)
     plan = FlightPlan(gains=(2.4,), settle=2.5, hold=3.5, checked_hold=2.0)
     found = fly_experiment(lambda: vehicle, plan, tmp_path, run=run, warn=warn)
     assert found.learned.fit.adequate is False

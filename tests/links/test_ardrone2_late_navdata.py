@@ -8,7 +8,7 @@ from deadtime.links import run
 from emulated import connected
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worst_case_drone import level
+from worst_case_drone import connected_drone
 
 
 def cut(late, uplink=0.0, clear=True):
@@ -16,7 +16,7 @@ def cut(late, uplink=0.0, clear=True):
     seen = {}
 
     async def fly():
-        async with level(late=late, uplink=uplink) as (drone, client):
+        async with connected_drone(late=late, uplink=uplink) as (drone, client):
             await client.take_off()
             await client.cut_motors()
             seen["cut"] = [on for _, on in drone.toggles]
@@ -60,7 +60,7 @@ def test_motors_of_the_emulator_are_cut_once(late):
 
 def test_a_toggle_that_was_lost_is_sent_again():
     async def fly():
-        async with level(late=0.2) as (drone, client):
+        async with connected_drone(late=0.2) as (drone, client):
             await client.take_off()
             socket = client._link._commands
             plain, lost = socket.sendto, []
@@ -82,11 +82,11 @@ def test_a_toggle_that_was_lost_is_sent_again():
 def test_what_waited_in_the_socket_during_a_pause_has_nothing_toggled_again():
     # News from before the drone heard of it, read 1.5 s later.
     async def fly():
-        async with level(uplink=0.3) as (drone, client):
+        async with connected_drone(uplink=0.3) as (drone, client):
             await client.take_off()
             cutting = asyncio.create_task(client.cut_motors())
             await asyncio.sleep(0.01)
-            drone.stand_still(1.5)
+            drone.pause_client(1.5)
             await cutting
             assert [on for _, on in drone.toggles] == [True]
 
@@ -95,7 +95,7 @@ def test_what_waited_in_the_socket_during_a_pause_has_nothing_toggled_again():
 
 def test_a_drone_that_says_nothing_is_not_toggled_again_and_that_is_said():
     async def fly():
-        async with level() as (drone, client):
+        async with connected_drone() as (drone, client):
             await client.take_off()
             drone._deliver = lambda packet: None
             with pytest.raises(LinkError, match="does not confirm"):
@@ -111,7 +111,7 @@ def test_a_drone_that_says_nothing_is_not_toggled_again_and_that_is_said():
 def test_news_from_before_a_take_off_confirm_no_landing(late, after):
     # Cancelled as it began to rise, it was said to be down because it had not been seen to rise.
     async def fly():
-        async with level(late=late, uplink=0.2) as (drone, client):
+        async with connected_drone(late=late, uplink=0.2) as (drone, client):
             taking_off = asyncio.create_task(client.take_off())
             await asyncio.sleep(after)
             taking_off.cancel()

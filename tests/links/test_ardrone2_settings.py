@@ -9,7 +9,7 @@ from deadtime.links import Limits, run
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator.settings import Settings
 from emulated import client_of, connected, emulator
-from worst_case_drone import LevelDrone, level
+from worst_case_drone import WorstCaseDrone, connected_drone
 
 BOTH = ("control:control_vz_max", "control:altitude_max")
 
@@ -25,7 +25,7 @@ def held(drone):
 def test_the_largest_climb_of_the_drone_is_what_was_asked_for_and_is_put_back(climb, set_to):
     # It was 1 m/s whatever had been asked for, and stayed so after the flight.
     async def fly():
-        async with LevelDrone() as drone:
+        async with WorstCaseDrone() as drone:
             limits = Limits(max_climb=climb, max_height=2.5)
             async with ARDrone2("127.0.0.1", limits, **drone.ports) as client:
                 assert held(drone) == [set_to, 2500]
@@ -47,7 +47,7 @@ async def fails(drone, how):
         await client.take_off()
         client.command(0.2)
         if how == "pause":
-            drone.stand_still(5.0)
+            drone.pause_client(5.0)
             client.hover()
         await asyncio.sleep(0.1)
         raise ZeroDivisionError
@@ -56,7 +56,7 @@ async def fails(drone, how):
 @pytest.mark.parametrize("how", ["exception", "cancelled", "pause"])
 def test_they_are_put_back_after_the_landing_however_a_flight_ends(how):
     async def fly():
-        async with LevelDrone() as drone:
+        async with WorstCaseDrone() as drone:
             put, plain = [], drone.settings.__class__.__setitem__
 
             class Watched(dict):
@@ -79,7 +79,7 @@ def test_they_are_put_back_after_the_landing_however_a_flight_ends(how):
 
 def test_a_drone_that_no_longer_answers_is_not_waited_for_and_it_is_said():
     async def fly():
-        async with LevelDrone() as drone:
+        async with WorstCaseDrone() as drone:
             ended = None
             try:
                 async with ARDrone2("127.0.0.1", **drone.ports) as client:
@@ -129,9 +129,9 @@ def test_a_connection_that_fails_leaves_the_settings_as_they_were(monkeypatch):
 def test_connecting_again_begins_with_news_of_its_own():
     # The same object, closed and connected again, took what it had heard before for news.
     async def fly():
-        async with level() as (drone, client):
+        async with connected_drone() as (drone, client):
             await client.take_off()
-            drone.stand_still(5.0)
+            drone.pause_client(5.0)
             with contextlib.suppress(LinkError):
                 client.hover()
             await client.close()

@@ -10,7 +10,7 @@ from deadtime.links.ardrone2.commands import Move, Ref, encode
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.navdata import State
 from emulated import client_of, emulator
-from worst_case_drone import level
+from worst_case_drone import connected_drone
 
 
 async def hovering(client, turns=100):
@@ -60,20 +60,23 @@ def test_a_second_client_of_the_emulator_is_named_to_the_first():
 def test_one_datagram_from_elsewhere_is_noticed_where_the_drone_tells_of_it(number, wish, short):
     # In short navdata there is no number of the last REF: what is left is the landing.
     async def fly():
-        async with level(tick=0.005, options=("short",) if short else ()) as (drone, client):
+        async with connected_drone(tick=0.005, options=("short",) if short else ()) as (
+            drone,
+            client,
+        ):
             await client.take_off()
             await hovering(client, 5)
-            before = len(drone.told)
-            while len(drone.told) == before:  # until this client's next one it is the last
+            before = len(drone.received)
+            while len(drone.received) == before:  # until this client's next one it is the last
                 await asyncio.sleep(0.001)
-            drone._sent(encode([wish, Move(flag=0)], number), None)
+            drone.receive_commands(encode([wish, Move(flag=0)], number), None)
             if short and wish.take_off:
                 return
             with pytest.raises(FlightAbortedError, match="another client commands this drone"):
                 await hovering(client)
             assert not any(
                 one.take_off
-                for sent, commands, came_down in drone.told
+                for sent, commands, came_down in drone.received
                 for one in commands
                 if isinstance(one, Ref) and 0.0 < came_down < sent - 0.05
             )
@@ -83,8 +86,8 @@ def test_one_datagram_from_elsewhere_is_noticed_where_the_drone_tells_of_it(numb
 
 def test_one_that_is_noticed_on_the_ground_keeps_it_there():
     async def fly():
-        async with level(tick=0.005) as (drone, client):
-            drone._sent(encode([Ref()], 5000), None)
+        async with connected_drone(tick=0.005) as (drone, client):
+            drone.receive_commands(encode([Ref()], 5000), None)
             await asyncio.sleep(0.1)
             with pytest.raises(LinkError, match="another client commands this drone"):
                 await client.take_off()
@@ -95,7 +98,7 @@ def test_one_that_is_noticed_on_the_ground_keeps_it_there():
 
 def test_own_commands_are_no_other_client():
     async def fly():
-        async with level(uplink=0.2, late=0.3) as (_, client):
+        async with connected_drone(uplink=0.2, late=0.3) as (_, client):
             await client.take_off()
             await hovering(client, 400)
             await client.land()
@@ -111,7 +114,7 @@ FAULTS = [(State.BATTERY_LOW, "its battery"), (State.MOTORS_PROBLEM, "a motor")]
 @pytest.mark.parametrize(("fault", "said"), FAULTS)
 def test_a_drone_that_lands_for_a_fault_is_not_blamed_on_another_client(fault, said):
     async def fly():
-        async with level(tick=0.005) as (drone, client):
+        async with connected_drone(tick=0.005) as (drone, client):
             await client.take_off()
             drone.fault = fault
             drone._enter("landing", drone.time)
@@ -124,7 +127,7 @@ def test_a_drone_that_lands_for_a_fault_is_not_blamed_on_another_client(fault, s
 def test_a_drone_that_lands_by_itself_is_not_asked_to_take_off_again():
     # The wish to fly went on being repeated; a drone that obeys its level rises again.
     async def fly():
-        async with level(tick=0.005) as (drone, client):
+        async with connected_drone(tick=0.005) as (drone, client):
             await client.take_off()
             drone._enter("landing", drone.time)
             drone.came_down = landed = drone.time
@@ -132,7 +135,9 @@ def test_a_drone_that_lands_by_itself_is_not_asked_to_take_off_again():
                 await hovering(client)
             await asyncio.sleep(2.0)
             assert drone.phase == "landed"
-            later = [one for sent, some, _ in drone.told if sent > landed + 0.05 for one in some]
+            later = [
+                one for sent, some, _ in drone.received if sent > landed + 0.05 for one in some
+            ]
             assert not any(one.take_off for one in later if isinstance(one, Ref))
 
     run(fly())
