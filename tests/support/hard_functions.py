@@ -51,7 +51,7 @@ def value(h, z):
 
 
 def planted(h, z):
-    """`h` less the line through its values at `z` and its conjugate, which are then nearly roots."""
+    """`h` less the line through its values at `z` and its conjugate: roots there, nearly."""
     w = value(h, z)
     if z.imag == 0.0:
         line = np.array([w.real])
