@@ -1,4 +1,4 @@
-"""The drone's own limits: set to what was asked for, read back, and put back afterwards."""
+"""The drone's own limits are set as requested, read back, and restored afterwards."""
 
 import asyncio
 import contextlib
@@ -22,8 +22,8 @@ def held(drone):
     ("climb", "set_to"),
     [(0.3, 300), (0.5, 500), (1.0, 1000), (1.1, 1100), (0.05, 200), (2.0, 2000)],
 )
-def test_the_largest_climb_of_the_drone_is_what_was_asked_for_and_is_put_back(climb, set_to):
-    # It was 1 m/s whatever had been asked for, and stayed so after the flight.
+def test_the_drone_s_climb_limit_is_set_as_requested_and_restored(climb, set_to):
+    # The limit must not stay at a default of 1 m/s, nor stay changed after the flight.
     async def fly():
         async with WorstCaseDrone() as drone:
             limits = Limits(max_climb=climb, max_height=2.5)
@@ -35,7 +35,7 @@ def test_the_largest_climb_of_the_drone_is_what_was_asked_for_and_is_put_back(cl
                 await asyncio.sleep(0.05)
                 assert drone.gaz * 1e-3 * set_to == pytest.approx(climb, rel=1e-6)
                 await client.land()
-                assert held(drone) == [set_to, 2500]  # until the end of the last flight
+                assert held(drone) == [set_to, 2500]  # Unchanged until the end of the last flight.
             assert drone.phase == "landed"
             assert held(drone) == [700, 3000]
 
@@ -54,17 +54,17 @@ async def fails(drone, how):
 
 
 @pytest.mark.parametrize("how", ["exception", "cancelled", "pause"])
-def test_they_are_put_back_after_the_landing_however_a_flight_ends(how):
+def test_settings_are_restored_after_the_landing_however_a_flight_ends(how):
     async def fly():
         async with WorstCaseDrone() as drone:
             put, plain = [], drone.settings.__class__.__setitem__
 
-            class Watched(dict):
+            class RecordingSettings(dict):
                 def __setitem__(self, key, value):
                     put.append((key, value, drone.phase))
                     plain(self, key, value)
 
-            drone.settings = Watched(drone.settings)
+            drone.settings = RecordingSettings(drone.settings)
             flight = asyncio.create_task(fails(drone, how))
             if how == "cancelled":
                 await asyncio.sleep(1.0)
@@ -77,7 +77,7 @@ def test_they_are_put_back_after_the_landing_however_a_flight_ends(how):
     run(fly())
 
 
-def test_a_drone_that_no_longer_answers_is_not_waited_for_and_it_is_said():
+def test_settings_of_a_drone_that_stops_answering_are_not_waited_for_and_reported():
     async def fly():
         async with WorstCaseDrone() as drone:
             ended = None
@@ -96,7 +96,7 @@ def test_a_drone_that_no_longer_answers_is_not_waited_for_and_it_is_said():
     run(fly())
 
 
-def test_a_setting_that_is_not_taken_back_is_warned_of(monkeypatch):
+def test_a_setting_that_cannot_be_restored_causes_a_warning(monkeypatch):
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
@@ -110,7 +110,7 @@ def test_a_setting_that_is_not_taken_back_is_warned_of(monkeypatch):
     run(fly())
 
 
-def test_a_connection_that_fails_leaves_the_settings_as_they_were(monkeypatch):
+def test_a_failed_connection_leaves_the_settings_unchanged(monkeypatch):
     plain = Settings.set
 
     def refuses_a_height(self, name, value):
@@ -126,8 +126,8 @@ def test_a_connection_that_fails_leaves_the_settings_as_they_were(monkeypatch):
     run(fly())
 
 
-def test_connecting_again_begins_with_news_of_its_own():
-    # The same object, closed and connected again, took what it had heard before for news.
+def test_a_second_connection_of_one_object_uses_new_navdata_only():
+    # Navdata from before the reconnection must not count as current.
     async def fly():
         async with connected_drone() as (drone, client):
             await client.take_off()
