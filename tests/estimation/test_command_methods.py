@@ -7,9 +7,17 @@ from deadtime.estimation import GCC, ARXScan
 from deadtime.estimation.data._commands import commands_over_samples
 from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
 from deadtime.estimation.models._held_response import HeldResponse
-from flown import CASES, TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import (
+    CASES,
+    TS,
+    delay_errors,
+    noise_for_output,
+    record_step,
+    replace_signals,
+    root_mean_square,
+)
 
 METHODS = ("gcc", "arx_scan")
 
@@ -74,8 +82,8 @@ def test_other_plants_are_correlated_as_they_are():
 
 
 def test_the_mean_command_of_a_continuous_loop_stops_before_a_jump():
-    flight, known = fly(ts=None, dt=0.05, limit=None, duration=3.0)
-    fine, _ = fly(ts=None, dt=0.001, limit=None, duration=3.0)
+    flight, known = record_step(ts=None, dt=0.05, limit=None, duration=3.0)
+    fine, _ = record_step(ts=None, dt=0.001, limit=None, duration=3.0)
     means, source = commands_over_samples(flight, known)
     whole = np.interp(flight.time, fine.time, np.cumsum(fine.command) * 0.001)
     np.testing.assert_allclose(means[:-1], np.diff(whole) / 0.05, atol=0.03)
@@ -100,20 +108,20 @@ ROWS = {
 
 @pytest.mark.parametrize("case", ROWS)
 def test_the_benchmark_of_correlation(case):
-    errors, _ = errors_of(case, 60, "gcc")
+    errors, _ = delay_errors(case, 60, "gcc")
     assert root_mean_square(errors) < 1.2 * ROWS[case][0]
 
 
 @pytest.mark.parametrize("case", [case for case in ROWS if case != "3 %"])
 def test_the_benchmark_of_arx_models(case):
     runs = 20 if CASES[case].get("dt") == 0.01 else 60
-    errors, _ = errors_of(case, runs, ARXScan(fractional=True))
+    errors, _ = delay_errors(case, runs, ARXScan(fractional=True))
     assert root_mean_square(errors) < 1.2 * ROWS[case][1]
 
 
 def test_a_whole_number_of_samples_is_half_a_sample_off():
     # 0.36 s are 5.54 samples, and the model with both coefficients begins at 5.
-    _, found = errors_of("0.3 %", 5, "arx_scan")
+    _, found = delay_errors("0.3 %", 5, "arx_scan")
     assert {fit.details["samples"] for fit in found} == {5.0}
 
 
@@ -121,7 +129,7 @@ def test_a_whole_number_of_samples_is_half_a_sample_off():
 
 
 def test_feedback_is_found_where_it_is_and_nowhere_else():
-    flown = [fly(noise=0.01, seed=seed, duration=10.0)[0] for seed in range(20)]
+    flown = [record_step(noise=0.01, seed=seed, duration=10.0)[0] for seed in range(20)]
     assert all(feedback_p_value(flight) < FEEDBACK for flight in flown)
     held = [open_loop(seed, hold=1 + seed % 4)[0] for seed in range(60)]
     # one in a thousand by chance
@@ -129,13 +137,13 @@ def test_feedback_is_found_where_it_is_and_nowhere_else():
 
 
 def test_feedback_is_said():
-    flight, known = fly(noise=0.01)
+    flight, known = record_step(noise=0.01)
     fit = dtm.estimate_delay(flight, known, method="gcc")
     assert fit.details["feedback"]
     assert "depends on the output" in fit.message
     assert "depends on the output" in fit.uncalibrated
     # A command that is computed from the output follows it by construction.
-    fit = dtm.estimate_delay(swapped(flight, command=None), known, method="gcc")
+    fit = dtm.estimate_delay(replace_signals(flight, command=None), known, method="gcc")
     assert fit.details["feedback_p_value"] == 0.0
     flight, known = open_loop(1)
     fit = dtm.estimate_delay(flight, known, method="gcc")
@@ -146,7 +154,7 @@ def test_feedback_is_said():
 def test_noise_that_comes_back_at_once_is_not_taken_for_an_answer():
     # At 10 ms and Kp 4 the peak of the noise at no shift is higher than that of the answer.
     for method in METHODS:
-        errors, _ = errors_of("10 ms, Kp 4, Td 0.05", 15, method)
+        errors, _ = delay_errors("10 ms, Kp 4, Td 0.05", 15, method)
         assert np.median(errors) > -45.0
 
 
@@ -155,22 +163,22 @@ def test_noise_that_comes_back_at_once_is_not_taken_for_an_answer():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_no_answer_to_a_command_is_refused(method):
-    flight, known = fly(noise=0.003)
+    flight, known = record_step(noise=0.003)
 
     def estimate(recording, loop=known, **options):
         return dtm.estimate_delay(recording, loop, method=method, **options)
 
     with pytest.raises(dtm.NotIdentifiableError, match=r"command is 0\.5 throughout"):
-        estimate(swapped(flight, command=np.full(len(flight), 0.5)))
+        estimate(replace_signals(flight, command=np.full(len(flight), 0.5)))
     with pytest.raises(dtm.NotIdentifiableError, match="did not move"):
-        estimate(swapped(flight, output=np.full(len(flight), 2.0)))
+        estimate(replace_signals(flight, output=np.full(len(flight), 2.0)))
     with pytest.raises(dtm.NotIdentifiableError, match="too few"):
         estimate(flight, window=(0.0, 0.9))
     uneven = flight.time + 0.02 * np.sin(np.arange(len(flight)))
     with pytest.raises(dtm.NotIdentifiableError, match="even"):
-        estimate(swapped(flight, time=uneven))
+        estimate(replace_signals(flight, time=uneven))
     with pytest.raises(dtm.NotIdentifiableError, match="log the command"):
-        estimate(swapped(flight, command=None), known.replace(controller=dtm.PV(1.0, 0.1)))
+        estimate(replace_signals(flight, command=None), known.replace(controller=dtm.PV(1.0, 0.1)))
     with pytest.raises(ValueError, match="delay"):
         estimate(flight, known.replace(delay=0.3), free=("gain",))
     refused = 0
@@ -183,7 +191,7 @@ def test_what_is_no_answer_to_a_command_is_refused(method):
 
 
 def test_options_are_checked():
-    flight, known = fly()
+    flight, known = record_step()
     with pytest.raises(ValueError, match="not one of"):
         dtm.estimate_delay(flight, known, method=GCC(weighting="roth"))
     with pytest.raises(ValueError, match="nb"):
@@ -192,7 +200,7 @@ def test_options_are_checked():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_no_interval_and_why(method):
-    flight, known = fly(noise=0.003)
+    flight, known = record_step(noise=0.003)
     fit = dtm.estimate_delay(flight, known, method=method)
     with pytest.raises(ValueError, match="output_error"):
         fit.ci()
@@ -201,7 +209,7 @@ def test_no_interval_and_why(method):
 
 def test_a_command_at_its_limit_throughout_has_no_peak():
     # The correlation of two steps is flat up to the delay; its first value was taken for a peak.
-    flight, known = fly(Kp=2.0, limit=0.05, duration=8.0, rest=1.0)
+    flight, known = record_step(Kp=2.0, limit=0.05, duration=8.0, rest=1.0)
     with pytest.raises(dtm.NotIdentifiableError, match="at its limit"):
         dtm.estimate_delay(flight, known, method="gcc")
     fit = dtm.estimate_delay(flight, known, method="output_error")
@@ -210,12 +218,12 @@ def test_a_command_at_its_limit_throughout_has_no_peak():
 
 def test_noise_that_the_controller_saw_is_no_answer():
     # A step of the command explained the offset that the noise of the first sample left.
-    flight, known = fly(Kp=2.0, duration=8.0, rest=1.0)
+    flight, known = record_step(Kp=2.0, duration=8.0, rest=1.0)
     for seed in range(30):
         noise = 0.05 * noise_for_output(flight, seed).output
         command = np.clip(2.0 * (flight.reference - noise), -1.0, 1.0)
         for method in METHODS:
             with pytest.raises(dtm.NotIdentifiableError):
                 dtm.estimate_delay(
-                    swapped(flight, output=noise, command=command), known, method=method
+                    replace_signals(flight, output=noise, command=command), known, method=method
                 )

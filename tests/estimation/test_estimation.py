@@ -29,7 +29,7 @@ from hypothesis import strategies as st
 TS = 0.065
 
 
-def fly(
+def record_step(
     delay=0.36,
     gain=1.0,
     lag=0.0,
@@ -137,7 +137,7 @@ def test_no_damping_ratio_without_a_solution(value):
 
 
 def test_exact_overshoot_of_a_noise_free_continuous_loop_has_no_bias():
-    flight, known = fly(Kp=1.31, ts=None, dt=0.002, duration=8.0)
+    flight, known = record_step(Kp=1.31, ts=None, dt=0.002, duration=8.0)
     fit = dtm.estimate_delay(flight, known, method=Overshoot(map="exact"))
     # the largest of samples 2 ms apart misses the peak by 1e-6 of the step at most
     assert fit.delay == pytest.approx(0.36, abs=2e-5)
@@ -147,7 +147,7 @@ def test_exact_overshoot_of_a_noise_free_continuous_loop_has_no_bias():
 
 
 def test_the_saturated_map_undoes_hold_and_limit():
-    flight, known = fly(Kp=2.4, limit=1.0, size=1.0)
+    flight, known = record_step(Kp=2.4, limit=1.0, size=1.0)
     fit = dtm.estimate_delay(flight, known, method=Overshoot(map="saturated"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
     # what the maps without them make of it
@@ -169,7 +169,7 @@ def test_the_paper_at_its_own_overshoot_with_the_limit():
 
 
 def test_the_overshoot_method_gives_no_interval_and_says_why():
-    flight, known = fly(Kp=2.0, noise=0.002)
+    flight, known = record_step(Kp=2.0, noise=0.002)
     fit = dtm.estimate_delay(flight, known, method="overshoot")
     assert not fit.calibrated
     with pytest.raises(ValueError, match="biased upwards"):
@@ -178,25 +178,25 @@ def test_the_overshoot_method_gives_no_interval_and_says_why():
 
 
 def test_no_overshoot_is_refused_by_name():
-    flight, known = fly(Kp=0.9)  # x = 0.324 < 1/e
+    flight, known = record_step(Kp=0.9)  # x = 0.324 < 1/e
     with pytest.raises(dtm.NotIdentifiableError, match=r"no overshoot.*1/e"):
         dtm.estimate_delay(flight, known, method="overshoot")
 
 
 def test_an_overshoot_within_the_noise_is_refused():
-    flight, known = fly(Kp=1.2, noise=0.01, seed=3)
+    flight, known = record_step(Kp=1.2, noise=0.01, seed=3)
     with pytest.raises(dtm.NotIdentifiableError, match="noise"):
         dtm.estimate_delay(flight, known, method="overshoot")
 
 
 def test_the_overshoot_method_is_for_an_integrator_under_p_control():
-    flight, known = fly(Kp=2.0)
+    flight, known = record_step(Kp=2.0)
     with pytest.raises(ValueError, match="Integrator under P control"):
         dtm.estimate_delay(flight, known.replace(controller=dtm.PV(2.0, 0.1)), method="overshoot")
 
 
 def test_two_steps_in_the_window_are_refused():
-    flight, known = fly(Kp=2.0)
+    flight, known = record_step(Kp=2.0)
     twice = dtm.Recording(
         flight.time, np.where(flight.time > 6, 2.0, flight.reference), flight.output
     )
@@ -212,7 +212,9 @@ def test_two_steps_in_the_window_are_refused():
     ("delay", "gain", "lag"), [(0.36, 1.0, 0.0), (0.05, 1.0, 0.0), (0.26, 0.85, 0.17)]
 )
 def test_a_noise_free_flight_is_recovered_exactly(delay, gain, lag, ts):
-    flight, known = fly(delay, gain, lag, Kp=2.0, ts=ts, dt=TS, limit=None if ts is None else 1.0)
+    flight, known = record_step(
+        delay, gain, lag, Kp=2.0, ts=ts, dt=TS, limit=None if ts is None else 1.0
+    )
     free = ("delay", "gain", "lag") if lag else ("delay", "gain")
     fit = dtm.estimate_delay(flight, known, free=free)
     # far below the 0.01 ms that would show a jump between two grid points
@@ -223,7 +225,7 @@ def test_a_noise_free_flight_is_recovered_exactly(delay, gain, lag, ts):
 
 
 def test_all_of_the_step_may_be_at_the_limit_at_first():
-    flight, known = fly(0.4, 0.9, Kp=2.4, limit=0.5, size=2.0, duration=15.0)
+    flight, known = record_step(0.4, 0.9, Kp=2.4, limit=0.5, size=2.0, duration=15.0)
     fit = dtm.estimate_delay(flight, known)
     assert (fit.delay, fit.gain) == pytest.approx((0.4, 0.9), abs=1e-7)
 
@@ -234,7 +236,7 @@ def test_intervals_cover_what_they_say():
     # 95 times in 100. Fewer than 86 of 100 happens once in 2000 with right intervals.
     held = 0
     for seed in range(100):
-        flight, known = fly(0.36, noise=0.01, seed=seed, noise_in_loop=False, duration=8.0)
+        flight, known = record_step(0.36, noise=0.01, seed=seed, noise_in_loop=False, duration=8.0)
         fit = dtm.estimate_delay(flight, known, free=("delay",))
         low, high = fit.ci(0.95)
         held += low <= 0.36 <= high
@@ -242,7 +244,7 @@ def test_intervals_cover_what_they_say():
 
 
 def test_the_standard_error_is_the_cramer_rao_bound_when_residuals_are_white():
-    flight, known = fly(0.36, noise=0.01, seed=1, noise_in_loop=False)
+    flight, known = record_step(0.36, noise=0.01, seed=1, noise_in_loop=False)
     fit = dtm.estimate_delay(flight, known)
     assert fit.whiteness.white
     assert fit.crb.free == ("delay", "gain", "initial output")
@@ -276,7 +278,7 @@ def test_the_standard_error_is_the_cramer_rao_bound_when_residuals_are_white():
 
 
 def test_a_lag_that_is_left_out_is_noticed():
-    flight, known = fly(0.26, 0.9, 0.2, Kp=2.0, noise=0.001, seed=2)
+    flight, known = record_step(0.26, 0.9, 0.2, Kp=2.0, noise=0.001, seed=2)
     without = dtm.estimate_delay(flight, known, free=("delay", "gain"))
     assert not without.adequate
     assert without.stderr["delay"] > without.crb.stderr["delay"]
@@ -289,7 +291,7 @@ def test_a_lag_that_is_left_out_is_noticed():
 
 
 def test_a_lag_that_is_not_there_comes_out_at_its_bound_and_is_said_so():
-    flight, known = fly(0.36, 1.0, 0.0, Kp=2.0, noise=0.002, seed=5)
+    flight, known = record_step(0.36, 1.0, 0.0, Kp=2.0, noise=0.002, seed=5)
     fit = dtm.estimate_delay(flight, known, free=("delay", "gain", "lag"))
     assert fit.lag >= 0.0
     assert fit.delay_plus_lag == pytest.approx(0.36, abs=0.01)
@@ -299,14 +301,14 @@ def test_a_lag_that_is_not_there_comes_out_at_its_bound_and_is_said_so():
 @settings(max_examples=15)
 @given(st.floats(0.02, 0.8), st.floats(0.4, 2.0), st.floats(0.3, 1.3))
 def test_any_stable_loop_is_recovered(delay, gain, x):
-    flight, known = fly(delay, gain, Kp=x / (gain * (delay + TS)), duration=20.0)
+    flight, known = record_step(delay, gain, Kp=x / (gain * (delay + TS)), duration=20.0)
     fit = dtm.estimate_delay(flight, known)
     assert fit.delay == pytest.approx(delay, abs=1e-6)
     assert fit.gain == pytest.approx(gain, rel=1e-6)
 
 
 def test_a_window_that_begins_in_flight_knows_the_commands_before_it():
-    flight, known = fly(0.36, 0.9, Kp=2.4, duration=20.0)
+    flight, known = record_step(0.36, 0.9, Kp=2.4, duration=20.0)
     moving = dtm.Recording(
         flight.time, np.where(flight.time > 10, 1.5, flight.reference), flight.output
     )
@@ -335,13 +337,13 @@ def test_a_window_that_begins_in_flight_knows_the_commands_before_it():
     ],
 )
 def test_what_cannot_be_estimated_is_refused_with_the_reason(change, words):
-    flight, known = fly(Kp=2.0)
+    flight, known = record_step(Kp=2.0)
     with pytest.raises((dtm.DeadtimeError, ValueError), match=words):
         dtm.estimate_delay(flight, known, **change)
 
 
 def test_a_name_is_the_short_form_of_the_object_with_its_default_options():
-    flight, known = fly(Kp=2.0, noise=0.01)
+    flight, known = record_step(Kp=2.0, noise=0.01)
     for name, kind in METHODS.items():
         assert kind().name == name
     by_name = dtm.estimate_delay(flight, known, method="waveform")
@@ -376,7 +378,7 @@ def test_options_are_checked_when_the_method_is_made(kind, options, words):
 
 
 def test_an_output_that_never_moves_is_refused():
-    flight, known = fly(Kp=2.0)
+    flight, known = record_step(Kp=2.0)
     still = dtm.Recording(flight.time, flight.reference, 0.0 * flight.time)
     with pytest.raises(dtm.NotIdentifiableError, match="did not move"):
         dtm.estimate_delay(still, known)
@@ -384,14 +386,14 @@ def test_an_output_that_never_moves_is_refused():
 
 def test_a_reference_that_copies_the_output_is_refused():
     # As autopilots log it while a mode is inactive; cross-correlation would say 0.000 s.
-    flight, known = fly(Kp=2.0, noise=0.01)
+    flight, known = record_step(Kp=2.0, noise=0.01)
     copy = dtm.Recording(flight.time, flight.output, flight.output)
     with pytest.raises(dtm.NotIdentifiableError, match="setpoint is inactive"):
         dtm.estimate_delay(copy, known)
 
 
 def test_wrong_types_are_named():
-    flight, known = fly(Kp=2.0)
+    flight, known = record_step(Kp=2.0)
     with pytest.raises(TypeError, match="must be a Recording"):
         dtm.estimate_delay([1, 2], known)
     with pytest.raises(TypeError, match="must be a ControlLoop"):

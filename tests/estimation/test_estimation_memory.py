@@ -9,7 +9,7 @@ from deadtime.estimation import Frequency
 from deadtime.estimation._estimate import METHODS
 from deadtime.estimation.data._input_output import InputOutput
 from deadtime.estimation.methods import _arx_scan as arx_scan
-from flown import fly
+from step_recordings import record_step
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
 
@@ -17,7 +17,7 @@ KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=
 MOST = 2000
 
 
-def flown(method, rows):
+def suitable_recording(method, rows):
     """A flight of so many rows that suits a method, and the method with its options."""
     truth = KNOWN.replace(delay=0.36)
     if method == "relay":
@@ -31,12 +31,12 @@ def flown(method, rows):
         "decrement": {"Kp": 3.0, "limit": None},
     }.get(method, {})
     duration = 7.0 if "dt" in special else 0.065 * rows - 1.0
-    flight, known = fly(noise=0.005, rest=1.0, duration=duration, **special)
+    flight, known = record_step(noise=0.005, rest=1.0, duration=duration, **special)
     return flight, known, method
 
 
 def peak(method, rows):
-    flight, known, method = flown(method, rows)
+    flight, known, method = suitable_recording(method, rows)
     tracemalloc.start()
     dtm.estimate_delay(flight, known, method=method)
     most = tracemalloc.get_traced_memory()[1]

@@ -4,9 +4,16 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Frequency
-from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import (
+    TS,
+    delay_errors,
+    noise_for_output,
+    record_step,
+    replace_signals,
+    root_mean_square,
+)
 
 PERIOD = 5.2
 
@@ -17,7 +24,9 @@ def multisine(lag=0.0, noise=0.0, seed=0, periods=5, lines=12, gain=1.0, delay=0
     wave = dtm.Experiment.multisine(0.4, PERIOD, lines, periods)
     flight = wave.run(loop, noise=noise, seed=seed)
     if offset:
-        flight = swapped(flight, output=flight.output + offset, reference=flight.reference + offset)
+        flight = replace_signals(
+            flight, output=flight.output + offset, reference=flight.reference + offset
+        )
     return flight, loop.replace(delay=None, lag=0.0, gain=1.0)
 
 
@@ -32,7 +41,7 @@ def estimate(flight, known, free=("delay", "gain"), period=PERIOD, window=None, 
 @settings(max_examples=15)
 @given(st.floats(0.0, 0.8), st.floats(0.4, 1.5), st.sampled_from([0.0, 0.1]))
 def test_one_record_without_noise_is_exact(delay, gain, lag):
-    flight, known = fly(delay, gain, lag)
+    flight, known = record_step(delay, gain, lag)
     free = ("delay", "gain", "lag") if lag else ("delay", "gain")
     fit = estimate(flight, known.replace(gain=1.0), free, None)
     assert fit.delay == pytest.approx(delay, abs=1e-6)
@@ -68,13 +77,13 @@ def test_periods_without_noise_are_exact(lag):
     ],
 )
 def test_the_benchmark_of_single_records(case, published):
-    errors, _ = errors_of(case, 20, "frequency")
+    errors, _ = delay_errors(case, 20, "frequency")
     assert root_mean_square(errors) < published
 
 
 @pytest.mark.survey
 def test_single_records_cover_with_gain_and_start_unknown():
-    errors, found = errors_of("1 %", 150, "frequency", free=("delay", "gain"))
+    errors, found = delay_errors("1 %", 150, "frequency", free=("delay", "gain"))
     # The bound with gain and offset free is 3.58 ms.
     assert root_mean_square(errors) == pytest.approx(3.58, rel=0.2)
     held = [low <= 0.36 <= high for low, high in (fit.ci() for fit in found)]
@@ -143,7 +152,7 @@ def test_lines_can_be_left_out():
 
 
 def test_a_continuous_loop_has_no_interval():
-    flight, known = fly(ts=None, dt=0.02, limit=None)
+    flight, known = record_step(ts=None, dt=0.02, limit=None)
     fit = estimate(flight, known, period=None)
     assert fit.delay == pytest.approx(0.36, abs=1e-3)
     with pytest.raises(ValueError, match="continuous loop"):
@@ -159,28 +168,28 @@ def test_what_cannot_be_estimated_is_refused():
     with pytest.raises(refused, match="does not repeat"):
         estimate(flight, known, period=60 * TS)
     with pytest.raises(refused, match="is constant"):
-        estimate(swapped(flight, reference=np.zeros(len(flight))), known)
+        estimate(replace_signals(flight, reference=np.zeros(len(flight))), known)
     with pytest.raises(refused, match="1 periods"):
         estimate(flight, known, window=(0.0, 12.0))
     with pytest.raises(ValueError, match="whole number"):
         estimate(flight, known, period=5.21)
     with pytest.raises(refused, match=r"command is 0\.5 throughout"):
-        estimate(swapped(flight, command=np.full(len(flight), 0.5)), known)
+        estimate(replace_signals(flight, command=np.full(len(flight), 0.5)), known)
     with pytest.raises(refused, match="output is 0 throughout"):
-        estimate(swapped(flight, output=np.zeros(len(flight))), known)
+        estimate(replace_signals(flight, output=np.zeros(len(flight))), known)
     with pytest.raises(refused, match="too few"):
         estimate(flight, known, highest=0.2)
     with pytest.raises(refused, match="too few"):
         estimate(flight, known, period=None, highest=0.05)
     with pytest.raises(refused, match="log the command"):
-        estimate(swapped(flight, command=None), known.replace(controller=dtm.PV(1.0, 0.1)))
+        estimate(replace_signals(flight, command=None), known.replace(controller=dtm.PV(1.0, 0.1)))
     with pytest.raises(ValueError, match="for an Integrator"):
         estimate(flight, known.replace(plant=dtm.FirstOrder()), ("delay",))
     with pytest.raises(ValueError, match="choose from"):
         estimate(flight, known, ("delay", "offset"))
     uneven = flight.time + 0.02 * np.sin(np.arange(len(flight)))
     with pytest.raises(refused, match="even"):
-        estimate(swapped(flight, time=uneven), known)
+        estimate(replace_signals(flight, time=uneven), known)
 
 
 @pytest.mark.parametrize("period", [PERIOD, None])

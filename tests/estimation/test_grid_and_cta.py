@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 from deadtime.estimation import CTA, Grid
 from deadtime.estimation.methods._cta import chebyshev_differentiation
-from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
+from step_recordings import (
+    TS,
+    delay_errors,
+    noise_for_output,
+    record_step,
+    replace_signals,
+    root_mean_square,
+)
 
 METHODS = ("grid", "cta")
 
@@ -15,7 +22,7 @@ METHODS = ("grid", "cta")
 
 @pytest.mark.parametrize("ts", [None, TS])
 def test_the_grid_is_exact_where_the_model_is(ts):
-    flight, known = fly(gain=0.8, lag=0.15, ts=ts, dt=TS, duration=6.0)
+    flight, known = record_step(gain=0.8, lag=0.15, ts=ts, dt=TS, duration=6.0)
     fit = dtm.estimate_delay(
         flight, known.replace(gain=1.0), method="grid", free=("delay", "gain", "lag")
     )
@@ -27,7 +34,7 @@ def test_the_grid_is_exact_where_the_model_is(ts):
 
 def test_the_curve_is_kept_and_its_local_minima_are_named():
     # In a limit cycle a delay that is off by a period fits almost as well.
-    flight, known = fly(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, noise_in_loop=False)
+    flight, known = record_step(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, noise_in_loop=False)
     fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
     delays, costs = np.array(fit.details["delays"]), np.array(fit.details["costs"])
     assert delays.shape == costs.shape
@@ -38,7 +45,7 @@ def test_the_curve_is_kept_and_its_local_minima_are_named():
 
 
 def test_a_grid_of_ones_own():
-    flight, known = fly()
+    flight, known = record_step()
     grid = np.linspace(0.2, 0.6, 9)
     fit = dtm.estimate_delay(flight, known, method=Grid(delays=grid), free=("delay",))
     assert fit.details["delays"] == pytest.approx(grid.tolist())
@@ -63,14 +70,14 @@ def test_a_grid_of_ones_own():
 )
 def test_the_benchmark_of_the_waveform(case, published):
     # 24 flights: the root mean square is known to 14 %.
-    errors, _ = errors_of(case, 24, Grid(initial_output=0.0))
+    errors, _ = delay_errors(case, 24, Grid(initial_output=0.0))
     assert root_mean_square(errors) < 1.2 * published * 1.14
 
 
 def test_the_curvature_is_the_spread_where_noise_does_not_circulate():
     errors, said = [], []
     for seed in range(24):
-        flight, known = fly(noise=0.01, seed=seed, noise_in_loop=False)
+        flight, known = record_step(noise=0.01, seed=seed, noise_in_loop=False)
         fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
         errors.append(fit.delay - 0.36)
         said.append(fit.stderr["delay"])
@@ -127,7 +134,7 @@ def test_chebyshev_with_a_lag_and_two_steps():
 
 def test_chebyshev_in_noise_is_the_fit_of_the_waveform():
     for case, published in (("continuous, Kp 1.31", 0.90), ("continuous, Kp 3", 0.14)):
-        errors, _ = errors_of(case, 5, CTA(initial_output=0.0))
+        errors, _ = delay_errors(case, 5, CTA(initial_output=0.0))
         assert root_mean_square(errors) < 1.2 * published * 1.4
 
 
@@ -136,7 +143,7 @@ def test_chebyshev_in_noise_is_the_fit_of_the_waveform():
     [({"sample_time": TS}, "a hold"), ({"limit": 1.0}, "a limit")],
 )
 def test_chebyshev_is_for_linear_continuous_loops(change, words):
-    flight, known = fly(ts=None, dt=0.02, limit=None)
+    flight, known = record_step(ts=None, dt=0.02, limit=None)
     with pytest.raises(ValueError, match=words):
         dtm.estimate_delay(flight, known.replace(**change), method="cta")
     with pytest.raises(ValueError, match="intervals"):
@@ -148,7 +155,9 @@ def test_chebyshev_is_for_linear_continuous_loops(change, words):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_to_fit_is_refused(method):
-    flight, known = fly(ts=None, dt=0.04, limit=None, rest=1.0, noise=0.003, noise_in_loop=False)
+    flight, known = record_step(
+        ts=None, dt=0.04, limit=None, rest=1.0, noise=0.003, noise_in_loop=False
+    )
 
     def estimate(recording, **options):
         return dtm.estimate_delay(recording, known, method=method, **options)
@@ -156,7 +165,7 @@ def test_nothing_to_fit_is_refused(method):
     with pytest.raises(dtm.NotIdentifiableError, match="does not excite"):
         estimate(flight, window=(4.8, 6.0))
     with pytest.raises(dtm.NotIdentifiableError, match="did not move"):
-        estimate(swapped(flight, output=np.zeros(len(flight))))
+        estimate(replace_signals(flight, output=np.zeros(len(flight))))
     with pytest.raises(dtm.NotIdentifiableError, match="too few"):
         estimate(flight, window=(0.5, 1.1))
     with pytest.raises(ValueError, match="unknown"):

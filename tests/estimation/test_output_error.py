@@ -1,9 +1,9 @@
 """Output error with the logged command: on the Cramér-Rao bound, and honest about a lag."""
 
 import deadtime as dtm
-import flown
 import numpy as np
 import pytest
+import step_recordings
 from deadtime.estimation import OutputError
 from deadtime.estimation.models._held_response import HeldResponse
 from flights import flight_path
@@ -14,7 +14,7 @@ from scipy.signal import lsim
 TS = 0.065
 
 
-def fly(delay=0.36, gain=1.0, lag=0.0, Kp=1.31, noise=0.0, seed=0, limit=1.0, duration=6.0):
+def record_step(delay=0.36, gain=1.0, lag=0.0, Kp=1.31, noise=0.0, seed=0, limit=1.0, duration=6.0):
     """A flight whose sensor noise the controller acts on, its command logged, and what is known."""
     loop = dtm.ControlLoop(
         dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=TS, limit=limit
@@ -22,9 +22,9 @@ def fly(delay=0.36, gain=1.0, lag=0.0, Kp=1.31, noise=0.0, seed=0, limit=1.0, du
     time = np.arange(0.0, duration, TS)
     reference = np.where(time < 1.0 - 1e-9, 0.0, 1.0)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
-    flown = loop.simulate(time, reference - error, reference_time=time, initial_output=0.0)
+    run = loop.simulate(time, reference - error, reference_time=time, initial_output=0.0)
     known = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=TS, limit=limit)
-    return dtm.Recording(time, reference, flown.outputs + error, flown.inputs), known
+    return dtm.Recording(time, reference, run.outputs + error, run.inputs), known
 
 
 # --- the response to a held command ---------------------------------------------------------
@@ -82,14 +82,14 @@ def test_the_derivatives_are_those_of_the_response(steps, lag, seed):
 @settings(max_examples=25)
 @given(delay=st.floats(0.0, 0.8), gain=st.floats(0.3, 2.0), lag=st.floats(0.02, 0.5))
 def test_a_noise_free_flight_is_recovered_exactly(delay, gain, lag):
-    plain, known = fly(delay, gain)
+    plain, known = record_step(delay, gain)
     fit = dtm.estimate_delay(plain, known)
     assert fit.method == "output_error"  # what the default takes when there is a command
     # The cost is that of an exact model: the delay comes out to rounding of the clock.
     assert fit.delay == pytest.approx(delay, abs=1e-9)
     assert fit.gain == pytest.approx(gain, abs=1e-9)
     assert fit.adequate
-    lagging, known = fly(delay, gain, lag)
+    lagging, known = record_step(delay, gain, lag)
     fit = dtm.estimate_delay(lagging, known, free=("delay", "gain", "lag"))
     # Delay and lag are nearly confounded: the valley is flat, its floor known to rounding.
     assert fit.delay == pytest.approx(delay, abs=1e-5)
@@ -105,7 +105,7 @@ def test_a_noise_free_flight_is_recovered_exactly(delay, gain, lag):
 def test_the_error_is_the_cramer_rao_bound_and_intervals_cover(free, start):
     errors, bounds, held = [], [], 0
     for seed in range(200):
-        flight, known = fly(noise=0.01, seed=seed)
+        flight, known = record_step(noise=0.01, seed=seed)
         fit = dtm.estimate_delay(flight, known, method=OutputError(start), free=free)
         errors.append(fit.delay - 0.36)
         bounds.append(fit.crb.stderr["delay"])
@@ -119,7 +119,7 @@ def test_the_error_is_the_cramer_rao_bound_and_intervals_cover(free, start):
 
 
 def test_the_bound_of_a_pure_delay_is_the_closed_form():
-    flight, known = fly(noise=0.01, seed=3)
+    flight, known = record_step(noise=0.01, seed=3)
     fit = dtm.estimate_delay(flight, known, method=OutputError(initial_output=0.0), free=("delay",))
     arriving = HeldResponse(flight.time, flight.command).at(flight.time - fit.delay).rate
     bound = fit.crb.noise / np.sqrt(np.sum(arriving**2))
@@ -133,7 +133,7 @@ def test_intervals_cover_where_the_lag_is_at_its_bound():
     truth = {"delay": 0.36, "lag": 0.0, "delay+lag": 0.36}
     runs = 40
     for seed in range(runs):
-        flight, known = fly(noise=0.01, seed=seed)
+        flight, known = record_step(noise=0.01, seed=seed)
         fit = dtm.estimate_delay(flight, known, free=("delay", "gain", "lag"))
         for name, value in truth.items():
             low, high = fit.ci(0.95, name)
@@ -143,14 +143,14 @@ def test_intervals_cover_where_the_lag_is_at_its_bound():
 
 
 def test_the_sum_of_delay_and_lag_is_known_when_the_parts_are_not():
-    flight, known = fly(0.30, lag=0.06, noise=0.01, seed=5)
+    flight, known = record_step(0.30, lag=0.06, noise=0.01, seed=5)
     fit = dtm.estimate_delay(flight, known, free=("delay", "gain", "lag"))
     assert fit.stderr["delay"] > 4 * fit.stderr["delay+lag"]
     assert fit.delay_plus_lag == pytest.approx(0.36, abs=3 * fit.stderr["delay+lag"])
 
 
 def test_profiles_meet_the_interval_where_they_say():
-    flight, known = fly(0.30, lag=0.06, noise=0.01, seed=5)
+    flight, known = record_step(0.30, lag=0.06, noise=0.01, seed=5)
     fit = dtm.estimate_delay(flight, known, free=("delay", "gain", "lag"))
     assert "profile likelihood" in fit.message
     from scipy.special import stdtrit
@@ -166,7 +166,7 @@ def test_profiles_meet_the_interval_where_they_say():
 
 
 def test_profile_and_gauss_agree_where_both_hold():
-    flight, known = fly(noise=0.01, seed=7)
+    flight, known = record_step(noise=0.01, seed=7)
     fit = dtm.estimate_delay(flight, known)
     low, high = fit.ci()
     _, t = fit.profile("delay", [low, high])
@@ -175,7 +175,7 @@ def test_profile_and_gauss_agree_where_both_hold():
 
 
 def test_a_window_in_flight_knows_the_commands_before_it():
-    flight, known = fly(0.36, 0.9)
+    flight, known = record_step(0.36, 0.9)
     fit = dtm.estimate_delay(flight, known, window=(1.4, 4.0))
     assert (fit.delay, fit.gain) == pytest.approx((0.36, 0.9), abs=1e-9)
 
@@ -189,7 +189,7 @@ def test_a_continuous_command_is_not_taken_as_held(Kp, known):
     # 0.88 and 0.16 ms.
     errors = []
     for seed in range(40):
-        flight, loop = flown.fly(
+        flight, loop = step_recordings.record_step(
             Kp=Kp, noise=0.01, seed=seed, ts=None, dt=0.01, limit=None, noise_in_loop=False
         )
         fit = dtm.estimate_delay(
@@ -200,7 +200,7 @@ def test_a_continuous_command_is_not_taken_as_held(Kp, known):
 
 
 def test_a_lag_that_is_left_out_is_noticed():
-    flight, known = fly(0.30, lag=0.15, noise=0.002, seed=1)
+    flight, known = record_step(0.30, lag=0.15, noise=0.002, seed=1)
     fit = dtm.estimate_delay(flight, known)
     assert not fit.adequate
     assert "free=('delay', 'gain', 'lag')" in fit.message
@@ -210,7 +210,7 @@ def test_a_lag_that_is_left_out_is_noticed():
 
 def refused(**change):
     time = np.arange(0.0, 6.0, TS)
-    flight, known = fly(noise=0.001)
+    flight, known = record_step(noise=0.001)
     arrays = {"reference": flight.reference, "output": flight.output, "command": flight.command}
     arrays |= {name: value for name, value in change.items() if name in arrays}
     loop = change.get("loop", known)
@@ -252,7 +252,7 @@ def test_what_cannot_be_estimated_is_refused_with_the_reason(change, match):
 @pytest.mark.parametrize("method", ["output_error", "waveform"])
 @pytest.mark.parametrize("free", [("delay",), ("delay", "gain"), ("delay", "gain", "lag")])
 def test_noise_alone_is_no_answer_to_a_command(method, free):
-    flight, known = fly(noise=0.001)
+    flight, known = record_step(noise=0.001)
     for seed in range(6):
         output = np.random.default_rng(seed).normal(size=len(flight))
         noise = dtm.Recording(flight.time, flight.reference, output, flight.command)
@@ -263,7 +263,7 @@ def test_noise_alone_is_no_answer_to_a_command(method, free):
 
 
 def test_an_estimate_without_a_profile_says_so():
-    flight, known = fly(noise=0.001, Kp=2.0)
+    flight, known = record_step(noise=0.001, Kp=2.0)
     fit = dtm.estimate_delay(flight, known, method="overshoot")
     with pytest.raises(ValueError, match="output_error"):
         fit.profile()

@@ -4,9 +4,9 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Relay
-from flown import TS, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import TS, noise_for_output, record_step, replace_signals, root_mean_square
 
 
 def relay(delay=0.36, lag=0.0, ts=TS, noise=0.0, seed=0, duration=20.0, dt=0.02):
@@ -58,7 +58,9 @@ def test_a_lag_counts_as_delay_unless_it_is_known():
 
 def test_a_relay_that_was_not_logged():
     flight, known = relay()
-    fit = dtm.estimate_delay(swapped(flight, command=None), known, method=Relay(amplitude=0.5))
+    fit = dtm.estimate_delay(
+        replace_signals(flight, command=None), known, method=Relay(amplitude=0.5)
+    )
     assert fit.delay == pytest.approx(0.36, abs=1e-9)
     assert fit.details["slope"] == pytest.approx(0.5, rel=1e-6)
 
@@ -83,18 +85,18 @@ def test_what_is_no_limit_cycle_is_refused():
     def estimate(recording, loop=known, **options):
         return dtm.estimate_delay(recording, loop, method="relay", **options)
 
-    ringing, its = fly(Kp=3.5, limit=None, duration=12.0)
+    ringing, its = record_step(Kp=3.5, limit=None, duration=12.0)
     with pytest.raises(dtm.NotIdentifiableError, match="not that of a relay"):
         estimate(ringing, its)
     with pytest.raises(dtm.NotIdentifiableError, match="decays from"):
-        estimate(swapped(ringing, command=None), its)
-    calm, its = fly(Kp=1.0)
+        estimate(replace_signals(ringing, command=None), its)
+    calm, its = record_step(Kp=1.0)
     with pytest.raises(dtm.NotIdentifiableError, match="no limit cycle"):
-        estimate(swapped(calm, command=None), its)
+        estimate(replace_signals(calm, command=None), its)
     with pytest.raises(dtm.NotIdentifiableError, match="too short"):
         estimate(flight, window=(0.0, 3.0))
     with pytest.raises(dtm.NotIdentifiableError, match="does not move"):
-        estimate(swapped(flight, output=np.zeros(len(flight))))
+        estimate(replace_signals(flight, output=np.zeros(len(flight))))
     for seed in range(10):
         with pytest.raises(dtm.NotIdentifiableError):
             estimate(noise_for_output(flight, seed))

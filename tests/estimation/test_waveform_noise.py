@@ -10,7 +10,9 @@ from scipy.signal import lsim
 TS = 0.065
 
 
-def fly(noise=0.0, seed=0, delay=0.36, Kp=1.31, limit=1.0, ts=TS, late=0.0, noise_in_loop=True):
+def record_step(
+    noise=0.0, seed=0, delay=0.36, Kp=1.31, limit=1.0, ts=TS, late=0.0, noise_in_loop=True
+):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), delay=delay, sample_time=ts, limit=limit)
     time = np.arange(0.0, 8.0, TS)
     reference = np.where(time < 1.0 - 1e-9, 0.0, 1.0)
@@ -32,7 +34,7 @@ def fly(noise=0.0, seed=0, delay=0.36, Kp=1.31, limit=1.0, ts=TS, late=0.0, nois
 
 
 def test_innovations_are_white_where_simulated_residuals_are_not():
-    flight, known = fly(0.01, seed=2, Kp=3.0)
+    flight, known = record_step(0.01, seed=2, Kp=3.0)
     plain, innovations = (
         dtm.estimate_delay(flight, known, method=Waveform(noise=noise), free=("delay",))
         for noise in ("recording", "loop")
@@ -47,7 +49,7 @@ def test_innovations_are_white_where_simulated_residuals_are_not():
 def test_where_the_noise_goes_is_found_out(noise_in_loop):
     right = 0
     for seed in range(20):
-        flight, known = fly(0.01, seed, Kp=3.0, noise_in_loop=noise_in_loop)
+        flight, known = record_step(0.01, seed, Kp=3.0, noise_in_loop=noise_in_loop)
         fit = dtm.estimate_delay(flight, known, method="waveform")
         right += fit.details["noise"] == ("loop" if noise_in_loop else "recording")
     # Likelihoods of single records come close now and then: in 7 % of them here.
@@ -64,7 +66,7 @@ def test_a_recording_may_begin_with_its_step():
 
 
 def test_a_known_start_sharpens_the_waveform():
-    flight, known = fly(0.01, seed=3, noise_in_loop=False)
+    flight, known = record_step(0.01, seed=3, noise_in_loop=False)
     free, told = (
         dtm.estimate_delay(
             flight,
@@ -81,7 +83,7 @@ def test_a_known_start_sharpens_the_waveform():
 
 
 def test_a_delay_in_the_measurement_is_as_good_as_one_in_the_command():
-    flight, known = fly(0.0)
+    flight, known = record_step(0.0)
     fit = dtm.estimate_delay(flight, known.replace(delay_path="measurement"), method="waveform")
     assert fit.delay == pytest.approx(0.36, abs=1e-7)
     assert fit.loop.delay_path == "measurement"
@@ -90,7 +92,7 @@ def test_a_delay_in_the_measurement_is_as_good_as_one_in_the_command():
 def test_intervals_cover_where_the_noise_circulates():
     held = 0
     for seed in range(200):
-        flight, known = fly(0.01, seed, Kp=3.0)
+        flight, known = record_step(0.01, seed, Kp=3.0)
         fit = dtm.estimate_delay(flight, known, method=Waveform(noise="loop"), free=("delay",))
         low, high = fit.ci()
         held += low <= 0.36 <= high
@@ -107,7 +109,7 @@ def test_intervals_cover_where_the_noise_circulates():
     ],
 )
 def test_innovations_need_a_command_that_can_be_computed(loop, match):
-    flight, _ = fly(0.01)
+    flight, _ = record_step(0.01)
     with pytest.raises(dtm.NotIdentifiableError, match=match):
         dtm.estimate_delay(flight, loop, method=Waveform(noise="loop"))
 
@@ -115,7 +117,7 @@ def test_innovations_need_a_command_that_can_be_computed(loop, match):
 @pytest.mark.parametrize("ts", [TS, None])
 @pytest.mark.parametrize("late", [0.04, 0.2])
 def test_a_clock_that_runs_late_is_recovered(ts, late):
-    flight, known = fly(late=late, ts=ts, limit=None)
+    flight, known = record_step(late=late, ts=ts, limit=None)
     fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "start"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
     assert fit.details["start"] == pytest.approx(late, abs=1e-6)
@@ -128,7 +130,7 @@ def test_a_clock_that_runs_late_is_recovered(ts, late):
 
 def test_a_start_that_is_not_known_costs_as_much_as_the_bound_says():
     # 0.77 ms become 1.22 ms at 0.3 % of noise: about 1.6 times.
-    flight, known = fly(0.003, noise_in_loop=False, ts=None)
+    flight, known = record_step(0.003, noise_in_loop=False, ts=None)
     alone = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
     both = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "start"))
     ratio = both.crb.stderr["delay"] / alone.crb.stderr["delay"]
@@ -136,13 +138,13 @@ def test_a_start_that_is_not_known_costs_as_much_as_the_bound_says():
 
 
 def test_a_start_cannot_be_told_from_the_delay_where_the_command_is_logged():
-    flight, known = fly(0.01)
+    flight, known = record_step(0.01)
     with pytest.raises(ValueError, match="choose from"):
         dtm.estimate_delay(flight, known, method="output_error", free=("delay", "start"))
 
 
 def test_a_limit_is_recovered():
-    flight, known = fly(limit=0.7)
+    flight, known = record_step(limit=0.7)
     fit = dtm.estimate_delay(
         flight, known.replace(limit=1.0), method="waveform", free=("delay", "limit")
     )
@@ -151,7 +153,7 @@ def test_a_limit_is_recovered():
 
 
 def test_profiles_of_the_waveform_meet_its_intervals():
-    flight, known = fly(0.01, seed=2, noise_in_loop=False)
+    flight, known = record_step(0.01, seed=2, noise_in_loop=False)
     fit = dtm.estimate_delay(flight, known, method=Waveform(noise="recording"), free=("delay",))
     low, high = fit.ci()
     _, t = fit.profile("delay", [low, fit.delay, high])

@@ -1,4 +1,4 @@
-"""Experiments: what they excite, and that flying one is the loop it says it is."""
+"""Experiments: their spectra and levels, and that a run is the simulated loop."""
 
 import copy
 import pickle
@@ -29,7 +29,7 @@ def test_a_step_begins_at_the_first_sample_or_after_its_rest():
     assert later.time[np.argmax(later.reference > 0)] == pytest.approx(1.3)
 
 
-def test_a_hold_of_no_whole_number_of_samples_changes_at_the_next_sample():
+def test_a_hold_that_is_not_a_multiple_of_the_sample_time_ends_at_the_next_sample():
     wave = dtm.Experiment.square(2.0, 1.0, hold=0.2)
     changes = wave.time[1:][np.diff(wave.reference) != 0]
     np.testing.assert_allclose(changes, np.ceil(0.2 * np.arange(1, 10) / TS) * TS)
@@ -38,7 +38,7 @@ def test_a_hold_of_no_whole_number_of_samples_changes_at_the_next_sample():
 
 
 @pytest.mark.parametrize("hold", [TS, 2 * TS, 0.4])
-def test_a_prbs_holds_and_has_both_levels(hold):
+def test_a_prbs_holds_its_value_and_has_both_levels(hold):
     wave = dtm.Experiment.prbs(20.0, 0.4, hold, seed=5)
     assert set(wave.reference) == {-0.4, 0.4}
     changes = wave.time[1:][np.diff(wave.reference) != 0]
@@ -51,8 +51,8 @@ def test_a_whole_period_of_a_prbs_is_nearly_white():
     bits = 6
     wave = dtm.Experiment.prbs((2**bits - 1) * TS, 1.0, TS)
     power = np.abs(np.fft.rfft(wave.reference)) ** 2
-    # One more of one level than of the other, and all harmonics alike: of a maximum-length
-    # sequence the circular autocorrelation is -1 off zero.
+    # One level occurs once more than the other, and all harmonics are equal: the circular
+    # autocorrelation of a maximum-length sequence is -1 at all shifts but 0.
     np.testing.assert_allclose(power, [1.0] + [2.0**bits] * (power.size - 1), rtol=1e-9)
     assert wave.period == pytest.approx((2**bits - 1) * TS)
 
@@ -62,7 +62,7 @@ def test_a_whole_period_of_a_prbs_is_nearly_white():
     phases=st.sampled_from(["random", "schroeder"]),
     periods=st.integers(1, 3),
 )
-def test_a_multisine_has_the_lines_it_was_given(lines, phases, periods):
+def test_a_multisine_has_the_given_lines(lines, phases, periods):
     wave = dtm.Experiment.multisine(0.4, 80 * TS, sorted(lines), periods, phases=phases)
     assert len(wave) == 80 * periods
     size = np.abs(np.fft.rfft(wave.reference[-80:]))
@@ -72,14 +72,14 @@ def test_a_multisine_has_the_lines_it_was_given(lines, phases, periods):
     assert np.abs(wave.reference).max() == pytest.approx(0.4)
 
 
-def test_a_number_of_lines_is_all_of_them_up_to_it():
+def test_a_number_of_lines_means_all_lines_up_to_it():
     few = dtm.Experiment.multisine(1.0, 80 * TS, np.int64(3))
     np.testing.assert_array_equal(
         few.reference, dtm.Experiment.multisine(1.0, 80 * TS, [1, 2, 3]).reference
     )
 
 
-def test_odd_lines_and_low_peaks():
+def test_a_multisine_can_have_odd_lines_only_and_low_peaks():
     odd = dtm.Experiment.multisine(1.0, 80 * TS, 10, odd=True)
     size = np.abs(np.fft.rfft(odd.reference))
     assert set(np.flatnonzero(size > 1e-9)) == {1, 3, 5, 7, 9}
@@ -92,17 +92,17 @@ def test_odd_lines_and_low_peaks():
     assert crest(phases="schroeder") < 0.85 * random
 
 
-# --- flying ---------------------------------------------------------------------------------
+# --- running ---------------------------------------------------------------------------------
 
 
-def test_the_command_that_is_logged_is_the_one_the_controller_makes():
+def test_the_logged_command_is_that_of_the_controller():
     flight = dtm.Experiment.prbs(10.0, 0.4, 0.4).run(held_loop(dtm.P(2.0)), noise=0.02, seed=4)
     made = np.clip(2.0 * (flight.reference - flight.output), -1.0, 1.0)
     np.testing.assert_allclose(flight.command, made, atol=1e-12)
 
 
 def by_hand(controller, experiment, error, delay_samples, gain=0.9, limit=1.0):
-    """A sampled loop of an integrator in plain recursions, its filter on samples."""
+    """A sampled loop of an integrator in plain recursions, its filter sampled."""
     smooth = controller.filter
     omega, damping = smooth.omega, smooth.damping
     y, seen, commands, outputs = 0.0, 0.0, [], []
@@ -121,7 +121,7 @@ def by_hand(controller, experiment, error, delay_samples, gain=0.9, limit=1.0):
     return np.array(outputs), np.array(commands)
 
 
-def test_noise_that_circulates_goes_through_the_filter_of_a_pv_controller():
+def test_noise_in_the_loop_passes_the_filter_of_a_pv_controller():
     smooth = dtm.DerivativeFilter(12.0, 0.8, discretisation="backward")
     controller = dtm.PV(1.5, 0.2, smooth)
     experiment = dtm.Experiment.square(5.0, 0.3, 0.8)
@@ -132,15 +132,15 @@ def test_noise_that_circulates_goes_through_the_filter_of_a_pv_controller():
     np.testing.assert_allclose(flight.command, commands, atol=1e-11)
 
 
-def test_a_continuous_filter_sees_noise_that_holds():
-    # A filter so fast that it differentiates over one sample gives the difference quotient at no
-    # sample: what it holds is what a fine simulation of the filter holds.
+def test_a_continuous_filter_receives_held_noise():
+    # A filter so fast that it differentiates over one sample does not give the difference quotient
+    # at the samples: the held value is that of a fine simulation of the filter.
     smooth = dtm.DerivativeFilter(20.0, 1.0)
     loop = held_loop(dtm.PV(1.5, 0.2, smooth), limit=None)
     quiet = dtm.Experiment.step(3.0)
     flight = quiet.run(loop, noise=0.03, seed=2)
     error = np.random.default_rng(2).normal(0.0, 0.03, len(quiet))
-    # The same through PD, which takes held noise as the reference by itself.
+    # The same loop with PD, which takes held noise as its reference.
     both = loop.replace(controller=dtm.PD(1.5, 0.2, smooth)).simulate(
         quiet.time, -error, reference_time=quiet.time, reference_before=0.0, initial_output=0.0
     )
@@ -152,7 +152,7 @@ def test_a_continuous_filter_sees_noise_that_holds():
     "controller",
     [dtm.P(2.0), dtm.PI(1.2, 0.3), dtm.PD(1.5, 0.1, dtm.DerivativeFilter(20.0))],
 )
-def test_noise_that_does_not_circulate_leaves_the_loop_alone(controller):
+def test_noise_outside_the_loop_does_not_change_the_loop(controller):
     loop, experiment = held_loop(controller), dtm.Experiment.step(5.0)
     clean = experiment.run(loop)
     logged = experiment.run(loop, noise=0.01, seed=1, noise_in_loop=False)
@@ -162,7 +162,7 @@ def test_noise_that_does_not_circulate_leaves_the_loop_alone(controller):
     assert (experiment.run(loop, noise=0.01, seed=1).command != clean.command).any()
 
 
-def test_a_relay_makes_the_limit_cycle_of_theory():
+def test_a_relay_gives_the_limit_cycle_of_theory():
     delay, size = 0.36, 0.5
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(3.0), delay=delay, limit=2.0)
     flight = dtm.Experiment.relay(20.0, size, sample_time=0.005, reference=1.0).run(loop)
@@ -180,7 +180,7 @@ def test_a_relay_in_a_sampled_loop_switches_at_samples_only():
     )
 
 
-def test_the_log_does_not_tell_where_the_delay_is():
+def test_the_recording_is_the_same_wherever_the_delay_is():
     loop = held_loop(dtm.P(2.0))
     other = loop.replace(delay_path="measurement")
     experiment = dtm.Experiment.prbs(5.0, 0.4, 0.4)
@@ -189,7 +189,7 @@ def test_the_log_does_not_tell_where_the_delay_is():
     np.testing.assert_array_equal(one.command, two.command)
 
 
-def test_copies_stay_as_they_are():
+def test_copies_are_equal_and_read_only():
     experiment = dtm.Experiment.multisine(0.4, 80 * TS, 12, 2)
     for again in (copy.deepcopy(experiment), pickle.loads(pickle.dumps(experiment))):
         np.testing.assert_array_equal(again.reference, experiment.reference)
@@ -198,7 +198,7 @@ def test_copies_stay_as_they_are():
             again.time[0] = 1.0
 
 
-# --- how it fails ---------------------------------------------------------------------------
+# --- refusals --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -225,7 +225,7 @@ def test_copies_stay_as_they_are():
         (lambda: dtm.Experiment.relay(5.0, 0.0), "relay_amplitude"),
     ],
 )
-def test_what_is_no_experiment_is_refused(make, match):
+def test_invalid_experiments_are_refused(make, match):
     with pytest.raises((ValueError, TypeError), match=match):
         make()
 
@@ -257,6 +257,8 @@ def test_what_is_no_experiment_is_refused(make, match):
         ),
     ],
 )
-def test_what_cannot_be_flown_is_refused_with_the_reason(experiment, loop, options, match):
+def test_experiments_that_cannot_be_run_are_refused_with_the_reason(
+    experiment, loop, options, match
+):
     with pytest.raises(ValueError, match=match):
         experiment.run(loop, **options)

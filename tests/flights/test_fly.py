@@ -1,4 +1,4 @@
-"""The experiment: steps on a vehicle, what ends them, and what is learnt; all in virtual time."""
+"""The flight experiment in virtual time: steps, rules that end a flight, and what is estimated."""
 
 import math
 import os
@@ -31,15 +31,15 @@ TS = 0.065
 
 
 def columns_of(path):
-    """The numbers of a recording, by the names in its first line."""
+    """The numbers of a recording, by the column names in its first line."""
     return np.genfromtxt(path, delimiter=",", names=True)
 
 
-# What is commanded
+# Commands
 
 
-def test_the_filtered_speed_is_that_of_the_exact_loop():
-    # The loop of the library, simulated with the same rule, gives the same command at each sample.
+def test_the_command_with_filtered_speed_is_that_of_the_exact_loop():
+    # The simulated `ControlLoop` with the same rule gives the same command at each sample.
     smooth = dtm.DerivativeFilter(38.0, discretisation="tustin")
     loop = dtm.ControlLoop(
         dtm.Integrator(0.9, 0.1), dtm.PV(2.0, 0.4, smooth), delay=0.3, sample_time=TS
@@ -54,7 +54,7 @@ def test_the_filtered_speed_is_that_of_the_exact_loop():
     np.testing.assert_allclose(made, flown.inputs, atol=1e-9)
 
 
-def test_a_reported_speed_takes_the_place_of_the_filtered_one():
+def test_a_reported_speed_replaces_the_filtered_one():
     control = HeightControl(dtm.PV(2.0, 0.5), TS)
     control.command(1.0, 0.5, None)
     assert control.command(1.0, 0.9, 0.2) == pytest.approx(2.0 * 0.1 - 0.5 * 0.2)
@@ -62,12 +62,12 @@ def test_a_reported_speed_takes_the_place_of_the_filtered_one():
         HeightControl(dtm.PI(1.0, 0.1), TS)
 
 
-def test_a_speed_begins_at_rest():
+def test_the_speed_filter_starts_at_rest():
     speed = Velocity(PAPER_FILTER, TS)
     assert [speed.next(1.3) for _ in range(5)] == pytest.approx([0.0] * 5, abs=1e-9)
 
 
-def test_a_programme_says_what_to_hold_when():
+def test_a_programme_gives_the_reference_at_each_sample():
     programme = StepProgramme((1.0, 1.25, 1.0), (0.5, 0.2, 0.2), 0.1)
     told = [programme.reference(k * 0.1) for k in range(programme.samples)]
     assert told == [1.0] * 5 + [1.25] * 2 + [1.0] * 2
@@ -90,16 +90,16 @@ def test_gains_are_bounded_before_the_delay_is_known(Kp, allowed):
             check_gain(Kp, 0.36, 0.885)
 
 
-# What ends a flight
+# Rules that end a flight
 
 
-def troubled(change, after=3.0):
-    """A vehicle whose states are changed from a time after the take-off on."""
+def vehicle_with(change, after=3.0):
+    """A vehicle whose reported states are changed from some time after take-off."""
 
-    def trouble(state, since):
+    def change_state(state, since):
         return state if since < after else change(state)
 
-    return SimulatedVehicle(trouble=trouble)
+    return SimulatedVehicle(change_state=change_state)
 
 
 ABORTS = {
@@ -121,9 +121,9 @@ ABORTS = {
 
 @pytest.mark.parametrize("reason", ABORTS)
 def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
-    vehicle = troubled(ABORTS[reason])
+    vehicle = vehicle_with(ABORTS[reason])
     said = "tilted" if reason == "pitch is no number" else reason
-    if reason == "more than 0.475 m apart":  # drifts there, so that nothing jumps
+    if reason == "more than 0.475 m apart":  # The height drifts there, so that it does not jump.
         began = []
 
         def drift(state, since):
@@ -132,14 +132,14 @@ def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
             began.append(since)
             return replace(state, height=state.height + 0.5 * (since - began[0]))
 
-        vehicle = SimulatedVehicle(trouble=drift)
+        vehicle = SimulatedVehicle(change_state=drift)
     if reason == "outside 0.2 to 3 m":
         began = []
 
         def sink(state, since):
             return state if since < 3.0 else replace(state, height=1.0 - 0.9 * (since - 3.0))
 
-        vehicle = SimulatedVehicle(trouble=sink)
+        vehicle = SimulatedVehicle(change_state=sink)
         said = "m apart|outside 0.2"
     with pytest.raises(FlightAbortedError, match=said):
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
@@ -149,24 +149,24 @@ def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
     assert rows.dtype.names == ROW
 
 
-def test_a_height_that_freezes_does_not_make_the_vehicle_climb_for_long(tmp_path):
-    # At the base; the first step is at 5 s, and would be held until 11.5 s.
-    vehicle = troubled(lambda state: replace(state, height=1.0))
+def test_a_constant_height_does_not_make_the_vehicle_climb_for_long(tmp_path):
+    # The vehicle is at the base; the first step is at 5 s and would be held until 11.5 s.
+    vehicle = vehicle_with(lambda state: replace(state, height=1.0))
     with pytest.raises(FlightAbortedError, match=r"has read 1\.000 m"):
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert columns_of(tmp_path / "flight-1-P.csv")["time_s"][-1] < 6.1
     assert vehicle.log[-2:] == ["landed", "closed"]
 
 
-def test_an_error_that_grows_ends_the_flight(tmp_path):
-    # More delay than was believed, and the prior says nothing of it: the loop is unstable.
+def test_a_growing_error_ends_the_flight(tmp_path):
+    # The delay is larger than assumed, and the prior does not show it: the loop is unstable.
     vehicle = SimulatedVehicle(delay=0.75)
     with pytest.raises(FlightAbortedError, match=r"more than 0\.475 m apart"):
         fly_experiment(lambda: vehicle, FlightPlan(gains=(2.4,)), tmp_path, run=run)
     assert vehicle.log[-2:] == ["landed", "closed"]
 
 
-def test_a_base_too_far_from_where_it_hovers_is_said_before_it_is_commanded(tmp_path):
+def test_a_base_far_from_the_hover_height_is_reported_before_it_is_commanded(tmp_path):
     vehicle = SimulatedVehicle()
     plan = FlightPlan(base=2.0)
     with pytest.raises(FlightAbortedError, match=r"hovers at 0\.75 m: .* 2 m, .* begin closer"):
@@ -174,14 +174,14 @@ def test_a_base_too_far_from_where_it_hovers_is_said_before_it_is_commanded(tmp_
     assert vehicle.log == ["connected", "took off", "landed", "closed"]
 
 
-def test_a_gain_beyond_the_bound_is_refused_before_anything_is_connected(tmp_path):
+def test_a_gain_beyond_the_bound_is_refused_before_connecting(tmp_path):
     vehicle = SimulatedVehicle()
     with pytest.raises(ValueError, match=r"Kp = 2\.6 is above 2\.47"):
         fly_experiment(lambda: vehicle, FlightPlan(gains=(1.2, 2.6)), tmp_path, run=run)
     assert vehicle.log == []
 
 
-def test_a_folder_that_takes_no_file_is_refused_before_anything_is_connected(tmp_path):
+def test_a_folder_that_cannot_be_written_is_refused_before_connecting(tmp_path):
     taken = tmp_path / "taken"
     taken.touch()
     for folder in (taken, taken / "below"):
@@ -198,7 +198,7 @@ def test_a_disk_that_fills_up_in_flight_lands_the_vehicle(tmp_path, monkeypatch)
         if "messages" not in self._path and self._file.tell() > 2000:
             synced.append(self)
             raise OSError(28, "No space left on device")
-        time.sleep(0.001)  # virtual time runs ahead of the disk
+        time.sleep(0.001)  # Virtual time is faster than the disk.
         return write(self, waiting)
 
     monkeypatch.setattr(_Writer, "_write", full)
@@ -212,8 +212,8 @@ def test_a_disk_that_fills_up_in_flight_lands_the_vehicle(tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
-    # Journals were put on the disk before the landing: one that took 3 s left it to the watchdog.
+def test_a_slow_disk_delays_neither_commands_nor_the_landing(fails, tmp_path, monkeypatch):
+    # A journal that takes 3 s to be written must not leave the landing to the drone's watchdog.
     ashore, waited = threading.Event(), []
 
     def slow(call):
@@ -226,7 +226,7 @@ def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
     monkeypatch.setattr(_Writer, "_write", slow(_Writer._write))
     monkeypatch.setattr(journal_module.os, "fsync", slow(os.fsync))
 
-    def trouble(state, since):
+    def change_state(state, since):
         return replace(state, roll=1.0) if fails and since > 3.0 else state
 
     class Closing(SimulatedVehicle):
@@ -234,7 +234,7 @@ def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
             await super().close()
             ashore.set()
 
-    vehicle = Closing(trouble=trouble)
+    vehicle = Closing(change_state=change_state)
     flight = fly_all(lambda: vehicle, [dtm.P(1.2)], FlightPlan(), 6.5, tmp_path, 1)
     if fails:
         with pytest.raises(FlightAbortedError, match="tilted"):
@@ -242,19 +242,19 @@ def test_no_disk_delays_commands_or_the_landing(fails, tmp_path, monkeypatch):
     else:
         run(flight)
     assert waited
-    assert all(waited)  # nothing was written before the vehicle was down and its link closed
+    assert all(waited)  # Nothing is written before the vehicle has landed and its link is closed.
     assert vehicle.log[-2:] == ["landed", "closed"]
     rows = columns_of(tmp_path / "flight-1-P.csv")
     assert np.diff(rows["time_s"]) == pytest.approx(TS, abs=1e-6)
     assert rows["time_s"][-1] > (2.8 if fails else 17.8)
 
 
-# What is learnt
+# Estimates
 
 
 @pytest.mark.survey
 @pytest.mark.parametrize("seed", range(3))
-def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
+def test_the_paper_s_experiment_is_reproduced(seed, tmp_path):
     stages = []
     plan = FlightPlan()
     found = fly_experiment(connecting(seed=seed), plan, tmp_path, stages.append, run)
@@ -280,7 +280,7 @@ def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
     assert after.overshoot < 5.0
     for before in (slow, fast, best):
         assert after.settling_time < before.settling_time
-    # Everything was saved, and reads as any recording.
+    # Everything was saved and can be read as any recording.
     again = dtm.read_recording(
         fast.path, time="time_s", reference="reference_m", output="height_m", command="command_m_s"
     )
@@ -290,8 +290,8 @@ def test_the_paper_s_experiment_from_end_to_end(seed, tmp_path):
 
 
 @pytest.mark.survey
-def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
-    vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), tells_climb=False)
+def test_a_vehicle_that_reports_no_climb_is_controlled_with_the_filter(tmp_path):
+    vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), reports_climb=False)
     found = fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert found.learned.split is None
     assert "does not tell" in found.learned.unsplit
@@ -301,11 +301,11 @@ def test_a_vehicle_that_tells_less_is_flown_with_the_filter(tmp_path):
     assert found.learned.fit.delay_plus_lag == pytest.approx(0.40, abs=0.01)
 
 
-def test_a_fit_that_is_not_adequate_is_said_before_its_gains_are_flown(
+def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
     tmp_path, capsys, monkeypatch
 ):
-    # `fly` designed for such intervals and flew the gains, and said nothing of it.
-    def undesigned(loop, *, controller, **how):  # what is flown does not matter here
+    # Intervals of an inadequate fit do not assure a margin.
+    def undesigned(loop, *, controller, **how):  # The designed gains do not matter here.
         return SimpleNamespace(loop=loop.replace(controller=controller))
 
     monkeypatch.setattr(learn_module, "design", undesigned)
@@ -319,7 +319,7 @@ def test_a_fit_that_is_not_adequate_is_said_before_its_gains_are_flown(
 
     said, flights = [], []
     random = np.random.default_rng(2)
-    vehicle = SimulatedVehicle(noise=0.001, random=random, trouble=gusts)
+    vehicle = SimulatedVehicle(noise=0.001, random=random, change_state=gusts)
     plan = FlightPlan(gains=(2.4,), settle=2.5, hold=3.5, checked_hold=2.0)
     found = fly_experiment(lambda: vehicle, plan, tmp_path, run=run, warn=warn)
     assert found.learned.fit.adequate is False
@@ -331,7 +331,7 @@ def test_a_fit_that_is_not_adequate_is_said_before_its_gains_are_flown(
     assert "adequate" not in replace(found, learned=fine).verdict()
 
 
-def test_flights_without_a_vehicle_in_them_are_refused(tmp_path):
+def test_recordings_in_which_the_vehicle_does_not_move_are_refused(tmp_path):
     time = np.arange(200) * TS
     reference = np.where(time < 5.0, 1.0, 1.25)
     noise = np.random.default_rng(0).normal(0.0, 0.002, time.size)
@@ -341,9 +341,9 @@ def test_flights_without_a_vehicle_in_them_are_refused(tmp_path):
         learn([flight], 1.0, 0.25, 2.5)
 
 
-def test_both_parts_are_found_from_what_is_told():
-    # A command in steps; the setpoint follows it 0.1234 s later, the climb that with a lag of 0.15
-    # s.
+def test_link_delay_and_vehicle_lag_are_estimated_from_reported_setpoint_and_climb():
+    # The command changes in steps; the setpoint follows it 0.1234 s later, and the climb follows
+    # the setpoint with a lag of 0.15 s.
     random = np.random.default_rng(3)
     command_time = np.arange(200) * TS
     command = np.repeat(random.uniform(-0.5, 0.5, 40), 5)
@@ -360,23 +360,23 @@ def test_both_parts_are_found_from_what_is_told():
         speed += 1e-4 * (0.8 * value - speed) / 0.15
     climb = np.interp(time, fine, speeds) + random.normal(0.0, 0.01, time.size)
     split = split_delay([telemetry_of((time, setpoint, climb, climb), command_time, command)])
-    # The echo is seen at the first message after it: half of 5 ms later on average.
+    # The setpoint is seen in the first message after its change: half of 5 ms later on average.
     assert split.transport.delay == pytest.approx(0.1234 + 0.0025, abs=0.002)
     assert split.transport.gain == pytest.approx(1.0, abs=0.01)
     assert split.vehicle_delay == pytest.approx(0.15, abs=0.01)
     assert split.vehicle.gain == pytest.approx(0.8, abs=0.01)
 
 
-def test_the_test_vehicle_is_the_kit():
+def test_the_simulated_vehicle_is_the_kit_plant():
     plant = dtm.kit_plant()
     assert (*plant.num, plant.den[1]) == KIT
 
 
-def test_steps_are_measured_as_flown(tmp_path):
+def test_metrics_are_those_of_the_recorded_steps(tmp_path):
     time = np.arange(300) * 0.1
     reference = np.where(time < 10.0, 1.0, np.where(time < 20.0, 1.5, 1.0))
     height = np.where(time < 10.0, 1.0, np.where(time < 20.0, 1.5, 1.0))
-    height[100:103] = (1.2, 1.6, 1.55)  # 20 % over, within 5 % from the fourth sample on
+    height[100:103] = (1.2, 1.6, 1.55)  # 20 % overshoot, within 5 % from the fourth sample on.
     height[200:205] = (1.3, 1.1, 0.95, 0.97, 1.03)
     recording = dtm.Recording(time, reference, height)
     flight = FlownSteps(dtm.P(1.0), recording, tmp_path / "none.csv", None, 0.1, 10.0)

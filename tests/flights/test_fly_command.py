@@ -1,4 +1,4 @@
-"""``deadtime fly`` as it is run: on an emulator of its own, and what signals do to it."""
+"""``deadtime fly`` as a command: with an emulator of its own, and its reactions to signals."""
 
 import asyncio
 import contextlib
@@ -22,7 +22,7 @@ from emulated import emulator, skip_if_too_busy
 FLY = [sys.executable, "-m", "deadtime", "fly"]
 
 
-def flown(*options):
+def run_fly(*options):
     return run("fly", *options)
 
 
@@ -36,7 +36,7 @@ def running(pid):
 
 def test_the_whole_experiment_in_virtual_time(tmp_path):
     folder = tmp_path / "new" / "flight"
-    done = flown("--virtual-time", "--folder", folder, "--seed", 3, "--json")
+    done = run_fly("--virtual-time", "--folder", folder, "--seed", 3, "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert told["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
@@ -53,7 +53,7 @@ def test_the_whole_experiment_in_virtual_time(tmp_path):
     assert page.count("<svg") == 3
     assert told["verdict"].split(".")[0] in page
     assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == told
-    again = flown("--virtual-time", "--folder", folder)
+    again = run_fly("--virtual-time", "--folder", folder)
     assert again.returncode == 1
     assert "holds recordings already" in again.stderr
 
@@ -63,13 +63,13 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         drone.bind(("127.0.0.1", 0))
         drone.settimeout(0.3)
         port = drone.getsockname()[1]
-        done = flown("--host", "127.0.0.1", "--navdata-port", port, "--command-port", port)
+        done = run_fly("--host", "127.0.0.1", "--navdata-port", port, "--command-port", port)
         with pytest.raises(TimeoutError):
             drone.recvfrom(1)
     assert done.returncode == 1
     assert "--i-have-a-safe-area" in done.stderr
     assert "nothing was sent" in done.stderr
-    # A real drone climbs at half a metre a second unless told otherwise.
+    # The default of a real drone's largest climb is half a metre a second.
     assert "no more than 0.5 m/s" in done.stderr
     assert "4 flights" in done.stderr
 
@@ -88,14 +88,14 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),
     ],
 )
-def test_what_is_not_safe_or_makes_no_sense_is_refused(options, said, tmp_path):
-    done = flown("--folder", tmp_path, *options)
+def test_unsafe_or_invalid_options_are_refused(options, said, tmp_path):
+    done = run_fly("--folder", tmp_path, *options)
     assert done.returncode == 1
     assert said in " ".join(done.stderr.split())
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_without_a_flight_in_it_is_taken(tmp_path, monkeypatch):
+def test_the_folder_is_the_first_that_holds_no_flight(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert str(_free_folder()) == "flight"
     (tmp_path / "flight").mkdir()
@@ -107,7 +107,7 @@ def test_a_folder_without_a_flight_in_it_is_taken(tmp_path, monkeypatch):
 
 
 def read_rows(path):
-    """The rows of a recording; every one has to be whole."""
+    """The rows of a recording, each of which must be complete."""
     with path.open(newline="") as stream:
         head, *rows = csv.reader(stream)
     assert tuple(head) == ROW
@@ -115,7 +115,7 @@ def read_rows(path):
     return rows
 
 
-# These tests may run under `nohup`, which the command would respect; this takes its place first.
+# These tests may run under `nohup`, which the command would respect, so SIGHUP is reset first.
 HEEDING_SIGHUP = [
     sys.executable,
     "-c",
@@ -129,7 +129,7 @@ ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
 @pytest.fixture
 def handlers():
-    """What signals do without anybody's word, also where a shell has had Ctrl-C ignored."""
+    """Default signal handlers, even where a shell has made the process ignore Ctrl-C."""
     before = {number: signal.getsignal(number) for number in ENDING}
     for number in ENDING:
         plain = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
@@ -140,9 +140,9 @@ def handlers():
 
 
 @pytest.mark.parametrize("number", ENDING)
-def test_each_signal_cancels_and_is_heeded_again_afterwards(number, handlers):
+def test_each_signal_cancels_the_experiment_and_works_again_afterwards(number, handlers):
     async def fly():
-        for _ in range(3):  # something on the way has taken the first ones for its own
+        for _ in range(3):  # Some code on the way has suppressed the first cancellations.
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.sleep(5.0)
                 raise AssertionError("nothing came")
@@ -161,7 +161,7 @@ def test_each_signal_cancels_and_is_heeded_again_afterwards(number, handlers):
             signal.raise_signal(number)
 
 
-def test_what_nohup_has_had_ignored_stays_so(handlers):
+def test_a_signal_ignored_under_nohup_stays_ignored(handlers):
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
     async def fly():
@@ -174,7 +174,7 @@ def test_what_nohup_has_had_ignored_stays_so(handlers):
 
 
 class LoopWithoutSignals(asyncio.SelectorEventLoop):
-    """As the event loops of Windows are."""
+    """An event loop without signal handlers, as on Windows."""
 
     def add_signal_handler(self, *given):
         raise NotImplementedError
@@ -183,8 +183,10 @@ class LoopWithoutSignals(asyncio.SelectorEventLoop):
         raise NotImplementedError
 
 
-def test_where_the_event_loop_takes_no_signals_the_interpreter_does(handlers, monkeypatch, capsys):
-    # `deadtime fly` could not run on Windows: its first call was one that is not there.
+def test_without_signal_handlers_of_the_event_loop_those_of_the_interpreter_are_used(
+    handlers, monkeypatch, capsys
+):
+    # The event loops of Windows have no `add_signal_handler`.
     monkeypatch.delattr(signal, "SIGHUP")
     monkeypatch.setattr(asyncio.events, "new_event_loop", LoopWithoutSignals)
     landed = []
@@ -231,7 +233,7 @@ def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
                 process.send_signal(number)
                 await asyncio.sleep(0.5)
                 assert emulated.truth().phase is Phase.LANDING
-                process.send_signal(number)  # impatience does not end the landing
+                process.send_signal(number)  # A second signal does not end the landing.
                 _, error = await asyncio.wait_for(process.communicate(), 20.0)
                 assert emulated.truth().phase is Phase.LANDED
                 assert process.returncode == 130
@@ -247,7 +249,7 @@ def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
 
 
 def own_emulators(parent):
-    """Processes that a process has started."""
+    """Processes started by a process."""
     found = []
     for entry in filter(str.isdigit, os.listdir("/proc")):
         try:
@@ -262,7 +264,7 @@ def own_emulators(parent):
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_its_own_emulator_ends_with_it(number, tmp_path):
+def test_the_emulator_that_the_command_starts_ends_with_it(number, tmp_path):
     process = subprocess.Popen([*FLY, "--folder", str(tmp_path)], stderr=subprocess.DEVNULL)
     children = []
     for _ in range(200):

@@ -1,4 +1,4 @@
-"""The experiment over real UDP, shortened: one flight to learn from, one under the PV gains."""
+"""The experiment over real UDP, shortened: one flight to estimate from, one with the PV gains."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -16,7 +16,7 @@ PLAN = FlightPlan(gains=(2.4,), settle=3.5, hold=4.0)
 
 
 @pytest.mark.survey
-def test_the_paper_s_gain_and_what_is_designed_for_it(tmp_path):
+def test_one_flight_with_the_paper_s_gain_and_one_with_the_designed_gains(tmp_path):
     async def fly():
         async with emulator(seed=5) as emulated:
 

@@ -8,14 +8,14 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import Experiment
-from flown import fly
+from step_recordings import record_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
 TIME = np.linspace(0.0, 5.0, 60)
 
 
 def estimated():
-    return dtm.estimate_delay(*fly(rest=1.0), free=("delay",))
+    return dtm.estimate_delay(*record_step(rest=1.0), free=("delay",))
 
 
 def planned():

@@ -8,7 +8,7 @@ import pickle
 import deadtime as dtm
 import numpy as np
 import pytest
-from flown import fly
+from step_recordings import record_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
 CONTINUOUS = LOOP.continuous()
@@ -41,7 +41,9 @@ MADE = {
     "ControlLoop": lambda: LOOP,
     "CramerRaoBound": lambda: dtm.estimation.CramerRaoBound(**bound_fields()),
     "Crossings": lambda: dtm.crossings(FAMILY, {"Kp": (0.1, 9.0)}, at={"T": 0.3}),
-    "DelayEstimate": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)),
+    "DelayEstimate": lambda: dtm.estimate_delay(
+        *record_step(rest=1.0, noise=0.01), free=("delay",)
+    ),
     "DelayResult": solved,
     "DelaySolution": lambda: solved().sol,
     "DelaySystem": lambda: SYSTEM,
@@ -53,7 +55,9 @@ MADE = {
         LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9
     ),
     "FirstOrder": lambda: dtm.FirstOrder(1.0, 0.3),
-    "FittedRun": lambda: dtm.estimate_delay(*fly(rest=1.0, noise=0.01), free=("delay",)).runs[0],
+    "FittedRun": lambda: dtm.estimate_delay(
+        *record_step(rest=1.0, noise=0.01), free=("delay",)
+    ).runs[0],
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
     "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),

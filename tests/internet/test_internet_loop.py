@@ -39,18 +39,18 @@ WAY = Network(delay=0.05)
 
 
 @pytest.fixture(scope="module")
-def calm():
+def constant_delays():
     return run_internet_loop(Trial(gain=8.0, forward_path=WAY, return_path=WAY))
 
 
-def test_with_constant_delays_every_method_finds_what_was_measured(calm):
-    assert [run.trial.gain for run in calm.runs] == list(GAINS)
-    for run in calm.runs:
+def test_with_constant_delays_every_method_finds_the_measured_delay(constant_delays):
+    assert [run.trial.gain for run in constant_delays.runs] == list(GAINS)
+    for run in constant_delays.runs:
         assert run.round_trip["p50"] == pytest.approx(0.1, abs=1e-9)
         assert run.age == pytest.approx(0.105, abs=1e-9)
         assert run.delay("waveform") == pytest.approx(0.1, abs=1e-9)
         assert run.delay("output_error") == pytest.approx(0.1, abs=1e-9)
-        # a continuous loop in place of the held one: the hold is in the delay
+        # The model is a continuous loop instead of the held one, so the hold is part of the delay.
         assert run.delay("exact") == pytest.approx(0.105, abs=1e-4)
         assert 0.105 < run.delay("dominant") < 0.109
         assert not run.is_unsteady
@@ -58,29 +58,29 @@ def test_with_constant_delays_every_method_finds_what_was_measured(calm):
         assert not run.refusals
 
 
-def test_it_is_the_loop_that_the_paper_s_reproduction_computes(calm):
-    run = calm.runs[3]
+def test_the_loop_is_that_of_the_paper_s_reproduction(constant_delays):
+    run = constant_delays.runs[3]
     there = internet_loop(8.0, delay=0.1, sample_time=0.01, duration=5.0)
     here = run.recordings["plant"]
     assert here.output == pytest.approx(there.output[: len(here)], abs=1e-9)
 
 
-def test_the_dominant_root_makes_the_delay_longer_the_larger_the_gain(calm):
-    found = [run.delay("dominant") for run in calm.runs]
+def test_the_dominant_root_method_estimates_a_longer_delay_at_a_larger_gain(constant_delays):
+    found = [run.delay("dominant") for run in constant_delays.runs]
     assert found == sorted(found)
-    # ... by 3 ms from K = 5 to 10, where Table 1 has 38 ms
+    # The increase is 3 ms from K = 5 to 10, where Table 1 has 38 ms.
     assert found[-1] - found[0] == pytest.approx(0.0026, abs=2e-4)
 
 
-def test_all_of_it_is_said_in_plain_values(calm):
-    said = calm.to_dict()
+def test_the_report_converts_to_plain_values(constant_delays):
+    said = constant_delays.to_dict()
     json.dumps(plain(said), allow_nan=False)
     assert said["runs"][0]["plant"]["link"]["round_trip"]["p50"] == pytest.approx(0.1)
     assert said["expected"]["waveform"] == pytest.approx(0.1)
     assert len(said["explanation"]) == 3
 
 
-def test_a_lag_is_found_apart_from_the_delay():
+def test_a_lag_is_estimated_apart_from_the_delay():
     found = run_internet_loop(
         Trial(gain=5.0, forward_path=WAY, return_path=WAY, lag=0.05), gains=(5.0,)
     )
@@ -110,14 +110,14 @@ def test_intervals_of_replayed_steps_cover_the_mean_age(way, monkeypatch):
     for method in methods:
         spreads = [loop.spread(method) for loop in loops]
         assert all(one.replayed for one in spreads)
-        # of ten intervals of 95 % eight or more hold the truth, in 99 of a hundred such tests
+        # Of ten 95 % intervals, eight or more hold the true value in 99 of a hundred such tests.
         assert sum(one.low <= age <= one.high for one in spreads) >= 8
         assert all(one.high - one.low < 0.06 for one in spreads)
     for loop in loops:
         assert any("interval of a single fit" in sentence for sentence in loop.explanation())
 
 
-def test_a_jitter_buffer_gives_the_exact_delay_on_a_network_that_jitters():
+def test_a_jitter_buffer_gives_the_exact_delay_on_a_network_with_jitter():
     way = Network(delay=Normal(0.05, 0.01))
     trial = Trial(gain=6.0, forward_path=way, return_path=way, policy=JitterBuffer(0.16))
     found = run_internet_loop(trial, gains=(5.0, 6.0))
@@ -126,7 +126,7 @@ def test_a_jitter_buffer_gives_the_exact_delay_on_a_network_that_jitters():
         assert not run.is_unsteady
 
 
-def test_both_ends_keep_recordings_that_can_be_read(tmp_path, calm):
+def test_both_ends_write_readable_recordings(tmp_path, constant_delays):
     trial = Trial(gain=8.0, forward_path=WAY, return_path=WAY)
     found = run_internet_loop(trial, (8.0,), folder=tmp_path, methods=["output_error"])
     names = sorted(file.name for file in tmp_path.iterdir())
@@ -138,19 +138,19 @@ def test_both_ends_keep_recordings_that_can_be_read(tmp_path, calm):
         run_internet_loop(trial, gains=(8.0,), folder=tmp_path)
 
 
-def test_answers_are_put_in_the_order_of_the_measurements():
+def test_answers_are_sorted_by_their_measurements():
     assert answer_times([(7, 0.3), (5, 0.1)]).tolist() == [0.1, math.inf, 0.3]
     assert answer_times([]).size == 0
 
 
-def test_a_spread_of_one_or_none_has_no_interval():
+def test_a_spread_of_fewer_than_two_values_has_no_interval():
     assert Spread.of([]).count == 0
     assert math.isnan(Spread.of([0.1]).low)
     both = Spread.of([0.1, 0.2])
     assert both.low < 0.1 < 0.2 < both.high
 
 
-def test_without_enough_replayed_steps_the_runs_give_the_interval():
+def test_with_few_replayed_steps_the_runs_give_the_interval():
     trial = Trial(gain=8.0, forward_path=WAY, return_path=Network(Normal(0.05, 0.01)), duration=2.0)
     whole = run_internet_loop(trial, (7.0, 8.0, 9.0), methods=["exact"])
     few = dataclasses.replace(whole, _errors=tuple({"exact": np.zeros(3)} for _ in range(3)))
@@ -158,11 +158,11 @@ def test_without_enough_replayed_steps_the_runs_give_the_interval():
     assert few.spread("exact") == Spread.of([run.delay("exact") for run in few.runs])
 
 
-def test_a_replayed_step_falls_back_on_the_safe_command():
+def test_a_replayed_step_applies_the_safe_command_after_the_watchdog():
     silent = np.array([0.01] + [math.inf] * 400)
     steps = {safe: Trial(gain=1.0, limit=5.0, duration=5.0, safe=safe) for safe in (0.0, 2.0)}
     peaks = {safe: _overshoot(trial, silent) for safe, trial in steps.items()}
-    # one answer, 1 per second until the watchdog's 0.5 s after it; then the safe command
+    # One answer: 1 per second until the watchdog acts 0.5 s later, then the safe command.
     assert peaks[0.0] == pytest.approx(0.5 - 1.0, abs=1e-9)
     assert peaks[2.0] == pytest.approx(0.5 + 2.0 * (3.99 - 0.51) - 1.0, abs=1e-9)
 
@@ -176,7 +176,7 @@ def test_a_replayed_step_falls_back_on_the_safe_command():
         ({"methods": ["guess"]}, "none of"),
     ],
 )
-def test_what_cannot_be_run_says_why(change, words):
+def test_invalid_trials_are_refused_with_the_reason(change, words):
     with pytest.raises(ValueError, match=words):
         run_internet_loop(Trial(gain=8.0), **change)
 
@@ -185,12 +185,12 @@ def test_what_cannot_be_run_says_why(change, words):
 
 
 def unsteadiness(found):
-    """By how much the ages of commands differ, on a network that is constant: a busy machine."""
+    """Spread of the ages of commands on a constant network, which shows how busy the machine is."""
     ages = found.runs[0].plant["age_when_applied"]
     return ages["p99"] - ages["p50"]
 
 
-def test_over_udp_in_three_processes_the_estimate_is_what_was_measured():
+def test_over_udp_in_three_processes_the_estimate_is_the_measured_delay():
     tries = []
     while len(tries) < 4 and (not tries or unsteadiness(tries[-1]) > 0.003):
         trial = Trial(gain=8.0, forward_path=WAY, return_path=WAY)
@@ -198,7 +198,7 @@ def test_over_udp_in_three_processes_the_estimate_is_what_was_measured():
     found = min(tries, key=unsteadiness)
     (run,) = found.runs
     busy = unsteadiness(found)
-    # a process wakes up some tenths of a millisecond late; a busy machine is later now and then
+    # A process wakes up some tenths of a millisecond late, and later on a busy machine.
     assert 0.100 <= run.round_trip["p50"] <= 0.106
     assert run.plant["link"]["lost"] <= 5
     for method in ("dominant", "exact"):
@@ -209,7 +209,7 @@ def test_over_udp_in_three_processes_the_estimate_is_what_was_measured():
 
 
 def moving_plant(folder, address):
-    """Options of a plant that is under way, at 5 per second, for as long as the test lasts."""
+    """Options of a plant that moves at 5 per second for as long as the test lasts."""
     return PlantOptions(
         controller=address,
         duration=60.0,
@@ -221,7 +221,7 @@ def moving_plant(folder, address):
 
 
 def rows(folder, least=1):
-    """The rows of the plant's recording, once there are so many."""
+    """The rows of the plant's recording, as soon as it has this many."""
     file = folder / "plant.csv"
     for _ in range(1000):
         lines = file.read_text().splitlines()[1:] if file.exists() else []
@@ -231,7 +231,7 @@ def rows(folder, least=1):
     raise AssertionError(f"only {len(lines)} rows after 20 s")
 
 
-def test_a_controller_that_is_killed_leaves_the_plant_safe_and_may_come_back(tmp_path):
+def test_a_killed_controller_leaves_the_plant_safe_and_can_be_restarted(tmp_path):
     options = ControllerOptions(gain=1.0, limit=5.0)
     with part("controller", arguments_of(options)) as controller:
         address = controller.address()
@@ -240,12 +240,12 @@ def test_a_controller_that_is_killed_leaves_the_plant_safe_and_may_come_back(tmp
             controller.process.kill()
             controller.process.wait()
             killed = float(rows(tmp_path)[-1][0])
-            # the watchdog's 0.5 s, and what a busy machine takes to write it down
+            # The watchdog's 0.5 s plus the time in which a busy machine writes the row.
             after = rows(tmp_path, least=round(killed / 0.01) + 150)
             moving = [float(row[0]) for row in after if float(row[3]) != 0.0]
             assert moving[-1] <= killed + 0.5 + 0.3
             assert float(after[-1][3]) == 0.0
-            # at rest: an integrator without a command stays where it is
+            # An integrator without a command stays at its value.
             assert after[-1][2] == after[-20][2]
             again = ControllerOptions(gain=1.0, limit=5.0, listen=address)
             with part("controller", arguments_of(again)) as second:
@@ -254,7 +254,7 @@ def test_a_controller_that_is_killed_leaves_the_plant_safe_and_may_come_back(tmp
                 assert float(later[-1][3]) == 5.0
 
 
-def test_the_parts_say_what_is_wrong_in_one_line(capsys):
+def test_each_part_reports_errors_in_one_line(capsys):
     def said(*arguments):
         try:
             code = main(arguments)
@@ -272,7 +272,7 @@ def test_the_parts_say_what_is_wrong_in_one_line(capsys):
     assert "port 0" in said("plant", "--controller", "127.0.0.1:0", "--duration", "1")
 
 
-def test_each_part_says_where_it_listens_and_at_ctrl_c_what_happened():
+def test_each_part_prints_its_address_and_on_ctrl_c_its_report():
     for name, arguments in (
         ("controller", ["--gain", "8"]),
         ("relay", ["--to", "127.0.0.1:9"]),
@@ -297,7 +297,7 @@ def test_a_part_ends_with_the_process_that_started_it():
         port = int(parent.stdout.readline())
         parent.kill()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        for _ in range(1000):  # until the port is given back
+        for _ in range(1000):  # Until the port is released.
             try:
                 free.bind(("127.0.0.1", port))
                 break
@@ -306,14 +306,14 @@ def test_a_part_ends_with_the_process_that_started_it():
         assert free.getsockname()[1] == port
 
 
-def test_why_a_part_ended_is_said():
+def test_the_reason_why_a_part_ended_is_reported():
     options = ["--controller", "127.0.0.1:9", "--recording", "/dev/null"]
     said = pytest.raises(LinkError, match=r"exit code 1\).*/dev/null")
     with part("plant", options) as running, said:
         running.report(within=20.0)
 
 
-def test_all_parts_speak_ipv6():
+def test_all_parts_support_ipv6():
     with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("::1", 0))
@@ -327,8 +327,8 @@ def test_all_parts_speak_ipv6():
                 assert plant.report(within=30.0)["applied"] > 50
 
 
-def test_options_go_through_the_command_line():
-    """What a process is told is what it does; one example of each kind of option."""
+def test_options_survive_the_command_line():
+    """A process runs with the options that it was given; one example of each type of option."""
     options = PlantOptions(
         controller=("127.0.0.1", 5600),
         policy=JitterBuffer(0.14),
@@ -358,7 +358,7 @@ def command(*arguments, cwd):
     return command_line.run("internet-loop", "--virtual-time", *arguments, cwd=cwd)
 
 
-def test_the_command_shows_what_was_measured_beside_the_estimates_and_table_1(tmp_path):
+def test_the_command_prints_measured_and_estimated_delays_beside_table_1(tmp_path):
     result = command("--gain", "5", "--gain", "8", "--plot", "loop.png", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     for words in ("round trip", "100.0 / 100.0", "34.1 %", "31.5 %", "107.2", "103.7"):
@@ -367,7 +367,7 @@ def test_the_command_shows_what_was_measured_beside_the_estimates_and_table_1(tm
 
 
 @pytest.mark.parametrize("where", [["--plot", "loop.txt"], ["--folder", "a-file"]])
-def test_where_nothing_can_be_written_nothing_runs(where, tmp_path, monkeypatch):
+def test_without_a_writable_folder_nothing_is_run(where, tmp_path, monkeypatch):
     (tmp_path / "a-file").touch()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(deadtime.internet._loop, "_run", lambda *_: pytest.fail("it runs"))
@@ -375,9 +375,9 @@ def test_where_nothing_can_be_written_nothing_runs(where, tmp_path, monkeypatch)
     assert isinstance(result.exception, (ValueError, FileExistsError))
 
 
-def test_the_command_says_the_same_for_the_same_seed(tmp_path):
+def test_the_command_prints_the_same_for_the_same_seed(tmp_path):
     arguments = ["--jitter", "0.01", "--loss", "0.05", "--gain", "8", "--json", "--seed", "3"]
-    # In two processes: within one, names have the same hashes and sets the same order.
+    # In two processes, because within one the order of sets would be the same.
     whole = [sys.executable, "-m", "deadtime", "internet-loop", "--virtual-time", *arguments]
     one, other = (
         subprocess.run(
@@ -407,7 +407,7 @@ def test_the_command_says_the_same_for_the_same_seed(tmp_path):
         (["--folder", "a-file", "--gain", "8"], "a-file: File exists"),
     ],
 )
-def test_the_command_says_what_is_wrong_in_one_line(arguments, words, tmp_path):
+def test_the_command_reports_errors_in_one_line(arguments, words, tmp_path):
     (tmp_path / "a-file").touch()
     result = command(*arguments, cwd=tmp_path)
     assert result.returncode == 1

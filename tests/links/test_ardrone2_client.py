@@ -19,8 +19,8 @@ def now():
     return asyncio.get_running_loop().time()
 
 
-async def look(drone, often=0.02, hovering=True):
-    """Read states until something is wrong."""
+async def read_states(drone, often=0.02, hovering=True):
+    """Read states until an error ends the flight."""
     while True:
         if hovering:
             drone.hover()
@@ -28,8 +28,8 @@ async def look(drone, often=0.02, hovering=True):
         await drone.state()
 
 
-async def fall(drone):
-    """Take off, then trip."""
+async def take_off_and_fail(drone):
+    """Take off, then raise an exception."""
     async with drone:
         await drone.take_off()
         drone.command(0.5)
@@ -37,7 +37,7 @@ async def fall(drone):
 
 
 async def take_off_and_hover(emulated):
-    """Fly until somebody ends it."""
+    """Take off and hover until something ends the flight."""
     async with client_of(emulated) as drone:
         await drone.take_off()
         while True:
@@ -45,8 +45,8 @@ async def take_off_and_hover(emulated):
             await asyncio.sleep(0.05)
 
 
-def watch_datagrams(drone):
-    """Everything that the client sends from now on, with the time."""
+def record_datagrams(drone):
+    """Record everything that the client sends from now on, with its time."""
     sent = []
     socket = drone._link._commands
 
@@ -59,12 +59,12 @@ def watch_datagrams(drone):
 
 
 @pytest.mark.parametrize("full", [True, False])
-def test_it_connects_flies_and_lands(full):
+def test_connect_take_off_command_and_land(full):
     async def fly():
         async with connected(full=full, noise=0.0) as (emulated, drone):
             assert drone.vz_max == 1.0
             assert (await drone.state()).landed
-            assert emulated.truth().phase is Phase.LANDED  # connecting never takes off
+            assert emulated.truth().phase is Phase.LANDED  # Connecting never takes off.
             await drone.take_off()
             state = await drone.state()
             assert state.flying
@@ -78,7 +78,7 @@ def test_it_connects_flies_and_lands(full):
             )
             await drone.land()
             assert (await drone.state()).landed
-            await drone.land()  # twice is once
+            await drone.land()  # A second call has no effect.
         assert emulated.truth().phase is Phase.LANDED
         statistics = drone.statistics
         assert statistics.missing == statistics.broken == statistics.implausible == 0
@@ -87,16 +87,16 @@ def test_it_connects_flies_and_lands(full):
     run(fly())
 
 
-def test_speed_is_a_share_of_what_was_read_back():
-    # The unit trap: at the drone's own default of 700 mm/s a command of 1 is 0.7 m/s.
+def test_climb_command_is_scaled_by_the_largest_climb_read_back():
+    # At the drone's own default of 700 mm/s a command of 1 means 0.7 m/s.
     async def fly():
         async with connected(noise=0.0) as (emulated, drone):
             assert emulated.drone.settings.climb_limit == 1.0
             assert emulated.drone.settings.heights[1] == LIMITS.max_height
             await drone.take_off()
-            sent = watch_datagrams(drone)
+            sent = record_datagrams(drone)
             drone.command(0.4)
-            await asyncio.sleep(0.275)  # the emulator's transport delay is 0.26 s
+            await asyncio.sleep(0.275)  # The emulator's transport delay is 0.26 s.
             assert emulated.truth().setpoint == pytest.approx(0.4, abs=1e-6)
             moves = [c for _, commands in sent for _, c in commands if hasattr(c, "gaz")]
             assert moves[0].gaz == pytest.approx(0.4, abs=1e-6)
@@ -104,7 +104,7 @@ def test_speed_is_a_share_of_what_was_read_back():
     run(fly())
 
 
-def test_commands_are_clipped_and_what_is_no_number_is_refused():
+def test_commands_are_clipped_and_non_numbers_refused():
     async def fly():
         async with connected(Limits(max_climb=0.5)) as (_, drone):
             with pytest.raises(LinkError, match="not in the air"):
@@ -119,15 +119,15 @@ def test_commands_are_clipped_and_what_is_no_number_is_refused():
     run(fly())
 
 
-def test_every_cycle_repeats_the_wish_and_no_setpoint_is_repeated_when_it_is_old():
+def test_every_cycle_sends_the_flight_request_and_an_old_setpoint_is_not_repeated():
     async def fly():
         async with connected() as (emulated, drone):
             await drone.take_off()
-            sent = watch_datagrams(drone)
+            sent = record_datagrams(drone)
             given = now()
             drone.command(0.5)
             with pytest.raises(FlightAbortedError, match=r"no command for 1\.0"):
-                await look(drone, 0.01, hovering=False)
+                await read_states(drone, 0.01, hovering=False)
             assert now() - given == pytest.approx(LIMITS.landing_after, abs=0.05)
             times = [time for time, _ in sent]
             assert max(b - a for a, b in itertools.pairwise(times)) <= 0.0301
@@ -148,32 +148,32 @@ def test_every_cycle_repeats_the_wish_and_no_setpoint_is_repeated_when_it_is_old
     run(fly())
 
 
-def test_take_off_is_held_until_the_transition_is_over():
+def test_take_off_bit_is_set_until_the_transition_ends():
     async def fly():
         async with connected() as (_, drone):
-            sent = watch_datagrams(drone)
+            sent = record_datagrams(drone)
             begun = now()
             await drone.take_off()
-            assert now() - begun > 4.5  # motors, rise and settling, as the vehicle does
+            assert now() - begun > 4.5  # The motors start, it rises and settles.
             up = [c.take_off for _, commands in sent for _, c in commands if isinstance(c, Ref)]
             first = up.index(True)
             assert all(up[first:])
             names = [type(c).__name__ for _, commands in sent for _, c in commands]
             assert names.count("FlatTrim") == 1
-            assert names.index("FlatTrim") < up.index(True) * 2  # on the ground, before
+            assert names.index("FlatTrim") < up.index(True) * 2  # On the ground, before take-off.
 
     run(fly())
 
 
 @pytest.mark.parametrize("begun", [0.5, 2.0, 4.0])
-def test_silence_while_taking_off_lands_it(begun):
+def test_missing_navdata_during_take_off_lands_the_drone(begun):
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
             await drone.connect()
             taking_off = asyncio.create_task(drone.take_off())
             await asyncio.sleep(begun)
-            drone._link.reader.accept = lambda packet, now: None  # commands still arrive
+            drone._link.reader.accept = lambda packet, now: None  # Commands still arrive.
             lost = now()
             with pytest.raises(LinkError, match="nothing received"):
                 await taking_off
@@ -186,7 +186,7 @@ def test_silence_while_taking_off_lands_it(begun):
     run(fly())
 
 
-def test_an_emergency_while_taking_off_ends_it():
+def test_an_emergency_during_take_off_ends_the_flight():
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
@@ -202,13 +202,13 @@ def test_an_emergency_while_taking_off_ends_it():
     run(fly())
 
 
-def test_an_exception_lands_it():
+def test_an_exception_lands_the_drone():
     seen = {}
 
     async def fly():
         async with emulator() as emulated:
             with pytest.raises(ZeroDivisionError):
-                await fall(client_of(emulated))
+                await take_off_and_fail(client_of(emulated))
             seen["phase"] = emulated.truth().phase
 
     run(fly())
@@ -216,7 +216,7 @@ def test_an_exception_lands_it():
 
 
 @pytest.mark.parametrize("impatient", [False, True])
-def test_cancelling_lands_it_also_when_cancelled_again(impatient):
+def test_cancelling_lands_the_drone_even_when_cancelled_again(impatient):
     async def fly():
         async with emulator() as emulated:
             task = asyncio.create_task(take_off_and_hover(emulated))
@@ -234,8 +234,8 @@ def test_cancelling_lands_it_also_when_cancelled_again(impatient):
 
 
 @pytest.mark.parametrize("packet", [1, 2, 5, 100, 600, 900])
-def test_cancelling_is_not_lost_when_it_comes_with_a_packet(packet):
-    # While connecting, at the 1st to 5th; while rising; in the air.
+def test_a_cancellation_that_coincides_with_a_packet_is_not_lost(packet):
+    # While connecting, at the 1st to 5th packet; while rising; in flight.
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
@@ -244,7 +244,7 @@ def test_cancelling_is_not_lost_when_it_comes_with_a_packet(packet):
             async def hover():
                 async with drone:
                     await drone.take_off()
-                    await look(drone)
+                    await read_states(drone)
 
             def cancelling(data):
                 take(data)
@@ -264,14 +264,14 @@ def test_cancelling_is_not_lost_when_it_comes_with_a_packet(packet):
     run(fly())
 
 
-def test_a_program_that_ends_without_closing_leaves_a_drone_that_lands():
+def test_a_program_that_ends_without_closing_lands_the_drone():
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
             await drone.connect()
             await drone.take_off()
             drone.command(0.3)
-            drone._link._cycle.cancel()  # what the end of the event loop does to its tasks
+            drone._link._cycle.cancel()  # The end of an event loop cancels its tasks in this way.
             await asyncio.sleep(0.1)
             assert emulated.truth().phase is Phase.LANDING
             drone._link.shut()
@@ -279,7 +279,7 @@ def test_a_program_that_ends_without_closing_leaves_a_drone_that_lands():
     run(fly())
 
 
-def test_silence_in_flight_is_told_and_landing_ends_in_bounded_time():
+def test_missing_navdata_in_flight_raise_and_landing_ends_in_bounded_time():
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
@@ -287,10 +287,10 @@ def test_silence_in_flight_is_told_and_landing_ends_in_bounded_time():
             await drone.take_off()
             drone._link.reader.accept = lambda packet, now: (
                 None
-            )  # navdata no longer arrive, commands do
+            )  # Navdata no longer arrive, but commands do.
             lost = now()
             with pytest.raises(LinkError, match="nothing received"):
-                await look(drone)
+                await read_states(drone)
             assert now() - lost == pytest.approx(1.0, abs=0.05)
             with pytest.raises(LinkError, match="while landing"):
                 await drone.close()
@@ -301,8 +301,8 @@ def test_silence_in_flight_is_told_and_landing_ends_in_bounded_time():
     run(fly())
 
 
-def test_a_landing_is_confirmed_also_by_a_drone_that_forgot_its_client():
-    # A program that was stopped for a while: the drone's watchdog has landed it.
+def test_landing_is_confirmed_by_a_drone_that_has_dropped_its_client():
+    # After a long pause of the program the drone's watchdog has landed it.
     async def fly():
         async with connected() as (emulated, drone):
             await drone.take_off()
@@ -319,26 +319,26 @@ def test_a_landing_is_confirmed_also_by_a_drone_that_forgot_its_client():
     run(fly())
 
 
-def test_a_dead_drone_ends_the_context_in_bounded_time():
+def test_a_drone_that_stops_answering_ends_the_context_in_bounded_time():
     async def fly():
         async with emulator() as emulated:
 
-            async def strand():
+            async def fly_until_silence():
                 async with client_of(emulated) as drone:
                     await drone.take_off()
                     await emulated.close()
                     stranded.append(now())
-                    await look(drone)
+                    await read_states(drone)
 
             stranded = []
             with pytest.raises(LinkError, match="nothing received"):
-                await strand()
+                await fly_until_silence()
             assert now() - stranded[0] < 5.0
 
     run(fly())
 
 
-def test_a_landing_that_nobody_confirms_is_noted_on_what_ended_the_flight():
+def test_an_unconfirmed_landing_is_noted_on_the_error_that_ended_the_flight():
     async def fly():
         async with emulator() as emulated:
             task = asyncio.create_task(take_off_and_hover(emulated))
@@ -352,16 +352,16 @@ def test_a_landing_that_nobody_confirms_is_noted_on_what_ended_the_flight():
     run(fly())
 
 
-def test_it_is_noted_also_when_the_landing_itself_was_cancelled():
+def test_an_unconfirmed_landing_is_noted_when_the_landing_was_cancelled():
     async def fly():
         async with emulator() as emulated:
 
-            async def hop():
+            async def take_off_and_leave():
                 async with client_of(emulated) as drone:
                     await drone.take_off()
                     await emulated.close()
 
-            task = asyncio.create_task(hop())
+            task = asyncio.create_task(take_off_and_leave())
             await asyncio.sleep(8.0)
             task.cancel()
             with pytest.raises(asyncio.CancelledError) as ended:
@@ -374,12 +374,12 @@ def test_it_is_noted_also_when_the_landing_itself_was_cancelled():
 @pytest.mark.parametrize(
     "wrong", [{"navdata_port": 99999}, {"command_port": -1}, {"control_port": 0}]
 )
-def test_a_port_that_is_none_is_refused(wrong):
+def test_an_invalid_port_is_refused(wrong):
     with pytest.raises(ValueError, match="give a port"):
         ARDrone2("127.0.0.1", **wrong)
 
 
-def test_forged_navdata_from_another_port_are_ignored():
+def test_navdata_from_another_port_are_ignored():
     async def fly():
         async with connected() as (_, drone):
             await drone.take_off()
@@ -401,8 +401,8 @@ def test_forged_navdata_from_another_port_are_ignored():
     run(fly())
 
 
-def test_what_a_socket_hands_on_from_elsewhere_is_counted_and_dropped():
-    # A system that filters less than it should: the protocol checks address and port itself.
+def test_datagrams_from_another_address_are_counted_and_dropped():
+    # The system may filter less than it should, so the protocol checks address and port itself.
     async def fly():
         async with connected() as (_, drone):
             door = _PeerFilter(drone._link.take, drone._link.reader.refuse)
@@ -418,7 +418,7 @@ def test_what_a_socket_hands_on_from_elsewhere_is_counted_and_dropped():
 
 
 @pytest.mark.parametrize("key", ["control:control_vz_max", "control:altitude_max"])
-def test_without_its_limits_read_back_it_does_not_connect(key, monkeypatch):
+def test_connecting_fails_unless_the_limits_are_read_back(key, monkeypatch):
     plain = Settings.set
     monkeypatch.setattr(
         Settings, "set", lambda self, name, value: name == key or plain(self, name, value)
@@ -454,8 +454,8 @@ def test_a_setting_that_is_never_acknowledged_ends_the_handshake(monkeypatch):
     ("piece", "said"),
     [(b"x" * 100_000, "no end within 65536 bytes"), (b"x", "nothing received for 2 s")],
 )
-def test_settings_that_never_end_are_not_waited_for(piece, said):
-    async def trickle(reader, writer):
+def test_a_configuration_without_end_is_not_waited_for(piece, said):
+    async def send_without_end(reader, writer):
         for _ in range(6):
             writer.write(piece)
             await asyncio.sleep(0.5)
@@ -463,7 +463,7 @@ def test_settings_that_never_end_are_not_waited_for(piece, said):
 
     async def fly():
         async with emulator() as emulated:
-            server = await asyncio.start_server(trickle, "127.0.0.1", 0)
+            server = await asyncio.start_server(send_without_end, "127.0.0.1", 0)
             drone = client_of(emulated)
             drone.control_port = server.sockets[0].getsockname()[1]
             begun = now()
@@ -476,7 +476,7 @@ def test_settings_that_never_end_are_not_waited_for(piece, said):
     run(fly())
 
 
-def test_nobody_there_is_told():
+def test_connecting_without_a_drone_raises_a_named_error():
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
@@ -486,7 +486,7 @@ def test_nobody_there_is_told():
     run(fly())
 
 
-def test_an_empty_battery_stays_on_the_ground():
+def test_an_empty_battery_prevents_take_off():
     async def fly():
         async with connected(battery=15.0) as (emulated, drone):
             with pytest.raises(LinkError, match=r"battery of 127\.0\.0\.1 is at 1"):
@@ -496,11 +496,11 @@ def test_an_empty_battery_stays_on_the_ground():
     run(fly())
 
 
-def test_cutting_the_motors_is_a_thing_of_its_own():
+def test_cut_motors_is_separate_from_landing():
     async def fly():
         async with connected() as (emulated, drone):
             await drone.take_off()
-            sent = watch_datagrams(drone)
+            sent = record_datagrams(drone)
             await drone.land()
             assert not any(c.emergency for _, some in sent for _, c in some if isinstance(c, Ref))
             await drone.take_off()
@@ -516,31 +516,31 @@ def test_cutting_the_motors_is_a_thing_of_its_own():
     run(fly())
 
 
-def test_a_listener_that_fails_is_told_with_the_next_state():
-    # A full disk under the file of all messages.
+def test_an_error_of_a_listener_is_raised_with_the_next_state():
+    # For example, the disk is full when the listener writes all messages to a file.
     async def fly():
         async with connected() as (_, drone):
             calls = []
 
-            def full(state):
+            def raise_disk_full(state):
                 calls.append(state)
                 raise OSError("no space left")
 
-            drone.listen(full)
+            drone.listen(raise_disk_full)
             with pytest.raises(LinkError, match="no space left"):
-                await look(drone, 0.1)
+                await read_states(drone, 0.1)
             assert len(calls) == 1
 
     run(fly())
 
 
-def test_a_drone_that_forgot_its_client_is_not_flown_on():
+def test_a_flight_ends_when_the_drone_has_dropped_its_client():
     async def fly():
         async with connected() as (emulated, drone):
             await drone.take_off()
-            emulated.drone._bootstrap, emulated.drone._sequence = True, 0  # it was restarted
+            emulated.drone._bootstrap, emulated.drone._sequence = True, 0  # The drone restarts.
             with pytest.raises(LinkError, match="restarted its count"):
-                await look(drone)
+                await read_states(drone)
             emulated.drone._bootstrap = False
 
     run(fly())

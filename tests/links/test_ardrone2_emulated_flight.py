@@ -1,4 +1,4 @@
-"""What the emulated AR.Drone 2.0 tells of its flight, and how its plants fly."""
+"""Navdata of the emulated AR.Drone 2.0 in flight, and the dynamics of its plants."""
 
 import math
 from itertools import pairwise
@@ -51,7 +51,7 @@ def test_options_of_short_packets_can_be_chosen():
     assert pilot.last.clock is None
 
 
-def test_the_setpoint_is_echoed_when_it_reaches_the_vehicle():
+def test_the_setpoint_appears_in_navdata_when_it_reaches_the_vehicle():
     pilot = Pilot().connect(demo=False).fly()
     asked = pilot.time
     pilot.sent.clear()
@@ -67,13 +67,13 @@ def test_the_setpoint_is_echoed_when_it_reaches_the_vehicle():
     assert last.kalman_pressure.est_z == pytest.approx(pilot.truth.height, abs=1e-6)
 
 
-def test_the_ultrasound_is_heard_25_times_a_second():
+def test_the_ultrasonic_height_changes_25_times_a_second():
     pilot = Pilot(noise=0.003).connect(demo=False).fly()
     pilot.sent.clear()
     pilot.wait(4.0, UP)
     raw = [parse_navdata(packet).altitude.altitude_raw for packet in pilot.sent]
     changes = sum(a != b for a, b in pairwise(raw))
-    assert 70 <= changes <= 100  # a millimetre is the resolution: some repeat
+    assert 70 <= changes <= 100  # The resolution is a millimetre, so some values repeat.
 
 
 def accelerations(pilot):
@@ -81,20 +81,20 @@ def accelerations(pilot):
     return said.acceleration_x, said.acceleration_y, said.acceleration_z
 
 
-def test_at_rest_and_hovering_the_accelerometers_feel_one_g():
-    """They told of no acceleration at all, as of a drone that falls."""
+def test_accelerometers_measure_one_g_at_rest_and_in_hover():
+    """An accelerometer measures specific force, which is g unless the drone falls freely."""
     pilot = Pilot().connect(demo=False)
     pilot.wait(0.1, Watchdog())
     assert accelerations(pilot) == pytest.approx((0.0, 0.0, -1.0), abs=1e-6)
     raw = pilot.last.raw_measures
     counts = (raw.acceleration_x, raw.acceleration_y, raw.acceleration_z)
-    assert counts == (2048, 2048, 2560)  # as of the vehicle in recordings, within its offsets
+    assert counts == (2048, 2048, 2560)  # As recorded, within sensor offsets.
     pilot.fly()
     assert accelerations(pilot) == pytest.approx((0.0, 0.0, -1.0), abs=1e-4)
 
 
 @pytest.mark.parametrize("plant", ["kit", "thrust"])
-def test_accelerometers_feel_what_the_climb_changes_by(plant):
+def test_accelerometers_measure_the_change_of_the_climb(plant):
     pilot = Pilot(plant=plant, delay=0.0).connect(demo=False).fly()
     pilot.sent.clear()
     pilot.wait(2.0, UP, Move(gaz=0.5))
@@ -103,19 +103,19 @@ def test_accelerometers_feel_what_the_climb_changes_by(plant):
     climb = np.array([packet.kalman_pressure.est_zdot for packet in told])
     gained = np.cumsum(-felt[1:] - 1.0) * GRAVITY * 0.005
     assert gained == pytest.approx(climb[1:] - climb[0], abs=0.002)
-    pilot.send(Ref(take_off=True, emergency=True))  # falls
+    pilot.send(Ref(take_off=True, emergency=True))  # In free fall.
     pilot.wait(0.1, Ref(take_off=True, emergency=True))
     assert accelerations(pilot) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
 
 
-def test_the_last_ref_is_told_by_its_number():
+def test_navdata_give_the_number_of_the_last_ref():
     pilot = Pilot().connect(demo=False)
     pilot.send(Watchdog(), DOWN, Watchdog())
     pilot.wait(0.01)
     assert pilot.last.video_stream.atcmd_ref_seq == pilot.number - 2
 
 
-def test_angles_follow_and_nothing_else_does():
+def test_angles_follow_commands_and_the_height_stays():
     pilot = Pilot().connect(demo=False).fly()
     before = pilot.truth.height
     pilot.wait(3.0, UP, Move(roll=0.5, pitch=-1.0, yaw=1.0))
@@ -129,7 +129,7 @@ def test_angles_follow_and_nothing_else_does():
 
 
 def noisy_flight(seed, stops=(), **options):
-    """All bytes of a flight; `stops` are times at which somebody merely looks."""
+    """All bytes of a flight; `stops` are times at which the state is only read."""
     pilot = Pilot(noise=0.002, jitter=0.03, seed=seed, **options).connect(demo=False)
     packets = []
     stops = sorted(stops)
@@ -151,11 +151,11 @@ def test_the_same_seed_gives_the_same_bytes(plant):
 
 @settings(max_examples=8)
 @given(st.lists(st.floats(0.0, 6.0), max_size=50), st.sampled_from(["real", "thrust"]))
-def test_looking_changes_nothing(stops, plant):
+def test_reading_the_state_does_not_change_the_flight(stops, plant):
     assert noisy_flight(1, stops, plant=plant) == noisy_flight(1, plant=plant)
 
 
-def test_jitter_delays_and_never_reorders():
+def test_jitter_delays_packets_and_never_reorders_them():
     pilot = Pilot(delay=0.1, jitter=0.05).connect(demo=False).fly()
     pilot.sent.clear()
     sent = {}
@@ -172,7 +172,7 @@ def test_jitter_delays_and_never_reorders():
         if echo.climb_setpoint != before.climb_setpoint
     ]
     assert min(late) >= 0.1 - 1e-6
-    assert max(late) <= 0.155 + 1e-6  # packets are 5 ms apart
+    assert max(late) <= 0.155 + 1e-6  # Packets are 5 ms apart.
     assert max(late) - min(late) > 0.03
 
 
@@ -194,8 +194,8 @@ def test_a_linear_plant_is_stepped_exactly(name):
 @pytest.mark.parametrize(
     ("name", "delay", "gain"), [("kit", 0.26, 2.4), ("paper", 0.36, 2.0), ("real", 0.34, 1.8)]
 )
-def test_a_loop_over_the_drone_is_the_loop_of_the_package(name, delay, gain):
-    """P control of the drone's height at 65 ms, against the exact simulation of the same loop."""
+def test_a_loop_around_the_emulated_drone_equals_the_control_loop(name, delay, gain):
+    """P control of the drone's height at 65 ms equals the exact simulation of the same loop."""
     sample, step = 0.065, 0.25
     pilot = Pilot(plant=name)
     configured(pilot, "control:control_vz_max", "1000")
@@ -216,7 +216,7 @@ def test_a_loop_over_the_drone_is_the_loop_of_the_package(name, delay, gain):
     assert np.allclose(heights, exact, rtol=0.0, atol=1e-6)
 
 
-def test_thrust_near_hover_is_two_equal_lags():
+def test_thrust_plant_near_hover_is_two_equal_lags():
     thruster = Thruster()
     motion = ThrustMotion(thruster)
     motion.settle(0, 1.0)
@@ -230,20 +230,20 @@ def test_thrust_near_hover_is_two_equal_lags():
     assert np.allclose(climbs, exact, rtol=0.0, atol=1e-4 * small)
 
 
-def test_thrust_is_that_of_the_equations():
+def test_thrust_plant_follows_its_equations():
     thruster = Thruster()
     weight = thruster.mass * GRAVITY
     assert 4.0 * thruster.thrust_factor * thruster.hover_speed**2 == pytest.approx(weight)
     down, up = thruster.accelerations
     assert down == pytest.approx(-8.513, abs=0.01)
     assert up == pytest.approx(10.887, abs=0.01)
-    # A setpoint far beyond what the rotors give: their limits accelerate the drone.
+    # The setpoint is far beyond what the rotors give, so their limits set the acceleration.
     motion = ThrustMotion(thruster)
     motion.settle(0, 0.0)
     motion.follow(0, 50.0)
     early, late = motion.at(400_000)[1], motion.at(500_000)[1]
     assert (late - early) / 0.1 == pytest.approx(up, rel=1e-3)
-    # Tilted, thrust carries less: m z'' = T cos(roll) cos(pitch) - m g, held by the speed loop.
+    # Tilted, thrust lifts less: m z'' = T cos(roll) cos(pitch) - m g; the speed loop compensates.
     motion.settle(1_000_000, 5.0)
     motion.follow(1_000_000, 0.0)
     motion.tilt(1_000_000, math.cos(0.2))
@@ -251,7 +251,7 @@ def test_thrust_is_that_of_the_equations():
     assert motion.at(4_000_000)[1] == pytest.approx(-lost, rel=1e-3)
 
 
-def test_thrust_is_the_same_whoever_looks():
+def test_thrust_plant_does_not_depend_on_when_it_is_read():
     seldom, often = (ThrustMotion(Thruster()) for _ in "ab")
     for motion in (seldom, often):
         motion.settle(0, 1.0)
@@ -275,13 +275,13 @@ def test_thrust_is_the_same_whoever_looks():
         ({"navdata_port": 70000}, "no port"),
     ],
 )
-def test_options_say_what_is_wrong(given, told):
+def test_invalid_options_are_refused_with_the_reason(given, told):
     with pytest.raises(ValueError, match=told):
         EmulatorOptions(**given)
 
 
 @pytest.mark.parametrize("field", ["mass", "motor_lag"])
-def test_a_thruster_has_positive_numbers(field):
+def test_a_thrust_plant_needs_positive_parameters(field):
     with pytest.raises(ValueError, match=field):
         Thruster(**{field: 0.0})
     with pytest.raises(ValueError, match="cannot hover"):

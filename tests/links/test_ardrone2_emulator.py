@@ -65,7 +65,7 @@ DOCUMENTED = [
 # --- the link --------------------------------------------------------------------------------
 
 
-def test_the_handshake_leads_from_24_bytes_to_navdata():
+def test_the_handshake_leads_from_packets_of_24_bytes_to_navdata():
     pilot = Pilot()
     (packet,) = pilot.wake()
     assert len(packet) == 24
@@ -75,7 +75,7 @@ def test_the_handshake_leads_from_24_bytes_to_navdata():
     assert first.com_watchdog
     assert first.sequence == 1
     pilot.wait(1.0)
-    assert len(pilot.sent) == 1  # nothing of its own accord before the handshake
+    assert len(pilot.sent) == 1  # The drone sends nothing before the handshake.
     pilot.send(Config("general:navdata_demo", "TRUE"))
     pilot.wait(0.1, Watchdog())
     assert not pilot.last.bootstrap
@@ -96,7 +96,7 @@ def test_wake_ups_of_one_two_and_four_bytes_are_answered(wake):
 @pytest.mark.parametrize(
     "wake", [b"", b"\x00", b"\x02\x00\x00\x00", b"\x01\x00\x00", b"\x01" * 500]
 )
-def test_other_datagrams_are_not(wake):
+def test_other_datagrams_on_the_navdata_port_are_not_answered(wake):
     assert Pilot().wake(wake) == []
 
 
@@ -109,11 +109,11 @@ def test_a_flood_of_wake_ups_is_answered_twenty_times_a_second():
     assert sum(map(len, pilot.sent)) <= 24 * 1000
 
 
-def test_navdata_go_to_where_the_host_of_the_commands_asked_last():
-    """A client that asks again from another socket was left without navdata as long as it spoke."""
+def test_navdata_go_to_the_socket_from_which_the_commanding_host_asked_last():
+    """A client that wakes the drone from a new socket receives navdata there."""
     pilot, other = Pilot().connect(), ("127.0.0.1", 50000)
     pilot.wait(0.5, Watchdog())
-    pilot.wake(b"\x01", ("10.0.0.9", 50000))  # of another host than the commands: never
+    pilot.wake(b"\x01", ("10.0.0.9", 50000))  # Another host never receives navdata.
     listeners = []
     for source in (NAVDATA, other, NAVDATA):
         pilot.drone.woken(b"\x01", source, pilot.time)
@@ -126,7 +126,7 @@ def test_navdata_go_to_where_the_host_of_the_commands_asked_last():
         one for one, before in zip(listeners, [None, *listeners], strict=False) if one != before
     ]
     assert changes == [NAVDATA, other, NAVDATA]
-    pilot.time += 3.0  # nobody says anything
+    pilot.time += 3.0  # Nobody sends anything.
     pilot.drone.advance(pilot.time)
     pilot.take()
     pilot.drone.woken(b"\x01", other, pilot.time)
@@ -142,7 +142,7 @@ def test_navdata_go_to_the_host_of_the_commands(waits):
     pilot.send(Config("general:navdata_demo", "FALSE"))
     if not waits:
         pilot.wake()
-    assert len(pilot.sent) == 1  # the answer to the wake-up from elsewhere
+    assert len(pilot.sent) == 1  # This answers the wake-up of the other host.
     told = []
     for _ in range(50):
         pilot.drone.commanded(encode([Watchdog()], pilot.number), COMMANDS, pilot.time)
@@ -155,33 +155,33 @@ def test_navdata_go_to_the_host_of_the_commands(waits):
     assert numbers == list(range(1, 201))
 
 
-def test_navdata_stop_two_seconds_after_the_last_sign_of_life():
+def test_navdata_stop_two_seconds_after_the_last_datagram():
     pilot = Pilot().connect(demo=False)
     pilot.wait(1.0, Watchdog())
     silent = pilot.time
     pilot.wait(5.0)
-    # The last command was at 1 s; the packet at 3 s does not leave any more.
+    # The last command was at 1 s, so the packet due at 3 s is not sent.
     assert parse_navdata(pilot.sent[-1]).clock == pytest.approx(silent + 1.995, abs=1e-9)
-    assert len(pilot.wake()[-1]) == 24  # back to the beginning
+    assert len(pilot.wake()[-1]) == 24  # The drone waits for a new handshake.
 
 
-def test_sequence_numbers():
+def test_only_rising_sequence_numbers_are_accepted():
     def ups(numbers):
         drone = Drone(EmulatorOptions())
         for number, command in numbers:
             drone.commanded(encode([command], number), COMMANDS, 0.0)
         return drone.truth(0.0).phase is Phase.TAKING_OFF
 
-    assert ups([(0, UP)])  # some begin at 0
+    assert ups([(0, UP)])  # Some clients begin at 0.
     assert ups([(1, DOWN), (2, UP)])
-    assert not ups([(5, DOWN), (5, UP)])  # not above the last
+    assert not ups([(5, DOWN), (5, UP)])  # Not above the last number.
     assert not ups([(5, DOWN), (4, UP)])
     assert not ups([(1, DOWN), (0, UP)])
-    assert ups([(500, DOWN), (1, UP)])  # 1 begins anew
-    assert ups([(5, DOWN), (900, UP)])  # gaps are losses, no more
+    assert ups([(500, DOWN), (1, UP)])  # Number 1 restarts the sequence.
+    assert ups([(5, DOWN), (900, UP)])  # Gaps are only losses.
 
 
-def test_after_two_seconds_of_silence_any_number_is_the_first():
+def test_after_two_seconds_without_commands_any_number_is_accepted():
     drone = Drone(EmulatorOptions())
     drone.commanded(encode([DOWN], 100), COMMANDS, 0.0)
     drone.commanded(encode([UP], 7), COMMANDS, 1.999999)
@@ -190,7 +190,7 @@ def test_after_two_seconds_of_silence_any_number_is_the_first():
     assert drone.truth(2.0).phase is Phase.TAKING_OFF
 
 
-def test_commands_that_mean_nothing_here_are_taken_politely():
+def test_commands_without_effect_here_are_accepted():
     pilot = Pilot().connect()
     pilot.send(Other("PMODE", ("1", "2")), Other("MISC", ("2", "2", "20", "2000", "3000")))
     pilot.send(FlatTrim(), Other("LED", ("1", "0", "1")), Other("ANIM", ("16", "5")))
@@ -205,10 +205,10 @@ def test_commands_that_mean_nothing_here_are_taken_politely():
 # --- states ----------------------------------------------------------------------------------
 
 
-def test_take_off_and_landing_as_the_vehicle_does_them():
+def test_take_off_and_landing_take_the_time_of_the_real_vehicle():
     pilot = Pilot().connect(demo=False)
     pilot.wait(4.5, UP)
-    assert pilot.truth.phase is Phase.TAKING_OFF  # since the first of them, at 0.02 s
+    assert pilot.truth.phase is Phase.TAKING_OFF  # Measured from the first of them, at 0.02 s.
     pilot.wait(0.02, UP)
     assert pilot.truth.phase is Phase.FLYING
     assert pilot.truth.height == pytest.approx(0.75, abs=0.02)
@@ -228,7 +228,7 @@ def test_take_off_and_landing_as_the_vehicle_does_them():
     assert all(demo.vz == 0.0 for demo in states)
 
 
-def test_bits_eight_and_nine_of_a_bare_ref_are_enough():
+def test_a_ref_with_bits_eight_and_nine_alone_is_accepted():
     drone = Drone(EmulatorOptions())
     drone.commanded(b"AT*REF=0,512\r", COMMANDS, 0.0)
     assert drone.truth(0.0).phase is Phase.TAKING_OFF
@@ -236,7 +236,7 @@ def test_bits_eight_and_nine_of_a_bare_ref_are_enough():
     assert drone.truth(0.1).emergency
 
 
-def test_a_released_take_off_lands():
+def test_clearing_the_take_off_bit_lands_the_drone():
     pilot = Pilot()
     pilot.wait(2.0, UP)
     pilot.send(DOWN)
@@ -246,14 +246,14 @@ def test_a_released_take_off_lands():
 def test_an_emergency_cuts_the_motors_and_toggles_on_the_rising_edge():
     pilot = Pilot().connect(demo=False).fly()
     begun = pilot.truth.height
-    pilot.wait(0.2, Ref(take_off=True, emergency=True))  # held: one edge
+    pilot.wait(0.2, Ref(take_off=True, emergency=True))  # The bit is held, so there is one edge.
     truth = pilot.truth
     assert truth.emergency
     assert truth.phase is Phase.FALLING
-    fallen = 0.2 - 0.02  # since the first of those commands
+    fallen = 0.2 - 0.02  # Measured from the first of those commands.
     assert truth.height == pytest.approx(begun - 0.5 * GRAVITY * fallen**2, abs=1e-9)
     assert truth.climb == pytest.approx(-GRAVITY * fallen, abs=1e-9)
-    pilot.wait(1.0, UP)  # nothing helps
+    pilot.wait(1.0, UP)  # No command has an effect.
     assert pilot.truth.phase is Phase.LANDED
     assert pilot.last.emergency
     assert pilot.last.demo.major == 2
@@ -265,11 +265,11 @@ def test_an_emergency_cuts_the_motors_and_toggles_on_the_rising_edge():
 
 
 @pytest.mark.parametrize("worst_case", [True, False])
-def test_a_drone_that_landed_by_itself_may_obey_who_only_repeats_himself(worst_case):
+def test_after_an_automatic_landing_only_the_worst_case_obeys_an_unchanged_take_off_bit(worst_case):
     pilot = Pilot(worst_case=worst_case).fly()
     pilot.wait(9.0)
     assert pilot.truth.phase is Phase.LANDED
-    pilot.wait(1.0, UP)  # back, and still holding take-off
+    pilot.wait(1.0, UP)  # The client is back and still sets the take-off bit.
     assert pilot.truth.phase is (Phase.TAKING_OFF if worst_case else Phase.LANDED)
     pilot.wait(6.0, DOWN)
     pilot.send(UP)
@@ -284,23 +284,23 @@ def test_a_new_client_may_begin_with_take_off():
     assert pilot.truth.phase is Phase.TAKING_OFF
 
 
-def test_what_another_client_wished_for_is_forgotten_with_its_numbers():
+def test_the_take_off_bit_of_the_last_client_is_dropped_with_its_numbers():
     pilot = Pilot().connect().fly()
     pilot.wait(20.0)
     assert pilot.truth.phase is Phase.LANDED
     pilot.number = 1
-    pilot.send(FlatTrim())  # its first command is no REF
+    pilot.send(FlatTrim())  # The first command of the new client is not a REF.
     assert pilot.wait(6.0, UP).phase is Phase.FLYING
 
 
-def test_numbers_from_0_on_are_those_of_one_client():
+def test_numbers_that_begin_at_0_belong_to_one_client():
     pilot = Pilot().connect().fly()
     pilot.number = 0
     pilot.drone.commanded(b"AT*REF=0,256\rAT*REF=1,256\r", COMMANDS, pilot.time + 3.0)
     assert pilot.drone.truth(pilot.time + 3.0).emergency
 
 
-def test_a_low_battery_is_told_forbids_to_take_off_and_ends_a_flight():
+def test_a_low_battery_is_reported_prevents_take_off_and_ends_a_flight():
     low = Pilot(battery=19.9).connect(demo=False)
     low.wait(1.0, UP)
     assert low.last.battery_low
@@ -312,7 +312,7 @@ def test_a_low_battery_is_told_forbids_to_take_off_and_ends_a_flight():
     assert pilot.truth.battery < 4.0
 
 
-def test_a_deaf_ultrasound_is_told():
+def test_a_failed_ultrasonic_sensor_is_reported():
     pilot = Pilot().connect(demo=False)
     pilot.drone.deaf = True
     pilot.wait(0.1, Watchdog())
@@ -322,12 +322,12 @@ def test_a_deaf_ultrasound_is_told():
 # --- watchdogs, to the microsecond -----------------------------------------------------------
 
 
-def test_a_forgiving_drone_hovers_a_quarter_of_a_second_after_its_last_motion_command():
+def test_unless_worst_case_the_drone_hovers_a_quarter_second_after_the_last_motion_command():
     pilot = Pilot(delay=0.1, worst_case=False).fly()
     pilot.wait(1.0, UP, Move(gaz=0.5))
     last = pilot.time
     assert pilot.truth.setpoint == pytest.approx(0.35)
-    # A thread that keeps the link alive does not keep the motion alive.
+    # Commands that only keep the link alive do not prolong the motion.
     pilot.wait(0.249, Watchdog(), every=0.01)
     assert pilot.truth.setpoint == pytest.approx(0.35)
     pilot.wait(0.000999)
@@ -336,8 +336,8 @@ def test_a_forgiving_drone_hovers_a_quarter_of_a_second_after_its_last_motion_co
     assert pilot.drone.truth(last + 0.25).phase is Phase.FLYING
 
 
-def test_commands_under_way_are_forgotten_with_the_motion():
-    pilot = Pilot(plant="paper", worst_case=False).fly()  # 0.36 s under way
+def test_commands_in_transit_are_dropped_with_the_motion():
+    pilot = Pilot(plant="paper", worst_case=False).fly()  # The transport takes 0.36 s.
     pilot.send(UP, Move(gaz=1.0))
     for _ in range(100):
         pilot.wait(0.01)
@@ -346,7 +346,7 @@ def test_commands_under_way_are_forgotten_with_the_motion():
 
 @pytest.mark.parametrize("kept_alive", [False, True])
 def test_in_the_worst_case_a_motion_holds_until_the_link_is_lost(kept_alive):
-    """One command moved the drone by 4 mm; clients of the public fly for seconds on one."""
+    """Some clients send one command and expect the drone to follow it for seconds."""
     pilot = Pilot(delay=0.1).fly()
     pilot.wait(0.02, UP, Move(gaz=0.2))
     last = pilot.time
@@ -360,7 +360,7 @@ def test_in_the_worst_case_a_motion_holds_until_the_link_is_lost(kept_alive):
     assert truth.setpoint < 0.0
 
 
-def test_commands_under_way_are_forgotten_with_the_link():
+def test_commands_in_transit_are_dropped_with_the_link():
     pilot = Pilot(delay=9.0).fly()
     pilot.send(UP, Move(gaz=1.0))
     pilot.wait(5.0)
@@ -384,7 +384,7 @@ def test_landing_begins_two_seconds_after_the_last_command():
     assert pilot.drone.truth(last + 12.0).phase is Phase.LANDED
 
 
-def test_the_communication_watchdog_warns_after_fifty_milliseconds():
+def test_the_communication_watchdog_is_reported_after_fifty_milliseconds():
     pilot = Pilot().connect(demo=False)
     pilot.wait(0.1, Watchdog(), every=0.01)
     warned = {}
@@ -398,7 +398,7 @@ def test_the_communication_watchdog_warns_after_fifty_milliseconds():
     assert not pilot.last.com_watchdog
 
 
-def test_a_lost_link_is_told_to_who_still_listens():
+def test_a_lost_link_is_reported_to_clients_that_still_receive():
     pilot = Pilot().connect(demo=False)
     for _ in range(30):
         pilot.wait(0.1)
@@ -420,8 +420,8 @@ def test_a_setting_is_acknowledged_and_read_back():
     assert not pilot.last.command_acknowledged
 
 
-def test_a_setting_is_taken_though_the_last_one_is_still_acknowledged():
-    """Clients of the public send several without ever resetting the acknowledgement."""
+def test_a_setting_is_accepted_while_the_last_one_is_still_acknowledged():
+    """Some clients send several settings and never reset the acknowledgement."""
     pilot = Pilot()
     pilot.send(Config("control:altitude_max", "2000"), Config("control:altitude_max", "2500"))
     pilot.send(Control(4))
@@ -438,7 +438,7 @@ def test_a_setting_is_taken_though_the_last_one_is_still_acknowledged():
         ("control:euler_angle_max", "3.0", 0.52),
     ],
 )
-def test_numbers_out_of_range_become_the_nearest(key, value, kept):
+def test_settings_out_of_range_are_clipped(key, value, kept):
     assert float(configured(Pilot(), key, value)[key]) == kept
 
 
@@ -455,7 +455,7 @@ def test_numbers_out_of_range_become_the_nearest(key, value, kept):
         ("no:such_key", "1"),
     ],
 )
-def test_what_is_no_value_changes_nothing_and_an_acknowledgement_promises_nothing(key, value):
+def test_an_invalid_value_changes_nothing_though_its_key_is_acknowledged(key, value):
     pilot = Pilot().connect(demo=False)
     before = dict(pilot.drone.settings.values)
     assert configured(pilot, key, value) == before
@@ -464,7 +464,7 @@ def test_what_is_no_value_changes_nothing_and_an_acknowledgement_promises_nothin
 
 
 def test_every_documented_key_is_acknowledged_and_can_be_read():
-    """Each key that was not known cost clients that wait for it half a second and an error."""
+    """A client waits for each unknown key until its time-out and then fails."""
     pilot = Pilot().connect(demo=False)
     for key in DOCUMENTED:
         found = configured(pilot, key, pilot.drone.settings.values[key])
@@ -473,7 +473,7 @@ def test_every_documented_key_is_acknowledged_and_can_be_read():
         assert pilot.last.command_acknowledged, key
 
 
-def test_outdoors_has_limits_of_its_own():
+def test_outdoor_flight_has_its_own_limits():
     pilot = Pilot()
     found = configured(pilot, "control:outdoor", "TRUE")
     assert float(found["control:control_vz_max"]) == 1000.0
@@ -483,7 +483,7 @@ def test_outdoors_has_limits_of_its_own():
     assert float(found["control:outdoor_control_vz_max"]) == 1500.0
 
 
-def test_with_a_session_a_setting_needs_its_identifiers_right_before_it():
+def test_in_a_session_a_setting_needs_its_identifiers_right_before_it():
     pilot = Pilot()
     configured(pilot, "custom:session_id", "0000abcd")
     key = "control:altitude_max"
@@ -499,7 +499,7 @@ def test_with_a_session_a_setting_needs_its_identifiers_right_before_it():
     assert configured(pilot, key, "2500")[key] == "2500"
 
 
-def test_the_heights_of_the_configuration_hold():
+def test_the_height_limits_of_the_configuration_are_enforced():
     pilot = Pilot(delay=0.0)
     configured(pilot, "control:altitude_max", "1500")
     configured(pilot, "control:control_vz_max", "2000")
@@ -516,7 +516,7 @@ def test_the_heights_of_the_configuration_hold():
     assert pilot.truth.phase is Phase.FLYING
 
 
-# --- whoever means harm ----------------------------------------------------------------------
+# --- hostile input ---------------------------------------------------------------------------
 
 TOKENS = st.sampled_from(
     [
@@ -531,7 +531,7 @@ DATAGRAMS = st.one_of(st.binary(max_size=200), st.lists(TOKENS, max_size=40).map
 
 @settings(max_examples=150)
 @given(st.lists(st.tuples(st.booleans(), DATAGRAMS, st.floats(0.0, 0.3)), max_size=30))
-def test_no_datagrams_break_the_drone_or_make_it_talk(datagrams):
+def test_arbitrary_datagrams_neither_break_the_drone_nor_make_it_send(datagrams):
     drone, now, received, sent = Drone(EmulatorOptions()), 0.0, 0, []
     configured_at = None
     for commands, datagram, later in datagrams:
@@ -547,25 +547,25 @@ def test_no_datagrams_break_the_drone_or_make_it_talk(datagrams):
         truth = drone.truth(now)
         assert math.isfinite(truth.height)
         assert abs(truth.setpoint) <= 2.0
-    if configured_at is None:  # nobody got through the handshake
+    if configured_at is None:  # No datagram completed the handshake.
         assert len(sent) <= received
     drone.advance(now + 30.0)
     sent += drone.packets(now + 30.0)
-    # The last sign of life is worth two seconds, no more.
+    # The last datagram keeps the link for two seconds only.
     assert all(address == NAVDATA for _, address in sent)
     drone.advance(now + 60.0)
     assert drone.packets(now + 60.0) == []
     assert drone.truth(now + 60.0).phase is Phase.LANDED
 
 
-def test_a_flood_of_motions_does_not_pile_up():
+def test_many_motion_commands_do_not_accumulate():
     pilot = Pilot(delay=100.0).fly()
     for _ in range(3000):
         pilot.send(Move(gaz=0.1))
     assert len(pilot.drone._under_way) <= 1024
 
 
-def test_where_others_can_reach_it_the_clients_have_to_be_named():
+def test_listening_beyond_this_machine_requires_named_clients():
     with pytest.raises(ValueError, match="name the clients"):
         EmulatorOptions(host="0.0.0.0")
     with pytest.raises(ValueError, match="'anybody' is no IP address"):
@@ -575,7 +575,7 @@ def test_where_others_can_reach_it_the_clients_have_to_be_named():
     assert EmulatorOptions(host="::", clients=("192.168.1.2",)).answers("::ffff:192.168.1.2")
 
 
-def test_a_name_that_looks_like_the_loopback_is_not_taken_for_it():
+def test_a_host_name_that_resembles_the_loopback_is_not_accepted_as_one():
     for host in ("127.0.0.1.example.org", "127.evil"):
         with pytest.raises(ValueError, match="reached by others"):
             EmulatorOptions(host=host)
@@ -584,7 +584,7 @@ def test_a_name_that_looks_like_the_loopback_is_not_taken_for_it():
 
 
 @pytest.mark.parametrize("plant", ["kit", "thrust"])
-def test_the_largest_noise_has_a_place_in_navdata(plant):
+def test_navdata_can_hold_the_largest_noise(plant):
     pilot = Pilot(plant=plant, noise=10.0, downlink=20.0).connect(demo=False).fly()
     pilot.wait(20.0, UP)
     heights = [parse_navdata(packet).height for packet in pilot.sent]
@@ -592,10 +592,10 @@ def test_the_largest_noise_has_a_place_in_navdata(plant):
     assert np.std(heights[1:]) == pytest.approx(10.0, rel=0.1)
 
 
-def test_hosts_that_are_not_named_are_neither_heard_nor_answered():
+def test_hosts_that_are_not_named_are_ignored_and_not_answered():
     heard = []
 
-    class Ear(asyncio.DatagramProtocol):
+    class Receiver(asyncio.DatagramProtocol):
         def datagram_received(self, data, address):
             heard.append(data)
 
@@ -607,7 +607,7 @@ def test_hosts_that_are_not_named_are_neither_heard_nor_answered():
                 (5556, encode([Config("general:navdata_demo", "TRUE"), UP], 1)),
             ):
                 ear, _ = await loop.create_datagram_endpoint(
-                    Ear, local_addr=(host, 0), remote_addr=("127.0.0.1", port)
+                    Receiver, local_addr=(host, 0), remote_addr=("127.0.0.1", port)
                 )
                 ear.sendto(said)
             await asyncio.sleep(0.5)

@@ -1,4 +1,4 @@
-"""The emulated AR.Drone 2.0 on sockets: other clients, clients that die, and the command."""
+"""The emulated AR.Drone 2.0 on sockets: other clients, killed clients, and the command."""
 
 import asyncio
 import importlib.util
@@ -22,7 +22,7 @@ from deadtime.links.ardrone2.navdata import parse_navdata
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-#: What a busy machine may add to a time that is exact in virtual time, s.
+#: Time that a busy machine may add to a time that is exact in virtual time, s.
 SLACK = 0.25
 
 FREE = {"navdata_port": 0, "command_port": 0, "control_port": 0}
@@ -72,7 +72,7 @@ PYARDRONE = """
         drone.close()
 """
 
-# Nothing but sockets, so that it starts at once; it never lands.
+# It imports sockets only, so that it starts at once; it never lands.
 RECKLESS = """
     import socket, sys, time
 
@@ -115,7 +115,7 @@ async def fly_pyardrone():
 
 
 async def kill_a_client():
-    """What the drone did after its client was killed: (time since then, truth), again and again."""
+    """Observations (time since the kill, truth) of the drone after its client was killed."""
     loop = asyncio.get_running_loop()
     async with Emulator(EmulatorOptions(**FREE)) as emulator:
         process = await client(RECKLESS, emulator)
@@ -135,8 +135,8 @@ async def kill_a_client():
 
 
 @pytest.fixture(scope="module")
-def flown():
-    """Both flights, at the same time: flights take as long as they take."""
+def both_flights():
+    """Both flights in real time, at the same time to save time."""
 
     async def both():
         flights = [kill_a_client()]
@@ -147,13 +147,13 @@ def flown():
     return asyncio.run(both())
 
 
-def test_pyardrone_flies_it(flown):
+def test_pyardrone_can_fly_the_emulator(both_flights):
     pytest.importorskip("pyardrone", reason="pyardrone, the client to fly with, is not installed")
-    status, out, errors, truth = flown[1]
+    status, out, errors, truth = both_flights[1]
     assert status == 0, errors
     found = json.loads(out)
     assert found["bootstrap"]
-    assert found["hovering"] == pytest.approx(750, abs=40)  # mm
+    assert found["hovering"] == pytest.approx(750, abs=40)  # Heights in navdata are in mm.
     assert found["climbed"] > found["hovering"] + 150
     assert found["on_one_command"] == pytest.approx(0.3 * 0.7 * 0.885 * 1.5 * 1000.0, rel=0.4)
     assert found["landed"] < 40
@@ -161,20 +161,20 @@ def test_pyardrone_flies_it(flown):
     assert not truth.emergency
 
 
-def test_a_drone_whose_client_was_killed_lands(flown):
-    seen = flown[0]
+def test_a_drone_whose_client_was_killed_lands(both_flights):
+    seen = both_flights[0]
     assert seen[0][1].setpoint == pytest.approx(0.35)
     flying = [truth.setpoint for _, truth in seen if truth.phase is Phase.FLYING]
-    assert flying == pytest.approx([0.35] * len(flying))  # in the worst case its last wish holds
+    assert flying == pytest.approx([0.35] * len(flying))  # It still follows its last command.
     begun = min(late for late, truth in seen if truth.phase is Phase.LANDING)
     assert 1.9 - SLACK < begun < 2.5 + SLACK
     assert seen[-1][1].phase is Phase.LANDED
 
 
-# --- the same on sockets in memory, in no time -----------------------------------------------
+# --- the same on sockets in memory and in virtual time ------------------------------------------
 
 
-class Ends(asyncio.DatagramProtocol):
+class Receiver(asyncio.DatagramProtocol):
     def __init__(self):
         self.received = []
 
@@ -182,11 +182,13 @@ class Ends(asyncio.DatagramProtocol):
         self.received.append((asyncio.get_running_loop().time(), data, addr))
 
 
-async def ends(emulator):
-    """A socket to the navdata port and one to the command port."""
+async def sockets_of(emulator):
+    """Open a socket to the navdata port and one to the command port."""
     loop, found = asyncio.get_running_loop(), []
     for port in (emulator.navdata_port, emulator.command_port):
-        found.append(await loop.create_datagram_endpoint(Ends, remote_addr=(emulator.host, port)))
+        found.append(
+            await loop.create_datagram_endpoint(Receiver, remote_addr=(emulator.host, port))
+        )
     (navdata, heard), (commands, silent) = found
     return navdata, heard, commands, silent
 
@@ -195,7 +197,7 @@ def test_a_flight_in_virtual_time():
     async def fly():
         loop = asyncio.get_running_loop()
         async with Emulator(EmulatorOptions(noise=0.0, downlink=0.02, **FREE)) as emulator:
-            navdata, heard, commands, silent = await ends(emulator)
+            navdata, heard, commands, silent = await sockets_of(emulator)
             navdata.sendto(b"\x01")
             commands.sendto(encode([Config("general:navdata_demo", "FALSE")], 1))
             number = 2
@@ -205,7 +207,7 @@ def test_a_flight_in_virtual_time():
                 number += 3
                 await asyncio.sleep(0.03)
             await asyncio.sleep(10.0)
-            assert silent.received == []  # commands are never answered
+            assert silent.received == []  # Commands are never answered.
             navdata.close()
             commands.close()
             return heard.received, emulator.truth()
@@ -225,13 +227,13 @@ def test_the_configuration_is_read_over_tcp():
     async def read():
         found = []
         async with Emulator(EmulatorOptions(**FREE)) as emulator:
-            _, _, commands, _ = await ends(emulator)
+            _, _, commands, _ = await sockets_of(emulator)
             here = (emulator.host, emulator.control_port)
             reader, writer = await asyncio.open_connection(*here)
             commands.sendto(encode([Config("control:control_vz_max", "1000"), Control(4)], 1))
             found.append(await reader.readuntil(b"\0"))
             writer.close()
-            commands.sendto(encode([Control(4)], 3))  # some ask first and connect then
+            commands.sendto(encode([Control(4)], 3))  # Some ask before they connect.
             await asyncio.sleep(0.1)
             reader, writer = await asyncio.open_connection(*here)
             found.append(await reader.readuntil(b"\0"))
@@ -251,7 +253,7 @@ def test_the_configuration_is_read_over_tcp():
     }
 
 
-def test_connections_are_few():
+def test_the_number_of_connections_is_limited():
     async def connect():
         async with Emulator(EmulatorOptions(**FREE)) as emulator:
             open_ones = []
@@ -260,7 +262,7 @@ def test_connections_are_few():
                     await asyncio.open_connection(emulator.host, emulator.control_port)
                 )
             await asyncio.sleep(0.1)
-            _, _, commands, _ = await ends(emulator)
+            _, _, commands, _ = await sockets_of(emulator)
             commands.sendto(encode([Control(4)], 1))
             await asyncio.sleep(0.1)
             told = []
@@ -279,7 +281,7 @@ def test_connections_are_few():
 # --- on real sockets -------------------------------------------------------------------------
 
 
-def test_a_port_that_is_taken_is_named():
+def test_an_occupied_port_is_named_in_the_error():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
@@ -293,7 +295,7 @@ def test_a_port_that_is_taken_is_named():
         assert isinstance(found.value, DeadtimeError)
 
 
-def test_it_listens_on_an_address_of_ipv6_and_knows_a_client_by_any_spelling():
+def test_it_listens_on_an_ipv6_address_and_accepts_any_spelling_of_a_client():
     called = "::1"
 
     async def read():
@@ -301,8 +303,8 @@ def test_it_listens_on_an_address_of_ipv6_and_knows_a_client_by_any_spelling():
         options = EmulatorOptions(host=called, clients=("0:0::1",), **FREE)
         async with Emulator(options) as emulator:
             there = (called, emulator.navdata_port), (called, emulator.command_port)
-            line, heard = await loop.create_datagram_endpoint(Ends, remote_addr=there[0])
-            commands, _ = await loop.create_datagram_endpoint(Ends, remote_addr=there[1])
+            line, heard = await loop.create_datagram_endpoint(Receiver, remote_addr=there[0])
+            commands, _ = await loop.create_datagram_endpoint(Receiver, remote_addr=there[1])
             line.sendto(b"\x01")
             await until(lambda: heard.received)
             reader, writer = await asyncio.open_connection(called, emulator.control_port)
@@ -326,7 +328,7 @@ def test_it_listens_on_an_address_of_ipv6_and_knows_a_client_by_any_spelling():
 def test_arbitrary_bytes_on_all_ports_leave_it_working(datagrams):
     async def throw():
         async with Emulator(EmulatorOptions(**FREE)) as emulator:
-            navdata, heard, commands, _ = await ends(emulator)
+            navdata, heard, commands, _ = await sockets_of(emulator)
             _, stream = await asyncio.open_connection(emulator.host, emulator.control_port)
             for port, datagram in datagrams:
                 if port == 2:
@@ -334,7 +336,7 @@ def test_arbitrary_bytes_on_all_ports_leave_it_working(datagrams):
                 else:
                     (navdata, commands)[port].sendto(datagram)
             await asyncio.sleep(0.02)
-            # Nobody has configured anything: at most one packet of 24 bytes for each datagram.
+            # No handshake was completed: at most one packet of 24 bytes answers each datagram.
             assert len(heard.received) <= len(datagrams)
             assert all(len(data) == 24 for _, data, _ in heard.received)
             navdata.sendto(b"\x01\x00\x00\x00")
@@ -360,7 +362,7 @@ def started(*arguments, **others):
     )
 
 
-def test_the_command_tells_its_ports_works_and_ends_with_its_input(tmp_path):
+def test_the_command_prints_its_ports_and_ends_when_its_input_ends(tmp_path):
     truth = tmp_path / "truth.csv"
     given = ("--json", "--until-input-ends", "--plant", "real", "--record", str(truth))
     with started(*given, stdin=subprocess.PIPE) as process:
@@ -384,7 +386,7 @@ def test_the_command_tells_its_ports_works_and_ends_with_its_input(tmp_path):
 
 
 @pytest.mark.parametrize("end", ["time", "Ctrl-C"])
-def test_it_may_end_before_its_input_does(end, listens_to_ctrl_c):
+def test_the_command_may_end_before_its_input(end, listens_to_ctrl_c):
     given = ("--json", "--until-input-ends", *(["--duration", "0.1"] if end == "time" else []))
     with started(*given, "--forgiving", stdin=subprocess.PIPE) as process:
         assert json.loads(process.stdout.readline())["worst_case"] is False
@@ -395,7 +397,7 @@ def test_it_may_end_before_its_input_does(end, listens_to_ctrl_c):
     assert said == ("deadtime: interrupted\n" if end == "Ctrl-C" else "")
 
 
-def test_without_an_input_it_ends_at_once():
+def test_the_command_ends_at_once_without_input():
     with started("--json", "--until-input-ends", preexec_fn=lambda: os.close(0)) as process:
         assert process.wait(20.0) == 0
         assert process.stderr.read() == ""
@@ -409,8 +411,8 @@ def test_ctrl_c_ends_the_command(listens_to_ctrl_c):
         assert process.stderr.read() == "deadtime: interrupted\n"
 
 
-def test_an_address_that_others_reach_is_warned_of(capsys):
-    # Not opened: tests stay on this machine.
+def test_an_address_that_other_machines_reach_causes_a_warning(capsys):
+    # The port is not opened, because tests stay on this machine.
     emulator = Emulator(EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)))
     tell(emulator, as_json=True)
     out, errors = capsys.readouterr()

@@ -1,8 +1,9 @@
-"""What clients of the public send to an AR.Drone 2.0, replayed to the emulator in virtual time.
+"""Messages of other AR.Drone 2.0 clients, replayed to the emulator in virtual time.
 
-python-ardrone (venthur) opens a socket for each command; ps_drone asks TCP 21 whether the drone is
-there and flies for seconds on one command; node-ar-drone waits for an acknowledgement of each
-setting. Written from what they send, by nobody's code but our own.
+python-ardrone (venthur) opens a socket for each command; ps_drone checks whether TCP port 21
+answers and flies for seconds on one command; node-ar-drone waits for the acknowledgement of each
+setting. The replays were written from what the clients send and contain none of their code.
+
 """
 
 import asyncio
@@ -20,8 +21,8 @@ HOST = "127.0.0.1"
 FREE = ports_from(0)
 
 
-class Ear(asyncio.DatagramProtocol):
-    """A socket that keeps what it hears."""
+class Receiver(asyncio.DatagramProtocol):
+    """A socket that keeps the navdata that it receives."""
 
     def __init__(self):
         self.heard = []
@@ -33,15 +34,15 @@ class Ear(asyncio.DatagramProtocol):
         self.heard.append((asyncio.get_running_loop().time(), parse_navdata(data)))
 
 
-async def ear(port):
+async def open_receiver(port):
     loop = asyncio.get_running_loop()
-    _, listening = await loop.create_datagram_endpoint(Ear, remote_addr=(HOST, port))
+    _, listening = await loop.create_datagram_endpoint(Receiver, remote_addr=(HOST, port))
     return listening
 
 
 @asynccontextmanager
 async def connection(port):
-    """What comes from a connection that says nothing."""
+    """Return what a connection receives without a request."""
     reader, writer = await asyncio.open_connection(HOST, port)
     try:
         yield reader
@@ -50,7 +51,7 @@ async def connection(port):
 
 
 async def has_ended(reader):
-    """Whether a connection is closed, once what it has brought is read."""
+    """Read a connection and return whether it is closed."""
     try:
         async with asyncio.timeout(0.01):
             while await reader.read(65536):
@@ -61,7 +62,7 @@ async def has_ended(reader):
 
 
 class Client:
-    """Numbers commands and sends each in a datagram, from one socket or from a new one each."""
+    """Number commands and send each in a datagram, from one socket or from a new one each."""
 
     def __init__(self, emulator, first=1, *, one_socket=True):
         self.port, self.number, self.one_socket = emulator.command_port, first, one_socket
@@ -70,7 +71,7 @@ class Client:
 
     async def at(self, name, *arguments):
         if self.line is None or not self.one_socket:
-            self.line = await ear(self.port)
+            self.line = await open_receiver(self.port)
         told = "".join(f",{argument}" for argument in arguments)
         self.line.transport.sendto(f"AT*{name}={self.number}{told}\r".encode())
         self.number, self.last = self.number + 1, self.clock()
@@ -81,7 +82,7 @@ class Client:
         await self.at("CONFIG", f'"{key}"', f'"{value}"')
 
     async def sleep(self, duration, every):
-        """Wait, and keep the link alive with COMWDG where nothing was sent for so long."""
+        """Wait, and keep the link alive with COMWDG whenever nothing has been sent for a while."""
         end = self.clock() + duration
         while self.clock() < end:
             await asyncio.sleep(min(0.01, end - self.clock()))
@@ -90,7 +91,7 @@ class Client:
 
 
 async def settings_of(emulator, client):
-    """The configuration as a connection reads it that is opened before it is asked for."""
+    """Return the configuration as read by a connection that was opened before the request."""
     async with connection(emulator.control_port) as reader:
         await client.at("CTRL", 4, 0)
         return parse_configuration(await reader.readuntil(b"\0"))
@@ -98,7 +99,7 @@ async def settings_of(emulator, client):
 
 IDS = ('"943dac23"', '"36355d78"', '"21d958e4"')
 
-#: In their order, with pauses of half a second; the first video key is misspelled by that client.
+#: In the client's order, with pauses of half a second; the client misspells the first video key.
 SETTINGS_OF_PYTHON_ARDRONE = [
     ("custom:session_id", "943dac23"),
     ("custom:profile_id", "36355d78"),
@@ -125,14 +126,14 @@ async def fly_python_ardrone():
             await client.config(key, value)
             await client.sleep(0.5, every=0.2)
         video = await stack.enter_async_context(connection(emulator.video_port))
-        navdata = await ear(emulator.navdata_port)
-        navdata.transport.sendto(b"\x01\x00\x00\x00")  # asked for once, and never again
+        navdata = await open_receiver(emulator.navdata_port)
+        navdata.transport.sendto(b"\x01\x00\x00\x00")  # Navdata are requested once only.
         control = await stack.enter_async_context(connection(emulator.control_port))
         begun = client.clock()
         await client.at("REF", 290718208)
         await client.sleep(6.0, every=0.2)
         hovering = emulator.truth()
-        await client.at("PCMD", 1, 0, 0, 1045220557, 0)  # up at 0.2, once
+        await client.at("PCMD", 1, 0, 0, 1045220557, 0)  # Climb at 0.2, sent once.
         await client.sleep(2.0, every=0.2)
         climbed = emulator.truth()
         await client.at("PCMD", 0, 0, 0, 0, 0)
@@ -140,14 +141,14 @@ async def fly_python_ardrone():
         flying = emulator.truth()
         await client.at("REF", 290717696)
         await client.sleep(8.0, every=0.2)
-        assert not await has_ended(video)  # an end of the stream makes that client read it for ever
+        assert not await has_ended(video)  # The client never stops reading a closed stream.
         assert not await has_ended(control)
         settings = await settings_of(emulator, client)
         truths = (hovering, climbed, flying, emulator.truth())
         return truths, settings, [t - begun for t, _ in navdata.heard], navdata.heard[-1][1]
 
 
-def test_python_ardrone_keeps_its_navdata_though_each_command_has_a_socket_of_its_own():
+def test_python_ardrone_keeps_receiving_navdata_with_a_new_socket_for_each_command():
     truths, settings, times, last = links.run(fly_python_ardrone())
     assert max(b - a for a, b in itertools.pairwise(times)) < 0.1
     assert times[-1] > 27.9
@@ -163,20 +164,21 @@ def test_python_ardrone_keeps_its_navdata_though_each_command_has_a_socket_of_it
 async def fly_ps_drone():
     async with AsyncExitStack() as stack:
         emulator = await stack.enter_async_context(Emulator(EmulatorOptions(noise=0.0, **FREE)))
-        async with connection(emulator.ftp_port) as files:  # is it there?
+        async with connection(emulator.ftp_port) as files:  # The client checks this port.
             said = await files.read()
         client = Client(emulator, first=3)
-        line = client.line = await ear(emulator.command_port)
+        line = client.line = await open_receiver(emulator.command_port)
         for raw in (b"\r", b"AT*PMODE=1,2\rAT*MISC=2,2,20,2000,3000\r"):
             line.transport.sendto(raw)
             await asyncio.sleep(0.01)
-        navdata = await ear(emulator.navdata_port)
+        navdata = await open_receiver(emulator.navdata_port)
         navdata.transport.sendto(b"\x01\x00\x00\x00")
-        reader = await stack.enter_async_context(connection(emulator.control_port))  # kept open
+        reader = await stack.enter_async_context(connection(emulator.control_port))  # stays open
         await asyncio.sleep(0.1)
         for key, value in (("general:navdata_demo", "TRUE"), ("custom:session_id", "-all")):
             await client.config(key, value)
-            for requested in (True, False):  # waits for the bit without an end, then for its reset
+            # The client waits for the bit and then for its reset, without a time-out.
+            for requested in (True, False):
                 async with asyncio.timeout(2.0):
                     while navdata.heard[-1][1].command_acknowledged is not requested:
                         await client.sleep(0.001, every=0.1)
@@ -188,7 +190,7 @@ async def fly_ps_drone():
         await client.at("REF", 290718208)
         await client.sleep(7.5, every=0.1)
         begun = emulator.truth()
-        await client.at("PCMD", 3, 0, -2147483648, 1045220557, 0)  # moveUp, once; flag 3 and -0.0
+        await client.at("PCMD", 3, 0, -2147483648, 1045220557, 0)  # moveUp, once: flag 3 and -0.0
         await client.sleep(2.0, every=0.1)
         await client.at("PCMD", 0, 0, 0, 0, 0)
         await client.sleep(2.0, every=0.1)
@@ -199,7 +201,7 @@ async def fly_ps_drone():
 
 
 def test_ps_drone_starts_and_flies_on_one_command_for_two_seconds():
-    """It found no TCP 21 and did not start; one `moveUp` moved the drone by 4 mm."""
+    """ps_drone needs an answer on TCP port 21, and `moveUp` is a single command."""
     said, settings, begun, flown, landed = links.run(fly_ps_drone())
     assert said.startswith(b"421 ")
     assert settings["general:navdata_demo"] == "TRUE"
@@ -207,7 +209,7 @@ def test_ps_drone_starts_and_flies_on_one_command_for_two_seconds():
     assert landed.phase is Phase.LANDED
 
 
-#: Settings that programs with node-ar-drone make.
+#: Settings of programs that use node-ar-drone.
 SETTINGS_OF_NODE = {
     "general:navdata_demo": "FALSE",
     "general:navdata_options": "105971713",
@@ -224,15 +226,15 @@ SETTINGS_OF_NODE = {
 
 
 async def configure_by_node(keys):
-    """Acknowledged or not for each key, and how long it took, s."""
+    """Send each setting; return whether it was acknowledged and how long that took, s."""
     async with Emulator(EmulatorOptions(noise=0.0, **FREE)) as emulator:
-        client, navdata = Client(emulator, first=0), await ear(emulator.navdata_port)
+        client, navdata = Client(emulator, first=0), await open_receiver(emulator.navdata_port)
         navdata.transport.sendto(b"\x01")
         found = {}
         for key, value in keys.items():
             await client.config(key, value)
             begun = client.clock()
-            while client.clock() - begun < 0.5:  # its time-out
+            while client.clock() - begun < 0.5:  # The client's own time-out.
                 await client.at("REF", 0)
                 await client.at("PCMD", 0, 0, 0, 0, 0)
                 await asyncio.sleep(0.03)
@@ -246,7 +248,7 @@ async def configure_by_node(keys):
 
 
 def test_node_ar_drone_has_each_of_its_settings_acknowledged_at_once():
-    """Each key that the emulator did not know cost it 0.6 s and an error."""
+    """The client waits 0.6 s for an acknowledgement and then raises an error."""
     found, settings = links.run(configure_by_node(SETTINGS_OF_NODE))
     for key, value in SETTINGS_OF_NODE.items():
         acknowledged, after = found[key]
@@ -254,11 +256,11 @@ def test_node_ar_drone_has_each_of_its_settings_acknowledged_at_once():
         assert after < 0.1, key
         assert settings[key] == value
     found, _ = links.run(configure_by_node({"general:navdata_demo": "TRUE", "video:codec": "1"}))
-    assert found["video:codec"][0] is False  # no key of the drone: a program learns of its mistake
+    assert found["video:codec"][0] is False  # The drone has no such key.
 
 
 async def idle_connections(port_name, host_speaks):
-    """How many of ten idle connections are open at once, and whether one more gets its answer."""
+    """How many of ten idle connections stay open at once, and the answer to one more."""
     async with AsyncExitStack() as stack:
         emulator = await stack.enter_async_context(Emulator(EmulatorOptions(**FREE)))
         client = Client(emulator)
@@ -277,16 +279,16 @@ async def idle_connections(port_name, host_speaks):
 
 @pytest.mark.parametrize("host_speaks", [True, False])
 @pytest.mark.parametrize("port_name", ["control_port", "video_port"])
-def test_idle_connections_are_few_end_and_are_in_nobodys_way(port_name, host_speaks):
-    """Four of them kept everybody else from the configuration, without a time-out."""
+def test_idle_connections_are_limited_time_out_and_block_nobody(port_name, host_speaks):
+    """Four idle connections must not keep other clients from the configuration."""
     open_ones, settings, left = links.run(idle_connections(port_name, host_speaks))
     assert open_ones == 4
     assert "control:altitude_max" in settings
     assert left == ((3 if port_name == "control_port" else 4) if host_speaks else 0)
 
 
-def test_a_connection_that_a_client_keeps_is_not_the_one_that_has_to_go():
-    async def crowd():
+def test_a_connection_in_use_is_not_the_one_that_is_closed():
+    async def open_many():
         async with AsyncExitStack() as stack:
             emulator = await stack.enter_async_context(Emulator(EmulatorOptions(**FREE)))
             client = Client(emulator)
@@ -299,5 +301,5 @@ def test_a_connection_that_a_client_keeps_is_not_the_one_that_has_to_go():
                     await stack.enter_async_context(connection(emulator.control_port))
             return found
 
-    first, *others = links.run(crowd())
+    first, *others = links.run(open_many())
     assert others == [first, first]

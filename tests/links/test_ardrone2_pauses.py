@@ -1,4 +1,4 @@
-"""A client that stood still: nothing may ask a drone that has landed to take off again."""
+"""Pauses of the client's program: a drone that has landed is never asked to take off again."""
 
 import asyncio
 import contextlib
@@ -16,7 +16,7 @@ from deadtime.links.ardrone2.sender import CYCLE, CommandSender
 from emulated import emulator, skip_if_too_busy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from level_drone import level
+from worst_case_drone import connected_drone
 
 
 def now():
@@ -24,14 +24,14 @@ def now():
 
 
 def refs(told):
-    """Of each datagram when it was sent, whether it asks to fly (None: it does not say)."""
+    """For each datagram: when it was sent, and whether it requests flight (None: no REF in it)."""
     for sent, commands, _ in told:
         said = [one.take_off for one in commands if isinstance(one, Ref)]
         yield sent, said[0] if said else None
 
 
-async def go_on(client, how, times=1):
-    """What a program does next, as if it had not stood still."""
+async def continue_program(client, how, times=1):
+    """What a program does next if it does not notice its pause."""
     for _ in range(times):
         if how == "hover":
             client.hover()
@@ -46,20 +46,20 @@ async def go_on(client, how, times=1):
 @pytest.mark.parametrize("going_on", ["hover", "command", "state", "nothing"])
 @pytest.mark.parametrize("pause", [2.1, 9.0])
 def test_after_a_pause_beyond_the_watchdog_a_landed_drone_is_not_asked_to_take_off(pause, going_on):
-    # An event loop that hung for 9 s: `hover()` sent seven take-off datagrams to a landed drone.
+    # If the event loop is blocked for 9 s, `hover()` must not send take-off to a landed drone.
     async def fly():
-        async with level() as (drone, client):
+        async with connected_drone() as (drone, client):
             await client.take_off()
             client.command(0.3)
-            drone.stand_still(pause)
+            drone.pause_client(pause)
             went_on = now()
             with pytest.raises(FlightAbortedError, match=rf"was paused for {pause:.0f}\."):
-                await go_on(client, going_on)
+                await continue_program(client, going_on)
             with pytest.raises(FlightAbortedError, match="commanded to land"):
                 client.hover()
             await asyncio.sleep(0.5)
             assert drone.phase == "landed"
-            later = [asked for sent, asked in refs(drone.told) if sent >= went_on]
+            later = [asked for sent, asked in refs(drone.received) if sent >= went_on]
             assert len(later) > 10
             assert set(later) == {False}
 
@@ -67,24 +67,24 @@ def test_after_a_pause_beyond_the_watchdog_a_landed_drone_is_not_asked_to_take_o
 
 
 @pytest.mark.parametrize("pause", [0.26, 0.6, 0.9])
-def test_after_a_short_pause_it_hovers_without_a_wish_until_the_drone_is_known_to_fly(pause):
+def test_after_a_short_pause_flight_is_requested_only_when_the_drone_is_known_to_fly(pause):
     async def fly():
-        async with level(late=0.1) as (drone, client):
+        async with connected_drone(late=0.1) as (drone, client):
             await client.take_off()
             client.command(0.3)
-            drone.stand_still(pause)
+            drone.pause_client(pause)
             went_on = now()
             assert client.command(0.3) == 0.0
             for _ in range(20):
                 await asyncio.sleep(0.02)
                 client.command(0.3)
-            # News that are younger than the pause are 0.1 s on their way.
-            asked = [(sent - went_on, up) for sent, up in refs(drone.told) if sent >= went_on]
+            # The first navdata sent after the pause arrive 0.1 s later.
+            asked = [(sent - went_on, up) for sent, up in refs(drone.received) if sent >= went_on]
             assert all(up is None for passed, up in asked if passed < 0.1)
             assert all(up is True for passed, up in asked if passed > 0.1 + 3 * CYCLE)
             moves = [
                 one.flag
-                for sent, commands, _ in drone.told
+                for sent, commands, _ in drone.received
                 for one in commands
                 if isinstance(one, Move) and went_on <= sent < went_on + 0.1
             ]
@@ -95,26 +95,26 @@ def test_after_a_short_pause_it_hovers_without_a_wish_until_the_drone_is_known_t
     run(fly())
 
 
-def test_where_no_clock_tells_old_news_from_new_a_pause_ends_the_flight():
+def test_a_pause_ends_the_flight_if_no_clock_dates_the_navdata():
     async def fly():
-        async with level(options=("short",)) as (drone, client):
+        async with connected_drone(options=("short",)) as (drone, client):
             await client.take_off()
-            drone.stand_still(0.5)
+            drone.pause_client(0.5)
             went_on = now()
             with pytest.raises(FlightAbortedError, match="after a pause of this program"):
-                await go_on(client, "hover", 60)
-            assert True not in [up for sent, up in refs(drone.told) if sent >= went_on]
+                await continue_program(client, "hover", 60)
+            assert True not in [up for sent, up in refs(drone.received) if sent >= went_on]
 
     run(fly())
 
 
-def test_a_pause_just_before_taking_off_ends_it_on_the_ground():
+def test_a_pause_just_before_take_off_leaves_the_drone_on_the_ground():
     async def fly():
-        async with level() as (drone, client):
-            asyncio.get_running_loop().call_later(0.1, drone.stand_still, 5.0)
+        async with connected_drone() as (drone, client):
+            asyncio.get_running_loop().call_later(0.1, drone.pause_client, 5.0)
             with pytest.raises(LinkError, match="just before"):
                 await client.take_off()
-            assert not any(up for _, up in refs(drone.told))
+            assert not any(up for _, up in refs(drone.received))
 
     run(fly())
 
@@ -129,26 +129,28 @@ PAUSES = st.lists(st.tuples(st.floats(0.0, 3.0), LENGTHS), min_size=1, max_size=
 )
 @example(pauses=[(0.5, 1.99), (2.5, 0.3)], own=[1.99], every=3, late=True)
 @example(pauses=[(0.2, 5.0)], own=[], every=3, late=False)
-def test_no_pause_anywhere_has_a_drone_that_came_down_asked_to_fly(pauses, own, every, late):
-    # Pauses of the whole program at any moment, and of the code between two commands.
+def test_no_pause_makes_a_landed_drone_be_asked_to_take_off(pauses, own, every, late):
+    # The whole program pauses at any moment, and so does the code between two commands.
     async def fly():
-        async with level(late=0.03 if late else 0.0) as (drone, client):
+        async with connected_drone(late=0.03 if late else 0.0) as (drone, client):
             loop, left = asyncio.get_running_loop(), list(own)
             asked = now()
             for begin, length in pauses:
-                loop.call_later(begin, drone.stand_still, length)
+                loop.call_later(begin, drone.pause_client, length)
             with contextlib.suppress(LinkError):
                 await client.take_off()
                 for turn in range(50):
                     await client.state()
                     if left and turn % every == 0:
-                        drone.stand_still(left.pop())
+                        drone.pause_client(left.pop())
                     client.command(0.3) if turn % 2 else client.hover()
                     await asyncio.sleep(0.05)
             with contextlib.suppress(LinkError):
                 await client.land()
             await asyncio.sleep(3.0)
-            for (_, up), (_, _, came_down) in zip(refs(drone.told), drone.told, strict=True):
+            for (_, up), (_, _, came_down) in zip(
+                refs(drone.received), drone.received, strict=True
+            ):
                 assert not (up and asked <= came_down)
             assert drone.phase == "landed"
 
@@ -156,10 +158,10 @@ def test_no_pause_anywhere_has_a_drone_that_came_down_asked_to_fly(pauses, own, 
 
 
 @pytest.mark.parametrize("out", [1.5, 2.5, 6.0])
-def test_a_drone_that_landed_while_the_radio_was_out_is_not_asked_to_take_off(out):
-    # The wish to fly was repeated by a program that only hovers, and heard when the radio was back.
+def test_a_drone_that_landed_during_a_radio_outage_is_not_asked_to_take_off(out):
+    # The program only hovers, and its commands are received again when the outage ends.
     async def fly():
-        async with level() as (drone, client):
+        async with connected_drone() as (drone, client):
             await client.take_off()
             socket, begun = client._link._commands, now()
             plain, deliver = socket.sendto, drone._deliver
@@ -175,15 +177,15 @@ def test_a_drone_that_landed_while_the_radio_was_out_is_not_asked_to_take_off(ou
                 await asyncio.sleep(0.05)
             assert "nothing received from 127.0.0.1 for 1.0 s" in str(ended)
             assert drone.phase == "landed"
-            later = [up for sent, up in refs(drone.told) if sent > begun + 0.05]
+            later = [up for sent, up in refs(drone.received) if sent > begun + 0.05]
             assert len(later) > 10
             assert True not in later
 
     run(fly())
 
 
-def test_ages_run_on_while_the_machine_sleeps(monkeypatch):
-    # A laptop that was closed in flight: the clock of the event loop stood still meanwhile.
+def test_message_ages_include_the_time_in_which_the_machine_sleeps(monkeypatch):
+    # For example a laptop closed in flight: the event loop's clock stands still meanwhile.
     if not hasattr(time, "CLOCK_BOOTTIME"):
         pytest.skip("this system has no clock that counts sleep beside one that does not")
     plain, slept = time.clock_gettime, []
@@ -208,7 +210,7 @@ def test_ages_run_on_while_the_machine_sleeps(monkeypatch):
     asyncio.run(look())
 
 
-def test_without_such_a_clock_it_is_that_of_the_event_loop(monkeypatch):
+def test_without_a_clock_that_counts_sleep_the_event_loop_s_clock_is_used(monkeypatch):
     monkeypatch.delattr(time, "CLOCK_BOOTTIME", raising=False)
     assert abs(clock._counted() - time.monotonic()) < 1e6
     assert clock._counted() <= clock._counted()
@@ -233,8 +235,8 @@ asyncio.run(main())
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="this system stops no process")
-def test_a_client_process_that_was_stopped_in_flight_lands_what_has_landed():
-    # SIGSTOP until the drone has landed itself, then SIGCONT: take-off for up to 0.46 s.
+def test_a_client_process_that_was_stopped_in_flight_does_not_restart_a_landed_drone():
+    # SIGSTOP until the drone has landed itself, then SIGCONT: no take-off may be sent.
     async def fly():
         async with emulator() as emulated:
             ports = (emulated.navdata_port, emulated.command_port, emulated.control_port)

@@ -1,4 +1,4 @@
-"""Which packets are believed, and what real ones tell."""
+"""Which packets the reader accepts, and the states that it reads from recorded ones."""
 
 import struct
 from dataclasses import replace
@@ -23,23 +23,23 @@ def packet(sequence, height=1.0, clock=None, state=State.FLYING, **others):
     return build_navdata(Navdata(int(state), sequence, clock=clock, demo=demo, **others))
 
 
-def fed(*packets, every=0.005):
-    """A reader that was given these packets, one after the other."""
+def read_all(*packets, every=0.005):
+    """Give these packets to a reader, one after the other."""
     reader = NavdataReader()
     states = [reader.accept(one, k * every) for k, one in enumerate(packets)]
     return reader, states
 
 
-def test_numbers_have_to_rise():
-    reader, states = fed(*(packet(k) for k in (1, 2, 2, 5, 3, 6)))
+def test_sequence_numbers_must_rise():
+    reader, states = read_all(*(packet(k) for k in (1, 2, 2, 5, 3, 6)))
     assert [s and s.sequence for s in states] == [1, 2, None, 5, None, 6]
     told = reader.statistics
     assert (told.duplicates, told.reordered, told.missing, told.states) == (1, 1, 1, 4)
-    assert reader.newest.missing == 2  # the most in a row, as the rules count
+    assert reader.newest.missing == 2  # The longest run of bad packets that the rules allow.
 
 
-def test_a_number_far_ahead_is_not_believed_and_does_not_lock_out_the_rest():
-    reader, states = fed(packet(1), packet(2**31), packet(2))
+def test_a_number_far_ahead_is_rejected_and_later_packets_are_accepted():
+    reader, states = read_all(packet(1), packet(2**31), packet(2))
     assert states[1] is None
     assert states[2].sequence == 2
     assert reader.statistics.implausible == 1
@@ -48,13 +48,13 @@ def test_a_number_far_ahead_is_not_believed_and_does_not_lock_out_the_rest():
 def test_broken_packets_are_counted_and_dropped():
     whole = packet(2)
     wrong = whole[:30] + bytes([whole[30] ^ 1]) + whole[31:]
-    reader, states = fed(packet(1), wrong, whole[:-3], b"", b"\x01", whole)
+    reader, states = read_all(packet(1), wrong, whole[:-3], b"", b"\x01", whole)
     assert [s is not None for s in states] == [True, False, False, False, False, True]
     assert reader.statistics.broken == 4
 
 
-def test_the_drone_s_clock_does_not_run_backwards_but_turns():
-    reader, states = fed(
+def test_the_drone_s_clock_never_runs_backwards_but_may_wrap():
+    reader, states = read_all(
         packet(1, clock=2047.99), packet(2, clock=2047.90), packet(3, clock=0.01), every=0.02
     )
     assert states[1] is None
@@ -62,30 +62,30 @@ def test_the_drone_s_clock_does_not_run_backwards_but_turns():
     assert reader.statistics.implausible == 1
 
 
-def test_a_height_does_not_jump_in_flight():
-    reader, states = fed(packet(1), packet(2, height=3.0), packet(3, height=1.02))
+def test_a_height_that_jumps_in_flight_is_rejected():
+    reader, states = read_all(packet(1), packet(2, height=3.0), packet(3, height=1.02))
     assert [s and s.height for s in states] == [1.0, None, 1.02]
     assert reader.statistics.implausible == 1
-    # By 5 m/s, here for 20 ms, and a bump of 0.1 m.
+    # At most 5 m/s, here for 20 ms, and a tolerance of 0.1 m.
     for height, believed in ((1.19, True), (1.21, False), (0.81, True), (0.79, False)):
-        _, states = fed(packet(1), packet(2, height=height), every=0.02)
+        _, states = read_all(packet(1), packet(2, height=height), every=0.02)
         assert (states[1] is not None) is believed
-    # On the ground it may: a drone is carried.
+    # On the ground it may jump, because a drone may be carried.
     on_ground = [packet(k, height=z, state=0) for k, z in ((1, 0.0), (2, 2.0))]
-    assert fed(*on_ground)[1][1].height == 2.0
+    assert read_all(*on_ground)[1][1].height == 2.0
 
 
 @pytest.mark.parametrize(
     ("state", "silence", "anew"),
     [
-        (State.FLYING, 5.0, False),  # an old packet, replayed
-        (State.FLYING | State.COM_WATCHDOG, 0.01, False),  # the bit flickers in real logs
+        (State.FLYING, 5.0, False),  # An old packet is replayed.
+        (State.FLYING | State.COM_WATCHDOG, 0.01, False),  # The bit changes rapidly in real logs.
         (State.FLYING | State.COM_WATCHDOG, 1.0, True),
         (State.FLYING | State.BOOTSTRAP, 0.01, True),
     ],
 )
-def test_numbers_begin_anew_only_when_the_drone_says_why(state, silence, anew):
-    reader, _ = fed(packet(100))
+def test_numbers_may_restart_only_when_the_drone_reports_the_cause(state, silence, anew):
+    reader, _ = read_all(packet(100))
     assert (reader.accept(packet(1, state=state), silence) is not None) is anew
     assert reader.restarts == int(anew)
 
@@ -111,8 +111,8 @@ def test_a_state_is_flying_only_under_control():
         (State.BATTERY_LOW, "battery"),
     ],
 )
-def test_what_the_drone_says_is_wrong_with_it_ends_a_flight(bit, says):
-    sound, troubled = fed(packet(1), packet(2, state=State.FLYING | bit))[1]
+def test_a_fault_reported_by_the_drone_ends_a_flight(bit, says):
+    sound, troubled = read_all(packet(1), packet(2, state=State.FLYING | bit))[1]
     assert sound.fault is None
     with pytest.raises(FlightAbortedError, match=rf"reports that .*{says}"):
         Watch(Limits()).check(troubled, troubled.time)
@@ -127,12 +127,12 @@ def real_packets():
         place += 4 + length
 
 
-#: The recording keeps every 12th packet of 200 a second.
+#: The recording has every 12th of 200 packets a second.
 BETWEEN = 0.06
 
 
 def replayed():
-    """The states of the real flight, as they come through the client's reader."""
+    """The states of the real flight, as the client's reader gives them."""
     reader, states = NavdataReader(), []
     for number, data in enumerate(real_packets()):
         state = reader.accept(data, BETWEEN * number)
@@ -141,7 +141,7 @@ def replayed():
     return reader, states
 
 
-def test_a_real_flight_passes_the_reader():
+def test_a_recorded_flight_is_read_without_errors():
     reader, states = replayed()
     told = reader.statistics
     assert told.packets == 500
@@ -154,22 +154,22 @@ def test_a_real_flight_passes_the_reader():
     flown = [state for state in states if state.flying]
     assert min(state.height for state in flown) > 0.6
     assert max(state.height for state in flown) < 1.4
-    # The reported speed is that of the height.
+    # The reported speed is the derivative of the height.
     time = np.array([state.vehicle_time for state in flown])
     height = np.array([state.height for state in flown])
     climb = np.array([state.climb for state in flown])
     assert np.corrcoef(np.gradient(height, time), climb)[0, 1] > 0.8
 
 
-def test_what_a_real_drone_tells_divides_its_delay():
-    # P control with gain 1 around 1 m, 200 Hz. The command is not in the recording; it is made of
+def test_a_recorded_flight_divides_into_link_delay_and_vehicle_lag():
+    # P control with gain 1 around 1 m, 200 Hz. The command is not recorded; it is computed from
     # the height, which the ground station had. Independent fits: link 0.07 to 0.12 s, the
-    # vehicle's own loop 0.2 to 0.37 s; every 12th packet knows the former to half of 60 ms.
+    # vehicle's own loop 0.2 to 0.37 s; every 12th packet gives the former within half of 60 ms.
     flown = [state for state in replayed()[1] if state.flying]
     time = np.array([state.vehicle_time for state in flown])
     time -= time[0]
     columns = np.array([[s.climb_setpoint, s.climb, s.height] for s in flown]).T
-    rows = (time > 0.6) & (time < 13.5)  # before the reference is moved
+    rows = (time > 0.6) & (time < 13.5)  # Before the reference changes.
     told = telemetry_of((time[rows], *columns[:, rows]), time[rows], 1.0 - columns[2][rows])
     split = split_delay([told])
     low, high = split.transport.ci(0.95)

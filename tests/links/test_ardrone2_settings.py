@@ -1,4 +1,4 @@
-"""The drone's own limits: set to what was asked for, read back, and put back afterwards."""
+"""The drone's own limits are set as requested, read back, and restored afterwards."""
 
 import asyncio
 import contextlib
@@ -9,7 +9,7 @@ from deadtime.links import Limits, run
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator.settings import Settings
 from emulated import client_of, connected, emulator
-from level_drone import LevelDrone, level
+from worst_case_drone import WorstCaseDrone, connected_drone
 
 BOTH = ("control:control_vz_max", "control:altitude_max")
 
@@ -22,10 +22,10 @@ def held(drone):
     ("climb", "set_to"),
     [(0.3, 300), (0.5, 500), (1.0, 1000), (1.1, 1100), (0.05, 200), (2.0, 2000)],
 )
-def test_the_largest_climb_of_the_drone_is_what_was_asked_for_and_is_put_back(climb, set_to):
-    # It was 1 m/s whatever had been asked for, and stayed so after the flight.
+def test_the_drone_s_climb_limit_is_set_as_requested_and_restored(climb, set_to):
+    # The limit must not stay at a default of 1 m/s, nor stay changed after the flight.
     async def fly():
-        async with LevelDrone() as drone:
+        async with WorstCaseDrone() as drone:
             limits = Limits(max_climb=climb, max_height=2.5)
             async with ARDrone2("127.0.0.1", limits, **drone.ports) as client:
                 assert held(drone) == [set_to, 2500]
@@ -35,7 +35,7 @@ def test_the_largest_climb_of_the_drone_is_what_was_asked_for_and_is_put_back(cl
                 await asyncio.sleep(0.05)
                 assert drone.gaz * 1e-3 * set_to == pytest.approx(climb, rel=1e-6)
                 await client.land()
-                assert held(drone) == [set_to, 2500]  # until the end of the last flight
+                assert held(drone) == [set_to, 2500]  # Unchanged until the end of the last flight.
             assert drone.phase == "landed"
             assert held(drone) == [700, 3000]
 
@@ -47,24 +47,24 @@ async def fails(drone, how):
         await client.take_off()
         client.command(0.2)
         if how == "pause":
-            drone.stand_still(5.0)
+            drone.pause_client(5.0)
             client.hover()
         await asyncio.sleep(0.1)
         raise ZeroDivisionError
 
 
 @pytest.mark.parametrize("how", ["exception", "cancelled", "pause"])
-def test_they_are_put_back_after_the_landing_however_a_flight_ends(how):
+def test_settings_are_restored_after_the_landing_however_a_flight_ends(how):
     async def fly():
-        async with LevelDrone() as drone:
+        async with WorstCaseDrone() as drone:
             put, plain = [], drone.settings.__class__.__setitem__
 
-            class Watched(dict):
+            class RecordingSettings(dict):
                 def __setitem__(self, key, value):
                     put.append((key, value, drone.phase))
                     plain(self, key, value)
 
-            drone.settings = Watched(drone.settings)
+            drone.settings = RecordingSettings(drone.settings)
             flight = asyncio.create_task(fails(drone, how))
             if how == "cancelled":
                 await asyncio.sleep(1.0)
@@ -77,9 +77,9 @@ def test_they_are_put_back_after_the_landing_however_a_flight_ends(how):
     run(fly())
 
 
-def test_a_drone_that_no_longer_answers_is_not_waited_for_and_it_is_said():
+def test_settings_of_a_drone_that_stops_answering_are_not_waited_for_and_reported():
     async def fly():
-        async with LevelDrone() as drone:
+        async with WorstCaseDrone() as drone:
             ended = None
             try:
                 async with ARDrone2("127.0.0.1", **drone.ports) as client:
@@ -96,7 +96,7 @@ def test_a_drone_that_no_longer_answers_is_not_waited_for_and_it_is_said():
     run(fly())
 
 
-def test_a_setting_that_is_not_taken_back_is_warned_of(monkeypatch):
+def test_a_setting_that_cannot_be_restored_causes_a_warning(monkeypatch):
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
@@ -110,7 +110,7 @@ def test_a_setting_that_is_not_taken_back_is_warned_of(monkeypatch):
     run(fly())
 
 
-def test_a_connection_that_fails_leaves_the_settings_as_they_were(monkeypatch):
+def test_a_failed_connection_leaves_the_settings_unchanged(monkeypatch):
     plain = Settings.set
 
     def refuses_a_height(self, name, value):
@@ -126,12 +126,12 @@ def test_a_connection_that_fails_leaves_the_settings_as_they_were(monkeypatch):
     run(fly())
 
 
-def test_connecting_again_begins_with_news_of_its_own():
-    # The same object, closed and connected again, took what it had heard before for news.
+def test_a_second_connection_of_one_object_uses_new_navdata_only():
+    # Navdata from before the reconnection must not count as current.
     async def fly():
-        async with level() as (drone, client):
+        async with connected_drone() as (drone, client):
             await client.take_off()
-            drone.stand_still(5.0)
+            drone.pause_client(5.0)
             with contextlib.suppress(LinkError):
                 client.hover()
             await client.close()

@@ -1,4 +1,4 @@
-"""A second client at the same drone, and a drone that lands by itself: noticed and named."""
+"""A second client of the same drone, and a drone that lands by itself, are detected and named."""
 
 import asyncio
 import contextlib
@@ -10,11 +10,11 @@ from deadtime.links.ardrone2.commands import Move, Ref, encode
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.navdata import State
 from emulated import client_of, emulator
-from level_drone import level
+from worst_case_drone import connected_drone
 
 
-async def hovering(client, turns=100):
-    """Hover, and look, until something is wrong."""
+async def hover_until_error(client, turns=100):
+    """Hover and read states until an error ends the flight."""
     for _ in range(turns):
         await asyncio.sleep(0.02)
         await client.state()
@@ -22,7 +22,7 @@ async def hovering(client, turns=100):
 
 
 async def connect_beside(emulated):
-    """A second client of this package, from the same machine."""
+    """Connect a second client of this package, from the same machine."""
     await asyncio.sleep(0.3)
     second = client_of(emulated)
     with contextlib.suppress(LinkError):
@@ -31,9 +31,9 @@ async def connect_beside(emulated):
         await second.close()
 
 
-def test_a_second_client_of_the_emulator_is_named_to_the_first():
-    # Its first datagram landed the flight of the first client, which went on asking to fly. If the
-    # drone sends navdata to the newer one, the first is left with their absence.
+def test_a_second_client_of_the_emulator_is_named_in_the_error_of_the_first():
+    # The first datagram of the second client lands the drone while the first still requests flight.
+    # If the drone sends navdata to the newer client, the first only notices that they are missing.
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
@@ -41,7 +41,7 @@ def test_a_second_client_of_the_emulator_is_named_to_the_first():
             await drone.take_off()
             beside = asyncio.create_task(connect_beside(emulated))
             with pytest.raises(FlightAbortedError, match="another client commands this drone"):
-                await hovering(drone)
+                await hover_until_error(drone)
             assert not drone._sender.in_air
             with pytest.raises(LinkError, match="another client"):
                 drone.hover()
@@ -57,23 +57,26 @@ def test_a_second_client_of_the_emulator_is_named_to_the_first():
 @pytest.mark.parametrize("number", [1, 5000])
 @pytest.mark.parametrize("wish", [Ref(), Ref(take_off=True)])
 @pytest.mark.parametrize("short", [False, True])
-def test_one_datagram_from_elsewhere_is_noticed_where_the_drone_tells_of_it(number, wish, short):
-    # In short navdata there is no number of the last REF: what is left is the landing.
+def test_a_datagram_of_another_client_is_detected_if_the_drone_reports_it(number, wish, short):
+    # Short navdata have no number of the last REF: only the landing itself can be seen.
     async def fly():
-        async with level(tick=0.005, options=("short",) if short else ()) as (drone, client):
+        async with connected_drone(tick=0.005, options=("short",) if short else ()) as (
+            drone,
+            client,
+        ):
             await client.take_off()
-            await hovering(client, 5)
-            before = len(drone.told)
-            while len(drone.told) == before:  # until this client's next one it is the last
+            await hover_until_error(client, 5)
+            before = len(drone.received)
+            while len(drone.received) == before:  # until this client sends again
                 await asyncio.sleep(0.001)
-            drone._sent(encode([wish, Move(flag=0)], number), None)
+            drone.receive_commands(encode([wish, Move(flag=0)], number), None)
             if short and wish.take_off:
                 return
             with pytest.raises(FlightAbortedError, match="another client commands this drone"):
-                await hovering(client)
+                await hover_until_error(client)
             assert not any(
                 one.take_off
-                for sent, commands, came_down in drone.told
+                for sent, commands, came_down in drone.received
                 for one in commands
                 if isinstance(one, Ref) and 0.0 < came_down < sent - 0.05
             )
@@ -81,10 +84,10 @@ def test_one_datagram_from_elsewhere_is_noticed_where_the_drone_tells_of_it(numb
     run(fly())
 
 
-def test_one_that_is_noticed_on_the_ground_keeps_it_there():
+def test_another_client_detected_on_the_ground_prevents_take_off():
     async def fly():
-        async with level(tick=0.005) as (drone, client):
-            drone._sent(encode([Ref()], 5000), None)
+        async with connected_drone(tick=0.005) as (drone, client):
+            drone.receive_commands(encode([Ref()], 5000), None)
             await asyncio.sleep(0.1)
             with pytest.raises(LinkError, match="another client commands this drone"):
                 await client.take_off()
@@ -93,14 +96,14 @@ def test_one_that_is_noticed_on_the_ground_keeps_it_there():
     run(fly())
 
 
-def test_own_commands_are_no_other_client():
+def test_own_commands_are_not_attributed_to_another_client():
     async def fly():
-        async with level(uplink=0.2, late=0.3) as (_, client):
+        async with connected_drone(uplink=0.2, late=0.3) as (_, client):
             await client.take_off()
-            await hovering(client, 400)
+            await hover_until_error(client, 400)
             await client.land()
             await client.take_off()
-            await hovering(client, 20)
+            await hover_until_error(client, 20)
 
     run(fly())
 
@@ -109,30 +112,32 @@ FAULTS = [(State.BATTERY_LOW, "its battery"), (State.MOTORS_PROBLEM, "a motor")]
 
 
 @pytest.mark.parametrize(("fault", "said"), FAULTS)
-def test_a_drone_that_lands_for_a_fault_is_not_blamed_on_another_client(fault, said):
+def test_a_landing_for_a_fault_is_not_attributed_to_another_client(fault, said):
     async def fly():
-        async with level(tick=0.005) as (drone, client):
+        async with connected_drone(tick=0.005) as (drone, client):
             await client.take_off()
             drone.fault = fault
             drone._enter("landing", drone.time)
             with pytest.raises(FlightAbortedError, match=f"lands by itself: {said}"):
-                await hovering(client)
+                await hover_until_error(client)
 
     run(fly())
 
 
 def test_a_drone_that_lands_by_itself_is_not_asked_to_take_off_again():
-    # The wish to fly went on being repeated; a drone that obeys its level rises again.
+    # A drone that obeys the level of the take-off bit would rise again if it were still set.
     async def fly():
-        async with level(tick=0.005) as (drone, client):
+        async with connected_drone(tick=0.005) as (drone, client):
             await client.take_off()
             drone._enter("landing", drone.time)
             drone.came_down = landed = drone.time
             with pytest.raises(FlightAbortedError, match="most likely another client"):
-                await hovering(client)
+                await hover_until_error(client)
             await asyncio.sleep(2.0)
             assert drone.phase == "landed"
-            later = [one for sent, some, _ in drone.told if sent > landed + 0.05 for one in some]
+            later = [
+                one for sent, some, _ in drone.received if sent > landed + 0.05 for one in some
+            ]
             assert not any(one.take_off for one in later if isinstance(one, Ref))
 
     run(fly())

@@ -1,4 +1,4 @@
-"""What every link shares: commands that cannot be wrong, limits, the watch, the journal."""
+"""What all links share: command ranges, limits, the watch over a flight, and the journal."""
 
 import copy
 import math
@@ -23,7 +23,7 @@ STATE = VehicleState(
 
 
 @given(st.floats())
-def test_a_command_is_finite_and_within_one_or_is_refused(value):
+def test_a_command_is_finite_and_at_most_one_or_is_refused(value):
     if math.isfinite(value):
         assert -1.0 <= UnitCommand.saturated(value) <= 1.0
         assert abs(UnitCommand.saturated(value) - value) == max(0.0, abs(value) - 1.0)
@@ -38,13 +38,13 @@ def test_a_command_is_finite_and_within_one_or_is_refused(value):
 
 
 @pytest.mark.parametrize("wrong", ["0.5", None, 1j, b"1", [0.1]])
-def test_a_command_of_another_kind_is_refused(wrong):
+def test_a_command_of_another_type_is_refused(wrong):
     with pytest.raises(TypeError, match="command="):
         UnitCommand(wrong)
 
 
-def test_a_command_of_which_nothing_is_said_is_none():
-    # Full climb as the default failed no test.
+def test_the_default_command_is_zero():
+    # The default must not be full climb.
     assert UnitCommand() == 0.0
 
 
@@ -56,12 +56,12 @@ def test_a_command_survives_copies():
 
 @pytest.mark.parametrize("name", list(Limits.__dataclass_fields__))
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, 0.0, -1.0])
-def test_a_limit_that_limits_nothing_is_refused(name, wrong):
+def test_a_limit_without_effect_is_refused(name, wrong):
     with pytest.raises(ValueError, match=name):
         Limits(**{name: wrong})
 
 
-def test_limits_that_contradict_each_other_are_refused():
+def test_contradictory_limits_are_refused():
     with pytest.raises(ValueError, match="max_height"):
         Limits(min_height=2.0, max_height=1.0)
     with pytest.raises(ValueError, match="max_height"):
@@ -72,7 +72,7 @@ def test_limits_that_contradict_each_other_are_refused():
         Limits(command_age=1.0, landing_after=1.0)
 
 
-def test_the_largest_gain_leaves_a_factor_of_two_to_instability():
+def test_the_largest_gain_is_half_of_that_of_instability():
     loop = dtm.ControlLoop(dtm.Integrator(0.8), dtm.P(1.0), delay=0.3)
     limit = loop.stable_range("Kp")[1]
     assert largest_gain(0.3, 0.8) == pytest.approx(limit / 2.0, rel=1e-9)
@@ -99,14 +99,14 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("reason", BROKEN)
-def test_each_rule_ends_a_flight_and_names_itself(reason):
+def test_each_rule_ends_a_flight_and_is_named(reason):
     state, others = BROKEN[reason]
     with pytest.raises(FlightAbortedError, match=reason) as caught:
         Watch(Limits()).check(replace(STATE, **state), **{"now": 10.0, **others})
     assert reason in caught.value.reason
 
 
-def test_what_is_within_the_limits_passes():
+def test_states_within_the_limits_pass():
     watch = Watch(Limits())
     watch.check(STATE, now=10.29, reference=1.9)
     watch.check(STATE, now=10.29, reference=0.1)
@@ -126,12 +126,12 @@ EXACTLY = {
 
 
 @pytest.mark.parametrize("limit", EXACTLY)
-def test_what_is_exactly_at_a_limit_passes(limit):
+def test_states_exactly_at_a_limit_pass(limit):
     state, others = EXACTLY[limit]
     Watch(Limits()).check(replace(STATE, **state), **{"now": 10.0, **others})
 
 
-def test_a_height_may_stand_still_for_exactly_as_long_as_the_limit_says():
+def test_a_height_may_stay_constant_for_exactly_the_time_of_the_limit():
     watch = Watch(Limits())
     for now in (0.0, 0.5, 1.0):
         watch.check(replace(STATE, time=now, vehicle_time=None), now=now, reference=1.5)
@@ -139,7 +139,7 @@ def test_a_height_may_stand_still_for_exactly_as_long_as_the_limit_says():
         watch.check(replace(STATE, time=1.001, vehicle_time=None), now=1.001, reference=1.5)
 
 
-def test_a_height_that_jumps_is_not_believed():
+def test_a_height_that_jumps_is_rejected():
     watch = Watch(Limits())
     watch.check(STATE, now=10.0)
     jumped = replace(STATE, time=10.01, sequence=8, vehicle_time=3.01, height=1.2)
@@ -149,8 +149,8 @@ def test_a_height_that_jumps_is_not_believed():
 
 @pytest.mark.parametrize(("passed", "most"), [(0.0, 0.1), (0.02, 0.2), (0.2, 1.1)])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_height_may_change_by_the_fastest_climb_and_a_bump(passed, most, sign):
-    # A bump that was taken off instead of added failed no test.
+def test_a_height_may_change_by_the_fastest_climb_plus_the_tolerance(passed, most, sign):
+    # The tolerance is added, not subtracted.
     for share, believed in ((0.99, True), (1.01, False)):
         watch = Watch(Limits())
         start = replace(STATE, height=1.5)
@@ -164,7 +164,7 @@ def test_a_height_may_change_by_the_fastest_climb_and_a_bump(passed, most, sign)
                 watch.check(later, now=10.0 + passed)
 
 
-def test_a_jump_of_exactly_what_is_allowed_is_none():
+def test_a_jump_of_exactly_the_allowed_size_passes():
     assert not jumps(0.0, BUMP, 0.0, 5.0)
     assert not jumps(0.0, 2.0 + BUMP, 0.5, 4.0)
     assert jumps(1.0, math.nan, 1.0, 5.0)
@@ -179,21 +179,21 @@ def test_a_clock_that_runs_backwards_allows_no_larger_jump():
         watch.check(replace(later, sequence=9, time=9.8, height=1.2), now=10.0)
 
 
-def test_messages_that_arrive_in_a_burst_are_judged_by_the_clock_of_the_vehicle():
+def test_messages_that_arrive_in_a_burst_are_dated_by_the_vehicle_s_clock():
     watch = Watch(Limits())
     watch.check(STATE, now=10.0)
     watch.check(replace(STATE, sequence=9, vehicle_time=3.2, height=1.5), now=10.0)
 
 
 def later_by(passed, **changes):
-    """The state a while later, as it arrives when nothing holds it up."""
+    """The state some time later, as it arrives without delay."""
     number = 7 + round(passed / 0.05)
     times = {"time": 10.0 + passed, "vehicle_time": 3.0 + passed, "sequence": number}
     return replace(STATE, **(times | changes))
 
 
-def test_messages_that_arrive_late_by_the_clock_of_the_vehicle_are_old():
-    # They queue on the way, and each looks new when it comes.
+def test_messages_that_are_late_by_the_vehicle_s_clock_are_old():
+    # They queue on the way, and the time between arrivals does not show it.
     watch = Watch(Limits())
     watch.check(STATE, now=10.0)
     watch.check(later_by(0.5, vehicle_time=3.25), now=10.5)
@@ -204,9 +204,7 @@ def test_messages_that_arrive_late_by_the_clock_of_the_vehicle_are_old():
 @pytest.mark.parametrize(
     ("reference", "wiggle", "ends"), [(1.2, 0.0, True), (1.2, 0.001, False), (1.04, 0.0, False)]
 )
-def test_a_height_that_stands_still_away_from_the_reference_is_not_believed(
-    reference, wiggle, ends
-):
+def test_a_height_that_stays_constant_away_from_the_reference_is_rejected(reference, wiggle, ends):
     watch = Watch(Limits())
     for k in range(60):
         passed = 0.05 * k
@@ -218,7 +216,7 @@ def test_a_height_that_stands_still_away_from_the_reference_is_not_believed(
         watch.check(state, now=state.time, reference=reference)
 
 
-def test_a_height_may_stand_still_until_the_reference_moves():
+def test_a_height_may_stay_constant_until_the_reference_changes():
     watch = Watch(Limits())
     for k in range(60):
         passed = 0.05 * k
@@ -226,7 +224,7 @@ def test_a_height_may_stand_still_until_the_reference_moves():
         watch.check(later_by(passed), now=10.0 + passed, reference=reference)
 
 
-def test_the_limits_can_be_shown():
+def test_limits_have_a_readable_description():
     lines = " ".join(Limits().lines())
     for number in ("0.5 m/s", "3 m", "15 degrees", "20 %", "0.25 s", "1 s"):
         assert number in lines
@@ -235,8 +233,8 @@ def test_the_limits_can_be_shown():
 COLUMNS = ("time_s", "reference_m", "height_m")
 
 
-def lines_once_there(path, count):
-    """What is in a file as soon as it has so many lines; a thread writes it."""
+def lines_when_written(path, count):
+    """Lines of a file once it has this many; a thread writes it."""
     for _ in range(2000):
         if len(path.read_text().splitlines()) >= count:
             break
@@ -244,19 +242,19 @@ def lines_once_there(path, count):
     return path.read_text().splitlines()
 
 
-def test_every_row_comes_into_the_file_without_being_asked_for(tmp_path):
+def test_every_row_is_written_without_a_flush_by_the_caller(tmp_path):
     path = tmp_path / "folder" / "flight.csv"
     journal = Journal(path, COLUMNS)
     for row in range(10):
         journal.write((0.065 * row, float(row > 4), 0.1 * row))
-        assert len(lines_once_there(path, row + 2)) == row + 2
+        assert len(lines_when_written(path, row + 2)) == row + 2
     journal.close()
     journal.close()
     flight = dtm.read_recording(path, time="time_s", reference="reference_m", output="height_m")
     np.testing.assert_allclose(flight.output, 0.1 * np.arange(10), rtol=1e-12)
 
 
-def test_a_recording_is_never_written_over(tmp_path):
+def test_a_recording_is_never_overwritten(tmp_path):
     path = tmp_path / "flight.csv"
     Journal(path, COLUMNS).close()
     with pytest.raises(FileExistsError, match="give another name"):
@@ -288,7 +286,7 @@ with Journal(sys.argv[1], ["x_m"]) as journal:
 """
 
 
-def test_a_full_disk_leaves_whole_rows_and_says_where(tmp_path):
+def test_a_full_disk_leaves_whole_rows_and_the_error_names_the_file(tmp_path):
     pytest.importorskip("resource", reason="this system has no limit on the size of files")
     path = tmp_path / "flight.csv"
     result = subprocess.run(
@@ -296,7 +294,7 @@ def test_a_full_disk_leaves_whole_rows_and_says_where(tmp_path):
     )
     assert result.returncode == 1
     assert str(path) in result.stderr.splitlines()[-1]
-    assert path.read_text() == "x_m\n1.25\n2.25\n"  # the third would end at byte 19
+    assert path.read_text() == "x_m\n1.25\n2.25\n"  # The third row would end at byte 19.
 
 
 ROOM_AGAIN = """
@@ -323,7 +321,7 @@ print(refused)
 """
 
 
-def test_after_a_row_that_found_no_room_nothing_follows_and_every_call_says_so(tmp_path):
+def test_after_a_failed_write_nothing_is_written_and_every_call_raises(tmp_path):
     pytest.importorskip("resource", reason="this system has no limit on the size of files")
     path = tmp_path / "flight.csv"
     command = [sys.executable, "-c", ROOM_AGAIN, str(path)]
@@ -350,14 +348,14 @@ if sys.argv[2] == "dropped":
 
 
 @pytest.mark.parametrize("ends", ["returns", "raises", "dropped"])
-def test_a_journal_that_nobody_closes_is_whole_when_the_program_ends(ends, tmp_path):
+def test_a_journal_that_is_not_closed_is_complete_when_the_program_ends(ends, tmp_path):
     path = tmp_path / "flight.csv"
     command = [sys.executable, "-c", LEFT_OPEN, str(path), ends]
     subprocess.run(command, check=False, capture_output=True)
     assert path.read_text().split() == ["x_m", *(f"{row}.0" for row in range(500))]
 
 
-def test_many_rows_at_once_are_all_there_in_their_order(tmp_path):
+def test_many_rows_at_once_are_all_written_in_order(tmp_path):
     with Journal(tmp_path / "flight.csv", ["x"]) as journal:
         for row in range(20000):
             journal.write([row])
@@ -366,14 +364,14 @@ def test_many_rows_at_once_are_all_there_in_their_order(tmp_path):
 
 
 @pytest.mark.parametrize("columns", [(), ("a", "a"), ("a,b",), ('a"',), ("a\n",), ("",)])
-def test_columns_that_cannot_be_read_back_are_refused(tmp_path, columns):
+def test_column_names_that_cannot_be_read_back_are_refused(tmp_path, columns):
     with pytest.raises(ValueError, match="name"):
         Journal(tmp_path / "flight.csv", columns)
     assert not (tmp_path / "flight.csv").exists()
 
 
 @given(st.floats(-1e9, 1e9))
-def test_twelve_digits_are_kept(value):
+def test_numbers_are_written_with_twelve_digits(value):
     import tempfile
     from pathlib import Path
 

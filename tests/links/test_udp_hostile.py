@@ -1,4 +1,4 @@
-"""Packets that say what cannot be, from the peer's own address: the run ends with a true report."""
+"""Packets with impossible contents from the peer's own address: the run ends with a true report."""
 
 import asyncio
 import ipaddress
@@ -42,13 +42,13 @@ CHANGES = st.lists(CHANGE, min_size=1, max_size=8)
 
 
 def raw(packet, change):
-    """A packet with fields changed, also to what `LoopPacket.encode` refuses."""
+    """Encode a packet with fields changed, including values that `LoopPacket.encode` refuses."""
     words = vars(packet) | change
     return struct.pack("<4sIIIddddd", b"DTL1", *(words[name] for name in FIELDS))
 
 
-class Other(asyncio.DatagramProtocol):
-    """The other end: keeps what comes."""
+class Peer(asyncio.DatagramProtocol):
+    """The other end of the link: it keeps what it receives."""
 
     def __init__(self):
         self.came = []
@@ -62,12 +62,12 @@ class Other(asyncio.DatagramProtocol):
 
 async def other_end(port=0):
     loop = asyncio.get_running_loop()
-    _, other = await loop.create_datagram_endpoint(Other, local_addr=("127.0.0.1", port))
+    _, other = await loop.create_datagram_endpoint(Peer, local_addr=("127.0.0.1", port))
     return loop, other
 
 
 async def controller_among(changes):
-    """The report of a controller whose plant sends true packets and, between them, changed ones."""
+    """Report of a controller whose plant sends true packets with changed ones between them."""
     loop, plant = await other_end()
     async with Controller(ControllerOptions(gain=4.0, limit=LIMIT)) as controller:
         number = 0
@@ -85,7 +85,7 @@ async def controller_among(changes):
 
 
 async def plant_among(changes):
-    """The report of a plant whose controller sends true answers and, between them, changed ones."""
+    """Report of a plant whose controller sends true answers with changed ones between them."""
     loop, controller = await other_end(41_000)
     options = PlantOptions(
         controller=("127.0.0.1", 41_000),
@@ -109,7 +109,7 @@ async def plant_among(changes):
 
 
 def check(report, came):
-    """What holds of every report and of all that is sent, whatever the other end said."""
+    """Check what holds of every report and of all that is sent, whatever the peer sent."""
     json.dumps(plain(report.to_dict()), allow_nan=False)
     link = report.link
     assert link.round_trip.count > 0
@@ -123,8 +123,8 @@ def check(report, came):
 
 
 @given(CHANGES)
-@example([{"echo_sent": -1e308}])  # ended the controller without a report
-@example([{"sent": 1e308}, {"sent": -1e308}])  # two ways whose sum is no number
+@example([{"echo_sent": -1e308}])  # must not end the controller
+@example([{"sent": 1e308}, {"sent": -1e308}])  # The sum of the two delays is not finite.
 @example([{"value": 1.7e308, "reference": -1.7e308}])
 @settings(max_examples=30)
 def test_no_packet_of_its_plant_ends_a_controller_without_a_report(changes):
@@ -149,43 +149,43 @@ def test_no_packet_of_its_controller_ends_a_plant_without_a_report(changes):
     "change",
     [
         {"echo_sent": -1e308},
-        {"echo_sent": 0.0},  # not the time at which that one was sent
-        {"echo_sequence": 4_000_000},  # never sent
-        {"echo_sent": 1e9},  # not sent yet
-        {"held": 3.0},  # held for longer than it was away
+        {"echo_sent": 0.0},  # Not the time at which that packet was sent.
+        {"echo_sequence": 4_000_000},  # It was never sent.
+        {"echo_sent": 1e9},  # It has not been sent yet.
+        {"held": 3.0},  # The hold is longer than the round trip.
     ],
 )
-def test_a_controller_believes_no_echo_that_the_plant_would_not(change):
-    """The times of a packet that answers nothing the controller sent are not measured."""
+def test_a_controller_rejects_every_echo_that_a_plant_would_reject(change):
+    """Times in a packet that answers nothing the controller sent are not measured."""
     true, _ = virtual_time.run(controller_among([]))
     report, _ = virtual_time.run(controller_among([change]))
-    # The true packet of the same number comes after it, as a duplicate.
+    # The true packet with the same number arrives after it and counts as a duplicate.
     assert report.link.round_trip.count == true.link.round_trip.count - 2
     assert report.link.round_trip.largest == pytest.approx(true.link.round_trip.largest, abs=1e-9)
     assert report.link.forward_delay == pytest.approx(true.link.forward_delay, abs=1e-9)
     assert (
         report.answered == true.answered
-    )  # what it measures is: the plant may have been restarted
+    )  # The measurement in it is used, because the plant may have restarted.
 
 
 # --- addresses ---------------------------------------------------------------------------------
 
 
 @given(st.ip_addresses(v=6))
-def test_every_spelling_of_an_address_is_the_same_address(address):
+def test_all_spellings_of_an_address_compare_equal(address):
     if address.ipv4_mapped is None:
         assert canonical(address.exploded) == canonical(str(address)) == str(address)
         assert canonical(address.exploded.upper()) == str(address)
 
 
 @given(st.ip_addresses(v=4))
-def test_an_ipv4_address_told_by_a_socket_of_ipv6_is_itself(address):
+def test_an_ipv4_address_reported_by_an_ipv6_socket_is_the_ipv4_address(address):
     assert canonical(str(address)) == str(address)
     assert canonical(f"::ffff:{address}") == str(address)
     assert canonical(ipaddress.IPv6Address(f"::ffff:{address}").exploded) == str(address)
 
 
-def test_a_scope_is_a_part_of_an_address_by_its_number():
+def test_the_scope_of_an_address_is_compared_by_its_number():
     ((number, name), *_) = socket.if_nameindex()
     assert canonical(f"fe80:0::1%{name}") == canonical(f"fe80::1%{number}") == f"fe80::1%{number}"
     assert canonical("fe80::1%77") != canonical("fe80::1%78")
@@ -193,7 +193,7 @@ def test_a_scope_is_a_part_of_an_address_by_its_number():
 
 
 def step(controller_host, listen="::1", plant=None):
-    """The report of a plant that looks for its controller at a host spelled so."""
+    """Report of a plant that looks for its controller at a host in this spelling."""
 
     async def run():
         options = ControllerOptions(gain=4.0, listen=(listen, 0), plant=plant)
@@ -206,8 +206,8 @@ def step(controller_host, listen="::1", plant=None):
     return run()
 
 
-def test_an_address_of_ipv6_may_be_spelled_in_any_way():
-    """With ``[0::1]`` every answer was a stranger's, and the run ended as if all were well."""
+def test_an_ipv6_address_may_be_spelled_in_any_way():
+    """With ``[0::1]`` the answers must not count as those of a foreign host."""
     plant, controller = virtual_time.run(step("0::1"))
     assert (plant.link.foreign, controller.link.foreign) == (0, 0)
     assert plant.applied > 30
@@ -221,7 +221,7 @@ def with_ipv6():
         pytest.skip("this machine has no IPv6")
 
 
-def test_on_real_sockets_too():
+def test_ipv6_addresses_on_real_sockets():
     with_ipv6()
     plant, _ = asyncio.run(step("0:0:0:0:0:0:0:1"))
     assert plant.link.foreign == 0
@@ -235,7 +235,7 @@ def test_a_controller_on_a_socket_of_ipv6_answers_a_plant_of_ipv4():
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]
-        listen = ("::ffff:127.0.0.1", 0)  # a socket of IPv6, and still of this machine alone
+        listen = ("::ffff:127.0.0.1", 0)  # IPv6, but reachable from this machine only
         options = ControllerOptions(gain=4.0, listen=listen, plant=("127.0.0.1", port))
         async with Controller(options) as controller:
             there = ("127.0.0.1", controller.address[1])

@@ -1,4 +1,4 @@
-"""Plant and controller over UDP in virtual time: exact on a calm network, safe on any."""
+"""Plant and controller over UDP in virtual time: exact with constant delays, safe with faults."""
 
 import asyncio
 import math
@@ -35,7 +35,7 @@ from hypothesis import strategies as st
 WAY = Network(delay=0.05)
 WATCHDOG, LIMIT = 0.5, 5.0
 
-#: What a relay can do at its worst, one fault at a time and all together.
+#: The worst options of a relay, one fault at a time and all together.
 FAULTS = {
     "60 % loss": Network(delay=0.05, loss=0.6),
     "bursts": Network(delay=0.05, loss=Bursts.of(0.3, 20.0)),
@@ -57,12 +57,12 @@ POLICIES = (NewestWins(), DropLate(0.2), HoldThenZero(5), JitterBuffer(0.15))
 
 
 async def watched(work):
-    """The result of a coroutine; what goes wrong in a callback is raised, not printed."""
+    """Return the result of a coroutine and raise errors that occur in callbacks."""
     wrong = []
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(lambda _, context: wrong.append(context))
     result = await work
-    for _ in range(10):  # what is still to be called
+    for _ in range(10):  # Errors whose callbacks are still pending.
         await asyncio.sleep(0)
     assert not wrong, wrong
     return result
@@ -96,7 +96,7 @@ def test_with_constant_delays_it_is_the_sampled_loop(lag):
     assert np.abs(model.outputs - recording.output).max() < 1e-9
 
 
-def test_what_is_measured_is_exact():
+def test_measured_delays_are_exact():
     report = run(Trial(gain=8.0, forward_path=Network(0.03), return_path=Network(0.07)))
     link = report.plant.link
     assert link.round_trip.p50 == pytest.approx(0.1, abs=1e-9)
@@ -105,13 +105,13 @@ def test_what_is_measured_is_exact():
     assert report.plant.oldest == pytest.approx(0.11, abs=1e-9)
     assert report.plant.period.largest == pytest.approx(0.01, abs=1e-9)
     assert (link.lost, link.late, link.reordered, report.plant.trips) == (0, 0, 0, 0)
-    # how the round trip divides cannot be measured, but the bounds hold
+    # The division of the round trip cannot be measured, but the bounds hold.
     assert link.forward_delay[0] <= 0.03 <= link.forward_delay[1]
     assert link.return_delay[0] <= 0.07 <= link.return_delay[1]
     assert abs(link.offset) <= link.offset_uncertainty
 
 
-def test_a_run_follows_from_its_seed_to_the_byte(tmp_path):
+def test_a_run_is_determined_by_its_seed_to_the_byte(tmp_path):
     way = Network(delay=Normal(0.05, 0.01), loss=0.05, duplication=0.1)
 
     def written(seed, folder):
@@ -149,7 +149,7 @@ def test_a_recording_that_cannot_be_written_ends_the_run(tmp_path):
         assert in_virtual_time(disk_fills_up(monkeypatch)) == pytest.approx(1.01, abs=0.01)
 
 
-def test_an_end_that_cannot_record_leaves_its_port(tmp_path):
+def test_an_end_that_cannot_record_releases_its_port(tmp_path):
     there = tmp_path / "there.csv"
     there.touch()
     here = ("127.0.0.1", 40_000)
@@ -169,13 +169,13 @@ def test_an_end_that_cannot_record_leaves_its_port(tmp_path):
         assert in_virtual_time(twice(made, **more)) == here
 
 
-def test_losses_are_counted_as_they_happened():
+def test_losses_are_counted_exactly():
     relays = []
     way = Network(delay=0.05, loss=0.1, duplication=0.1)
     trial = Trial(gain=6.0, forward_path=way, return_path=way, seed=5)
     report = run(trial, meanwhile=lambda relay, controller: relays.append(relay))
     (relay,) = relays
-    # what is still under way at the end, or lost after the last one that came, is not counted
+    # Packets in transit at the end, or lost after the last that arrived, are not counted.
     assert report.controller.link.lost == pytest.approx(relay.forward_path.lost, abs=3)
     assert report.plant.link.lost == pytest.approx(relay.return_path.lost, abs=3)
     assert report.controller.link.duplicates == pytest.approx(relay.forward_path.duplicated, abs=3)
@@ -210,7 +210,7 @@ def test_answers_may_take_as_long_as_the_watchdog_allows():
     assert report.plant.age_when_applied.largest == pytest.approx(4.8, abs=1e-9)
 
 
-def test_late_commands_are_dropped_where_asked_for():
+def test_late_commands_are_dropped_if_requested():
     way = Network(delay=ShiftedGamma(0.03, 0.05, 0.02))
     report = run(Trial(gain=6.0, forward_path=way, return_path=way, policy=DropLate(0.1)))
     assert report.plant.age_when_applied.largest <= 0.1
@@ -221,44 +221,44 @@ def test_late_commands_are_dropped_where_asked_for():
     assert edges[-1] == report.plant.link.lateness.largest
 
 
-def test_a_command_without_successor_is_let_go():
+def test_a_command_without_successor_is_released():
     back = Network(delay=0.05, blackouts=((1.2, 3.0),))
     trial = Trial(gain=2.0, forward_path=WAY, return_path=back, policy=HoldThenZero(5))
     recording = run(trial).plant.recording
-    # what left before the blackout arrives until 1.25 s, and holds for five samples of 10 ms
+    # What was sent before the blackout arrives until 1.25 s, and holds for five samples of 10 ms.
     held = (recording.time > 1.20) & (recording.time < 1.29)
     gone = (recording.time > 1.31) & (recording.time < 3.0)
     assert (recording.command[held] > 0.0).all()
     assert (recording.command[gone] == 0.0).all()
 
 
-def test_the_watchdog_applies_the_safe_command_in_time_and_lets_go_of_it_again():
+def test_the_watchdog_applies_the_safe_command_in_time_and_releases_it_again():
     back = Network(delay=0.05, blackouts=((1.2, 3.0),))
     trial = Trial(gain=2.0, forward_path=WAY, return_path=back, watchdog=0.3, safe=-0.1)
     report = run(trial)
     recording = report.plant.recording
     safe = recording.time[recording.command == -0.1]
-    safe = safe[safe > 1.0]  # it is in force until the first command comes, too
+    safe = safe[safe > 1.0]  # The safe command also holds until the first command arrives.
     assert safe[0] == pytest.approx(1.25 + 0.3, abs=0.011)
     assert safe[-1] == pytest.approx(3.05, abs=0.011)
     assert report.plant.trips == 1
     assert report.plant.safe_time == pytest.approx(3.05 - 1.55, abs=0.02)
 
 
-def test_a_controller_that_hears_nothing_tells_the_plant_to_be_safe():
+def test_a_controller_without_measurements_commands_the_plant_to_be_safe():
     there = Network(delay=0.05, blackouts=((1.2, 9.0),))
     trial = Trial(gain=2.0, forward_path=there, return_path=WAY, watchdog=0.4, safe=0.25)
     report = run(trial)
     recording = report.plant.recording
     safe = recording.time[(recording.command == 0.25) & (recording.time > 1.0)]
-    # silence from 1.25 s on, noticed 0.4 s later, told 0.05 s after that
+    # Silence from 1.25 s on, detected 0.4 s later, received by the plant 0.05 s after that.
     assert safe[0] == pytest.approx(1.25 + 0.4 + 0.05, abs=0.011)
     assert safe[-1] == recording.time[-1]
     assert report.controller.trips == 1
     assert report.plant.trips == 1
 
 
-def test_a_controller_that_ends_says_so_and_a_new_one_takes_over():
+def test_a_controller_announces_its_end_and_a_new_one_takes_over():
     async def change_of_controllers():
         async with Controller(ControllerOptions(gain=2.0)) as first:
             port = first.address[1]
@@ -340,12 +340,12 @@ def check_safety(trial, report):
     assert report.plant.largest_command <= LIMIT
     assert report.controller.largest_command <= LIMIT
     # A command is at most as old as the watchdog's time when it is applied, and holds no longer
-    # than that: after twice the time without news the plant is safe, whatever happened between.
+    # than that: after twice that time without packets the plant is safe, whatever happened before.
     assert report.plant.oldest <= 2.0 * WATCHDOG + 1e-9
     assert report.plant.age_when_applied.count == 0 or (
         report.plant.age_when_applied.largest <= WATCHDOG + 1e-9
     )
-    # a plant that was told nothing new has not moved on: its speed is bounded, so is its way
+    # A plant without new commands has a bounded speed, so the change of its output is bounded.
     assert np.abs(np.diff(recording.output)).max() <= LIMIT * trial.sample_time + 1e-9
     for start, stop in trial.return_path.blackouts:
         silent = (recording.time > start + 2.0 * WATCHDOG) & (recording.time < stop)
@@ -360,8 +360,8 @@ def test_twenty_seeds_of_a_bad_network_leave_the_output_bounded():
         assert abs(report.plant.recording.output[-1] - 1.0) < 0.5
 
 
-class Hostile(asyncio.DatagramProtocol):
-    """Sends what it likes to whom it likes; it has read the last measurement."""
+class Attacker(asyncio.DatagramProtocol):
+    """Sends any packets to any address and has read the last measurement."""
 
     heard = LoopPacket(0, 0.0)
 
@@ -373,9 +373,9 @@ class Hostile(asyncio.DatagramProtocol):
 
 
 async def attacked(packets, *, from_the_peer=True):
-    """The plant's report when what `packets` makes of a measurement arrives while it runs."""
+    """Report of the plant when `packets`, made from a measurement, arrive while it runs."""
     loop = asyncio.get_running_loop()
-    _, hostile = await loop.create_datagram_endpoint(Hostile, local_addr=("127.0.0.1", 41_000))
+    _, hostile = await loop.create_datagram_endpoint(Attacker, local_addr=("127.0.0.1", 41_000))
     peer = ("127.0.0.1", 41_000 if from_the_peer else 42_000)
     options = PlantOptions(controller=peer, listen=("127.0.0.1", 40_000), duration=1.0)
     plant = asyncio.ensure_future(run_plant(options))
@@ -388,7 +388,7 @@ async def attacked(packets, *, from_the_peer=True):
 
 
 def answer(measurement, **change):
-    """A command that the plant has no reason to refuse, but for what is changed in it."""
+    """A command that is valid for the plant except for the changed fields."""
     words = {
         "sequence": 1,
         "sent": measurement.sent,
@@ -399,14 +399,14 @@ def answer(measurement, **change):
     return LoopPacket(**{**words, **change}).encode()
 
 
-def test_an_answer_to_the_last_measurement_is_obeyed():
+def test_an_answer_to_the_last_measurement_is_applied():
     report = in_virtual_time(attacked(lambda measured: [answer(measured)]))
     assert (report.applied, report.largest_command) == (1, 3.0)
 
 
-def test_packets_from_elsewhere_are_not_obeyed():
+def test_packets_from_other_addresses_are_not_applied():
     def forged(_):
-        number, sent = 51, 0.5  # what is being measured while they are sent can be guessed
+        number, sent = 51, 0.5  # An attacker can guess the current measurement.
         return [LoopPacket(1, sent, echo_sequence=number, echo_sent=sent, value=3.0).encode()] * 5
 
     report = in_virtual_time(attacked(forged, from_the_peer=False))
@@ -417,26 +417,26 @@ def test_packets_from_elsewhere_are_not_obeyed():
 @pytest.mark.parametrize(
     "change",
     [
-        {"echo_sequence": 0},  # answers nothing
-        {"echo_sequence": 9999},  # was never sent
-        {"echo_sequence": 7},  # not at that time
-        {"echo_sent": 0.9},  # is not sent yet
-        {"held": 0.2},  # held for longer than it can be
+        {"echo_sequence": 0},  # It answers nothing.
+        {"echo_sequence": 9999},  # The measurement was never sent.
+        {"echo_sequence": 7},  # Not sent at that time.
+        {"echo_sent": 0.9},  # Not sent yet.
+        {"held": 0.2},  # The hold is longer than possible.
     ],
 )
-def test_answers_that_cannot_be_are_not_obeyed(change):
+def test_impossible_answers_are_not_applied(change):
     report = in_virtual_time(attacked(lambda measured: [answer(measured, **change)]))
     assert report.applied == 0
     assert report.link.invalid == 1
 
 
 @pytest.mark.parametrize("change", [{"echo_sequence": 9999}, {"echo_sent": 0.1}, {"held": 0.2}])
-def test_who_cannot_have_heard_the_plant_cannot_make_it_safe(change):
+def test_a_sender_that_has_not_received_the_plant_cannot_make_it_safe(change):
     report = in_virtual_time(attacked(lambda measured: [answer(measured, flags=1, **change)]))
     assert (report.link.invalid, report.trips) == (1, 0)
 
 
-def test_told_to_be_safe_the_plant_does_what_it_has_declared_itself():
+def test_on_a_safe_request_the_plant_applies_its_own_safe_command():
     report = in_virtual_time(attacked(lambda measured: [answer(measured, flags=1, value=20.0)]))
     assert report.trips == 1
     assert (report.recording.command == 0.0).all()
@@ -444,19 +444,19 @@ def test_told_to_be_safe_the_plant_does_what_it_has_declared_itself():
 
 @given(st.lists(st.binary(max_size=80), max_size=20))
 @settings(max_examples=25)
-def test_bytes_that_are_no_packets_are_counted_and_left(packets):
+def test_bytes_that_are_not_packets_are_counted_and_ignored(packets):
     report = in_virtual_time(attacked(lambda _: packets))
     assert report.link.invalid == len(packets)
     assert report.applied == 0
 
 
 @given(
-    value=st.floats(-1e100, 1e100),  # larger ones are no numbers of a loop
+    value=st.floats(-1e100, 1e100),  # Larger numbers do not occur in a loop.
     flags=st.integers(0, 3),
     times=st.integers(1, 200),
 )
 @settings(max_examples=50)
-def test_whatever_the_peer_commands_stays_within_the_limit(value, flags, times):
+def test_every_command_of_the_peer_is_clipped_to_the_limit(value, flags, times):
     def commands(measured):
         return [
             answer(measured, value=value, flags=flags, sequence=1 + number)
@@ -469,7 +469,7 @@ def test_whatever_the_peer_commands_stays_within_the_limit(value, flags, times):
     assert report.trips + report.applied >= 1
 
 
-def test_bare_doubles_close_the_loop_without_being_measured():
+def test_bare_doubles_close_the_loop_without_measured_delays():
     async def simulink():
         options = ControllerOptions(gain=4.0, doubles=(2, 1))
         async with (
@@ -487,20 +487,20 @@ def test_bare_doubles_close_the_loop_without_being_measured():
     assert other.answered > 490
 
 
-def test_a_watchdog_that_would_bite_between_two_commands_is_refused():
+def test_a_watchdog_that_would_act_between_two_commands_is_refused():
     with pytest.raises(ValueError, match="trip between"):
         Trial(gain=1.0, sample_time=0.5, watchdog=0.5)
     with pytest.raises(ValueError, match="older than"):
         Trial(gain=1.0, policy=JitterBuffer(0.6), watchdog=0.5)
 
 
-def test_what_needs_times_is_refused_for_bare_doubles():
+def test_options_that_need_times_are_refused_for_bare_doubles():
     with pytest.raises(ValueError, match="time stamps"):
         PlantOptions(controller=("127.0.0.1", 1), doubles=(1, 1), policy=JitterBuffer(0.1))
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.3])
-def test_the_integrator_does_not_mind_how_its_time_is_divided(lag):
+def test_the_integrator_gives_the_same_for_any_division_of_time(lag):
     whole, parts = HeldIntegrator(lag=lag), HeldIntegrator(lag=lag)
     whole.advance(1.0, 0.7)
     for _ in range(64):
@@ -509,7 +509,7 @@ def test_the_integrator_does_not_mind_how_its_time_is_divided(lag):
     assert parts.velocity == pytest.approx(whole.velocity, rel=1e-13)
 
 
-def test_other_hosts_than_this_one_work_and_are_warned_of(capsys):
+def test_other_hosts_work_and_cause_a_warning(capsys):
     async def two_computers():
         options = ControllerOptions(gain=4.0, listen=("192.0.2.1", 5600))
         async with Controller(options) as controller:
@@ -523,6 +523,6 @@ def test_other_hosts_than_this_one_work_and_are_warned_of(capsys):
     assert "every host that reaches" in said
 
 
-def test_on_this_computer_nothing_is_warned_of(capsys):
+def test_this_host_causes_no_warning(capsys):
     run(Trial(gain=4.0, duration=1.0))
     assert capsys.readouterr().err == ""

@@ -1,4 +1,4 @@
-"""The network between plant and controller: what it does to packets follows from its seed."""
+"""The network between plant and controller: its effect on packets is determined by its seed."""
 
 import math
 import random
@@ -52,7 +52,7 @@ def test_the_same_seed_gives_the_same_network_and_another_seed_another(network):
     [Normal(0.05, 0.005), ShiftedGamma(0.04, 0.05, 0.005), LogNormal(0.04, 0.05, 0.005)],
     ids=lambda one: type(one).__name__,
 )
-def test_delays_have_the_moments_they_say(delays):
+def test_delays_have_the_stated_moments(delays):
     numbers = random.Random(1)
     drawn = [delays.draw(numbers) for _ in range(20_000)]
     assert statistics.mean(drawn) == pytest.approx(delays.mean, abs=2e-4)
@@ -65,7 +65,7 @@ def test_a_normal_delay_is_never_negative():
     assert min(Normal(0.001, 0.01).draw(numbers) for _ in range(1000)) == 0.0
 
 
-def test_losses_one_by_one_and_in_bursts():
+def test_losses_occur_singly_and_in_bursts():
     for loss in (0.05, Bursts.of(0.05, 5.0)):
         path, arrivals = through(Network(loss=loss), packets=40_000)
         assert path.lost / path.sent == pytest.approx(0.05, abs=0.006)
@@ -77,7 +77,7 @@ def test_losses_one_by_one_and_in_bursts():
     assert sum(lost) / starts == pytest.approx(5.0, rel=0.1)
 
 
-def test_duplicates_leave_the_losses_as_they_were_and_losses_the_delays():
+def test_duplicates_do_not_change_the_losses_and_losses_do_not_change_the_delays():
     def network(loss, duplication):
         return Network(Normal(0.05, 0.01), loss=loss, duplication=duplication)
 
@@ -97,33 +97,33 @@ def test_packets_overtake_each_other_unless_the_network_is_ordered():
     assert times == sorted(times)
 
 
-def test_a_rate_makes_packets_wait_and_a_short_queue_drops_them():
-    # 56 bytes at 2800 bytes/s take 20 ms; a packet comes every 10 ms
+def test_a_limited_rate_delays_packets_and_a_short_queue_drops_them():
+    # 56 bytes at 2800 bytes/s take 20 ms; a packet is sent every 10 ms.
     path, arrivals = through(Network(rate=2800.0, queue=0.1), packets=200)
     waits = [time - 0.01 * number for time, number in arrivals]
     assert max(waits) <= 0.1 + 0.02 + 1e-9
     assert path.dropped == pytest.approx(100, abs=10)
 
 
-def test_nothing_passes_in_a_blackout():
+def test_a_blackout_drops_everything():
     _, arrivals = through(Network(delay=0.05, blackouts=((1.0, 3.0),)))
     assert [number for _, number in arrivals] == [*range(100), *range(300, 400)]
 
 
-def test_groups_come_in_reversed_order():
+def test_groups_arrive_in_reversed_order():
     _, arrivals = through(Network(delay=0.05, reversed_groups=4), packets=9)
     assert [number for _, number in arrivals] == [3, 2, 1, 0, 7, 6, 5, 4]
     assert arrivals[0][0] == pytest.approx(0.08)
 
 
-def test_some_packets_come_twice():
+def test_some_packets_arrive_twice():
     path, arrivals = through(Network(delay=0.05, duplication=0.25), packets=4000)
     assert path.duplicated / path.sent == pytest.approx(0.25, abs=0.03)
     assert len(arrivals) == path.sent + path.duplicated
 
 
 @pytest.mark.parametrize("network", [FULL, Network(), Network(Constant(0.1), 0.2), network_of()])
-def test_a_network_goes_through_words(network):
+def test_a_network_survives_conversion_to_text(network):
     assert through(network_from(network_text(network)))[1] == through(network)[1]
 
 
@@ -142,7 +142,7 @@ def test_a_network_goes_through_words(network):
         (lambda: network_from("{}"), "describe"),
     ],
 )
-def test_networks_that_cannot_be_say_why(wrong, words):
+def test_invalid_networks_are_refused_with_the_reason(wrong, words):
     with pytest.raises(ValueError, match=words):
         wrong()
 
@@ -161,6 +161,6 @@ def test_the_offset_of_a_clock_is_within_its_bounds(offset, ways):
     assert abs(clock.offset - offset) <= clock.uncertainty + 1e-9 * (1.0 + abs(offset))
 
 
-def test_percentiles_of_nothing_say_so():
+def test_percentiles_of_no_data_have_count_zero():
     assert Percentiles.of([]).count == 0
     assert Percentiles.of([1.0, 3.0]).p50 == 2.0

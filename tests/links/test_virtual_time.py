@@ -1,4 +1,4 @@
-"""Virtual time: the clock jumps, the network is in memory, and nothing is left to chance."""
+"""Virtual time: the clock jumps, the network is in memory, and every run is deterministic."""
 
 import asyncio
 import math
@@ -28,7 +28,7 @@ class Collector(asyncio.DatagramProtocol):
 
 
 @given(st.lists(st.floats(0.0, 1e4), min_size=1, max_size=20))
-def test_sleepers_wake_in_the_order_of_their_times_and_at_them(delays):
+def test_sleeping_tasks_wake_in_order_and_at_their_times(delays):
     async def main():
         loop, woken = asyncio.get_running_loop(), []
 
@@ -40,12 +40,12 @@ def test_sleepers_wake_in_the_order_of_their_times_and_at_them(delays):
         return woken
 
     woken = run(main())
-    # A clock of the loop's resolution: it may wake whoever is due within a nanosecond.
+    # A loop may wake every task that is due within its clock's resolution of a nanosecond.
     assert all(abs(at - delay) <= 2e-9 for delay, at in woken)
     assert [delay for delay, _ in woken] == pytest.approx(sorted(delays), abs=2e-9)
 
 
-def test_time_begins_at_zero_and_stands_still_while_the_program_works():
+def test_time_begins_at_zero_and_stands_still_while_the_program_computes():
     async def main():
         loop = asyncio.get_running_loop()
         first = loop.time()
@@ -64,7 +64,7 @@ def test_timeouts_are_those_of_asyncio():
     assert run(main()) == pytest.approx(7.5, abs=1e-8)
 
 
-def test_a_wait_without_end_is_an_error_and_not_a_hang():
+def test_a_wait_without_end_raises_instead_of_hanging():
     async def main():
         await asyncio.get_running_loop().create_future()
 
@@ -72,7 +72,7 @@ def test_a_wait_without_end_is_an_error_and_not_a_hang():
         run(main())
 
 
-def test_the_end_of_all_times_is_not_jumped_to():
+def test_a_sleep_of_infinite_length_is_not_jumped_to():
     with pytest.raises(LinkError, match="would never end"):
         run(asyncio.sleep(math.inf))
 
@@ -84,7 +84,7 @@ def test_the_end_of_all_times_is_not_jumped_to():
     assert run(main()) == 5.0
 
 
-def test_datagrams_arrive_at_once_in_order_and_carry_their_sender():
+def test_datagrams_arrive_at_once_in_order_with_their_sender():
     async def main():
         loop = asyncio.get_running_loop()
         there, sink = await loop.create_datagram_endpoint(Collector, local_addr=("127.0.0.1", 0))
@@ -105,7 +105,7 @@ def test_datagrams_arrive_at_once_in_order_and_carry_their_sender():
     assert [data for _, data, _ in back] == [b"back"]
 
 
-def test_a_connected_endpoint_hears_its_peer_alone_and_of_its_absence():
+def test_a_connected_endpoint_receives_its_peer_only_and_errors_if_it_is_absent():
     async def main():
         loop = asyncio.get_running_loop()
         peer, _ = await loop.create_datagram_endpoint(Collector, local_addr=("127.0.0.1", 5000))

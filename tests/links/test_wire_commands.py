@@ -1,4 +1,4 @@
-"""Commands to the drone: bytes as known clients send them, and what can never be sent."""
+"""Commands to the drone: their bytes as known clients send them, and what is never sent."""
 
 import math
 import struct
@@ -81,7 +81,7 @@ def test_commands_are_written_as_known_clients_write_them(sequence, command, lin
     assert encode([read], number) == line
 
 
-def test_several_commands_share_a_datagram_in_their_order():
+def test_several_commands_share_a_datagram_in_order():
     datagram = encode([Ref(take_off=True), Hover, Watchdog()], 41)
     assert datagram == b"AT*REF=41,290718208\rAT*PCMD=42,0,0,0,0,0\rAT*COMWDG=43\r"
     assert decode(datagram) == [(41, Ref(take_off=True)), (42, Hover), (43, Watchdog())]
@@ -93,7 +93,7 @@ def test_numbers_are_the_bits_of_single_precision(value, token):
     assert line.split(b",")[4] == str(token).encode()
 
 
-def test_a_reader_takes_what_clients_in_the_wild_send():
+def test_commands_of_other_clients_are_decoded():
     wild = (
         b"AT*PMODE=1,2\rAT*MISC=2,2,20,2000,3000\rAT*REF=0,512\nAT*REF=1,256\r\n"
         b"AT*PCMD=3,3,-2147483648,0,0,0\rAT*FTRIM=4,\r"
@@ -124,18 +124,18 @@ def test_a_reader_takes_what_clients_in_the_wild_send():
         "",
     ],
 )
-def test_malformed_commands_are_left_out_and_their_neighbours_kept(broken):
+def test_malformed_commands_are_skipped_and_their_neighbours_decoded(broken):
     datagram = f"AT*REF=1,512\rAT*{broken}\rAT*COMWDG=3\r".encode()
     assert decode(datagram) == [(1, Ref(take_off=True)), (3, Watchdog())]
 
 
-def test_a_command_that_was_cut_off_is_left_out():
+def test_a_truncated_command_is_skipped():
     assert decode(b"AT*COMWDG=1\rAT*PCMD=2,1,0,0,105696460") == [(1, Watchdog())]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1.0000001, -1.5, 1e300])
 @pytest.mark.parametrize("axis", ["roll", "pitch", "gaz", "yaw"])
-def test_no_motion_can_hold_what_must_not_be_sent(axis, bad):
+def test_a_motion_outside_its_range_cannot_be_built(axis, bad):
     with pytest.raises(ValueError, match="command="):
         Move(**{axis: bad})
     with pytest.raises(ValueError, match="command="):
@@ -155,7 +155,7 @@ def test_no_motion_can_hold_what_must_not_be_sent(axis, bad):
         (Control(2**40), "a number of the commands from 1 on"),
     ],
 )
-def test_what_would_break_a_line_is_not_written(command, says):
+def test_commands_that_cannot_be_encoded_are_refused(command, says):
     with pytest.raises(ValueError, match=says):
         encode([command], 1)
 
@@ -185,7 +185,7 @@ def test_any_number_becomes_a_command_or_is_refused(value):
 
 
 @given(st.lists(st.integers(-(2**31), 2**31 - 1), min_size=4, max_size=4), st.integers(0, 7))
-def test_any_tokens_are_read_as_commands_in_range_or_left_out(tokens, flag):
+def test_any_tokens_are_decoded_as_commands_in_range_or_skipped(tokens, flag):
     line = f"AT*PCMD=1,{flag},{','.join(map(str, tokens))}\r".encode()
     sent = [struct.unpack("<f", struct.pack("<i", token))[0] for token in tokens]
     read = decode(line)
@@ -218,24 +218,24 @@ COMMANDS = st.one_of(
 
 
 @given(st.lists(COMMANDS, max_size=4), st.integers(0, 2**31 - 5))
-def test_what_is_written_is_read_again(commands, first):
+def test_encoded_commands_are_decoded_unchanged(commands, first):
     try:
         datagram = encode(commands, first)
     except ValueError:
-        assert sum(len(str(command)) for command in commands) > 600  # more than 1024 bytes
+        assert sum(len(str(command)) for command in commands) > 600  # It exceeds 1024 bytes.
         return
     assert decode(datagram) == list(enumerate(commands, first))
 
 
 @given(st.binary(max_size=300))
-def test_any_bytes_are_read(datagram):
+def test_any_bytes_are_decoded_without_error(datagram):
     for sequence, command in decode(datagram):
         assert 0 <= sequence < 2**31
         assert command is not None
 
 
 @given(st.lists(st.sampled_from([line for _, _, line in GOLDEN]), min_size=1), st.data())
-def test_damaged_datagrams_are_read(lines, data):
+def test_damaged_datagrams_are_decoded_without_error(lines, data):
     damaged = bytearray(b"".join(lines))
     for _ in range(data.draw(st.integers(1, 4))):
         damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))

@@ -40,7 +40,7 @@ def test_settings_are_read_with_their_sections():
         (b"a:b = c\n" * 3000 + b"\0", "24001 bytes, of which there may be 16384 at most"),
     ],
 )
-def test_what_is_no_configuration_is_refused_with_the_reason(dump, says):
+def test_invalid_configurations_are_refused_with_the_reason(dump, says):
     with pytest.raises(PacketError, match=says):
         parse_configuration(dump)
 
@@ -48,7 +48,7 @@ def test_what_is_no_configuration_is_refused_with_the_reason(dump, says):
 @pytest.mark.parametrize(
     "settings", [{"ab": "c"}, {"a:b": " c"}, {"a:b": "c\n"}, {"a:b": "c\0"}, {"a b:c": "d"}]
 )
-def test_what_would_not_be_read_is_not_written(settings):
+def test_settings_that_could_not_be_read_back_are_refused(settings):
     with pytest.raises(ValueError, match="section:key = value"):
         write_configuration(settings)
 
@@ -58,7 +58,7 @@ VALUES = st.text(st.characters(exclude_categories=["C"]), max_size=30).map(lambd
 
 
 @given(st.dictionaries(KEYS, VALUES, max_size=20))
-def test_settings_survive(settings):
+def test_settings_survive_a_round_trip(settings):
     assert parse_configuration(write_configuration(settings)) == settings
 
 
@@ -84,7 +84,7 @@ def test_damaged_configurations_are_read_or_refused(data):
     assert parse_configuration(write_configuration(settings)) == settings
 
 
-def test_a_packet_of_a_loop_has_its_fields_in_their_places():
+def test_a_loop_packet_has_its_fields_at_their_offsets():
     packet = ANSWER.encode()
     assert packet[:4] == b"DTL1"
     assert struct.unpack("<3I5d", packet[4:]) == (3, 9, 8, 100.0, 12.5, 1e-4, 0.5, 1.0)
@@ -93,7 +93,7 @@ def test_a_packet_of_a_loop_has_its_fields_in_their_places():
 
 @pytest.mark.parametrize("name", ["sent", "echo_sent", "held", "value", "reference"])
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_packets_of_a_loop_hold_finite_numbers(name, bad):
+def test_loop_packets_hold_finite_numbers(name, bad):
     with pytest.raises(ValueError, match=f"{name}=.*: give a finite number"):
         replace(ANSWER, **{name: bad}).encode()
     packet = bytearray(ANSWER.encode())
@@ -103,7 +103,7 @@ def test_packets_of_a_loop_hold_finite_numbers(name, bad):
         LoopPacket.decode(bytes(packet))
 
 
-def test_what_is_no_packet_of_a_loop_is_refused():
+def test_invalid_loop_packets_are_refused():
     packet = ANSWER.encode()
     for wrong, says in [
         (b"", "0 bytes in place of 56"),
@@ -126,12 +126,12 @@ WORDS = st.integers(0, 2**32 - 1)
 @given(
     st.builds(LoopPacket, WORDS, FINITE, WORDS, FINITE, st.floats(0.0, 1e9), FINITE, FINITE, WORDS)
 )
-def test_packets_of_a_loop_survive(packet):
+def test_loop_packets_survive_a_round_trip(packet):
     assert LoopPacket.decode(packet.encode()) == packet
 
 
 @given(st.binary(max_size=80))
-def test_any_bytes_are_a_packet_of_a_loop_or_refused(data):
+def test_any_bytes_are_a_loop_packet_or_refused(data):
     for packet in (data, b"DTL1" + data[:52].ljust(52, b"\0")):
         try:
             read = LoopPacket.decode(packet)
@@ -141,7 +141,7 @@ def test_any_bytes_are_a_packet_of_a_loop_or_refused(data):
         assert all(map(math.isfinite, (read.sent, read.value, read.reference)))
 
 
-def test_bare_doubles_are_those_of_simulink():
+def test_bare_doubles_have_the_layout_of_simulink():
     assert encode_doubles([1.0, -2.5]) == bytes.fromhex("000000000000f03f00000000000004c0")
     assert decode_doubles(encode_doubles([1.0, -2.5]), 2) == (1.0, -2.5)
     for data, count in [(bytes(15), 1), (bytes(16), 1), (bytes(16), 3), (b"", 1)]:
@@ -154,7 +154,7 @@ def test_bare_doubles_are_those_of_simulink():
 
 
 @given(st.lists(FINITE, max_size=20))
-def test_doubles_survive(values):
+def test_doubles_survive_a_round_trip(values):
     assert list(decode_doubles(encode_doubles(values), len(values))) == values
 
 

@@ -1,4 +1,4 @@
-"""Navdata: real packets of two firmwares, fields in their places, and bytes that are no packet."""
+"""Navdata: real packets of two firmwares, field offsets, and invalid bytes."""
 
 import math
 import struct
@@ -42,7 +42,7 @@ SHORT = build_navdata(Navdata(0x0F8004D5, 308119, 1, demo=FLIGHT.demo, options=D
 
 
 def checked(packet):
-    """A packet with the checksum that its bytes have."""
+    """The packet with the checksum of its bytes."""
     return packet[:-4] + struct.pack("<I", sum(packet[:-8]))
 
 
@@ -57,7 +57,7 @@ def test_the_classes_have_the_fields_of_the_native_tables():
     assert len(room._FIELDS) == len(navdata_layouts())
 
 
-def test_real_packets_are_read_and_written_again():
+def test_real_packets_are_decoded_and_encoded_unchanged():
     packets = full_packets()
     broken, numbers, times = [], [], []
     for packet in packets:
@@ -67,7 +67,7 @@ def test_real_packets_are_read_and_written_again():
             broken.append(str(error))
             continue
         assert build_navdata(navdata) == packet
-        assert [tag for tag, _ in navdata.options] == TAGS  # 28 and 29 are known to nobody
+        assert [tag for tag, _ in navdata.options] == TAGS  # Tags 28 and 29 are not documented.
         assert navdata.demo.vz == 0.0
         assert navdata.kalman_pressure.est_zdot == pytest.approx(-navdata.altitude.altitude_vz)
         assert 0 < navdata.battery <= 100
@@ -75,7 +75,7 @@ def test_real_packets_are_read_and_written_again():
         assert navdata.state & ~0x0F8000F5 == 0
         numbers.append(navdata.sequence)
         times.append(navdata.clock)
-    # One lost its framing when it was recorded.
+    # One packet is broken in the recording.
     assert len(packets) == 500
     assert broken == [
         "navdata: the option of tag 0 says that it has 0 bytes: 4 at least and 2174 at most are "
@@ -91,7 +91,7 @@ def test_real_packets_are_read_and_written_again():
     assert steps[len(steps) // 2] == pytest.approx(0.005, rel=0.01)
 
 
-def test_real_packets_say_how_the_drone_flew():
+def test_real_packets_show_a_flight():
     _, first, *_, last = full_packets()
     first, last = parse_navdata(first), parse_navdata(last)
     assert not first.flying
@@ -109,7 +109,7 @@ def test_real_packets_say_how_the_drone_flew():
     assert math.hypot(*force) == pytest.approx(1.0, abs=0.2)
 
 
-def test_the_speed_on_board_is_that_of_the_height():
+def test_the_measured_speed_is_the_derivative_of_the_height():
     flight = [parse_navdata(packet) for packet in full_packets()[1:]]
     pairs = [
         ((b.kalman_pressure.est_z - a.kalman_pressure.est_z) / (b.clock - a.clock), a, b)
@@ -120,7 +120,7 @@ def test_the_speed_on_board_is_that_of_the_height():
     assert errors[len(errors) // 2] < 0.05  # m/s, positive up
 
 
-def test_packets_of_an_older_firmware_are_read():
+def test_packets_of_an_older_firmware_are_decoded():
     packet = older_packet()
     navdata = parse_navdata(packet)
     assert len(packet) == 2120
@@ -131,7 +131,7 @@ def test_packets_of_an_older_firmware_are_read():
     assert build_navdata(navdata) == packet
 
 
-def test_a_short_packet_is_read():
+def test_a_short_packet_is_decoded():
     packet = demo_packet()
     navdata = parse_navdata(packet)
     assert (len(packet), navdata.height, navdata.battery) == (172, 0.995, 68)
@@ -140,7 +140,7 @@ def test_a_short_packet_is_read():
     assert build_navdata(navdata) == packet
 
 
-def test_a_drone_that_waits_to_be_configured():
+def test_a_drone_that_waits_for_configuration_reports_it():
     navdata = parse_navdata(BOOTSTRAP)
     assert navdata.bootstrap
     assert navdata.com_watchdog
@@ -149,7 +149,7 @@ def test_a_drone_that_waits_to_be_configured():
     assert build_navdata(navdata) == BOOTSTRAP
 
 
-def test_packets_have_the_sizes_of_the_drone():
+def test_packets_have_the_sizes_of_the_drone_s_own():
     assert len(FULL) == 2190
     assert len(SHORT) == 500
     read = parse_navdata(FULL)
@@ -167,12 +167,12 @@ def test_options_without_bytes_of_their_own_are_added_by_tag():
     assert [len(body) + 4 for _, body in added.options] == [5, 148, 8, 92, 56, 72]
 
 
-def test_a_height_below_zero_is_one():
+def test_a_negative_height_is_decoded():
     low = replace(FLIGHT, demo=Demo(height=-3.847))
     assert parse_navdata(build_navdata(low)).height == -3.847
 
 
-def test_a_field_is_written_and_the_bytes_around_it_stay():
+def test_changing_a_field_leaves_the_bytes_around_it():
     packet = full_packets()[1]
     navdata = parse_navdata(packet)
     moved = replace(navdata, demo=replace(navdata.demo, height=2.5), sequence=navdata.sequence + 1)
@@ -198,25 +198,25 @@ def test_a_field_is_written_and_the_bytes_around_it_stay():
         (FULL * 5, "10950 bytes, of which there may be 8192 at most"),
     ],
 )
-def test_what_is_no_packet_is_refused_with_the_reason(packet, says):
+def test_invalid_packets_are_refused_with_the_reason(packet, says):
     with pytest.raises(PacketError, match=says):
         parse_navdata(packet)
 
 
-def test_a_packet_error_is_one_of_the_link_and_a_bad_value():
+def test_a_packet_error_is_a_link_error_and_a_value_error():
     with pytest.raises(LinkError):
         parse_navdata(b"")
     with pytest.raises(ValueError, match="at byte 0"):
         parse_navdata(b"")
 
 
-def test_every_shorter_packet_is_refused():
+def test_every_truncated_packet_is_refused():
     for length in range(len(SHORT)):
         with pytest.raises(PacketError):
             parse_navdata(SHORT[:length], checksum=False)
 
 
-def test_a_wrong_checksum_is_refused_or_told():
+def test_a_wrong_checksum_is_refused_or_reported():
     wrong = FULL[:100] + bytes([FULL[100] ^ 1]) + FULL[101:]
     with pytest.raises(PacketError, match="the checksum is"):
         parse_navdata(wrong)
@@ -246,23 +246,23 @@ def test_a_wrong_checksum_is_refused_or_told():
     ],
     ids=str,
 )
-def test_what_has_no_place_in_a_packet_is_refused(part):
+def test_values_that_do_not_fit_a_packet_are_refused(part):
     with pytest.raises(ValueError, match=r"."):
         build_navdata(replace(FLIGHT, **part))
 
 
-def test_the_clock_starts_again_after_2048_seconds():
+def test_the_clock_wraps_after_2048_seconds():
     assert parse_navdata(build_navdata(replace(FLIGHT, clock=2050.25))).clock == 2.25
 
 
-def test_a_number_that_is_none_is_not_handed_on():
+def test_a_field_that_is_not_finite_is_not_passed_on():
     at = 16 + 16  # roll
     packet = checked(SHORT[:at] + struct.pack("<f", math.nan) + SHORT[at + 4 :])
     navdata = parse_navdata(packet)
     assert math.isnan(navdata.demo.roll)
     assert navdata.roll is None
     assert navdata.pitch is not None
-    # Written again bit by bit, though nobody can write such a number anew.
+    # The option is encoded again bit by bit, though such a value cannot be set.
     assert build_navdata(navdata) == packet
 
 
@@ -275,7 +275,7 @@ def test_states_are_bits():
 
 
 @given(st.binary(max_size=600), st.booleans())
-def test_any_bytes_are_read_or_refused(packet, checksum):
+def test_any_bytes_are_decoded_or_refused(packet, checksum):
     for data in (
         packet,
         BOOTSTRAP[:16] + packet,
@@ -289,7 +289,7 @@ def test_any_bytes_are_read_or_refused(packet, checksum):
 
 
 @given(st.binary(max_size=100), st.lists(st.tuples(st.integers(0, 40), st.binary(max_size=200))))
-def test_any_options_survive(head, options):
+def test_any_options_survive_a_round_trip(head, options):
     words = struct.unpack("<3I", head[:12].ljust(12, b"\x00"))
     navdata = Navdata(*words, options=tuple(options))
     if sum(len(body) + 4 for _, body in options) > 8192 - 24:
@@ -302,7 +302,7 @@ def test_any_options_survive(head, options):
 
 
 @given(st.sampled_from([FULL, SHORT, BOOTSTRAP]), st.data())
-def test_damaged_packets_are_read_or_refused(packet, data):
+def test_damaged_packets_are_decoded_or_refused(packet, data):
     damaged = bytearray(packet)
     for _ in range(data.draw(st.integers(1, 6))):
         damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))
@@ -316,7 +316,7 @@ def test_damaged_packets_are_read_or_refused(packet, data):
         assert number is None or math.isfinite(number)
 
 
-def test_every_byte_of_a_real_packet_may_be_wrong():
+def test_any_byte_of_a_real_packet_may_be_damaged():
     packet = full_packets()[1]
     refused = 0
     for at in range(len(packet)):
@@ -328,5 +328,5 @@ def test_every_byte_of_a_real_packet_may_be_wrong():
             parse_navdata(bytes(damaged), checksum=False)
         except PacketError:
             refused += 1
-    # Head and the options' sizes and the checksum's place; the rest is in the fields.
+    # Errors occur in the head, the sizes of options and the checksum; other bytes are field values.
     assert 60 < refused < 200

@@ -1,7 +1,8 @@
-"""An independent client reads what we write, and writes what we read the same.
+"""An independent client decodes our packets, and its commands are decoded by us.
 
-`pyardrone` never returns from a packet with an option of no bytes and refuses what is not of its
-own sizes, so that it is given neither.
+`pyardrone` never returns from a packet with an option of no bytes and refuses options that differ
+from its own sizes, so the tests give it neither.
+
 """
 
 import ctypes
@@ -28,7 +29,7 @@ from deadtime.links.ardrone2.navdata import (
 )
 
 with warnings.catch_warnings():
-    # Its docstrings have escapes that Python warns of.
+    # Its docstrings have escapes for which Python issues a warning.
     warnings.simplefilter("ignore")
     pytest.importorskip("pyardrone", reason="pyardrone is not installed")
     from pyardrone import at
@@ -39,11 +40,11 @@ RANDOM = random.Random(8)
 
 
 def theirs(tag):
-    """Bytes that pyardrone takes for an option, without tag and size."""
+    """Bytes that pyardrone decodes as an option, without tag and size."""
     return ctypes.sizeof(index[tag]) - 4 if tag in index else None
 
 
-#: What both know in the same size.
+#: Options that both decode with the same size.
 COMMON = tuple(option for option in FULL_OPTIONS if theirs(option[0]) == len(option[1]))
 
 
@@ -71,11 +72,11 @@ def random_flight(options):
     )
 
 
-def test_both_know_most_options():
+def test_both_decode_most_options():
     assert {0, 1, 2, 6, 8, 10, 16, 19, 21, 24} <= {tag for tag, _ in COMMON}
 
 
-def test_pyardrone_reads_our_short_packets():
+def test_pyardrone_decodes_our_short_packets():
     for _ in range(100):
         packet = build_navdata(random_flight(DEMO_OPTIONS))
         read, ours = NavData(packet), parse_navdata(packet)
@@ -89,7 +90,7 @@ def test_pyardrone_reads_our_short_packets():
         assert read.demo.num_frames == ours.demo.frame
 
 
-def test_pyardrone_finds_our_fields_in_the_same_places():
+def test_pyardrone_finds_our_fields_at_the_same_offsets():
     for _ in range(50):
         options = tuple((tag, RANDOM.randbytes(len(body))) for tag, body in COMMON)
         packet = build_navdata(Navdata(1, 2, options=options))
@@ -140,7 +141,7 @@ def test_both_refuse_a_wrong_checksum():
         parse_navdata(wrong)
 
 
-def test_pyardrone_writes_the_same_commands():
+def test_pyardrone_encodes_the_same_commands():
     for sequence in range(1, 200):
         values = [struct.unpack("<f", struct.pack("<f", RANDOM.uniform(-1, 1)))[0] for _ in "rpgy"]
         for theirs_command, ours in [

@@ -1,7 +1,8 @@
-"""Logs of two autopilots: what a vehicle's inner loop makes of its setpoint.
+"""Logs of two autopilots: delay and lag of a vehicle's inner loop from its setpoint.
 
-The expected numbers are rough ones from two independent fits; the logs are of 10 Hz, so a delay is
-known to a sample or so, its sum with the time constant better.
+The expected numbers are approximate, from two independent fits. The logs are sampled at 10 Hz, so a
+delay is known within about a sample, and its sum with the time constant is known better.
+
 """
 
 import deadtime as dtm
@@ -11,7 +12,7 @@ from flights import flight_path
 
 FREE = ("delay", "gain", "time_constant")
 
-#: An inner loop answers its setpoint like a first-order lag; what commands it is of no matter.
+#: An inner loop follows its setpoint with a first-order lag; the outer controller does not matter.
 INNER = dtm.ControlLoop(dtm.FirstOrder(1.0, 0.2), dtm.P(1.0), delay=0.0)
 
 
@@ -28,7 +29,7 @@ def arducopter(demanded, measured):
 
 
 @pytest.mark.parametrize(("axis", "late", "gain"), [("Roll", 0.22, 0.65), ("Pitch", 0.17, 0.79)])
-def test_the_attitude_of_a_copter(axis, late, gain):
+def test_the_roll_loop_of_a_copter(axis, late, gain):
     flight = arducopter(f"Des{axis}", axis)
     fit = dtm.estimate_delay(flight, INNER, free=FREE)
     assert fit.delay + fit.loop.parameters["time_constant"] == pytest.approx(late, abs=0.02)
@@ -36,21 +37,21 @@ def test_the_attitude_of_a_copter(axis, late, gain):
     assert not fit.adequate
 
 
-def test_the_climb_of_a_simulated_copter():
+def test_the_climb_loop_of_a_simulated_copter():
     pyulog = pytest.importorskip("pyulog", reason="pyulog reads ULog files")
     log = pyulog.ULog(str(flight_path("px4_sitl_takeoff.ulg")))
     data = {topic.name: topic.data for topic in log.data_list}
     wanted, found = data["vehicle_local_position_setpoint"], data["vehicle_local_position"]
     start = min(wanted["timestamp"][0], found["timestamp"][0])
     asked, seen = (1e-6 * (topic["timestamp"] - start) for topic in (wanted, found))
-    # While the mode is inactive its setpoints are not numbers.
+    # While the mode is inactive its setpoints are NaN.
     active = np.isfinite(wanted["vz"])
     rows = (seen >= 18.0) & (seen <= 25.8)
     last = np.searchsorted(asked[active], seen[rows], side="right") - 1
     command = wanted["vz"][active][last].astype(float)
     flight = dtm.Recording(seen[rows], command, found["vz"][rows].astype(float), command)
     fit = dtm.estimate_delay(flight, INNER, free=FREE)
-    # Delay about 0, lag 0.12 s, gain 0.80: one of the fits behind these treats the start otherwise.
+    # Delay about 0, lag 0.12 s, gain 0.80; one of the two fits treats the beginning differently.
     assert fit.delay <= 0.02
     assert fit.loop.parameters["time_constant"] == pytest.approx(0.12, abs=0.03)
     assert fit.gain == pytest.approx(0.80, abs=0.06)

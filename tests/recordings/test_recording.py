@@ -1,4 +1,4 @@
-"""Recordings and their files: what is read, what is refused, and in which words."""
+"""Recordings and their files: what is read, what is refused, and the text of the errors."""
 
 import math
 
@@ -45,7 +45,7 @@ def test_line_ends_and_byte_order_marks_do_not_matter(tmp_path, end, mark):
 
 
 @pytest.mark.parametrize("delimiter", [";", "\t"])
-def test_other_delimiters_are_told_from_the_header(tmp_path, delimiter):
+def test_other_delimiters_are_detected_from_the_header(tmp_path, delimiter):
     path = write(tmp_path)
     path.write_text(path.read_text().replace(",", delimiter))
     assert len(read(path)) == 20
@@ -58,13 +58,13 @@ def test_comments_and_empty_lines_are_left_out(tmp_path):
     assert len(read(path)) == 20
 
 
-def test_a_window_keeps_its_ends(tmp_path):
+def test_a_window_includes_its_ends(tmp_path):
     flight = read(write(tmp_path), window=(0.3, 1.2))
     assert flight.time[0] == pytest.approx(0.3)
     assert flight.time[-1] == pytest.approx(1.2)
 
 
-def test_what_lies_outside_the_window_need_not_be_valid(tmp_path):
+def test_values_outside_the_window_need_not_be_valid(tmp_path):
     rows = [*ROWS, (2.5, math.nan, math.nan)]
     assert len(read(write(tmp_path, rows), window=(0.0, 2.0))) == 20
     with pytest.raises(dtm.RecordingError, match="line 22"):
@@ -93,14 +93,14 @@ def broken(**change):
         ([*ROWS, (9.0, 1.0)], ["line 22", "2 cells"]),
     ],
 )
-def test_bad_rows_are_refused_with_their_place(tmp_path, rows, words):
+def test_bad_rows_are_refused_with_their_line(tmp_path, rows, words):
     with pytest.raises(dtm.RecordingError) as caught:
         read(write(tmp_path, rows))
     for word in words:
         assert word in str(caught.value)
 
 
-def test_a_missing_column_is_named_with_the_likely_one(tmp_path):
+def test_a_missing_column_is_named_with_a_similar_one(tmp_path):
     with pytest.raises(dtm.RecordingError, match=r"no column 'heigth_m'.*did you mean 'height_m'"):
         read(write(tmp_path), output="heigth_m")
 
@@ -122,7 +122,7 @@ def test_two_columns_of_one_name_are_refused(tmp_path):
         (b'"t_s,ref_m\n', "not a CSV file"),
     ],
 )
-def test_files_that_are_no_recording_are_refused(tmp_path, content, words):
+def test_files_that_are_not_recordings_are_refused(tmp_path, content, words):
     path = tmp_path / "flight.csv"
     path.write_bytes(content)
     with pytest.raises(dtm.RecordingError, match=words):
@@ -137,7 +137,7 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 
 
 @given(st.binary(max_size=400))
-def test_no_file_brings_the_reader_down(tmp_path_factory, content):
+def test_arbitrary_bytes_are_refused_by_name(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("fuzz") / "flight.csv"
     path.write_bytes(content)
     with pytest.raises(dtm.RecordingError):
@@ -145,7 +145,7 @@ def test_no_file_brings_the_reader_down(tmp_path_factory, content):
 
 
 @given(st.text(alphabet="t_s,ref_mheight\n0123456789.-+einfa\"'; \t#", max_size=300))
-def test_no_text_brings_the_reader_down(tmp_path_factory, content):
+def test_any_text_is_read_or_refused_by_name(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("fuzz") / "flight.csv"
     path.write_text("t_s,ref_m,height_m\n" + content, encoding="utf-8")
     try:
@@ -182,7 +182,7 @@ def test_a_recording_checks_its_columns(change, words):
         make(**change)
 
 
-def test_a_recording_cannot_be_changed_afterwards():
+def test_a_recording_is_immutable():
     source = np.zeros(10)
     flight = make(output=source)
     source[:] = 5.0
@@ -193,14 +193,14 @@ def test_a_recording_cannot_be_changed_afterwards():
         flight.output = source
 
 
-def test_a_window_without_samples_says_where_the_recording_is():
+def test_a_window_without_samples_is_refused_with_the_time_range():
     with pytest.raises(dtm.RecordingError, match=r"0 samples.*from 0 to 9 s"):
         make().window(100, 200)
     with pytest.raises(dtm.RecordingError, match="low below high"):
         make().window(5, 2)
 
 
-def test_steps_are_where_the_reference_changes():
+def test_steps_are_the_changes_of_the_reference():
     flight = make(reference=[0, 0, 0, 1, 1, 1, 1, -2, -2, -2])
     assert [(step.index, step.time, step.amplitude) for step in flight.steps()] == [
         (3, 3.0, 1.0),

@@ -10,7 +10,7 @@ import pytest
 from ball_count import BallCounter, OnContourError, TooManyPiecesError, precision
 from ball_survey import Package, examine
 from flint import arb
-from trouble import KINDS, trouble
+from hard_functions import KINDS, hard_function
 
 CASES = {
     case["name"]: case
@@ -132,9 +132,9 @@ def test_budgets_and_zero():
 
 
 def test_cases_are_reproducible_and_of_every_kind():
-    cases = [trouble(2, k) for k in range(200)]
-    assert cases == [trouble(2, k) for k in range(200)]
-    assert cases != [trouble(3, k) for k in range(200)]
+    cases = [hard_function(2, k) for k in range(200)]
+    assert cases == [hard_function(2, k) for k in range(200)]
+    assert cases != [hard_function(3, k) for k in range(200)]
     assert {case.kind for case in cases} == set(KINDS)
     for case in cases:
         assert 1 <= len(case.delays) <= 14
@@ -156,7 +156,7 @@ DROWNED = 1e12
 )
 def test_hard_cases_have_the_count_of_ball_arithmetic(number):
     """No wrong count; refusals only where a root is, or where rounding exceeds the value."""
-    verdicts, places = examine(trouble(2, number), Package())
+    verdicts, places = examine(hard_function(2, number), Package())
     assert verdicts
     for question, verdict in verdicts.items():
         assert not verdict.startswith("wrong"), (question, verdict)
@@ -166,7 +166,7 @@ def test_hard_cases_have_the_count_of_ball_arithmetic(number):
 
 def test_a_wrong_answer_would_be_noticed():
     """The comparison on a package that is off by one root."""
-    case = next(case for k in range(50) if (case := trouble(2, k)).kind == "retarded")
+    case = next(case for k in range(50) if (case := hard_function(2, k)).kind == "retarded")
 
     class OffByOne(Package):
         def __call__(self, ask):

@@ -7,7 +7,7 @@ import deadtime as dtm
 import pytest
 from ball_survey import Package, examine
 from deadtime import delay, s
-from trouble import trouble
+from hard_functions import hard_function
 
 # Coefficients up to 1e227: real or complex roots as far out as 1e69 lead; a neutral equation whose
 # leading root lies at 5e10 beside chains at 0.01.
@@ -19,7 +19,7 @@ BESIDE_CLUSTERS = (3538, 3677, 5265)
 
 @pytest.mark.parametrize("number", LEADING_FAR_OUT)
 def test_a_root_far_out_is_found(number):
-    case = trouble(1, number)
+    case = hard_function(1, number)
     found = dtm.QuasiPolynomial(case.coefficients, case.delays).rightmost()
     assert len(found) in (1, 2)
     assert abs(found[0]) > 1e5
@@ -28,7 +28,7 @@ def test_a_root_far_out_is_found(number):
 # Those for which balls take no more than a moment.
 @pytest.mark.parametrize("number", [1726, 5768, 7674])
 def test_the_rightmost_root_far_out(number):
-    case = trouble(1, number)
+    case = hard_function(1, number)
     verdicts, _ = examine(case, Package())
     # Balls leave some of these undecided in the pieces they are given.
     assert verdicts["rightmost"] in ("equal", "unknown")
@@ -37,7 +37,7 @@ def test_the_rightmost_root_far_out(number):
 
 @pytest.mark.parametrize("number", BESIDE_CLUSTERS)
 def test_counts_beside_clusters(number):
-    verdicts, _ = examine(trouble(1, number), Package())
+    verdicts, _ = examine(hard_function(1, number), Package())
     assert verdicts["count"] == verdicts["sum of roots"] == verdicts["discs"] == "equal"
 
 

@@ -7,7 +7,7 @@ on |g″| over the ball that covers the piece. Where that is below 0.9 |g(m)|, a
 of arg g(m), so that the change between the ends is the principal one; elsewhere the piece is
 divided. Everything is computed in python-flint's balls: nothing overflows, every rounding error is
 bounded, and the precision is raised from 64 bits to 448 where a value is not known to 1 part in
-100. Numbers given as floats are taken exactly. What cannot be decided is an error, never a number.
+100. Numbers given as floats are taken exactly. What cannot be decided raises an error.
 """
 
 import math
@@ -286,7 +286,7 @@ class BallCounter:
     def real(self, re):
         """Real roots in an open interval whose ends are no roots; an error at multiple ones.
 
-        But for one at 0 that stands in the coefficients, as a power of s that all have in common.
+        An exact root at 0 is allowed: a power of s that all coefficients have in common.
         """
         zeros = min(k for row in self.rows for k, x in enumerate(row) if x)
         if zeros:

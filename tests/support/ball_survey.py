@@ -1,7 +1,7 @@
 """Counts, roots and rightmost roots of random hard functions against ball arithmetic.
 
-``python tests/support/ball_survey.py --cases 10000 --seed 1`` prints every case that is not
-equal and a table at the end; ``--only NUMBER`` repeats one case and prints the function.
+``python tests/support/ball_survey.py --cases 10000 --seed 1`` prints every case whose answers
+differ and a table at the end; ``--only NUMBER`` repeats one case and prints the function.
 """
 
 import argparse
@@ -15,7 +15,7 @@ import numpy as np
 from ball_count import EXACT_BITS, BallCounter, OnContourError, TooManyPiecesError, precision
 from deadtime._base.errors import ContourError
 from flint import arb
-from trouble import trouble
+from hard_functions import hard_function
 
 # A root whose relative distance to the edge is smaller than this justifies a refusal.
 NEAR = 1e-9
@@ -44,8 +44,8 @@ class Package:
 def refusal(counter, error):
     """The reason for a refusal of the package.
 
-    'near': a root is where it says. 'drowned': none is, but there the rounding of the terms in
-    double precision is above 1/16 of |h|. 'clear': not even that.
+    'near': a root lies where the error says. 'drowned': no root lies there, but the rounding error
+    of the terms in double precision is above 1/16 of |h| there. 'clear': neither holds.
     """
     if not isinstance(error, ContourError):
         return f"refused: {type(error).__name__}"
@@ -224,7 +224,7 @@ def main():
         numbers = [options.only]
     begin = time.perf_counter()
     for number in numbers:
-        case = trouble(options.seed, number)
+        case = hard_function(options.seed, number)
         if options.only is not None:
             print(case)
         package = Package()

@@ -1,4 +1,4 @@
-"""Packets of navdata that real drones have sent, read from a folder beside the project."""
+"""Navdata packets recorded from real drones, read from a folder beside the project."""
 
 import struct
 
@@ -25,5 +25,5 @@ def older_packet():
 
 
 def demo_packet():
-    """A short packet, made of a real full one."""
+    """Return a short packet, built from a real full one."""
     return flight_path("ardrone2_demo_from_real_172B.bin").read_bytes()

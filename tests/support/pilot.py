@@ -42,7 +42,7 @@ class Pilot:
         return new
 
     def wait(self, duration, *commands, every=0.02):
-        """Let time pass, sending the same commands again and again, or nothing."""
+        """Advance the time, sending the same commands every `every` seconds, or nothing."""
         until = round(self.time + duration, 6)
         while commands and round(self.time + every, 6) <= until:
             self.time = round(self.time + every, 6)
@@ -74,7 +74,7 @@ class Pilot:
 
 
 def configured(pilot, key, value):
-    """Set a key, and read the configuration back."""
+    """Set a key and return the configuration that the drone then reports."""
     pilot.send(Control(5))
     pilot.send(Config(key, value))
     pilot.send(Control(4))

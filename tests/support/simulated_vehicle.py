@@ -9,12 +9,15 @@ KIT = (0.15265, 5.1529, 5.820)
 
 
 class SimulatedVehicle:
-    """The kit's height model with a delay; `trouble` may change any state that it reports."""
+    """The height model of the development kit with a delay.
 
-    def __init__(self, delay=0.26, noise=0.0, random=None, trouble=None, tells_climb=True):
+    `change_state` may change any state that the vehicle reports.
+    """
+
+    def __init__(self, delay=0.26, noise=0.0, random=None, change_state=None, reports_climb=True):
         self.delay, self.noise, self.random = delay, noise, random
-        self.trouble = trouble or (lambda state, since: state)
-        self.tells_climb = tells_climb
+        self.change_state = change_state or (lambda state, since: state)
+        self.reports_climb = reports_climb
         self.commands, self.log = [], []
         self.height, self.speed, self.flying = 0.0, 0.0, False
         self.sequence, self.listener, self.task = 0, None, None
@@ -91,12 +94,12 @@ class SimulatedVehicle:
                 landed=not self.flying,
                 sequence=self.sequence,
                 vehicle_time=self.sequence * step,
-                climb=self.speed if self.tells_climb else None,
-                climb_setpoint=setpoint if self.tells_climb else None,
+                climb=self.speed if self.reports_climb else None,
+                climb_setpoint=setpoint if self.reports_climb else None,
                 battery=80.0,
             )
             since = self.clock() - self.began if self.flying else -1.0
-            state = self.trouble(state, since)
+            state = self.change_state(state, since)
             if state is not None:
                 self.newest = state
                 if self.listener is not None:

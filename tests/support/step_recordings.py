@@ -6,7 +6,7 @@ import numpy as np
 TS = 0.065
 
 
-def fly(
+def record_step(
     delay=0.36,
     gain=1.0,
     lag=0.0,
@@ -21,7 +21,7 @@ def fly(
     size=1.0,
     noise_in_loop=True,
 ):
-    """A recording with its command logged, and its loop without the delay."""
+    """Simulate a recording of a step with its command; return it and its loop without the delay."""
     loop = dtm.ControlLoop(
         dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=ts, limit=limit
     )
@@ -30,21 +30,21 @@ def fly(
     reference = np.where(time < rest - 1e-9, 0.0, size)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
     seen = reference - error if noise_in_loop else reference
-    flown = loop.simulate(time, seen, reference_time=time, initial_output=0.0, reference_before=0.0)
+    run = loop.simulate(time, seen, reference_time=time, initial_output=0.0, reference_before=0.0)
     known = loop.replace(delay=None, lag=0.0)
-    return dtm.Recording(time, reference, flown.outputs + error, flown.inputs), known
+    return dtm.Recording(time, reference, run.outputs + error, run.inputs), known
 
 
-def swapped(recording, **signals):
-    """The recording with other signals."""
+def replace_signals(recording, **signals):
+    """Return the recording with some of its signals replaced."""
     parts = {name: getattr(recording, name) for name in ("time", "reference", "output", "command")}
     return dtm.Recording(**parts | signals)
 
 
 def noise_for_output(recording, seed=0):
-    """The recording with noise alone as its output."""
+    """Return the recording with its output replaced by white noise."""
     random = np.random.default_rng(seed)
-    return swapped(recording, output=random.normal(size=len(recording)))
+    return replace_signals(recording, output=random.normal(size=len(recording)))
 
 
 #: The rows of the benchmark: the parameters of each recording.
@@ -62,17 +62,17 @@ CASES = {
 }
 
 
-def errors_of(case, runs, method, **options):
-    """Errors of the delay in ms over recordings with different noise, and the estimates."""
+def delay_errors(case, runs, method, **options):
+    """Errors of the delay, ms, over recordings with different noise, and the estimates."""
     what = CASES[case]
     noise_in_loop = what.get("ts", TS) is not None
     found, errors = [], []
     for seed in range(runs):
-        flight, known = fly(
+        recording, known = record_step(
             seed=seed, rest=options.get("rest", 0.0), noise_in_loop=noise_in_loop, **what
         )
         keywords = {name: value for name, value in options.items() if name == "free"}
-        fit = dtm.estimate_delay(flight, known, method=method, **{"free": ("delay",)} | keywords)
+        fit = dtm.estimate_delay(recording, known, method=method, **{"free": ("delay",)} | keywords)
         found.append(fit)
         errors.append(1e3 * (fit.delay - what.get("delay", 0.36)))
     return np.array(errors), found

@@ -8,9 +8,16 @@ import pytest
 from deadtime.estimation import Decay, Graphical, Overshoot
 from deadtime.estimation.methods._decrement import loop_with_root
 from deadtime.estimation.models._held_transfer import held_transfer
-from flown import TS, errors_of, fly, noise_for_output, root_mean_square, swapped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from step_recordings import (
+    TS,
+    delay_errors,
+    noise_for_output,
+    record_step,
+    replace_signals,
+    root_mean_square,
+)
 
 METHODS = ("decrement", "decay", "graphical")
 
@@ -42,7 +49,9 @@ def test_the_rightmost_root_tells_delay_and_gain(ts, lag, x):
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize("Kp", [1.6, 2.5, 3.4])
 def test_peaks_tell_delay_and_gain(ts, Kp):
-    flight, known = fly(Kp=Kp, ts=ts, dt=0.01 if ts is None else ts, limit=None, duration=9.0)
+    flight, known = record_step(
+        Kp=Kp, ts=ts, dt=0.01 if ts is None else ts, limit=None, duration=9.0
+    )
     fit = dtm.estimate_delay(flight, known.replace(gain=0.5), method="decrement")
     # Cubics through five or six samples of a peak: 0.3 ms where both numbers are read.
     assert fit.delay == pytest.approx(0.36, abs=3e-4)
@@ -54,14 +63,14 @@ def test_peaks_tell_delay_and_gain(ts, Kp):
 
 def test_peaks_in_noise():
     # The paper's overshoot is off by 45 ms here, and by 115 ms within the limit.
-    errors, _ = errors_of("1 %, Kp 3, no limit", 40, "decrement", rest=1.0)
+    errors, _ = delay_errors("1 %, Kp 3, no limit", 40, "decrement", rest=1.0)
     assert root_mean_square(errors) < 5.0
-    errors, _ = errors_of("1 %, Kp 3", 40, "decrement", rest=1.0)
+    errors, _ = delay_errors("1 %, Kp 3", 40, "decrement", rest=1.0)
     assert root_mean_square(errors) < 13.0
 
 
 def test_a_gain_that_is_off_is_seen_by_the_decrement():
-    flight, known = fly(gain=0.8, Kp=3.5, noise=0.003, limit=None, duration=8.0, rest=1.0)
+    flight, known = record_step(gain=0.8, Kp=3.5, noise=0.003, limit=None, duration=8.0, rest=1.0)
     fit = dtm.estimate_delay(flight, known.replace(gain=1.0), method="decrement")
     assert fit.gain == pytest.approx(0.8, abs=0.02)
     assert fit.delay == pytest.approx(0.36, abs=0.02)
@@ -77,13 +86,13 @@ def test_a_gain_that_is_off_is_seen_by_the_decrement():
     ],
 )
 def test_the_decrement_refuses_by_name(change, words):
-    flight, known = fly(**change)
+    flight, known = record_step(**change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
         dtm.estimate_delay(flight, known, method="decrement")
 
 
 def test_the_decrement_has_no_lag_to_give():
-    flight, known = fly(Kp=3.0)
+    flight, known = record_step(Kp=3.0)
     with pytest.raises(ValueError, match="fix the lag"):
         dtm.estimate_delay(flight, known, method="decrement", free=("delay", "lag"))
 
@@ -94,13 +103,13 @@ def test_the_decrement_has_no_lag_to_give():
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize(("x", "tail", "within"), [(0.1, 0.3, 1e-9), (0.2, 0.1, 1e-6)])
 def test_the_tail_tells_the_delay(ts, x, tail, within):
-    flight, known = fly(Kp=x / 0.36, ts=ts, dt=TS, limit=None, duration=25.0)
+    flight, known = record_step(Kp=x / 0.36, ts=ts, dt=TS, limit=None, duration=25.0)
     fit = dtm.estimate_delay(flight, known, method=Decay(tail=tail))
     assert fit.delay == pytest.approx(0.36, abs=within)
 
 
 def test_close_to_one_over_e_a_later_tail_is_purer():
-    flight, known = fly(Kp=0.3 / 0.36, limit=0.5, duration=25.0)
+    flight, known = record_step(Kp=0.3 / 0.36, limit=0.5, duration=25.0)
     off = [
         abs(dtm.estimate_delay(flight, known, method=Decay(tail=tail)).delay - 0.36)
         for tail in (0.3, 0.03, 0.001)
@@ -110,7 +119,7 @@ def test_close_to_one_over_e_a_later_tail_is_purer():
 
 
 def test_the_decay_with_a_known_lag():
-    flight, known = fly(Kp=0.5, lag=0.2, limit=None, duration=30.0)
+    flight, known = record_step(Kp=0.5, lag=0.2, limit=None, duration=30.0)
     fit = dtm.estimate_delay(flight, known.replace(lag=0.2), method=Decay(tail=0.01))
     assert fit.delay == pytest.approx(0.36, abs=1e-4)
 
@@ -118,7 +127,7 @@ def test_the_decay_with_a_known_lag():
 def test_the_standard_error_of_the_decay_is_that_of_repeated_flights():
     errors, said = [], []
     for seed in range(60):
-        flight, known = fly(Kp=0.55, noise=0.01, seed=seed, duration=10.0, rest=1.0)
+        flight, known = record_step(Kp=0.55, noise=0.01, seed=seed, duration=10.0, rest=1.0)
         fit = dtm.estimate_delay(flight, known, method="decay")
         errors.append(fit.delay - 0.36)
         said.append(fit.stderr["delay"])
@@ -137,7 +146,7 @@ def test_the_standard_error_of_the_decay_is_that_of_repeated_flights():
     ],
 )
 def test_the_decay_refuses_by_name(change, known_gain, words):
-    flight, known = fly(limit=None, **change)
+    flight, known = record_step(limit=None, **change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
         dtm.estimate_delay(flight, known.replace(gain=known_gain), method=Decay(tail=0.2))
 
@@ -153,13 +162,13 @@ def test_the_decay_refuses_by_name(change, known_gain, words):
     st.sampled_from([None, TS]),
 )
 def test_the_tangent_is_exact_under_hold_and_limit(delay, Kp, limit, ts):
-    flight, known = fly(delay, Kp=Kp, limit=limit, ts=ts, dt=ts or 0.02, duration=12.0)
+    flight, known = record_step(delay, Kp=Kp, limit=limit, ts=ts, dt=ts or 0.02, duration=12.0)
     fit = dtm.estimate_delay(flight, known, method="graphical")
     assert fit.delay == pytest.approx(delay, abs=1e-9)
 
 
 def test_the_other_constructions():
-    flight, known = fly(duration=10.0)
+    flight, known = record_step(duration=10.0)
     two = dtm.estimate_delay(flight, known, method=Graphical(construction="two_point"))
     assert two.delay == pytest.approx(0.36, abs=1e-9)
     first = dtm.estimate_delay(flight, known, method=Graphical(construction="first_movement"))
@@ -168,14 +177,14 @@ def test_the_other_constructions():
 
 def test_the_tangent_in_noise():
     # Nine flights of ten within 20 ms where the paper's overshoot has 35 ms.
-    errors, _ = errors_of("1 %", 40, "graphical", rest=1.0)
+    errors, _ = delay_errors("1 %", 40, "graphical", rest=1.0)
     assert root_mean_square(errors) < 12.0
-    errors, _ = errors_of("continuous, Kp 1.31", 20, "graphical", rest=1.0)
+    errors, _ = delay_errors("continuous, Kp 1.31", 20, "graphical", rest=1.0)
     assert root_mean_square(errors) < 5.0
 
 
 def test_a_lag_counts_as_delay():
-    flight, known = fly(lag=0.1)
+    flight, known = record_step(lag=0.1)
     fit = dtm.estimate_delay(flight, known, method="graphical")
     assert 0.40 < fit.delay < 0.46
     assert not fit.adequate
@@ -191,13 +200,13 @@ def test_a_lag_counts_as_delay():
     ],
 )
 def test_the_tangent_refuses_by_name(change, words):
-    flight, known = fly(**change)
+    flight, known = record_step(**change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
         dtm.estimate_delay(flight, known, method="graphical")
 
 
 def test_graphical_options_are_checked():
-    flight, known = fly()
+    flight, known = record_step()
     with pytest.raises(ValueError, match="not one of"):
         dtm.estimate_delay(flight, known, method=Graphical(construction="ruler"))
     with pytest.raises(ValueError, match="increase"):
@@ -224,7 +233,7 @@ def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method):
     # The overshoot of a loop that its limit alone keeps in bounds was read as that of a stable one.
     flights = ((0.0, 5.0), (0.01, 5.0), (0.03, 20.0))
     for Kp, (noise, duration) in itertools.product((4.2, 4.5, 6.0), flights):
-        flight, known = fly(Kp=Kp, noise=noise, duration=duration, rest=1.0)
+        flight, known = record_step(Kp=Kp, noise=noise, duration=duration, rest=1.0)
         with pytest.raises(dtm.NotIdentifiableError, match=r"limit cycle.*'output_error'"):
             dtm.estimate_delay(flight, known, method=method)
 
@@ -232,7 +241,7 @@ def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method):
 @pytest.mark.parametrize("method", LINEAR)
 def test_a_loop_that_still_rings_is_no_limit_cycle(method):
     for Kp, seed in itertools.product((3.0, 3.6), range(5)):
-        flight, known = fly(Kp=Kp, noise=0.01, duration=12.0, rest=1.0, seed=seed)
+        flight, known = record_step(Kp=Kp, noise=0.01, duration=12.0, rest=1.0, seed=seed)
         if method == "decay":
             with pytest.raises(dtm.NotIdentifiableError, match="overshoots"):
                 dtm.estimate_delay(flight, known, method=method)
@@ -241,22 +250,22 @@ def test_a_loop_that_still_rings_is_no_limit_cycle(method):
 
 
 def test_the_saturated_map_knows_the_limit_and_reads_a_limit_cycle():
-    flight, known = fly(Kp=4.5, duration=12.0)
+    flight, known = record_step(Kp=4.5, duration=12.0)
     fit = dtm.estimate_delay(flight, known, method=Overshoot(map="saturated"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_to_read_is_refused(method):
-    flight, known = fly(Kp=0.8, duration=10.0)
+    flight, known = record_step(Kp=0.8, duration=10.0)
 
     def read(recording, loop=known, **options):
         return dtm.estimate_delay(recording, loop, method=method, **options)
 
     with pytest.raises(dtm.NotIdentifiableError, match="no step"):
-        read(swapped(flight, reference=np.ones(len(flight))))
+        read(replace_signals(flight, reference=np.ones(len(flight))))
     with pytest.raises(dtm.NotIdentifiableError, match="does not follow"):
-        read(swapped(flight, output=np.zeros(len(flight))))
+        read(replace_signals(flight, output=np.zeros(len(flight))))
     for seed in range(10):
         with pytest.raises(dtm.NotIdentifiableError):
             read(noise_for_output(flight, seed))
@@ -269,7 +278,7 @@ def test_nothing_to_read_is_refused(method):
 
 
 def test_no_interval_and_why():
-    flight, known = fly(Kp=2.5, noise=0.003, duration=8.0, rest=1.0)
+    flight, known = record_step(Kp=2.5, noise=0.003, duration=8.0, rest=1.0)
     for method in ("decrement", "graphical"):
         fit = dtm.estimate_delay(flight, known, method=method)
         assert not fit.calibrated

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from deadtime.estimation import Frequency
 from deadtime.estimation._estimate import METHODS
-from flown import fly
+from step_recordings import record_step
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
 
 
-def flown(method):
+def suitable_recording(method):
     """A flight that suits a method, and the method with its options."""
     truth = KNOWN.replace(delay=0.36)
     if method == "relay":
@@ -28,14 +28,14 @@ def flown(method):
         "decay": {"Kp": 0.6, "duration": 12.0},
         "decrement": {"Kp": 3.0, "limit": None, "duration": 8.0},
     }
-    flight, known = fly(noise=0.005, rest=1.0, **special.get(method, {}))
+    flight, known = record_step(noise=0.005, rest=1.0, **special.get(method, {}))
     return flight, known, method
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_result_is_whole(method):
     # A relay's could not be drawn, one of the frequency method not be sent to another process.
-    flight, known, method = flown(method)
+    flight, known, method = suitable_recording(method)
     fit = dtm.estimate_delay(flight, known, method=method)
     assert "nan" not in fit.summary().lower().replace("dominant", "")
     assert math.isfinite(json.loads(json.dumps(fit.to_dict(), allow_nan=False))["delay"])
@@ -59,7 +59,7 @@ def test_every_result_is_whole(method):
 @pytest.mark.parametrize("method", ["output_error", "waveform", "grid"])
 def test_a_lag_that_is_not_there_leaves_the_other_numbers_exact(method):
     # The profile of an exact fit had no sign change, and the grid could not part delay and lag.
-    flight, known = fly(rest=1.0)
+    flight, known = record_step(rest=1.0)
     fit = dtm.estimate_delay(flight, known, method=method, free=("delay", "gain", "lag"))
     assert fit.delay == pytest.approx(0.36, abs=1e-8)
     assert fit.lag == pytest.approx(0.0, abs=1e-8)
@@ -69,7 +69,7 @@ def test_a_lag_that_is_not_there_leaves_the_other_numbers_exact(method):
 
 def test_the_profile_of_a_fit_without_lag_holds_the_best_delay():
     # Profiles of continuous loops knew lags from the shortest on only, none at all was left out.
-    flight, known = fly(
+    flight, known = record_step(
         Kp=2.0, ts=None, dt=0.05, limit=None, noise=0.005, rest=1.0, noise_in_loop=False
     )
     fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "gain", "lag"))
@@ -81,6 +81,6 @@ def test_the_profile_of_a_fit_without_lag_holds_the_best_delay():
 
 @pytest.mark.parametrize("window", [3, (1.0,), "1 to 3"])
 def test_a_window_that_is_none_is_shown(window):
-    flight, known = fly(rest=1.0)
+    flight, known = record_step(rest=1.0)
     with pytest.raises(TypeError, match=r"give a range \(low, high\)"):
         dtm.estimate_delay(flight, known, window=window)

@@ -13,8 +13,8 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Trouble:
-    """A function, a region that may contain hard cases, and a line to the right of its chains."""
+class HardFunction:
+    """A function, a region whose roots are hard to count, and a line to the right of its chains."""
 
     number: int
     kind: str
@@ -51,7 +51,7 @@ def value(h, z):
 
 
 def planted(h, z):
-    """`h` less the line through its values at `z` and its mirror image: roots there, nearly."""
+    """`h` less the line through its values at `z` and its conjugate: roots there, nearly."""
     w = value(h, z)
     if z.imag == 0.0:
         line = np.array([w.real])
@@ -206,7 +206,7 @@ def size_of(h, place):
     return float(np.exp(np.mean(np.log(sizes)))) if sizes else 1.0
 
 
-def trouble(seed, number):
+def hard_function(seed, number):
     """Case `number` of a seed."""
     rng = np.random.default_rng([seed, number])
     kind = list(KINDS)[rng.integers(len(KINDS))]
@@ -224,7 +224,7 @@ def trouble(seed, number):
     a = middle - width * rng.uniform(0.05, 1)
     b = middle + width * rng.uniform(0.05, 1)
     if span:
-        # Not so far left that the values at roots of the chains are rounding errors alone.
+        # Limited to the left, because further left the values at roots are only rounding errors.
         a = max(a, -30.0 / span)
         b = max(b, a + 0.1 * width)
     d = height * rng.uniform(0.3, 1)
@@ -245,6 +245,6 @@ def trouble(seed, number):
     longest = max(len(p) for p in h.values())
     rows = tuple(tuple(map(float, np.pad(h[t], (0, longest - len(h[t]))))) for t in delays)
     ranges = (float(a), float(b)), (float(c), float(d))
-    return Trouble(
+    return HardFunction(
         number, kind, rows, tuple(delays), *ranges, None if line is None else float(line)
     )

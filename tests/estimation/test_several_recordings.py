@@ -1,17 +1,17 @@
 """Several recordings of one vehicle, fitted by one set of numbers."""
 
 import deadtime as dtm
-import flown
 import numpy as np
 import pytest
+import step_recordings
 from deadtime.estimation.fit._joint import JointModel
 from flights import flight_path
 
 TS = 0.065
 
 
-def fly(Kp, noise, seed, size=1.0, lag=0.0, limit=1.0):
-    flight, known = flown.fly(
+def record_step(Kp, noise, seed, size=1.0, lag=0.0, limit=1.0):
+    flight, known = step_recordings.record_step(
         gain=0.9, lag=lag, Kp=Kp, noise=noise, seed=seed, limit=limit, size=size, rest=1.0
     )
     return flight, known.replace(gain=1.0)
@@ -20,7 +20,9 @@ def fly(Kp, noise, seed, size=1.0, lag=0.0, limit=1.0):
 @pytest.mark.parametrize("method", ["output_error", "waveform"])
 @pytest.mark.parametrize("lag", [0.0, 0.12])
 def test_noise_free_flights_are_recovered_exactly(method, lag):
-    flights, loops = zip(*(fly(Kp, 0.0, 0, lag=lag) for Kp in (0.8, 1.31, 2.0)), strict=True)
+    flights, loops = zip(
+        *(record_step(Kp, 0.0, 0, lag=lag) for Kp in (0.8, 1.31, 2.0)), strict=True
+    )
     free = ("delay", "gain", "lag") if lag else ("delay", "gain")
     fit = dtm.estimate_delay(list(flights), list(loops), method=method, free=free)
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
@@ -35,7 +37,7 @@ def test_two_like_flights_are_worth_twice_one():
     # The bound on white noise is 1/sqrt(2) of that of one flight, and the errors keep to it.
     errors, bounds, single = [], [], []
     for seed in range(60):
-        pairs = [fly(1.31, 0.01, 2 * seed + k) for k in range(2)]
+        pairs = [record_step(1.31, 0.01, 2 * seed + k) for k in range(2)]
         flights, loops = [p[0] for p in pairs], [p[1] for p in pairs]
         fit = dtm.estimate_delay(flights, loops)
         errors.append(fit.delay - 0.36)
@@ -47,8 +49,8 @@ def test_two_like_flights_are_worth_twice_one():
 
 
 def test_a_noisy_flight_counts_by_its_noise():
-    quiet, loop = fly(1.31, 0.002, 1)
-    loud, _ = fly(1.31, 0.05, 2)
+    quiet, loop = record_step(1.31, 0.002, 1)
+    loud, _ = record_step(1.31, 0.05, 2)
     alone = dtm.estimate_delay(quiet, loop)
     both = dtm.estimate_delay([quiet, loud], loop)
     assert both.whiteness.white
@@ -61,8 +63,8 @@ def test_a_noisy_flight_counts_by_its_noise():
 
 def test_coloured_misfit_counts_by_the_size_of_the_step():
     # A lag that is left out grows with the motion: a small and a large step say the same of it.
-    small, loop = fly(1.31, 0.0, 0, size=0.25, lag=0.3, limit=None)
-    large, _ = fly(1.31, 0.0, 0, size=1.0, lag=0.3, limit=None)
+    small, loop = record_step(1.31, 0.0, 0, size=0.25, lag=0.3, limit=None)
+    large, _ = record_step(1.31, 0.0, 0, size=1.0, lag=0.3, limit=None)
     alone = dtm.estimate_delay(small, loop)
     both = dtm.estimate_delay([small, large], loop)
     assert not both.adequate
@@ -73,7 +75,7 @@ def test_the_joint_model_is_its_parts():
     from deadtime.estimation.data._runs import paired_runs
     from deadtime.estimation.methods._waveform import _model
 
-    pairs = [fly(Kp, 0.01, 3) for Kp in (0.8, 2.0)]
+    pairs = [record_step(Kp, 0.01, 3) for Kp in (0.8, 2.0)]
     runs = paired_runs([p[0] for p in pairs], [p[1] for p in pairs])
     parts = tuple(_model(run, ("delay", "gain")) for run in runs)
     joint = JointModel(parts, (1.0, 0.5))
@@ -98,7 +100,7 @@ def test_the_joint_model_is_its_parts():
     ],
 )
 def test_what_does_not_fit_together_is_refused(arguments, error, match):
-    flight, loop = fly(1.31, 0.01, 0)
+    flight, loop = record_step(1.31, 0.01, 0)
     other = loop.replace(plant=dtm.FirstOrder())
     named = {"two": [flight, flight], "loop": loop, "plants": [loop, other]}
 
@@ -111,7 +113,7 @@ def test_what_does_not_fit_together_is_refused(arguments, error, match):
 
 
 def test_methods_for_one_recording_say_so():
-    flight, loop = fly(2.0, 0.001, 0)
+    flight, loop = record_step(2.0, 0.001, 0)
     with pytest.raises(ValueError, match="one recording, not 2"):
         dtm.estimate_delay([flight, flight], loop, method="overshoot")
 
