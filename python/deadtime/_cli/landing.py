@@ -16,8 +16,8 @@ T = TypeVar("T")
 
 Stop: TypeAlias = Callable[[], None]
 
-#: Signals that end a flight: Ctrl-C, a request to terminate, and a closed or lost terminal (SIGBREAK
-#: on Windows). No system has all of them.
+#: Signals that end a flight: Ctrl-C, a request to terminate, and a closed or lost terminal
+#: (SIGBREAK on Windows). No system has all of them.
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 

@@ -44,8 +44,8 @@ _MOST_STEPS = 10 * _PER_DOUBLING
 # repeat the simulation more often, more make it longer.
 _TO_SETTLE = 8.0
 
-# Added to a number of steps before it is rounded up, so that a rounding error does not make the time
-# too short.
+# Added to a number of steps before it is rounded up, so that a rounding error does not make the
+# time too short.
 _STEP_ROUNDING = 1e-6
 
 # Status given by the native part to a response that is inside its band at the end, without evidence
