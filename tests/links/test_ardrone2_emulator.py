@@ -562,7 +562,7 @@ def test_a_flood_of_motions_does_not_pile_up():
     pilot = Pilot(delay=100.0).fly()
     for _ in range(3000):
         pilot.send(Move(gaz=0.1))
-    assert len(pilot.drone._under_way) <= 1024
+    assert len(pilot.drone._in_transit) <= 1024
 
 
 def test_where_others_can_reach_it_the_clients_have_to_be_named():
