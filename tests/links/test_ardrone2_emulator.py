@@ -562,7 +562,7 @@ def test_many_motion_commands_do_not_accumulate():
     pilot = Pilot(delay=100.0).fly()
     for _ in range(3000):
         pilot.send(Move(gaz=0.1))
-    assert len(pilot.drone._under_way) <= 1024
+    assert len(pilot.drone._in_transit) <= 1024
 
 
 def test_listening_beyond_this_machine_requires_named_clients():

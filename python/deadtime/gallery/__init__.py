@@ -1,7 +1,6 @@
 """Problems of the literature by citation key, with their known answers.
 
-Systems that others have published, as quasi-polynomials: to try an algorithm on, to compare
-programs with, to learn from. Data only.
+Published systems as quasi-polynomials, for tests of algorithms, comparisons of programs, and study.
 
 Examples
 --------

@@ -1,21 +1,4 @@
-"""Problems of the literature by citation key, with their known answers.
-
-Systems that others have published, as quasi-polynomials: to try an algorithm on, to compare
-programs with, to learn from. Data only.
-
-Examples
---------
->>> from deadtime import gallery
->>> gallery.names()[:3]
-('appeltans2023-2.12', 'appeltans2023-2.6', 'appeltans2023-2.9')
->>> problem = gallery.problem("wright1955")
->>> problem.h
-s + 1.57079632679 exp(-1 s)
->>> problem.rightmost
-1.5707963267948966j
->>> sorted(p.key for p in gallery.problems() if p.h.kind == "neutral")[0]
-'appeltans2023-2.12'
-"""
+"""The problems of the gallery, and their look-up by citation key."""
 
 from __future__ import annotations
 
@@ -32,12 +15,12 @@ __all__ = ["Problem", "names", "problem", "problems"]
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem and what is known of it.
+    """A problem and its known answers.
 
     Attributes
     ----------
     key : str
-        Citation key: first author and year, and the example's number where there are several.
+        Citation key: first author and year, and the number of the example if there are several.
     title : str
         What the system is.
     reference : str
@@ -45,29 +28,30 @@ class Problem:
     h : QuasiPolynomial
         The characteristic function, at `values` where there is a `family`.
     family : ParametricQuasiPolynomial or None
-        The same with the source's parameters left open.
+        The characteristic function with the parameters of the source as variables.
     values : mapping of str to float
         The parameters of `h`.
     base_delay : float
-        The largest number, in s, of which all delays are whole multiples as the source writes them
-        (decimals always have one). The only delay itself where there is but one.
+        The largest number, in s, of which all delays, as printed in the source, are integer
+        multiples (decimals always have one). A single delay is its own base delay.
     rightmost : complex or None
         The rightmost root, Im >= 0, in 1/s: computed in ball arithmetic to 25 digits, and proved
-        to be the rightmost one. None where the chains of a neutral equation lie further right, in
-        the sense of `QuasiPolynomial.chain_abscissa`.
+        to be the rightmost one. None if the chains of a neutral equation lie further right, in the
+        sense of `QuasiPolynomial.chain_abscissa`.
     multiplicity : int
         Multiplicity of that root.
     region : tuple of (float, float)
         Ranges of the real part (1/s) and of the imaginary part (rad/s) for `count`.
     count : int
-        Number of roots in the region, with multiplicity: certified in ball arithmetic.
+        Number of roots in the region, with multiplicity, certified in ball arithmetic.
     published : mapping of str to str
-        Further answers, in the source's words and digits or in closed form.
+        Further answers, in the words and digits of the source or in closed form.
 
     Notes
     -----
-    Coefficients and delays are doubles, taken as exact; where the source gives exact ones
-    (1/3, 1/e), a multiple root of the source may be a cluster here, and `published` says so.
+    Coefficients and delays are doubles, taken as exact. If the source has numbers that are no
+    doubles (1/3, 1/e), a multiple root of the source may be a cluster here; `published` then says
+    so.
     """
 
     key: str
@@ -105,7 +89,7 @@ def names() -> tuple[str, ...]:
 
 
 def problem(key: str) -> Problem:
-    """Look a problem up by its citation key.
+    """Return the problem with a citation key.
 
     Parameters
     ----------
@@ -135,7 +119,7 @@ def problem(key: str) -> Problem:
 
 
 def problems() -> Iterator[Problem]:
-    """Go through all problems, in the order of `names`.
+    """Yield all problems, in the order of `names`.
 
     Yields
     ------

@@ -1,4 +1,4 @@
-"""The entries of the gallery, by citation key: `Problem` says what the fields mean."""
+"""The entries of the gallery by citation key; `Problem` describes the fields."""
 
 from typing import Any, Final
 
@@ -8,7 +8,7 @@ __all__ = ["ENTRIES"]
 
 a, g, kappa1, Kd, Kp, Kv, T, tau, Td, w = parameters("a g kappa1 Kd Kp Kv T tau Td w")
 
-_LARGE = QuasiPolynomial(
+_EIGHT_DELAYS = QuasiPolynomial(
     [
         [0.0, -1.8, 0.001, 0.0, 0.0, -12.8, 0.0, 1.7, 0.2],
         [29.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -22,7 +22,7 @@ _LARGE = QuasiPolynomial(
     ],
     [0.0, 4.61, 8.52, 10.33, 13.32, 18.52, 19.9, 23.35, 24.99],
 )
-_FOUR = QuasiPolynomial(
+_FOUR_DELAYS = QuasiPolynomial(
     [
         [2.1, 5.0, 0.0, 0.2, 1.0],
         [0.0, -2.1, 0.0, 0.0, 0.5],
@@ -32,7 +32,7 @@ _FOUR = QuasiPolynomial(
     ],
     [0.0, 1.5, 2.2, 4.3, 6.3],
 )
-_CLOSED = QuasiPolynomial(
+_CLOSED_LOOP = QuasiPolynomial(
     [
         [0.8700000000000001, -3.926, 2.28, 1.0],
         [0.2719870000000002, 2.3080524000000002, 2.881628, 0.032600000000000004],
@@ -48,7 +48,7 @@ _ROUTER = QuasiPolynomial(
     ],
     [0.0, 0.246],
 )
-_RING = QuasiPolynomial(
+_CAR_RING = QuasiPolynomial(
     [
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0, 5.0, 0.0],
@@ -118,7 +118,7 @@ _TWO_STATES = QuasiPolynomial(
 
 
 def _member(family: ParametricQuasiPolynomial | QuasiPolynomial, **values: float) -> dict[str, Any]:
-    # To a type checker, s plus anything is a QuasiPolynomial.
+    # For a type checker, s plus a parameter is a QuasiPolynomial.
     assert isinstance(family, ParametricQuasiPolynomial)
     return {"family": family, "values": values, "h": family.at(**values)}
 
@@ -144,7 +144,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
             'computation of quasi-polynomial zeros", IEEE Transactions on Automatic '
             "Control 54(1) (2009), 171-177"
         ),
-        "h": _LARGE,
+        "h": _EIGHT_DELAYS,
         "base_delay": 0.01,
         "rightmost": (2.425236932116968 + 0j),
         "region": ((-4.5, 2.5), (0.0, 100.0)),
@@ -157,7 +157,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
             'update and examples", in Delay Systems: From Theory to Numerics and '
             "Applications, Springer (2014), example 3"
         ),
-        "h": _FOUR,
+        "h": _FOUR_DELAYS,
         "base_delay": 0.1,
         "rightmost": complex(0.9100066128666843, 1.5566934977882543),
         "region": ((-10.0, 2.0), (0.0, 100.0)),
@@ -212,7 +212,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
             'P. Appeltans and W. Michiels, "Analysis and controller-design of time-delay '
             'systems using TDS-CONTROL: a tutorial and manual" (2023), example 2.9'
         ),
-        "h": _CLOSED,
+        "h": _CLOSED_LOOP,
         "base_delay": 1.0,
         "rightmost": complex(-0.28448043673259954, 0.21784497571362862),
         "region": ((-4.0, 0.5), (0.0, 100.0)),
@@ -329,7 +329,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
             'model with reaction-time delay", Proceedings of the Royal Society A 462 '
             "(2006); alpha = 1, V' = 0.8, tau = 0.4"
         ),
-        "h": _RING,
+        "h": _CAR_RING,
         "base_delay": 0.4,
         "rightmost": complex(0.10849685831586656, 0.7886612690947454),
         "region": ((-8.0, 2.0), (0.0, 40.0)),

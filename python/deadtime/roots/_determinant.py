@@ -1,13 +1,13 @@
-"""Determinants of matrices of quasi-polynomials, expanded while their roots stand it.
+"""Determinants of matrices of quasi-polynomials, expanded where this keeps their roots accurate.
 
-Nothing is rounded on the way: floats are dyadic rationals, so that coefficients are integers over
-a power of two, and delays are fractions. Each coefficient and delay is rounded once, at the end.
+The expansion is exact: floats are dyadic rationals, so that coefficients are integers over a power
+of two, and delays are fractions. Each coefficient and delay is rounded once, at the end.
 
-That alone does not make the roots of the expansion good: where its terms are much larger than
-det M responds to the entries of M, rounding them moves the roots more than the entries' own
-rounding does. To first order, rounding the coefficients changes the determinant by at most
-u sum |terms|, and relative changes of u of the entries by u sum_ij |M_ij| |cofactor_ij|: the
-ratio of the two is measured, and an expansion with a large one refused.
+An exact expansion alone does not give accurate roots: where its terms are large compared with the
+sensitivity of det M to the entries of M, rounding the terms moves the roots more than rounding the
+entries does. To first order, rounding the coefficients changes the determinant by at most
+u sum |terms|, and relative changes of u of the entries by u sum_ij |M_ij| |cofactor_ij|. The ratio
+of the two is computed, and an expansion with a large ratio is refused.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from deadtime.roots._quasipolynomial import QuasiPolynomial
 
 __all__ = ["Entry", "NotExpandedError", "expanded"]
 
-#: A quasi-polynomial by power of s and delay.
+#: The coefficients of a quasi-polynomial by power of s and delay.
 Entry: TypeAlias = Mapping[tuple[int, float], float]
-#: A quasi-polynomial without rounding: integer coefficients by power of s and delay.
+#: The same without rounding: integer coefficients by power of s and exact delay.
 _Exact: TypeAlias = dict[tuple[int, Fraction], int]
 
 # Upper limits on the states and the terms of an expansion, whose work grows like n 2^n times the
@@ -37,22 +37,27 @@ _MOST_TERMS = 1000
 # a larger one expands more systems and loses digits of their roots.
 _MOST_GROWTH = 1e4
 
-# Number of frequencies on the imaginary axis, where stability is decided, among which the worst are
-# searched, and of those at which the effect is measured.
+# Number of frequencies on the imaginary axis, where stability is decided, at which the cancellation
+# of terms is computed, and of those among them with the largest cancellation, at which the effect
+# of rounding is computed. More find a worse frequency and take longer.
 _CANDIDATES = 4001
 _SAMPLES = 64
 
+# Ends of the range of these frequencies, relative to the smallest and the largest one at which two
+# terms are equal in size.
+_LOWER, _UPPER = 0.01, 100.0
+
 
 class NotExpandedError(ValueError):
-    """The determinant is there, but its coefficients would not say where its roots are."""
+    """The determinant exists, but its rounded coefficients would not give accurate roots."""
 
 
 def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> QuasiPolynomial:
-    """Determinant of a matrix of quasi-polynomials; NotExpandedError where that is not safe.
+    """Determinant of a matrix of quasi-polynomials; NotExpandedError if it would be inaccurate.
 
-    With `bordered` one row and column belong to an output and an input, and the determinant may
-    be zero. This is the one place at which expansion is decided on: what is refused here is
-    searched for roots by factorising the matrix itself.
+    With `bordered` the last row and column belong to an output and an input, and the determinant
+    may be zero. Only this function decides whether a determinant is expanded: the roots of one that
+    is refused are found by factorising the matrix.
     """
     size = len(entries)
     states = size - int(bordered)
@@ -91,7 +96,7 @@ def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> Quas
 
 
 def _determinant(rows: Sequence[Sequence[_Exact]]) -> _Exact:
-    """Laplace's expansion along the rows; minors of the first k rows are kept by their columns."""
+    """Laplace expansion along the rows; the minors of the first k rows are stored by columns."""
     minors: dict[int, _Exact] = {0: {(0, Fraction(0)): 1}}
     for row in rows:
         following: dict[int, _Exact] = {}
@@ -116,7 +121,7 @@ def _determinant(rows: Sequence[Sequence[_Exact]]) -> _Exact:
 
 
 def _rounded(exact: _Exact, scale: int) -> QuasiPolynomial:
-    """Coefficients over `scale` and delays as floats, each rounded once."""
+    """Divide coefficients by `scale` and round them and the delays to floats, each once."""
     delays = sorted({float(t) for _, t in exact})
     degree = max(k for k, _ in exact)
     sums: dict[tuple[int, float], int] = {}
@@ -134,11 +139,11 @@ def _rounded(exact: _Exact, scale: int) -> QuasiPolynomial:
 
 
 def _growth(entries: Sequence[Sequence[Entry]], h: QuasiPolynomial) -> float:
-    """What rounding the coefficients does to h, over what rounding the entries does, at worst.
+    """Largest ratio of the effect on h of rounding the coefficients to that of the entries.
 
-    Since n |det| <= sum |M_ij| |cofactor_ij|, that is large only where |h| is small compared with
-    the sum of its terms: it is measured where this is most so, from a hundredth of the smallest
-    to a hundred times the largest frequency at which two terms of h are equal in size.
+    Since n |det| <= sum |M_ij| |cofactor_ij|, the ratio is large only where |h| is small compared
+    with the sum of its terms. It is computed where this quotient is smallest, from a hundredth of
+    the smallest to a hundred times the largest frequency at which two terms of h are equal in size.
     """
     size = np.abs(h.coefficients).sum(axis=0)
     used = np.flatnonzero(size)
@@ -147,7 +152,7 @@ def _growth(entries: Sequence[Sequence[Entry]], h: QuasiPolynomial) -> float:
     ]
     if not slopes:
         slopes = [1.0]
-    omega = np.geomspace(0.01 * min(slopes), 100.0 * max(slopes), _CANDIDATES)
+    omega = np.geomspace(_LOWER * min(slopes), _UPPER * max(slopes), _CANDIDATES)
     with np.errstate(all="ignore"):
         cancelled = np.abs(h(1j * omega)) / np.polyval(size[::-1], omega)
     omega = omega[np.argsort(cancelled)[:_SAMPLES]]
@@ -170,8 +175,8 @@ def _growth(entries: Sequence[Sequence[Entry]], h: QuasiPolynomial) -> float:
 def _cofactors(matrices: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Moduli of the cofactors of a stack of matrices.
 
-    From determinants of their own, because the inverse is accurate only compared with its largest
-    entry, and the entries may have different units.
+    Each is computed as a determinant: the entries of the inverse have errors in relation to the
+    largest one, which is too inaccurate where the entries have different units.
     """
     n = matrices.shape[-1]
     moduli = np.empty(matrices.shape)

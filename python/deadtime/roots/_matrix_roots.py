@@ -1,7 +1,8 @@
 """Roots of det M(s) from the matrices themselves, with the methods of a quasi-polynomial.
 
-M(s) = s E + sum (s N_j - A_j) e^{-s tau_j} is factorised at each point of a contour; nothing is
-expanded, so that the number of states and the size of coefficients do not matter.
+M(s) = s E + sum (s N_j - A_j) e^{-s tau_j} is factorised at each point of a contour. The
+determinant is not expanded, so that the accuracy does not depend on the number of states or on the
+size of coefficients.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _Matrix = NDArray[np.float64]
 
 
 class MatrixDeterminant:
-    """The determinant of a characteristic matrix, never expanded."""
+    """The determinant of a characteristic matrix that is not expanded."""
 
     __slots__ = ("_native",)
 
@@ -43,7 +44,7 @@ class MatrixDeterminant:
 
     @property
     def is_invertible(self) -> bool:
-        """Whether the inverse of E can be verified."""
+        """Whether E is proved to be invertible."""
         return self._native.is_invertible()
 
     def count(
@@ -54,7 +55,7 @@ class MatrixDeterminant:
         return self._native.count(open_interval("re", re), open_interval("im", im))
 
     def certify(self, re: OpenRange | None = None, im: OpenRange | None = None) -> Certificate:
-        """Refuse: certificates hold the coefficients of an expanded function."""
+        """Raise ValueError: a certificate needs the coefficients of an expanded determinant."""
         raise ValueError(
             "a certificate needs the expanded determinant, which this system does not have: "
             "count() proves the same number without writing the proof down"
@@ -63,7 +64,7 @@ class MatrixDeterminant:
     def roots(
         self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: str = "error"
     ) -> RootSet:
-        """Locate every root in a region, each in a disc proved to hold it."""
+        """Locate every root in a region, each in a disc proved to contain it."""
         _refuse_edge(edge)
         return root_set(self._native.roots(open_interval("re", re), open_interval("im", im)))
 
@@ -82,7 +83,7 @@ class MatrixDeterminant:
         raise ValueError(f"strong=False: {_NOT_EXACT}; its strong abscissa is {found:.6g} 1/s")
 
     def chain_enclosure(self) -> tuple[float, float]:
-        """Lower and upper bound of the real part that chains come to, delays free to vary."""
+        """Lower and upper bound on the chain abscissa for arbitrarily small changes of delays."""
         return self._native.chain_abscissa()
 
     def chain_abscissa(self, strong: bool = True) -> float:

@@ -42,27 +42,26 @@ def dde_roots(
         Which root; all four arguments broadcast. ``k=0`` is rightmost. The roots k and -k are
         conjugate when ``a1 > 0``, k and -1-k when ``a1 < 0`` (unless both are real).
     out, where, threads, **options
-        As for `lambertw`; arguments are not looked at where `where` is false.
+        As for `lambertw`; arguments are not checked where `where` is false.
 
     Returns
     -------
     ndarray or scalar of complex128
-        The roots in 1/s. With ``delay=0`` or ``a1=0`` one root is left, ``a0 + a1``; the others
-        have real part ``-inf``. NaN where ``a0*delay`` or ``a1*delay`` exceeds 1e300.
+        The roots in 1/s. With ``delay=0`` or ``a1=0`` there is only one root, ``a0 + a1``; the
+        others have real part ``-inf``. NaN where ``a0*delay`` or ``a1*delay`` exceeds 1e300.
 
     Raises
     ------
     TypeError
-        An argument is not real, or `k` is not of integers.
+        An argument is not real, or `k` is not an array of integers.
     ValueError
         A coefficient or delay is not finite, a delay is negative, or shapes do not broadcast.
 
     Notes
     -----
-    The formula overflows for large :math:`|a_0 T|` and loses digits where its terms cancel. Here
-    W only gives the start; the last steps are taken on s itself, so that every root comes to
-    nearly full precision. Where two roots meet, they are as sensitive to rounding of the
-    arguments as any computed value can be.
+    The formula overflows for large :math:`|a_0 T|` and loses digits where its terms cancel. Here W
+    only gives the initial value of an iteration for s, so that every root has nearly full
+    precision. Close to a double root the error is that caused by rounding of the arguments.
 
     References
     ----------
@@ -84,11 +83,11 @@ def dde_roots(
         number = _deadtime.dde_root_number(a0, a1, delay, k)
         if number is not None:
             return number
-    own, delayed = finite("a0", a0, where), finite("a1", a1, where)
-    lag = finite("delay", delay, where)
-    if not foreign(lag):
-        refuse(lag, lag < 0, where, "delay must not be negative")
-    arguments = (own, delayed, lag, branches(k))
+    present, delayed = finite("a0", a0, where), finite("a1", a1, where)
+    delays = finite("delay", delay, where)
+    if not foreign(delays):
+        refuse(delays, delays < 0, where, "delay must not be negative")
+    arguments = (present, delayed, delays, branches(k))
     return apply(_deadtime.dde_roots, arguments, options, out, where, None, threads)
 
 

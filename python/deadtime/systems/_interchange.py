@@ -1,12 +1,12 @@
-"""Transfer functions of python-control and scipy.signal, read and written; Padé where asked for.
+"""Transfer functions of python-control and scipy.signal: reading, and writing with Padé.
 
-Neither package knows delays in continuous time. Reading, a delay is given beside the system;
-writing, a delay is either absent or replaced, on request, by the diagonal Padé approximant
+Neither package supports delays in continuous time. For reading, a delay is a separate argument; for
+writing, delays are refused, or on request replaced by the diagonal Padé approximant
 
     e^(-s T) = p(-s T) / p(s T),   p(x) = sum_k c_k x^k,
     c_k = (2n - k)! n! / ((2n)! k! (n - k)!),
 
-which is all-pass and wrong in phase from about omega T = 2n on.
+which is all-pass, and whose phase is wrong from about omega T = 2n on.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ __all__ = ["Writable", "polynomials_of_control", "polynomials_of_scipy"]
 
 Vector = NDArray[np.float64]
 
+# Upper limit on the order of a Padé approximant: the coefficients of higher ones differ so much in
+# size that polynomials in double precision lose their digits.
 _HIGHEST_ORDER = 20
 
 
@@ -88,7 +90,7 @@ def polynomials_of_scipy(system: Any) -> tuple[Vector, Vector]:
 
 
 def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Vector, Vector]:
-    """Expand both determinants exactly: differences of rounded polynomials leave a wrong degree."""
+    """Expand both determinants exactly, because rounding could leave a wrong degree."""
     a, b, c, d = (_numbers(matrix) for matrix in (A, B, C, D))
     n = len(a)
     entries = [[{(0, 0.0): -float(v)} if v else {} for v in row] for row in a]
@@ -142,10 +144,10 @@ def rational(
     def without_delays(h: QuasiPolynomial) -> Vector:
         """Multiply h by the denominators of all approximants."""
         total = np.zeros(1)
-        for row, own in zip(h.coefficients, h.delays, strict=True):
+        for row, tau in zip(h.coefficients, h.delays, strict=True):
             term = row[::-1]
             for t in delays:
-                term = np.convolve(term, above[t] if t == own else below[t])
+                term = np.convolve(term, above[t] if t == tau else below[t])
             total = np.polyadd(total, term)
         return total
 
@@ -153,7 +155,7 @@ def rational(
 
 
 class Writable:
-    """Base of `TransferFunction`: writing it for other packages."""
+    """Base of `TransferFunction`: conversion to classes of other packages."""
 
     __slots__ = ()
 
@@ -161,7 +163,7 @@ class Writable:
     _den: QuasiPolynomial
 
     def to_control(self, pade: int | None = None) -> Any:
-        """Write as a transfer function of python-control, which knows no delays.
+        """Convert to a transfer function of python-control, which supports no delays.
 
         Parameters
         ----------
@@ -184,7 +186,7 @@ class Writable:
         return package.TransferFunction(*rational(self._num, self._den, pade))
 
     def to_scipy(self, pade: int | None = None) -> Any:
-        """Write as a transfer function of scipy.signal, which knows no delays.
+        """Convert to a transfer function of scipy.signal, which supports no delays.
 
         Parameters
         ----------

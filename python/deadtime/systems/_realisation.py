@@ -1,4 +1,4 @@
-"""Systems in the form that the native part simulates.
+"""Linear systems with delays in the form for the native simulation.
 
     x'(t) + sum N_j x'(t - tau_j) = sum A_j x(t - tau_j) + sum B_j u(t - tau_j),
     y(t) = sum C_j x(t - tau_j) + sum F_j x'(t - tau_j) + sum D_j u(t - tau_j).
@@ -28,23 +28,23 @@ _Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
 
 @dataclass(frozen=True, eq=False)
 class Realisation:
-    """The native system and what a run needs to know of it."""
+    """The native system, and its properties that a simulation needs."""
 
     native: LinearSystem
     states: int
     inputs: int
     outputs: int
-    #: Delay-free matrix on the state.
+    #: Matrix of the state without delay.
     A: NDArray[np.float64]
-    #: The longest delay there is, s.
+    #: The longest delay, s.
     longest: float
-    #: How far back the state is needed, s.
+    #: Length of the history of the state that is needed, s.
     memory: float
-    #: Whether derivatives of the history are needed.
+    #: Whether the derivative of the history is needed.
     needs_slopes: bool
-    #: Whether the states mean something to the user.
+    #: Whether the states are those of the user's system.
     has_states: bool
-    #: Where they do not: the state at rest under an input of one, None where there is no rest.
+    #: If not: the state at rest under an input of one; None if there is no such state.
     rest: NDArray[np.float64] | None = None
 
 
@@ -57,12 +57,12 @@ class Realisable(Protocol):
         """Give the system whose outputs are the derivatives of those of this one."""
 
     def _gains_at_rest(self) -> NDArray[np.float64] | None:
-        """Outputs at rest per input, shape (n_outputs, n_inputs); None where there are none."""
+        """Steady-state gains, shape (n_outputs, n_inputs); None if there are none."""
 
 
 @dataclass(frozen=True, eq=False)
 class SystemMatrices:
-    """A system as the native part takes it: a group is a list of matrices with their delays."""
+    """The arguments of the native system: each group is a list of matrices with their delays."""
 
     states: int
     inputs: int
@@ -84,14 +84,14 @@ def _realised(
     rest: NDArray[np.float64] | None = None,
     **groups: Group,
 ) -> Realisation:
-    """Give the native form of the groups A, N, B, C, F and D, as far as they are given."""
+    """Give the native form of the groups A, N, B, C, F and D; those left out are zero."""
     terms = {
         name: [(tau, matrix) for tau, matrix in group.items() if matrix.any()]
         for name, group in groups.items()
     }
     matrices = SystemMatrices(states, inputs, outputs, **terms)
     delays = {name: [tau for tau, _ in group] for name, group in terms.items()}
-    reach = [tau for name in "ANCF" for tau in delays.get(name, ())]
+    state_delays = [tau for name in "ANCF" for tau in delays.get(name, ())]
     return Realisation(
         native=LinearSystem(matrices),
         states=states,
@@ -99,7 +99,7 @@ def _realised(
         outputs=outputs,
         A=groups.get("A", {}).get(0.0, np.zeros((states, states))),
         longest=max((tau for group in delays.values() for tau in group), default=0.0),
-        memory=max(reach, default=0.0),
+        memory=max(state_delays, default=0.0),
         needs_slopes=bool(matrices.N or matrices.F),
         has_states=has_states,
         rest=rest,
@@ -118,9 +118,9 @@ def of_matrices(
     *,
     differentiated: bool = False,
 ) -> Realisation:
-    """Solve for the derivative, which takes an E that can be inverted.
+    """Realise the matrices of a system by solving for x', which needs an invertible E.
 
-    Where the outputs are to be `differentiated`, their matrices stand before x' instead of x.
+    With `differentiated` the outputs are the derivatives: their matrices multiply x' instead of x.
     """
     size = len(E)
     if not np.array_equal(E, np.eye(size)):
@@ -135,14 +135,14 @@ def of_matrices(
     return _realised(size, inputs, outputs, has_states=True, A=a, N=n, B=b, C=C, F=F, D=d)
 
 
-def _singular(rank: int, size: int, is_late: bool) -> str:
+def _singular(rank: int, size: int, is_neutral: bool) -> str:
     missing = size - rank
     equations = "an algebraic equation" if missing == 1 else f"{missing} algebraic equations"
     text = (
         f"E has rank {rank} of {size}: the system holds {equations} besides differential ones, "
         "which is not simulated"
     )
-    if is_late:
+    if is_neutral:
         text += (
             "; with N, derivatives of the past would determine the state itself (an advanced "
             "equation), and every break would come back rougher than before"
@@ -152,7 +152,7 @@ def _singular(rank: int, size: int, is_late: bool) -> str:
 
 @lru_cache(maxsize=64)
 def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
-    """Take the derivatives of one auxiliary signal as the states of a proper, causal num/den."""
+    """Realise a proper, causal num/den; its states are derivatives of an auxiliary signal."""
     n = den.degree
     first = float(den.delays[0])
     leading = float(den.coefficients[0, n]) if n < den.coefficients.shape[1] else 0.0
@@ -182,12 +182,12 @@ def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
 
     a = last_row(rows(den, lower, -1.0 / leading))
     a[0.0] = a[0.0] + np.diag(np.ones(n - 1), 1)
-    late = last_row(last_column(rows(den, highest, 1.0 / leading)))
-    late.pop(0.0)
+    neutral = last_row(last_column(rows(den, highest, 1.0 / leading)))
+    neutral.pop(0.0)
     b = np.zeros((n, 1))
     b[-1] = 1.0 / leading
     f = last_column(rows(num, highest, 1.0))
     c = rows(num, lower, 1.0)
     constant = float(den.coefficients[:, 0].sum())
     rest = np.append(1.0 / constant, np.zeros(n - 1)) if constant else None
-    return _realised(n, 1, 1, has_states=False, rest=rest, A=a, N=late, B={0.0: b}, C=c, F=f)
+    return _realised(n, 1, 1, has_states=False, rest=rest, A=a, N=neutral, B={0.0: b}, C=c, F=f)

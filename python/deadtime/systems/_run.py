@@ -1,6 +1,6 @@
-"""One run of a linear system: arguments to the native part's, its arrays to a response.
+"""Simulation of a linear system: arguments for the native part, and a response from its result.
 
-Before the start the state follows the history and the inputs have the value given for that time.
+Before the start the state is given by the history, and the inputs have the value `input_before`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _LOST = 20.0
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One run, to be made again for other times."""
+    """The arguments of a simulation, which is repeated for other times."""
 
     system: Realisable
     start: float
@@ -46,13 +46,13 @@ class _Run:
 
     def __call__(self, times: Vector) -> Vector:
         inner = times[times > self.start]
-        again = respond(self.system, np.concatenate([[self.start], inner]), **self.arguments)
-        outputs = np.atleast_2d(again.outputs)
+        response = respond(self.system, np.concatenate([[self.start], inner]), **self.arguments)
+        outputs = np.atleast_2d(response.outputs)
         return outputs if len(inner) < len(times) else outputs[:, 1:]
 
 
 def _rest(system: Realisable, inputs: Vector | None) -> Vector | None:
-    """Outputs at rest under inputs that stay constant."""
+    """Steady outputs under constant inputs; None if there are none."""
     gains = None if inputs is None else system._gains_at_rest()
     if gains is None or inputs is None or not np.isfinite(gains).all():
         return None
@@ -142,7 +142,7 @@ def step_response(
     amplitude: float,
     input: int,  # noqa: A002
 ) -> Response:
-    """Response to a step of one input from rest at zero; up to where it has settled by default."""
+    """Response to a step of one input from rest at zero; by default until it has settled."""
     model = _realisation(system)
     index = operator.index(input)
     if not 0 <= index < model.inputs:
@@ -156,18 +156,18 @@ def step_response(
     for _ in range(_DOUBLINGS):
         response = respond(system, np.linspace(0.0, span, _POINTS), height)
         rest, outputs = response.steady_state, np.atleast_2d(response.outputs)
-        goal = outputs[:, -1] if rest is None else np.atleast_1d(rest)
-        away = np.abs(outputs - goal[:, None]).max(axis=0)
-        # A response that comes back to zero is measured by its peak.
-        size = float(np.abs(goal).max()) or float(away.max())
-        if away[-_POINTS // 4 :].max() <= _SETTLED * size or away.max() > _LOST * size:
+        final = outputs[:, -1] if rest is None else np.atleast_1d(rest)
+        error = np.abs(outputs - final[:, None]).max(axis=0)
+        # If the response returns to zero, its error is compared with its peak.
+        size = float(np.abs(final).max()) or float(error.max())
+        if error[-_POINTS // 4 :].max() <= _SETTLED * size or error.max() > _LOST * size:
             break
         span *= 2.0
     return response
 
 
 def impulse_response(system: Realisable, time: ArrayLike | None, input: int) -> Response:  # noqa: A002
-    """Response to an impulse: the derivative of the response to a step."""
+    """Response to an impulse: the derivative of the step response."""
     found = step_response(system._differentiated(), time, 1.0, input)
     return replace(found, inputs=np.zeros_like(found.inputs), states=None)
 
@@ -197,7 +197,7 @@ def _input(
     breaks: tuple[float, ...],
     smooth: dict[str, Any],
 ) -> tuple[Signal, Vector | None]:
-    """Give the native inputs, and the values they end with, where they do."""
+    """Give the native inputs, and their last values if these stay constant."""
     start, p = smooth["start"], model.inputs
     if interpolation not in ("hold", "linear"):
         raise ValueError(f"interpolation={interpolation!r}: give 'hold' or 'linear'")
@@ -219,10 +219,10 @@ def _input(
     where = times if input_time is None else increasing("input_time", input_time)
     rows = values[None, :] if values.ndim == 1 and p == 1 else values
     if rows.shape != (p, where.size) or where.size == 0:
-        wanted = f"({where.size},)" if p == 1 else f"({p}, {where.size})"
+        expected = f"({where.size},)" if p == 1 else f"({p}, {where.size})"
         raise ValueError(
-            f"inputs has shape {values.shape}, not {wanted}: give one value for each input at each "
-            "of the times in input_time (or in time, without input_time)"
+            f"inputs has shape {values.shape}, not {expected}: give one value for each input at "
+            "each of the times in input_time (or in time, without input_time)"
         )
     if not np.isfinite(rows).all():
         at = int(np.argmin(np.isfinite(rows).all(axis=0)))
@@ -242,7 +242,7 @@ def _past(
     breaks: tuple[float, ...],
     smooth: dict[str, Any],
 ) -> tuple[Signal, Signal | None, Vector]:
-    """Give the native history, its derivative where that is needed, and what it comes to."""
+    """Give the native history, its derivative if needed, and the state at the start."""
     if not callable(history):
         if derivative is not None:
             raise ValueError("history_derivative goes with a callable history: leave it out")
@@ -265,7 +265,7 @@ def _past(
 
 
 def _vector(name: str, given: ArrayLike, width: int, what: str = "inputs") -> Vector:
-    """Check a constant: one number where there is one component or it is zero, else a vector."""
+    """Check a constant: a vector; a number if it is zero or there is only one component."""
     values = real_array(name, given)
     if values.ndim == 0 and (width == 1 or not values):
         values = np.full(width, float(values))

@@ -1,7 +1,7 @@
-"""Functions of time as the native part takes them: Legendre series by pieces.
+"""Functions of time for the native part: piecewise Legendre series.
 
-Constants, held samples and straight lines between samples are exact; a callable is fitted to
-rounding. Times are counted from the start of the run.
+Constants, held samples and linear interpolation of samples are exact; a callable is fitted with an
+error of the size of rounding. Times are counted from the start of the run.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FOREVER = float("inf")
 
 
 class Fitted(NamedTuple):
-    """A callable by pieces: coefficient k of component i in piece j at ``series[j, i, k]``."""
+    """A fitted callable: coefficient k of component i in piece j at ``series[j, i, k]``."""
 
     edges: Vector
     series: NDArray[np.float64]
@@ -40,11 +40,11 @@ class Fitted(NamedTuple):
         return self._replace(series=slopes)
 
     def signal(self) -> Signal:
-        """Give the native form, without anything before or after."""
+        """Give the native form, defined only within the pieces."""
         return Signal(self.edges, np.ascontiguousarray(self.series), self.breaks)
 
     def input_signal(self, before: Vector) -> Signal:
-        """Give the native form, constant before and after."""
+        """Give the native form, constant at `before` before the pieces and constant after them."""
         edges = np.concatenate([[-_FOREVER], self.edges, [_FOREVER]])
         outer = np.zeros((2, *self.series.shape[1:]))
         outer[0, :, 0] = before
@@ -54,18 +54,18 @@ class Fitted(NamedTuple):
 
 
 def constant(values: Vector) -> Signal:
-    """Give `values`, shape (p,), at all times."""
+    """Give the signal with constant `values`, shape (p,)."""
     return Signal(np.array([-_FOREVER, _FOREVER]), values.reshape(1, -1, 1), [])
 
 
 def step(before: Vector, after: Vector) -> Signal:
-    """Give a step at the start, both of shape (p,)."""
+    """Give a step at the start from `before` to `after`, both of shape (p,)."""
     series = np.stack([before, after])[:, :, None]
     return Signal(np.array([-_FOREVER, 0.0, _FOREVER]), series, [1])
 
 
 def held(times: Vector, values: Matrix, before: Vector) -> Signal:
-    """Give values, shape (p, m), that hold from `times` on."""
+    """Give a signal that holds each of `values`, shape (p, m), from its time on."""
     edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
     series = np.concatenate([before[:, None], values], axis=1).T[:, :, None]
     changed = np.any(series[1:] != series[:-1], axis=(1, 2))
@@ -79,7 +79,7 @@ def held(times: Vector, values: Matrix, before: Vector) -> Signal:
 
 
 def lines(times: Vector, values: Matrix, before: Vector) -> Signal:
-    """Join values, shape (p, m), at `times` by straight lines; the last one holds."""
+    """Interpolate values, shape (p, m), at `times` linearly; the last one is held."""
     edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
     series = np.zeros((len(times) + 1, len(values), 2))
     series[0, :, 0] = before
@@ -92,7 +92,7 @@ def lines(times: Vector, values: Matrix, before: Vector) -> Signal:
 def sampled(
     name: str, function: Callable[..., ArrayLike], times: Vector, width: int, vectorized: bool
 ) -> Matrix:
-    """Values of a callable at `times`, shape (width, m), checked."""
+    """Evaluate a callable at `times` and check the values, shape (width, m)."""
     found: Any = function(times) if vectorized else [function(float(t)) for t in times]
     values = real_array(f"the value of {name}", found)
     if not vectorized:
@@ -100,12 +100,12 @@ def sampled(
     elif values.ndim == 1:
         values = values[None, :]
     if values.shape != (width, len(times)):
-        wanted = f"({width}, {len(times)})" if vectorized else f"({width},) at each time"
+        expected = f"({width}, {len(times)})" if vectorized else f"({width},) at each time"
         shape = values.shape if vectorized else values.shape[:1]
-        raise ValueError(f"{name} gives values of shape {shape}, not {wanted}")
-    sound = np.isfinite(values).all(axis=0)
-    if not sound.all():
-        at = int(np.argmin(sound))
+        raise ValueError(f"{name} gives values of shape {shape}, not {expected}")
+    is_finite = np.isfinite(values).all(axis=0)
+    if not is_finite.all():
+        at = int(np.argmin(is_finite))
         raise ValueError(
             f"{name} at t = {times[at]} s is {values[:, at][~np.isfinite(values[:, at])][0]}: give "
             "finite values"
@@ -124,7 +124,7 @@ def fitted(
     vectorized: bool,
     max_step: float | None,
 ) -> Fitted:
-    """Fit a callable of the user's time over `span`, in time from `start` on, between breaks."""
+    """Fit a callable over `span` between its breaks, with times counted from `start`."""
 
     def sample(times: Vector) -> Matrix:
         return sampled(name, function, times, width, vectorized)

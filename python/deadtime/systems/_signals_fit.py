@@ -1,13 +1,13 @@
-"""A function of time as Legendre series by pieces, to rounding.
+"""Fit of a function of time by piecewise Legendre series, with an error of the size of rounding.
 
-The function is sampled evenly first, no further apart than a given gap, and every piece has to give
-the samples within it: what lasts longer than the gap is seen, what is shorter may be missed. A
-piece takes the Gauss nodes of its interval and two points next to its ends. Where the last
-coefficients are not below rounding, or the series does not give all that is known, the interval is
-halved; all intervals of a round are asked for in one call. Where halving comes to an end there is a
-jump, which is found by bisection, or a kink, which is refused.
+The function is first sampled evenly, at distances of at most a given gap, and every piece has to
+reproduce the samples within it: events longer than the gap are found, shorter ones may be missed. A
+piece uses the Gauss nodes of its interval and two points close to its ends. If the last
+coefficients are not below rounding, or the series does not reproduce all known values, the interval
+is halved; all intervals of a round are evaluated in one call. An interval that has become too short
+to be halved contains a jump, which is located by bisection, or a kink, which is refused.
 
-Rounding is that of the values and that of the time, which moves a value by eps |t| |u'|.
+Rounding affects the values, and the time, which changes a value by eps |t| |u'|.
 """
 
 from __future__ import annotations
@@ -28,40 +28,40 @@ Vector = NDArray[np.float64]
 Blocks = NDArray[np.float64]
 Sampler = Callable[[Vector], NDArray[np.float64]]
 
-#: Shortest event of a callable that the even samples do not miss, as a part of the span: smaller
-#: finds more and calls the function more often.
+#: Shortest event of a callable that the even samples do not miss, as a fraction of the span: a
+#: smaller one finds more events and calls the function more often.
 RESOLUTION = 1e-3
 
-# Values at these nodes, times the matrix, are coefficients.
+# The values at these nodes times this matrix are the coefficients.
 _TABLES = legendre_tables()
 _NODES, _TRANSFORM = _TABLES.nodes, _TABLES.transform
 _TERMS = len(_NODES)
 
 _EPS = float(np.finfo(float).eps)
 
-# A series is accurate to rounding where its last two coefficients are below this part of the
-# largest value: smaller never ends, larger gives digits away.
+# A series is accurate to rounding if its last two coefficients are below this fraction of the
+# largest value: with a smaller one rounding errors would halve intervals for ever, a larger one
+# gives less accurate series.
 _ENDED = 16.0 * _EPS
 
-# Error of the time, as a part of it, that the values of a callable are allowed to show: it rounds
-# in its own operations.
+# Relative error of the time that the values of a callable may have, since its own operations round.
 _UNITS = 8.0 * _EPS
 
-# Upper limit of the effect of that error on the values, as a part of their variation on a piece: a
-# piece with more is so short that it cannot be distinguished from a jump.
+# Upper limit on the effect of that error on the values, as a fraction of their variation on a
+# piece: a piece with a larger effect is so short that it cannot be distinguished from a jump.
 _BLURRED = 1e-3
 
-# Tolerance of the comparison of a series with samples, in units of that of its last coefficients.
+# Tolerance for the difference of a series from samples, relative to that for its last coefficients.
 _OFF = 30.0
 
-# Distance of the points next to the ends of a piece from them, relative to the time.
+# Distance from the ends of a piece to the points close to them, relative to the time.
 _INSET = 4.0 * _EPS
 
-# Shortest interval that is halved, as a part of the whole: a shorter one holds a break.
+# Shortest interval that is halved, as a fraction of the span: a shorter one contains a break.
 _SHORTEST = 1e-9
 
-# Upper limits on the number of intervals of one function and of breaks found in it: they bound
-# memory and time.
+# Upper limits on the number of intervals of one function, of breaks found in it and of its even
+# samples (they bound memory and time).
 _MOST = 20_000
 _MOST_BREAKS = 1_000
 _MOST_SAMPLES = 1_000_000
@@ -76,7 +76,7 @@ class Pieces(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """Even samples, and how large each component is."""
+    """Even samples, the largest modulus of each component, and the shortest interval to halve."""
 
     times: Vector
     values: NDArray[np.float64]
@@ -134,7 +134,7 @@ def _known(sample: Sampler, corners: list[float], gap: float) -> _Known:
 def _divided(
     name: str, sample: Sampler, corners: list[float], known: _Known
 ) -> tuple[tuple[Vector, Blocks], NDArray[np.float64]]:
-    """Edges and series, or the intervals, shape (m, 2), in which no series ends."""
+    """Edges and series of the pieces, and intervals, shape (m, 2), that no series can fit."""
     waiting = np.array(list(pairwise(corners)))
     scale = known.scale
     done: list[NDArray[np.float64]] = []
@@ -148,7 +148,7 @@ def _divided(
         found = values @ _TRANSFORM
         allowed = np.maximum(_ENDED * scale, _blur(values, a, b))
         good = (np.abs(found[:, :, -2:]).max(axis=2) <= allowed).all(axis=1)
-        good &= _gives(found, waiting, allowed, ends, known)
+        good &= _reproduces(found, waiting, allowed, ends, known)
         done.append(waiting[good])
         series.append(found[good])
         count += int(good.sum())
@@ -171,7 +171,7 @@ def _divided(
 
 
 def _values(sample: Sampler, a: Vector, b: Vector) -> tuple[Blocks, tuple[Vector, Blocks]]:
-    """Values at the nodes, shape (m, width, node), and next to the ends, with their places."""
+    """Values at the nodes, shape (m, width, node); points close to the ends and values there."""
     half, middle = 0.5 * (b - a), 0.5 * (a + b)
     inset = np.minimum(_INSET * np.maximum(np.abs(a), np.abs(b)), 0.25 * (b - a))
     inset = np.maximum(inset, _EPS * (b - a))
@@ -184,21 +184,21 @@ def _values(sample: Sampler, a: Vector, b: Vector) -> tuple[Blocks, tuple[Vector
 
 
 def _blur(values: Blocks, a: Vector, b: Vector) -> NDArray[np.float64]:
-    """What rounding of the time makes of the values of a piece."""
+    """Effect of rounding of the time on the values of each piece."""
     gaps = 0.5 * np.outer(b - a, np.diff(_NODES))
     rates = (np.abs(np.diff(values, axis=2)) / gaps[:, None, :]).max(axis=2)
     times = np.maximum(np.abs(a), np.abs(b))[:, None]
     return np.asarray(np.minimum(_UNITS * times * rates, _BLURRED * np.ptp(values, axis=2)))
 
 
-def _gives(
+def _reproduces(
     series: Blocks,
     spans: NDArray[np.float64],
     allowed: NDArray[np.float64],
     ends: tuple[Vector, Blocks],
     known: _Known,
 ) -> NDArray[np.bool_]:
-    """Whether series give what is known of the function: next to the ends, and the samples."""
+    """Whether each series reproduces the known values: those close to the ends and the samples."""
     places, values = ends
     table = legendre.legvander(places, _TERMS - 1)
     off = np.abs(np.einsum("mek,mwk->mwe", table, series) - values).max(axis=2)

@@ -1,4 +1,4 @@
-//! The one place where the interpreter is released: thread pool, GIL, Ctrl-C, panics.
+//! The one place where long work releases the interpreter: thread pool, GIL, Ctrl-C, panics.
 //!
 //! A kernel runs inside one process-local rayon pool while the calling thread, detached from the
 //! interpreter, waits and looks for signals. Any number of Python threads may call at once. The
@@ -52,19 +52,19 @@ where
 {
     let pool = pool(threads)?;
     let task = Task::new();
-    let (result, refused) = py.detach(|| wait(&pool, &task, progress, work));
-    settle(result, refused)
+    let (result, interrupted) = py.detach(|| wait(&pool, &task, progress, work));
+    into_py_result(result, interrupted)
 }
 
-/// [`run`] for a caller that NumPy may have detached from the interpreter, or not.
+/// [`run`] for a caller that may or may not be detached from the interpreter, by NumPy.
 pub(crate) fn run_detached<T, F>(threads: usize, work: F) -> PyResult<T>
 where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
     let pool = pool(Some(threads))?;
-    let (result, refused) = wait(&pool, &Task::new(), None, work);
-    settle(result, refused)
+    let (result, interrupted) = wait(&pool, &Task::new(), None, work);
+    into_py_result(result, interrupted)
 }
 
 type Finished<T> = std::thread::Result<Result<T, Error>>;
@@ -82,39 +82,39 @@ where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
-    let (tell, hear) = channel();
+    let (sender, receiver) = channel();
     let job: Box<dyn FnOnce() + Send + '_> = Box::new(move || {
         let result = catch_unwind(AssertUnwindSafe(|| work(task)));
         // The receiver outlives this job: the caller waits below until it has the result.
-        let _ = tell.send(result);
+        let _ = sender.send(result);
     });
-    // SAFETY: the type of a job, but for the lifetime of what it borrows: `Waiting` keeps the
-    // caller here until the job has sent its result, after which it touches nothing borrowed.
-    // A scope of rayon would do the same, but it cannot be left in a forked child, in which the
-    // job never ends: its thread is not there, so nothing borrowed is touched there either.
+    // SAFETY: only the lifetime of the borrowed values changes. `Waiting` keeps the caller here
+    // until the job has sent its result, after which the job uses no borrowed value. A scope of
+    // rayon would do the same, but it cannot be left in a forked child, in which the job never
+    // ends: its thread does not exist there, so it uses no borrowed value there either.
     #[allow(unsafe_code)]
     let job: Box<dyn FnOnce() + Send + 'static> = unsafe { std::mem::transmute(job) };
     pool.pool.spawn(job);
     let mut waiting = Waiting {
-        hear,
+        receiver,
         process: pool.process,
-        is_over: false,
+        is_finished: false,
     };
-    let mut refused = None;
+    let mut interrupted = None;
     loop {
-        match waiting.listen() {
-            Ok(result) => return (Some(result), refused),
-            Err(RecvTimeoutError::Disconnected) => return (None, refused),
-            Err(RecvTimeoutError::Timeout) if refused.is_none() => {
+        match waiting.poll() {
+            Ok(result) => return (Some(result), interrupted),
+            Err(RecvTimeoutError::Disconnected) => return (None, interrupted),
+            Err(RecvTimeoutError::Timeout) if interrupted.is_none() => {
                 task.look_at_memory();
-                if let Err(error) = attached(|py| look_up(py, task, progress)) {
+                if let Err(error) = attached(|py| poll_python(py, task, progress)) {
                     task.stop();
-                    refused = Some(error);
+                    interrupted = Some(error);
                 }
-                if waiting.is_elsewhere() {
-                    // It has no threads to join here: it is never dropped.
+                if waiting.is_in_forked_child() {
+                    // The pool has no threads in this process that could be joined: forget it.
                     std::mem::forget(Arc::clone(pool));
-                    return (None, refused.or_else(|| Some(forked())));
+                    return (None, interrupted.or_else(|| Some(fork_error())));
                 }
             }
             Err(RecvTimeoutError::Timeout) => {}
@@ -122,43 +122,45 @@ where
     }
 }
 
-/// Waits for a job to end, unless the caller is now in a forked child.
+/// Waits for a job to end when it is dropped, except in a forked child.
 struct Waiting<T> {
-    hear: Receiver<Finished<T>>,
+    receiver: Receiver<Finished<T>>,
     process: u32,
-    is_over: bool,
+    is_finished: bool,
 }
 
 impl<T> Waiting<T> {
-    fn listen(&mut self) -> Result<Finished<T>, RecvTimeoutError> {
-        let heard = self.hear.recv_timeout(POLL);
-        self.is_over = !matches!(heard, Err(RecvTimeoutError::Timeout));
-        heard
+    /// The result, if it is received within `POLL`.
+    fn poll(&mut self) -> Result<Finished<T>, RecvTimeoutError> {
+        let received = self.receiver.recv_timeout(POLL);
+        self.is_finished = !matches!(received, Err(RecvTimeoutError::Timeout));
+        received
     }
 
-    fn is_elsewhere(&self) -> bool {
+    fn is_in_forked_child(&self) -> bool {
         std::process::id() != self.process
     }
 }
 
 impl<T> Drop for Waiting<T> {
     fn drop(&mut self) {
-        if !self.is_over && !self.is_elsewhere() {
-            // Either the result, or an error because the job is gone.
-            let _ = self.hear.recv();
+        if !self.is_finished && !self.is_in_forked_child() {
+            // Either the result, or an error because the job no longer exists.
+            let _ = self.receiver.recv();
         }
     }
 }
 
-fn forked() -> PyErr {
+fn fork_error() -> PyErr {
     PyRuntimeError::new_err(
         "this process was forked from within the progress function: the computation goes on in \
          the parent only; end the child there, or start it in another way",
     )
 }
 
-fn settle<T>(result: Option<Finished<T>>, refused: Option<PyErr>) -> PyResult<T> {
-    match (result, refused) {
+/// The result of the work, or the exception that interrupted it or that its failure raises.
+fn into_py_result<T>(result: Option<Finished<T>>, interrupted: Option<PyErr>) -> PyResult<T> {
+    match (result, interrupted) {
         (_, Some(error)) => Err(error),
         (Some(Ok(result)), None) => result.map_err(|error| attached(|py| to_python(py, error))),
         (Some(Err(panic)), None) => Err(internal(panic.as_ref())),
@@ -166,68 +168,69 @@ fn settle<T>(result: Option<Finished<T>>, refused: Option<PyErr>) -> PyResult<T>
     }
 }
 
-/// Call `work` attached to the interpreter, whatever this thread's state is.
+/// Call `work` attached to the interpreter, whether or not this thread is attached.
 ///
-/// pyo3 counts attached threads by itself, and NumPy detaches without telling it.
+/// pyo3 keeps its own count of attached threads, and NumPy detaches without changing it.
 #[allow(unsafe_code)]
 pub(crate) fn attached<T>(work: impl FnOnce(Python<'_>) -> T) -> T {
     struct Release(pyo3::ffi::PyGILState_STATE);
     impl Drop for Release {
         fn drop(&mut self) {
-            // SAFETY: made by the call below, on the same thread, released once.
+            // SAFETY: the state is from the call below on the same thread, and released once.
             unsafe { pyo3::ffi::PyGILState_Release(self.0) };
         }
     }
-    // SAFETY: may be called attached or not; the interpreter runs, as its caller is Python.
+    // SAFETY: it may be called attached or not; the interpreter is running, since Python called.
     let _release = Release(unsafe { pyo3::ffi::PyGILState_Ensure() });
     Python::attach(work)
 }
 
-/// Run single-threaded `work` on the calling thread, interpreter released; Ctrl-C stops it at one
-/// of its next checks. A call costs a tenth of one through the pool.
+/// Run single-threaded `work` on the calling thread with the interpreter released; Ctrl-C stops it
+/// at its next check for signals. A call costs a tenth of one through the pool.
 pub(crate) fn run_here<T, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
-    let (task, refused) = listening();
+    let (task, interrupted) = interruptible_task();
     let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task))));
-    settle(Some(result), refusal(&refused))
+    into_py_result(Some(result), take_error(&interrupted))
 }
 
-/// [`run_here`] for work that calls Python all the time: the interpreter is kept.
+/// [`run_here`] for work that calls Python often: the interpreter is not released.
 pub(crate) fn run_attached<T, F>(_py: Python<'_>, work: F) -> PyResult<T>
 where
     F: FnOnce(&Task) -> Result<T, Error>,
 {
-    let (task, refused) = listening();
+    let (task, interrupted) = interruptible_task();
     let result = catch_unwind(AssertUnwindSafe(|| work(&task)));
-    settle(Some(result), refusal(&refused))
+    into_py_result(Some(result), take_error(&interrupted))
 }
 
-type Refusal = Arc<Mutex<Option<PyErr>>>;
+type SharedError = Arc<Mutex<Option<PyErr>>>;
 
-/// A task that checks for signals by itself, and where it puts the exception they raise.
-fn listening() -> (Task, Refusal) {
-    let refused = Refusal::default();
-    let keep = Arc::clone(&refused);
+/// A task that checks for signals by itself, and the place for the exception that they raise.
+fn interruptible_task() -> (Task, SharedError) {
+    let interrupted = SharedError::default();
+    let shared = Arc::clone(&interrupted);
     let task = Task::asking(POLL, move || match attached(|py| py.check_signals()) {
         Ok(()) => true,
         Err(error) => {
-            if let Ok(mut place) = keep.lock() {
-                *place = Some(error);
+            if let Ok(mut slot) = shared.lock() {
+                *slot = Some(error);
             }
             false
         }
     });
-    (task, refused)
+    (task, interrupted)
 }
 
-fn refusal(refused: &Refusal) -> Option<PyErr> {
-    refused.lock().ok().and_then(|mut place| place.take())
+fn take_error(shared: &SharedError) -> Option<PyErr> {
+    shared.lock().ok().and_then(|mut slot| slot.take())
 }
 
-fn look_up(py: Python<'_>, task: &Task, progress: Option<&Py<PyAny>>) -> PyResult<()> {
+/// Check for signals and report progress.
+fn poll_python(py: Python<'_>, task: &Task, progress: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
     if let Some(progress) = progress {
         progress.call1(py, (task.done(),))?;
@@ -249,7 +252,7 @@ pub(crate) fn internal(panic: &(dyn Any + Send)) -> PyErr {
 
 /// The pool of this process with the requested number of threads, built where there is none.
 fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
-    let threads = wanted(threads)?;
+    let threads = thread_count(threads)?;
     let process = std::process::id();
     let current = POOL.load_full();
     if let Some(pool) = &current
@@ -279,9 +282,9 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
 }
 
 /// Number of threads: argument, then environment, then the machine.
-pub(crate) fn wanted(threads: Option<usize>) -> PyResult<usize> {
+pub(crate) fn thread_count(threads: Option<usize>) -> PyResult<usize> {
     if let Some(threads) = threads {
-        return sensible("threads", threads);
+        return check_thread_count("threads", threads);
     }
     for variable in THREAD_VARIABLES {
         if let Ok(text) = std::env::var(variable) {
@@ -296,14 +299,14 @@ pub(crate) fn wanted(threads: Option<usize>) -> PyResult<usize> {
             })?;
             // Rayon reads 0 as "the machine decides".
             if threads > 0 {
-                return sensible(variable, threads);
+                return check_thread_count(variable, threads);
             }
         }
     }
     Ok(std::thread::available_parallelism().map_or(1, usize::from))
 }
 
-fn sensible(name: &str, threads: usize) -> PyResult<usize> {
+fn check_thread_count(name: &str, threads: usize) -> PyResult<usize> {
     if (1..=MAX_THREADS).contains(&threads) {
         return Ok(threads);
     }

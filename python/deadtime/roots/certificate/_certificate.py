@@ -1,4 +1,4 @@
-"""Proofs of root counts that can be filed and checked by someone else."""
+"""Proofs of root counts that can be stored, and checked independently."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ _FORMAT: Final = "deadtime certificate"
 
 @dataclass(frozen=True)
 class Certificate(Proof):
-    """The proved number of roots in a region, with all that is needed to prove it again.
+    """The proved number of roots in a region, with everything needed to check the proof.
 
-    Made by `QuasiPolynomial.certify`. Complete in itself: function, region, number and proof.
+    Made by `QuasiPolynomial.certify`. It contains the function, the region, the number and the
+    proof.
 
     Attributes
     ----------
@@ -40,20 +41,22 @@ class Certificate(Proof):
     count : int
         Roots in the region, with multiplicity.
     scale, zeros : int
-        The values in the proof are those of 2^scale h(s) / s^zeros: roots at 0 that stand in the
-        coefficients are exact.
+        The values in the proof are those of 2^scale h(s) / s^zeros: a common factor s^zeros of the
+        coefficients gives exact roots at 0.
     beyond : tuple of (int, float) or None
-        Row and radius, where the imaginary part is open: where ``abs(s)`` is at least the radius,
-        in the strip of the region, the row's leading term exceeds all others together.
+        Row and radius, if the range of the imaginary part is open: in the strip of the region,
+        where ``abs(s)`` is at least the radius, the leading term of the row exceeds the sum of the
+        moduli of all others.
     closed : tuple of (float, float)
-        The region with open sides closed where no root can lie beyond: by `beyond`, or since far
-        to the right (left) the first (last) row exceeds the others. Mirrored at the real axis if
-        it lies more below it than above.
+        The region with its open sides replaced by bounds beyond which there is no root: by
+        `beyond`, or because the first (last) row exceeds the others far to the right (left).
+        Reflected in the real axis if it extends farther below it than above.
     contours : tuple of Contour
-        Paths around the closed region: around the part symmetric about the real axis, of which
-        the upper half is walked, and around what lies above that.
+        Paths around the closed region: one around the part symmetric about the real axis, of which
+        only the upper half is stored, and one around the part above it.
     real : tuple of Segment or Monotone
-        The real axis in parts, where it is the edge of the region: real roots belong to it.
+        The real axis in parts, if it is the edge of the region: real roots then belong to the
+        region.
 
     See Also
     --------
@@ -81,13 +84,13 @@ class Certificate(Proof):
         )
 
     def verify(self) -> int:
-        """Check every claim again, without the code that made it.
+        """Check every claim independently of the code that made it.
 
-        The checker is plain Python: polynomials in exact whole numbers, exponentials and angles
-        enclosed in fixed point to 120 binary digits below the value, inequalities between
-        fractions. It shares nothing with the native code, whose bounds it confirms or refutes.
-        Some tenths of a millisecond per segment, a few milliseconds right beside a root of high
-        multiplicity.
+        The checker is plain Python: polynomials are evaluated in exact integers, exponentials and
+        angles are enclosed in fixed point to 120 binary digits below the value, inequalities are
+        decided between fractions. It shares no code with the native part, whose bounds it confirms
+        or refutes. It takes some tenths of a millisecond per segment, and a few milliseconds very
+        close to a root of high multiplicity.
 
         Returns
         -------
@@ -97,14 +100,14 @@ class Certificate(Proof):
         Raises
         ------
         CertificateError
-            If a claim is false, with the first one that is, or takes more digits to check than
-            any that `QuasiPolynomial.certify` makes.
+            If a claim is false (the first false one is named), or needs more digits to check than
+            any claim made by `QuasiPolynomial.certify`.
 
         Notes
         -----
-        Along a segment the function stays in a disc that does not hold 0, so its argument changes
-        by less than a half turn from one middle to the next; added up around the region the
-        changes are 2 pi times the number of roots (argument principle).
+        Along a segment the function stays in a disc that does not contain 0, so its argument
+        changes by less than pi from one middle to the next; the sum of these changes around the
+        region is 2 pi times the number of roots (argument principle).
 
         Examples
         --------
@@ -123,7 +126,7 @@ class Certificate(Proof):
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the contour in its segments, coloured by the argument of h; needs matplotlib.
 
-        The colours run through their circle once for every root inside.
+        The colours pass through their full cycle once for every root inside.
 
         Parameters
         ----------
@@ -142,7 +145,7 @@ class Certificate(Proof):
         return axes
 
     def to_json(self, indent: int | None = None) -> str:
-        """Write the certificate as JSON, numbers in hexadecimal so that none is rounded.
+        """Write the certificate as JSON, with numbers in hexadecimal so that none is rounded.
 
         Parameters
         ----------
@@ -157,7 +160,7 @@ class Certificate(Proof):
 
     @classmethod
     def from_json(cls, text: str) -> Certificate:
-        """Read what `to_json` wrote; nothing is believed before `verify`.
+        """Read what `to_json` wrote; only the form is checked, `verify` checks the claims.
 
         Parameters
         ----------
@@ -170,7 +173,7 @@ class Certificate(Proof):
         Raises
         ------
         ValueError
-            If it is no certificate, or has numbers that none has.
+            If the text is not a certificate, or contains numbers that no certificate has.
         """
         try:
             data = json.loads(text)
@@ -199,7 +202,7 @@ class Certificate(Proof):
 
 
 def _plain(value: Any) -> Any:
-    """Turn a value into what JSON holds; floats and complex numbers as hexadecimal text."""
+    """Convert a value to types of JSON; floats and complex numbers become hexadecimal text."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = dataclasses.fields(value)
         return {field.name: _plain(getattr(value, field.name)) for field in fields}

@@ -1,18 +1,19 @@
-"""Re-verification of certificates: exact numbers and own enclosures, nothing of the prover.
+"""Independent check of certificates with exact numbers, without any code of the prover.
 
-The claims of a certificate are taken one by one, none on trust:
+Every claim of a certificate is checked:
 
-1. what is cut off from the region holds no root (`_check_closing`);
-2. the paths are those around the closed region, without a gap (`_check_path`);
-3. along each segment g = h e^(s tau_c) keeps to the disc about the stated value: the value is
-   enclosed anew at the middle, the slope bounded anew in the disc about it (`_check_segment`);
-4. the values then turn about 0 by less than a half turn each, so their turns add up exactly; where
-   tau_c changes and at the ends, g is enclosed once more; the sum is a whole number (`_turns`);
-5. on the real axis, where it is an edge, signs tell the roots (`_real_roots`).
+1. the parts removed from an open region contain no root (`_check_closing`);
+2. the paths go around the closed region without a gap (`_check_path`);
+3. along each segment g = h e^(s tau_c) stays in the disc about the stated value: the value at the
+   middle is enclosed, and the slope is bounded in the disc about it (`_check_segment`);
+4. the argument of g then changes by less than pi from one value to the next, so the changes can be
+   summed exactly; where tau_c changes and at the ends, g is enclosed as well; the sum is an integer
+   multiple of pi (`_turns`);
+5. on the real axis, if it is an edge, the signs of g determine the roots (`_real_roots`).
 
-Polynomials with the coefficients and points given (doubles are exact numbers) are computed
-without any rounding, exponentials enclosed in fixed point (`_enclosures`), inequalities decided
-between whole numbers or fractions.
+Polynomials with the given coefficients and points (doubles are exact numbers) are evaluated without
+any rounding, exponentials are enclosed in fixed point (`_enclosures`), and inequalities are decided
+between integers or fractions.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ __all__ = ["check"]
 
 
 def check(certificate: Proof) -> int:
-    """Verify everything a certificate claims; the count if it is true.
+    """Verify all claims of a certificate and return its count.
 
     Raises
     ------
     CertificateError
-        With the first claim found false.
+        If a claim is false; the message names the first one.
     """
     try:
         check_form(certificate)
@@ -56,7 +57,7 @@ def check(certificate: Proof) -> int:
 
 
 class _Checker:
-    """The function of a certificate as whole numbers, and the claims about it."""
+    """The function of a certificate in integers, and the claims about it."""
 
     def __init__(self, certificate: Proof) -> None:
         self.certificate = certificate
@@ -64,28 +65,28 @@ class _Checker:
             certificate.coefficients, certificate.delays, certificate.scale, certificate.zeros
         )
 
-    # The claims, from the count down
+    # All claims, and the count
 
     def count(self) -> int:
-        """Verify all; the number of roots."""
+        """Verify all claims and return the number of roots."""
         claimed = self.certificate
         (a, b), (c, d) = claimed.region
         if not (a < b and c < d and a < math.inf and b > -math.inf):
             fail(f"the region {claimed.region} has a range that does not increase")
         total = self._zeros()
         re, im = self._check_closing()
-        wanted = []
+        expected = []
         if re[0] < re[1] and im[0] < im[1]:
             if im[0] <= 0:
                 height = im[1] if im[0] == 0 else -im[0]
-                wanted.append((re, (0.0, height), True))
+                expected.append((re, (0.0, height), True))
                 if height < im[1]:
-                    wanted.append((re, (height, im[1]), False))
+                    expected.append((re, (height, im[1]), False))
             else:
-                wanted.append((re, im, False))
+                expected.append((re, im, False))
         given = [(contour.re, contour.im, contour.symmetric) for contour in claimed.contours]
-        if given != wanted:
-            fail(f"the paths go around {given}, not around {wanted}")
+        if given != expected:
+            fail(f"the paths go around {given}, not around {expected}")
         for contour in claimed.contours:
             number = self._turns(contour)
             if number != contour.count:
@@ -101,7 +102,7 @@ class _Checker:
         return total
 
     def _zeros(self) -> int:
-        """Exact roots at 0 that count."""
+        """Number of exact roots at 0 in the region."""
         zeros = self.certificate.zeros
         (a, b), (c, d) = self.certificate.region
         if zeros < 0:
@@ -112,9 +113,10 @@ class _Checker:
             fail("a root at 0 lies on the edge")
         return zeros
 
-    # 1: what is cut off
+    # 1: open sides of the region
 
     def _check_closing(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Verify that no root is outside the closed region; return its ranges."""
         claimed = self.certificate
         (a, b), (c, d) = claimed.region
         if c + d < 0:
@@ -140,9 +142,9 @@ class _Checker:
         return re, im
 
     def _check_dominance(self, index: int, radius: float, re: tuple[float, float]) -> None:
-        """One leading term exceeds all others where |s| >= radius, in a strip.
+        """Verify that one leading term exceeds the others in a strip where |s| >= radius.
 
-        Divided by |s|^n the others fall with |s|, so the radius itself is the worst.
+        Divided by |s|^n the others decrease with |s|, so it is enough to check |s| = radius.
         """
         degree = max(map(len, self.function.rows)) - 1
         if not (0 <= index < len(self.function.rows) and 0 <= radius < math.inf):
@@ -167,7 +169,7 @@ class _Checker:
                     room -= weight * abs(c)
         r = Fraction(radius)
         affordable(self.function.rows, r)
-        # Beyond 0 itself only a constant has no roots.
+        # With radius 0 the whole strip is excluded, which only a constant allows.
         positive = radius > 0 or degree == 0
         if not positive or room * r**degree <= sum(c * r**k for k, c in enumerate(lower)):
             fail(f"roots beyond |s| = {radius} are not excluded")
@@ -176,7 +178,7 @@ class _Checker:
         return _dominates_rightward(self.function.rows_exact, self.function.delays_exact, x, height)
 
     def _is_left_edge(self, x: float, height: float) -> bool:
-        """As on the right, for h(-s) e^(-s tau_last)."""
+        """As `_is_right_edge`, for h(-s) e^(-s tau_last)."""
         rows = [
             [-c if k % 2 else c for k, c in enumerate(row)]
             for row in reversed(self.function.rows_exact)
@@ -189,7 +191,7 @@ class _Checker:
     # 2: paths
 
     def _check_path(self, contour: Contour) -> None:
-        """The segments lead around the rectangle, each beginning where another ends."""
+        """Verify that the segments go around the rectangle, each from the end of the one before."""
         (a, b), (c, d) = contour.re, contour.im
         corners = [complex(b, c), complex(b, d), complex(a, d), complex(a, c)]
         if not contour.symmetric:
@@ -204,7 +206,7 @@ class _Checker:
                 if segment.start != here:
                     fail(f"the path has a gap between {here} and {segment.start}")
                 here = segment.end
-                if not _goes_on(segment.start, here, end):
+                if not _is_on_line(segment.start, here, end):
                     fail(f"the path strays from its edge at {here}")
         if next(segments, None) is not None:
             fail("the path goes on behind its end")
@@ -212,7 +214,7 @@ class _Checker:
     # 3: segments
 
     def _check_segment(self, segment: Segment) -> None:
-        """Verify that g keeps to the disc of radius error + slope r about `value`, without 0."""
+        """Verify that g stays in the disc of radius error + slope r about `value`, and 0 is not."""
         if not 0 <= segment.reference < len(self.function.rows):
             fail(f"there is no delay number {segment.reference}")
         if not (segment.error >= 0 and segment.slope >= 0):
@@ -223,7 +225,7 @@ class _Checker:
         spread = Fraction(segment.error) + Fraction(segment.slope) * radius
         if not spread**2 < value[0] ** 2 + value[1] ** 2:
             fail(f"the function may vanish {where}")
-        # More digits where the slope, times r, is compared with the value.
+        # The enclosure needs more digits if the slope times r is to be compared with the value.
         size = abs(segment.value) / max(1.0, float(radius))
         found = self.function.enclose(segment.middle, segment.reference, size)
         if not found.is_within(value, Fraction(segment.error)):
@@ -232,7 +234,7 @@ class _Checker:
         steepest = found.slope_above() + bend * radius
         claimed = Fraction(segment.slope)
         if steepest > claimed:
-            # Next to several roots.
+            # A sharper bound, for segments close to several roots.
             steepest = self.function.steepness(segment.middle, radius, segment.reference, size)
         if steepest > claimed:
             fail(f"the slope stated {where} can be exceeded")
@@ -240,7 +242,7 @@ class _Checker:
     # 4: turns
 
     def _turns(self, contour: Contour) -> int:
-        """Verify a contour; how often h turns along it, in half turns if it is symmetric."""
+        """Verify a contour and return its number of roots, by the change of argument of h."""
         self._check_path(contour)
         half_turns = 0
         # In units of 2^-64 rad.
@@ -257,10 +259,10 @@ class _Checker:
             for before, after in pairwise(values):
                 half_turns += 2 * _crossing(before, after)
             angles = [_angle(value) for value in ends]
-            gone = Fraction(last.end.imag) - Fraction(first.start.imag)
+            rise = Fraction(last.end.imag) - Fraction(first.start.imag)
             total += angles[1] - angles[0]
-            total -= self.function.delays_exact[first.reference] * gone * (1 << 64)
-            # An end is known to 2^-20 of itself, an angle to 8 units.
+            total -= self.function.delays_exact[first.reference] * rise * (1 << 64)
+            # The value at an end has a relative error of 2^-20, its angle an error of 8 units.
             slack += 2 * ((1 << 45) + 8)
         turn = pi(64)
         number = half_turns + round(total / turn)
@@ -273,7 +275,7 @@ class _Checker:
         return number // unit
 
     def _clear_end(self, place: complex, segment: Segment) -> tuple[Fraction, Fraction]:
-        """Enclose g where a leg begins or ends, to 2^-20 of itself."""
+        """Enclose g where a leg begins or ends, with a relative error of 2^-20."""
         found = self.function.enclose(place, segment.reference, abs(segment.value))
         if found.lost << 20 > max(abs(found.vr), abs(found.vi)):
             fail(f"the function may vanish at {place}")
@@ -283,6 +285,7 @@ class _Checker:
     # 5: the real axis
 
     def _real_roots(self, re: tuple[float, float]) -> int:
+        """Verify the parts of the real axis and return the number of real roots."""
         total = 0
         here = re[0]
         for part in self.certificate.real:
@@ -303,7 +306,7 @@ class _Checker:
         return total
 
     def _check_monotone(self, part: Monotone) -> int:
-        """One root or none where g' keeps its sign."""
+        """Verify that g' keeps its sign on a part; return its number of roots, 0 or 1."""
         if not 0 <= part.reference < len(self.function.rows) or not (
             part.error >= 0 and part.bend >= 0
         ):
@@ -335,8 +338,8 @@ def _dominates_rightward(
 ) -> bool:
     """Whether the first row's leading term exceeds all others for Re s >= x, |Im s| <= height.
 
-    Divided by (Re s)^n every other term falls with Re s: at once without delay, and from
-    (k - n)/delay on with a delay and s^k.
+    Divided by (Re s)^n every other term decreases with Re s: without a delay everywhere, with a
+    delay and s^k from Re s = (k - n)/delay on.
     """
     if not x > 0:
         return False
@@ -356,8 +359,8 @@ def _dominates_rightward(
     return total < abs(rows[0][degree]) * edge**degree
 
 
-def _goes_on(start: complex, end: complex, corner: complex) -> bool:
-    """Whether `end` lies on the straight way from `start` to `corner`."""
+def _is_on_line(start: complex, end: complex, corner: complex) -> bool:
+    """Whether `end` lies on the straight line from `start` to `corner`."""
     if start.imag == end.imag == corner.imag:
         a, b, c = start.real, end.real, corner.real
     elif start.real == end.real == corner.real:
@@ -368,7 +371,7 @@ def _goes_on(start: complex, end: complex, corner: complex) -> bool:
 
 
 def _radius(start: complex, middle: complex, end: complex) -> Fraction:
-    """How far the ends are from the middle, which lies on the line between them."""
+    """Largest distance of the ends from the middle, which must lie on the line between them."""
     if start.imag == middle.imag == end.imag:
         a, m, b = start.real, middle.real, end.real
     elif start.real == middle.real == end.real:
@@ -379,7 +382,7 @@ def _radius(start: complex, middle: complex, end: complex) -> Fraction:
 
 
 def _legs(segments: Iterable[Segment]) -> list[list[Segment]]:
-    """Runs of segments with the same reference."""
+    """Groups of successive segments with the same reference."""
     legs: list[list[Segment]] = []
     for segment in segments:
         if legs and legs[-1][-1].reference == segment.reference:
@@ -390,7 +393,7 @@ def _legs(segments: Iterable[Segment]) -> list[list[Segment]]:
 
 
 def _crossing(a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction]) -> int:
-    """How the turn from a to b, less than a half turn, crosses the negative real axis."""
+    """Crossing of the negative real axis by a turn of less than pi from a to b: 1, 0 or -1."""
     if (a[1] >= 0) == (b[1] >= 0):
         return 0
     cross = a[0] * b[1] - a[1] * b[0]

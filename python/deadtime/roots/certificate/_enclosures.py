@@ -1,11 +1,11 @@
-"""Exponential, cosine, sine and angle of exact numbers, enclosed in whole-number arithmetic.
+"""Exponential, cosine, sine and angle of exact numbers, enclosed in integer arithmetic.
 
-A number is a whole number n over a power of two: n / 2**q. Series are summed in fixed point with
-16 guard bits; every division rounds down, so each term of a series is wrong by less than 3 units
-of the last guard bit (its own two roundings and what it takes over from the term before, which
-shrinks), and the rest of a series that is stopped when a term vanishes is less than 2. With the 3
-units of the reduced argument, n terms are wrong by less than 3 n + 8 units. Plain integers, no
-floating point: slow, and independent of how anything else in this package computes.
+A number is an integer n over a power of two: n / 2**q. Series are summed in fixed point with 16
+guard bits. Every division rounds down, so the error of each term of a series is less than 3 units
+of the last guard bit: its own two roundings and the error of the term before, which is reduced. A
+series ends when a term vanishes; its remainder is less than 2 units. With the 3 units of the
+reduced argument, the error of n terms is less than 3 n + 8 units. This uses integers only, no
+floating point: it is slow, and independent of all other computations in this package.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ __all__ = ["angle", "cos_sin", "dyadic", "exponential", "pi"]
 
 _GUARD = 16
 
-# Exponents beyond these are in no certificate: weights are doubles, up to e^745.
+# Upper limits, as powers of two, on exponents and angles: no certificate has larger ones, because
+# its weights are doubles, up to e^745.
 _LARGEST_EXPONENT = 13
 _LARGEST_ANGLE = 58
 
@@ -34,7 +35,7 @@ def shifted(n: int, left: int) -> int:
 
 
 def _inverse_series(x: int, bits: int, sign: int) -> int:
-    """Sum x^-(2k+1) sign^k / (2k+1): arctangent (sign -1) or its hyperbolic sister of 1/x."""
+    """Sum x^-(2k+1) sign^k / (2k+1): arctangent (sign -1) or artanh (sign 1) of 1/x."""
     power = (1 << bits) // x
     total, k, square = 0, 0, x * x
     while power:

@@ -1,8 +1,8 @@
-"""The form of a certificate: the types of its parts, and bounds on what only costs time.
+"""The form of a certificate: the types of its parts, and limits that bound the time of the check.
 
-A certificate may come from anyone. What is checked here takes time in proportion to its length;
-whether its claims are true is the checker's matter (`_certificate_check`), which refuses numbers
-of more digits than a true certificate needs.
+A certificate may come from an untrusted source. The checks here take time in proportion to its
+length. Whether its claims are true is checked in `_check`, which refuses numbers with more digits
+than a true certificate needs.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Segment
 
 __all__ = ["check_form"]
 
-# Coefficients are doubles, between 2^-1074 and 2^1024: no larger power of two is ever taken out.
+# Upper limit on the scale: coefficients are doubles, between 2^-1074 and 2^1024, so that no larger
+# power of two is needed.
 _LARGEST_SCALE: Final = 1 << 12
 
-# A path about the part that is symmetric about the real axis, and one about what lies above it.
+# One path around the part that is symmetric about the real axis, and one around the part above it.
 _MOST_CONTOURS: Final = 2
 
 _SEGMENT: Final = {
@@ -53,7 +54,7 @@ def check_form(certificate: Proof) -> None:
     Raises
     ------
     ValueError
-        With the first part that is not what it has to be.
+        If a part is not valid; the message names the first one.
     """
     for number, row in enumerate(_parts("coefficients", certificate.coefficients)):
         for k, c in enumerate(_parts(f"coefficients[{number}]", row)):
@@ -92,16 +93,16 @@ def check_form(certificate: Proof) -> None:
 
 
 def _part(name: str, part: Any, kinds: tuple[type, ...]) -> None:
-    """One piece of a path or of the real axis."""
+    """Check one segment of a path or part of the real axis."""
     if not isinstance(part, kinds):
-        wanted = " or ".join(kind.__name__ for kind in kinds)
-        raise ValueError(f"{name} is {reprlib.repr(part)}, not a {wanted}")
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise ValueError(f"{name} is {reprlib.repr(part)}, not a {expected}")
     for field, kind in (_MONOTONE if isinstance(part, Monotone) else _SEGMENT).items():
         _is(f"{name}.{field}", getattr(part, field), kind)
 
 
 def _box(name: str, value: Any) -> None:
-    """Ranges of the real and the imaginary part."""
+    """Check the ranges of the real and the imaginary part."""
     for which, ends in zip(("re", "im"), _parts(name, value, 2), strict=True):
         for end in _parts(f"{name}.{which}", ends, 2):
             _is(f"an end of {name}.{which}", end, float)
@@ -116,7 +117,7 @@ def _parts(name: str, value: Any, number: int | None = None) -> tuple[Any, ...]:
 
 
 def _is(name: str, value: Any, kind: type) -> None:
-    """Refuse another type, and what is not a number."""
+    """Refuse a value of another type, and NaN."""
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
         raise ValueError(f"{name} is {reprlib.repr(value)}, not {_WORDS[kind]}")
     if kind in (float, complex) and value != value:

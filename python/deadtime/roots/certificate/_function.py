@@ -1,9 +1,9 @@
-"""The function of a certificate in exact numbers: enclosures of its values, bounds on its bends.
+"""The function of a certificate in exact numbers: enclosures of its values, bounds on derivatives.
 
-Coefficients, delays and points are doubles, so whole numbers over powers of two: polynomials are
-computed without any rounding, exponentials enclosed in fixed point. The slope in a disc is
-bounded to second order; next to several roots, where the higher derivatives are far below the
-moduli of their terms, by the Taylor polynomial at the middle.
+Coefficients, delays and points are doubles, which are integers over powers of two: polynomials are
+evaluated without any rounding, and exponentials are enclosed in fixed point. The slope in a disc is
+bounded by a bound on the second derivative; close to several roots, where the higher derivatives
+are much smaller than the moduli of their terms, by the Taylor polynomial at the middle.
 """
 
 from __future__ import annotations
@@ -19,20 +19,22 @@ from deadtime.roots.certificate._enclosures import cos_sin, dyadic, exponential,
 
 __all__ = ["Enclosure", "ExactFunction", "above", "affordable", "exponential_above", "fail", "pair"]
 
-# Binary digits kept below the size of a value; doubles have 53.
+# Binary digits of a value, in relation to its size: more take longer, fewer refuse true claims
+# close to a root. Doubles have 53.
 _DIGITS = 120
 
-# Digits of enclosures that only have to decide an inequality with a wide margin.
+# Binary digits of enclosures for inequalities with a wide margin.
 _FEW = 128
 
-# Order of Taylor polynomials next to several roots.
+# Order of Taylor polynomials close to several roots: a higher one gives sharper bounds and takes
+# longer.
 _ORDER = 8
 
-# Upper limit on the digits: an inequality that is undecided with these is refused.
+# Upper limit on the digits (bounds the time): a value that needs more is refused.
 _MOST_DIGITS = 1 << 14
 
-# Binary digits of all powers of a point together, one power for each coefficient; and the same for
-# Taylor polynomials, which are fractions.
+# Upper limit on the binary digits of all powers of a point together, one power for each
+# coefficient, and the same for Taylor polynomials, which are fractions (they bound the time).
 _MOST_WORK = 1 << 24
 _MOST_WORK_WITH_FRACTIONS = 1 << 20
 
@@ -41,10 +43,10 @@ _Exact: TypeAlias = tuple[Fraction, Fraction]
 
 
 class ExactFunction:
-    """2^scale h(s) / s^zeros as whole numbers.
+    """2^scale h(s) / s^zeros in integers.
 
-    ``rows`` are over 2^q and ``delays`` over 2^t; ``rows_exact`` and ``delays_exact`` are the same
-    as fractions.
+    The integers ``rows`` are divided by 2^q and ``delays`` by 2^t; ``rows_exact`` and
+    ``delays_exact`` are the same numbers as fractions.
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class ExactFunction:
         self.delays = [int(tau * (1 << self.t)) for tau in self.delays_exact]
 
     def enclose(self, s: complex, index: int, size: float) -> Enclosure:
-        """Enclose g and g' at s, with digits enough for values of about `size`."""
+        """Enclose g and g' at s, with enough digits for values of about `size`."""
         (x, qx), (y, qy) = dyadic(s.real), dyadic(s.imag)
         q = max(qx, qy)
         affordable(self.rows, Fraction(1, 1 << q), above(*map(abs, pair(s))))
@@ -109,19 +111,19 @@ class ExactFunction:
         return found
 
     def _factor(self, gap: int, x: int, y: int, q: int, bits: int) -> tuple[int, int, int]:
-        """e^(-s gap) times 2**bits, each part within the error given."""
+        """Real and imaginary part of e^(-s gap) times 2**bits, and a bound on their errors."""
         low, high, shift = exponential(-gap * x, self.t + q, bits)
         low, high = shifted(low, bits - shift), shifted(high, bits - shift) + 1
         cosine, sine = cos_sin(gap * y, self.t + q, bits)
-        # The weight, the angle (2 units each), and the rounding of the product.
+        # Errors of the exponential, of cosine and sine (2 units each), and of the product.
         error = high - low + ((high * 2) >> bits) + 2
         return (low * cosine) >> bits, -((low * sine) >> bits), error
 
     def bend(self, middle: complex, radius: Fraction, index: int) -> Fraction:
-        """Bound |g''| in a disc by moduli of coefficients: exact but for |s| and exponentials."""
+        """Bound |g''| in a disc by moduli of coefficients, rounding only |s| and exponentials."""
         x, y = pair(middle)
         reach = above(abs(x), abs(y)) + radius
-        # A hundred digits of the largest |s|, rounded up.
+        # The largest |s| in the disc, rounded up to 100 binary digits.
         size = reach.numerator.bit_length() - reach.denominator.bit_length()
         q = max(0, 100 - size)
         n = _ceil(reach, q)
@@ -133,7 +135,8 @@ class ExactFunction:
                 dp = dp * n + p
                 p = p * n + (abs(c) << (q * power))
             gap = abs(tau - self.delays[index])
-            # All three over 2^(q degree + 2 t), like the coefficients over 2^self.q besides.
+            # All three terms are divided by 2^(q degree + 2 t), and by the 2^self.q of the
+            # coefficients.
             curved = (ddp << (2 * q + 2 * self.t + 1)) + (gap * dp << (q + self.t + 1))
             curved += gap * gap * p
             exponent = Fraction(gap, 1 << self.t) * radius
@@ -143,7 +146,7 @@ class ExactFunction:
         return total
 
     def steepness(self, middle: complex, radius: Fraction, index: int, size: float) -> Fraction:
-        """Bound |g'| in a disc by the Taylor polynomial, for values of about `size`."""
+        """Bound |g'| in a disc by the Taylor polynomial of g, for values of about `size`."""
         affordable(self.rows, *map(abs, pair(middle)), limit=_MOST_WORK_WITH_FRACTIONS)
         # |g'| <= sum k |a_k| r^(k - 1) + (n + 1) R r^n, R bounding the coefficient a_(n + 1).
         total = (_ORDER + 1) * self._taylor_rest(middle, radius, index)
@@ -152,7 +155,7 @@ class ExactFunction:
         return total
 
     def _taylor(self, middle: complex, radius: Fraction, index: int, size: float) -> list[Fraction]:
-        """Bounds on the moduli of the Taylor coefficients of g up to the highest order used."""
+        """Bounds on the moduli of the Taylor coefficients of g up to the order `_ORDER`."""
         x, y = pair(middle)
         (nx, qx), (ny, qy) = dyadic(middle.real), dyadic(middle.imag)
         q = max(qx, qy)
@@ -163,7 +166,7 @@ class ExactFunction:
             gap = self.delays_exact[j] - self.delays_exact[index]
             polynomial = _expanded(_moved(row, x, y, _ORDER), gap)
             terms.append((j, polynomial))
-            # Digits before the point of the terms on the rim of the disc.
+            # Integer digits of the terms on the boundary of the disc.
             spread = max((abs(a) + abs(b)) * radius**k for k, (a, b) in enumerate(polynomial))
             spread *= exponential_above(-gap * x) if gap * x < 0 else 1
             largest = max(largest, (spread.numerator // spread.denominator).bit_length())
@@ -175,12 +178,12 @@ class ExactFunction:
             tr, ti, error = (Fraction(part, 1 << bits) for part in parts)
             for k, (a, b) in enumerate(polynomial):
                 re, im, lost = sums[k]
-                off = (abs(a) + abs(b)) * error
-                sums[k] = (re + a * tr - b * ti, im + a * ti + b * tr, lost + off)
+                more = (abs(a) + abs(b)) * error
+                sums[k] = (re + a * tr - b * ti, im + a * ti + b * tr, lost + more)
         return [above(abs(re), abs(im)) + 2 * lost for re, im, lost in sums]
 
     def _taylor_rest(self, middle: complex, radius: Fraction, index: int) -> Fraction:
-        """Bound on the Taylor coefficient after these at every point of a disc, by moduli."""
+        """Bound on the Taylor coefficient of order `_ORDER` + 1 at every point of a disc."""
         x, y = pair(middle)
         reach = above(abs(x), abs(y)) + radius
         digits = max(0, 100 + reach.denominator.bit_length() - reach.numerator.bit_length())
@@ -189,14 +192,17 @@ class ExactFunction:
         for row, tau in zip(self.rows_exact, self.delays_exact, strict=True):
             gap = tau - self.delays_exact[index]
             moved = _moved([abs(c) for c in row], reach, Fraction(0), _ORDER + 1)
-            # All terms of one sign: -|gap| in place of the gap.
+            # With -|gap| in place of the gap all terms are positive.
             bound, _ = _expanded(moved, -abs(gap), _ORDER + 1)[-1]
             total += bound * exponential_above(abs(gap) * radius - gap * x)
         return total
 
 
 class Enclosure:
-    """g and g' at a point in units of 2**-bits, and what they are wrong by at most."""
+    """g = vr + i vi and g' = wr + i wi at a point in units of 2**-bits.
+
+    `lost` bounds the error of each part of g, `worse` that of g'.
+    """
 
     __slots__ = ("bits", "lost", "vi", "vr", "wi", "worse", "wr")
 
@@ -206,25 +212,25 @@ class Enclosure:
         self.lost = self.worse = 0
 
     def add(self, vr: int, vi: int, lost: int, wr: int, wi: int, worse: int) -> None:
-        """Add a term; errors are those of each part."""
+        """Add a term and its errors."""
         self.vr, self.vi, self.wr, self.wi = self.vr + vr, self.vi + vi, self.wr + wr, self.wi + wi
         self.lost, self.worse = self.lost + lost, self.worse + worse
 
     def is_within(self, center: tuple[Fraction, Fraction], radius: Fraction) -> bool:
-        """Tell whether g is surely that close to `center`."""
+        """Whether g is proved to be within `radius` of `center`."""
         unit = Fraction(1, 1 << self.bits)
         room = radius - 2 * self.lost * unit
-        off = (self.vr * unit - center[0], self.vi * unit - center[1])
-        return room >= 0 and off[0] ** 2 + off[1] ** 2 <= room**2
+        difference = (self.vr * unit - center[0], self.vi * unit - center[1])
+        return room >= 0 and difference[0] ** 2 + difference[1] ** 2 <= room**2
 
     def slope_above(self) -> Fraction:
-        """Bound |g'|."""
+        """Upper bound on |g'|."""
         size = math.isqrt(self.wr**2 + self.wi**2) + 1 + 2 * self.worse
         return Fraction(size, 1 << self.bits)
 
 
 def _moved(row: Sequence[Fraction], x: Fraction, y: Fraction, order: int) -> list[_Exact]:
-    """p(s + t) in powers of t, s = x + iy, by repeated synthetic division."""
+    """Coefficients of p(s + t) in powers of t, s = x + iy, by repeated synthetic division."""
     values = [(Fraction(c), Fraction(0)) for c in row]
     for lowest in range(min(len(row), order + 1)):
         a, b = Fraction(0), Fraction(0)
@@ -250,7 +256,7 @@ def fail(message: str) -> NoReturn:
 
 
 def _trimmed(row: Sequence[float], zeros: int) -> list[float]:
-    """A row without the common power of s and without trailing zeros."""
+    """A row divided by s^zeros, without trailing zeros."""
     if any(row[:zeros]):
         fail(f"s^{zeros} is not a factor of the function")
     kept = list(row[zeros:])
@@ -268,7 +274,7 @@ def pair(value: complex) -> tuple[Fraction, Fraction]:
 def affordable(
     rows: Sequence[Sequence[object]], *points: Fraction, limit: int = _MOST_WORK
 ) -> None:
-    """Refuse points of which the powers in polynomials have too many digits."""
+    """Refuse points whose powers in the polynomials have too many digits."""
     digits = sum(point.numerator.bit_length() + point.denominator.bit_length() for point in points)
     work = digits * max(map(len, rows)) * sum(map(len, rows))
     if work > limit:
@@ -285,7 +291,7 @@ def _ceil(x: Fraction, bits: int) -> int:
 
 
 def above(x: Fraction, y: Fraction) -> Fraction:
-    """Bound of the length of (x, y), by less than 2^-100 of it or 2^-1200."""
+    """Upper bound on the length of (x, y), too large by less than 2^-100 of it or 2^-1200."""
     largest = max(x, y)
     if largest == 0:
         return largest

@@ -1,4 +1,4 @@
-"""What a certificate consists of: segments, parts of the real axis, contours."""
+"""The parts of a certificate: segments, parts of the real axis, contours."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Range: TypeAlias = tuple[float, float]
 class Segment:
     """A straight line on which the function has no root.
 
-    With g(s) = 2^scale h(s) s^-zeros exp(s tau), tau the delay number `reference`, g stays within
-    ``error + slope * r`` of `value` along the line, r the distance of its ends from `middle`: a
-    disc that does not hold 0.
+    Let g(s) = 2^scale h(s) s^-zeros exp(s tau), where tau is the delay with the index `reference`.
+    Along the line g stays within ``error + slope * r`` of `value`, where r is the larger distance
+    of the ends from `middle`. This disc does not contain 0.
 
     Attributes
     ----------
@@ -25,11 +25,11 @@ class Segment:
     reference : int
         Index of the delay tau.
     value : complex
-        g(middle), but for `error`.
+        g(middle), with an error of at most `error`.
     error : float
         Bound on the error of `value`.
     slope : float
-        Bound on the modulus of g' in the disc about the middle that reaches to both ends.
+        Bound on the modulus of g' in the disc of radius r about the middle.
     """
 
     start: complex
@@ -43,7 +43,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Monotone:
-    """A part of the real axis where g' has no zero: the signs of g at its ends tell the roots.
+    """A part of the real axis where g' has no zero, so that g has a root if its sign changes.
 
     Attributes
     ----------
@@ -52,11 +52,11 @@ class Monotone:
     reference : int
         Index of the delay, as in a segment.
     slope : float
-        g'(middle), but for `error`.
+        g'(middle), with an error of at most `error`.
     error : float
         Bound on the error of `slope`.
     bend : float
-        Bound on the modulus of g'' in the disc about the middle that reaches to both ends.
+        Bound on the modulus of g'' in the disc about the middle that contains both ends.
     """
 
     start: float
@@ -77,12 +77,12 @@ class Contour:
     re, im : tuple of (float, float)
         Its ranges.
     symmetric : bool
-        Is it the upper half of a rectangle symmetric about the real axis? The path then leaves
-        out the axis.
+        Whether this is the upper half of a rectangle symmetric about the real axis; its path then
+        does not include the axis.
     count : int
-        Roots inside; of a symmetric rectangle in both halves together.
+        Number of roots inside; for a symmetric rectangle, in both halves together.
     segments : tuple of segments
-        In order, each beginning where the one before ends.
+        In order, each from the end of the one before.
     """
 
     re: tuple[float, float]
@@ -94,7 +94,7 @@ class Contour:
 
 @dataclass(frozen=True)
 class Proof:
-    """The claims of a `Certificate`, which says what each field is."""
+    """The claims of a `Certificate`, where the fields are described."""
 
     coefficients: tuple[tuple[float, ...], ...]
     delays: tuple[float, ...]

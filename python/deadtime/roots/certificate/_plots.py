@@ -1,4 +1,4 @@
-"""Drawings of proofs. Matplotlib is imported when something is drawn."""
+"""Plots of certificates; matplotlib is imported when one is drawn."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["plot_certificate"]
 
 
 def plot_certificate(ax: Axes, proof: Certificate) -> None:
-    """Contours of a proof in its segments, coloured by the argument of the function at each.
+    """Draw the segments of a certificate, coloured by the argument of the function.
 
-    Once around, the colours run through the circle as often as there are roots inside, but for the
-    turns of the exponential that is taken out of the values, which are put back here.
+    The values in a certificate contain a factor exp(s tau), which is removed here, so that the
+    colours pass through their cycle once for every root inside.
     """
     from matplotlib.collections import LineCollection
 

@@ -1,4 +1,4 @@
-"""Certificates from the proofs that the native part writes down."""
+"""Certificates made from the proofs of the native part."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _T = TypeVar("_T")
 def proved(
     coefficients: list[list[float]], delays: list[float], proof: _deadtime.Certificate
 ) -> Certificate:
-    """What the native part proved of a function."""
+    """Make the certificate of a function from a proof of the native part."""
     return _copied(
         Certificate,
         proof,
@@ -31,7 +31,7 @@ def proved(
 
 
 def _copied(kind: type[_T], native: Any, **made: Any) -> _T:
-    """Build a dataclass from an object with the same names, but for those that are given."""
+    """Make a dataclass from the attributes of an object, except for the fields in `made`."""
     names: tuple[str, ...] = kind.__match_args__  # type: ignore[attr-defined]
     return kind(**{name: made[name] if name in made else getattr(native, name) for name in names})
 

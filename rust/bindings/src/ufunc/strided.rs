@@ -88,7 +88,7 @@ fn compute<L: Loop>(operands: &Operands) -> PyResult<()> {
         L::compute::<BLOCK>(operands, 0..SAMPLE);
         done = SAMPLE;
         if start.elapsed() * u32::try_from(length / SAMPLE).unwrap_or(u32::MAX) > WORTHWHILE {
-            let threads = runtime::wanted(LIMIT.get())?;
+            let threads = runtime::thread_count(LIMIT.get())?;
             if threads > 1 {
                 return in_pool::<L>(operands, done, threads);
             }
@@ -167,7 +167,7 @@ fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
 #[pyo3(signature = (threads))]
 pub(crate) fn limit_threads(threads: Option<usize>) -> PyResult<Option<usize>> {
     if let Some(threads) = threads {
-        runtime::wanted(Some(threads))?;
+        runtime::thread_count(Some(threads))?;
     }
     Ok(LIMIT.replace(threads))
 }

@@ -37,7 +37,7 @@ class Pose:
     height, climb : float
         m and m/s, up positive.
     setpoint : float
-        The climb that is followed, m/s.
+        Commanded climb, m/s.
     roll, pitch, heading : float
         Right, backwards (nose up) and clockwise positive.
     forward, right : float
@@ -55,7 +55,7 @@ class Pose:
 
 
 class Airframe:
-    """Follows setpoints, independent of links, states and limits.
+    """Motion of the drone under given setpoints, without link, phases and limits.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Airframe:
         self.stand(0)
 
     def stand(self, time: Micros) -> None:
-        """Be on the ground, level, with the motors off."""
+        """Put the drone on the ground: level, at rest, motors off; the heading stays."""
         self._vertical = self._hover
         self._hover.settle(time, 0.0)
         self.setpoint = 0.0
@@ -89,13 +89,13 @@ class Airframe:
         self._angles, self._moved = (0.0, 0.0, 0.0), False
 
     def climb_at(self, time: Micros, climb: float) -> None:
-        """Follow this climb from now on, m/s."""
+        """Set the commanded climb from this time on, m/s."""
         if climb != self.setpoint:
             self.setpoint = climb
             self._vertical.follow(time, climb)
 
     def lean(self, time: Micros, roll: float, pitch: float, turning: float) -> None:
-        """Follow these angles (rad) and this turning speed (rad/s) from now on."""
+        """Set the commanded angles (rad) and turning speed (rad/s) from this time on."""
         if (roll, pitch, turning) == self._angles:
             return
         self._angles, self._moved = (roll, pitch, turning), True
@@ -106,7 +106,7 @@ class Airframe:
         self._heading.follow(time, turning)
 
     def settle_tilt(self, time: Micros) -> None:
-        """Pass the tilt to the thrust; the loop on board does not compensate for it."""
+        """Apply the tilt to the thrust, for which the controller on board does not compensate."""
         if isinstance(self._vertical, ThrustMotion) and self._moved:
             roll, pitch = self._roll.at(time)[0], self._pitch.at(time)[0]
             self._vertical.tilt(time, math.cos(roll) * math.cos(pitch))

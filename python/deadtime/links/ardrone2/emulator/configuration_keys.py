@@ -1,8 +1,8 @@
-"""The configuration keys of an AR.Drone 2.0: kinds, ranges, and values when it is switched on.
+"""The configuration keys of an AR.Drone 2.0: kinds, ranges and initial values.
 
-The keys are those of the developer guide and of the SDK's header ``config_keys.h``, which also says
-which of them can only be read, and those that firmware 2.4 has beside them. Values of sensors and
-of hardware are made up.
+The keys are those of the developer guide and of the SDK's header ``config_keys.h``, which also
+states which of them are read-only, and further ones of firmware 2.4. Values of sensors and hardware
+are invented.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ __all__ = ["ENTRIES", "LONGEST", "NAVDATA_OPTIONS", "NO_ID", "Entry", "Kind"]
 #: DEMO and VISION_DETECT.
 NAVDATA_OPTIONS = 65537
 
-#: No value is longer: the SDK's strings have 128 bytes, the last one zero.
+#: Largest length of a value: the SDK's strings have 128 bytes, the last one zero.
 LONGEST = 127
 
 NO_ID = "00000000"
@@ -29,7 +29,7 @@ LEAST, MOST = -(2**31), 2**31 - 1
 
 @dataclass(frozen=True)
 class Entry:
-    """One key: its value when switched on, its kind, and its range where it is a number."""
+    """One key: its initial value, its kind, and its range if it is a number."""
 
     value: str
     kind: Kind = "fixed"
@@ -54,7 +54,7 @@ def _text(value: str) -> Entry:
 
 
 def _vector(*values: float) -> Entry:
-    """Numbers of a calibration, as the drone writes them; they can only be read."""
+    """Numbers of a calibration, in the format of the drone; they are read-only."""
     return Entry(f"{{ {' '.join(f'{value:.7e}' for value in values)} }}")
 
 
@@ -174,7 +174,7 @@ OTHERS = {
     "syslog:max_size": _whole(102_400),
     "syslog:nb_files": _whole(5),
     "userbox:userbox_cmd": _text("0"),
-    # Doubles, sent as the 64 bits of one in decimal: kept as they come.
+    # Doubles, sent as the decimal integer of their 64 bits: stored as received.
     "gps:latitude": _text("5.0000000000000000e+02"),
     "gps:longitude": _text("5.0000000000000000e+02"),
     "gps:altitude": _text("0.0000000000000000e+00"),
@@ -189,7 +189,7 @@ CUSTOM = {
     "custom:session_desc": _text("Default session configuration"),
 }
 
-#: Ranges of the developer guide; what it leaves open is wide.
+#: All keys. The ranges are those of the developer guide; those it does not give are wide.
 ENTRIES: dict[str, Entry] = {
     **GENERAL,
     **CONTROL,

@@ -1,8 +1,8 @@
-"""TCP connections to an emulated drone: few at a time, and always room for a new one.
+"""TCP connections to an emulated drone: their number is limited, and a new one is always accepted.
 
-A new connection is accepted, and replaces the youngest one if all places are taken: connections
-that a client keeps from its start stay, and many idle ones leave a place for the next. A connection
-whose host is inactive is closed after a time.
+If the largest number is reached, a new connection replaces the most recent one. So connections that
+a client keeps open from its start are kept, and many idle ones do not exclude further clients. A
+connection whose host is inactive for a time is closed.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Connection(asyncio.Protocol):
         self._door.leave(self)
 
     def write(self, data: bytes) -> None:
-        """Send data, if the client reads them."""
+        """Send data; close the connection if the client does not read them."""
         if self._transport is None:
             return
         if self._transport.get_write_buffer_size() > MOST_UNREAD:
@@ -83,7 +83,7 @@ class Door:
         self, answers: Callable[[str], bool], welcome: Callable[[Connection], None]
     ) -> None:
         self._answers, self._welcome = answers, welcome
-        self._inside: dict[Connection, asyncio.TimerHandle] = {}
+        self._open: dict[Connection, asyncio.TimerHandle] = {}
 
     def __call__(self) -> Connection:
         """A protocol for asyncio."""
@@ -94,22 +94,22 @@ class Door:
         if not self._answers(connection.host):
             connection.abort()
             return
-        if len(self._inside) >= MOST_CONNECTIONS:
-            youngest = next(reversed(self._inside))
-            self.leave(youngest)
-            youngest.abort()
+        if len(self._open) >= MOST_CONNECTIONS:
+            latest = next(reversed(self._open))
+            self.leave(latest)
+            latest.abort()
         loop = asyncio.get_running_loop()
         connection.heard = loop.time()
-        self._inside[connection] = loop.call_later(IDLE, self._look, connection)
+        self._open[connection] = loop.call_later(IDLE, self._check_activity, connection)
         self._welcome(connection)
 
     def leave(self, connection: Connection) -> None:
         """Remove a connection."""
-        timer = self._inside.pop(connection, None)
+        timer = self._open.pop(connection, None)
         if timer is not None:
             timer.cancel()
 
-    def _look(self, connection: Connection) -> None:
+    def _check_activity(self, connection: Connection) -> None:
         """Close a connection whose host is inactive, or check again later."""
         loop = asyncio.get_running_loop()
         end = connection.heard + IDLE
@@ -117,7 +117,9 @@ class Door:
             self.leave(connection)
             connection.abort()
         else:
-            self._inside[connection] = loop.call_at(end, self._look, connection)  # in its old place
+            self._open[connection] = loop.call_at(
+                end, self._check_activity, connection
+            )  # keeps its position
 
     def hear(self, host: str) -> None:
         """Note activity of a host."""
@@ -126,10 +128,10 @@ class Door:
 
     def of(self, host: str) -> list[Connection]:
         """The open connections of a host."""
-        return [one for one in self._inside if one.host == host and one.is_open]
+        return [one for one in self._open if one.host == host and one.is_open]
 
     def close(self) -> None:
         """Close all connections."""
-        for connection in list(self._inside):
+        for connection in list(self._open):
             self.leave(connection)
             connection.abort()

@@ -33,16 +33,16 @@ from deadtime.links.ardrone2.emulator.settings import IDS, Settings
 
 __all__ = ["Drone", "Truth"]
 
-#: Time for which a forgiving drone follows a motion command; then it hovers.
+#: Time after the last motion command at which a drone hovers, except in the worst case.
 HOVER_AFTER: Micros = SECOND // 4
 
-#: Short navdata a second; full navdata are sent at every tick.
+#: Rate of short navdata, 1/s; full navdata are sent at every tick.
 DEMO_RATE = 15
 
-#: Most motion commands in transit (bounds memory against floods).
-MOST_UNDER_WAY = 1024
+#: Upper limit on the motion commands in transit (bounds memory).
+MOST_IN_TRANSIT = 1024
 
-#: Most navdata that are kept until they are taken.
+#: Upper limit on the navdata that wait to be sent (bounds memory).
 MOST_WAITING = 4096
 
 SEND_CONFIGURATION, ACKNOWLEDGE, SEND_IDS = 4, 5, 6
@@ -64,12 +64,12 @@ class Truth:
     climb : float
         m/s, up positive.
     setpoint : float
-        The climb that is followed, m/s.
+        Commanded climb, m/s.
     battery : float
         Percent.
     emergency, link_lost, connected : bool
-        Whether the motors are stopped, commands are missing for two seconds, navdata have a
-        receiver.
+        Whether the motors are stopped by the emergency switch, whether no command has been received
+        for two seconds, and whether there is a receiver of navdata.
     """
 
     time: float
@@ -90,7 +90,7 @@ class Drone:
     ----------
     options : EmulatorOptions
     start : float
-        Time at which it is switched on, s, by the clock of all times given to it.
+        Time at which it is switched on, s, on the clock of all times passed to it.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Drone:
     ...     drone.commanded(b"AT*REF=%d,512\r" % (tick + 1), here, now=0.02 * tick)
     >>> drone.truth(5.0).phase, round(drone.truth(5.0).height, 2)
     (<Phase.FLYING: 'flying'>, 0.75)
-    >>> drone.truth(12.0).phase                           # nobody commands any more
+    >>> drone.truth(12.0).phase                           # seven seconds without commands
     <Phase.LANDED: 'landed'>
     """
 
@@ -121,12 +121,12 @@ class Drone:
         self._sensors = Sensors(options)
         self._order, self._listener = Order(), Listener()
         self._jitter = np.random.default_rng((options.seed, 1))
-        self._under_way: deque[tuple[Micros, Setpoints]] = deque()
+        self._in_transit: deque[tuple[Micros, Setpoints]] = deque()
         self._last_arrival: Micros = 0
         self._moved_at: Micros | None = None
         self._bootstrap, self._to_acknowledge = True, False
         self._sequence = 0
-        self._ref, self._ref_number, self._asked = Ref(), 0, False
+        self._ref, self._ref_number, self._take_off_requested = Ref(), 0, False
         self._ids: ConfigIds | None = None
         self._ticked: Micros = 0
         self._sent: Micros = 0
@@ -137,20 +137,20 @@ class Drone:
 
     def commanded(self, datagram: bytes, source: Address, now: float) -> None:
         """Process a datagram of the command port."""
-        time = self._go_on(now)
+        time = self._advance_to(now)
         for number, command in decode(datagram):
             begins = self._order.begins(number)
             if not self._order.accept(number, time):
                 continue
-            if begins:  # the requests of another client do not count for this one
+            if begins:  # discard the requests of an earlier client
                 self._ref = Ref()
             if self._listener.commanded(source, time):
                 self._sequence = 0
-            self._carry_out(number, command, source, time)
+            self._execute(number, command, source, time)
 
     def woken(self, datagram: bytes, source: Address, now: float) -> None:
         """Process a datagram of the navdata port."""
-        time = self._go_on(now)
+        time = self._advance_to(now)
         if self._listener.wake(datagram, source, time):
             self._sequence, self._sent = 0, time
         if self._bootstrap and self._listener.may_answer(source, time):
@@ -160,7 +160,7 @@ class Drone:
 
     def advance(self, now: float) -> None:
         """Process all events until now."""
-        self._go_on(now)
+        self._advance_to(now)
 
     def due(self) -> float:
         """Time of the next event without further input, s; infinite if there is none."""
@@ -187,7 +187,7 @@ class Drone:
 
     def truth(self, now: float) -> Truth:
         """The true state of the drone now."""
-        time = self._go_on(now)
+        time = self._advance_to(now)
         pose = self._flight.airframe.at(time)
         return Truth(
             seconds(time),
@@ -203,10 +203,10 @@ class Drone:
 
     # Commands.
 
-    def _carry_out(self, number: int, command: Command, source: Address, time: Micros) -> None:
+    def _execute(self, number: int, command: Command, source: Address, time: Micros) -> None:
         ids, self._ids = self._ids, None
         if isinstance(command, Ref):
-            self._refer(number, command, time)
+            self._process_ref(number, command, time)
         elif isinstance(command, (Move, MoveFrom)):
             self._move(command, time)
         elif isinstance(command, ConfigIds):
@@ -216,11 +216,11 @@ class Drone:
         elif isinstance(command, Control):
             self._control(command.mode, source)
 
-    def _refer(self, number: int, ref: Ref, time: Micros) -> None:
-        """Process the command to be in the air or on the ground, and the emergency switch.
+    def _process_ref(self, number: int, ref: Ref, time: Micros) -> None:
+        """Process a REF command: take-off, landing and the emergency switch.
 
-        In the worst case, a drone that has landed by itself takes off again when the earlier
-        request is repeated. A forgiving one needs a new request.
+        In the worst case, a drone that has landed by itself takes off again if the earlier request
+        is repeated. Otherwise it needs a new request.
         """
         before, self._ref, self._ref_number = self._ref, ref, number
         flight = self._flight
@@ -229,23 +229,23 @@ class Drone:
         if not ref.take_off:
             flight.land(time)
         if not ref.take_off or flight.phase in (Phase.TAKING_OFF, Phase.FLYING):
-            self._asked = False
+            self._take_off_requested = False
         elif self.options.worst_case or not before.take_off:
-            self._asked = True
-        if self._asked and not flight.airborne:
+            self._take_off_requested = True
+        if self._take_off_requested and not flight.airborne:
             flight.take_off(time)
             if flight.airborne:
-                self._asked, self._ticked = False, time
+                self._take_off_requested, self._ticked = False, time
 
     def _move(self, command: Move | MoveFrom, time: Micros) -> None:
         self._moved_at = time
         late = self.options.transport_delay + self.options.jitter * self._jitter.random()
         self._last_arrival = max(self._last_arrival, time + micros(late))
-        if len(self._under_way) < MOST_UNDER_WAY:
-            self._under_way.append((self._last_arrival, self._asked_for(command)))
+        if len(self._in_transit) < MOST_IN_TRANSIT:
+            self._in_transit.append((self._last_arrival, self._setpoints_of(command)))
 
-    def _asked_for(self, command: Move | MoveFrom) -> Setpoints:
-        """A motion in SI units, scaled by the configured largest ones."""
+    def _setpoints_of(self, command: Move | MoveFrom) -> Setpoints:
+        """Setpoints of a motion command in SI units, scaled by the configured limits."""
         if not command.flag & 1:
             return HOVER
         limits = self.settings
@@ -258,7 +258,7 @@ class Drone:
         )
 
     def _configure(self, command: Config, ids: ConfigIds | None) -> None:
-        """Process a setting, and acknowledge it in navdata."""
+        """Process a CONFIG command, and acknowledge it in navdata."""
         settings = self.settings
         given = None if ids is None else (ids.session, ids.user, ids.application)
         entering = command.key.startswith("custom:")
@@ -276,7 +276,7 @@ class Drone:
         elif mode in (SEND_CONFIGURATION, SEND_IDS):
             values = self.settings.values
             shown = values if mode == SEND_CONFIGURATION else {key: values[key] for key in IDS}
-            # One answer to a host at a time, however many requests it sends.
+            # At most one answer to a host is pending, however many requests it sends.
             if all(host != source[0] for host, _ in self._dumps):
                 self._dumps.append((source[0], write_configuration(shown)))
 
@@ -285,22 +285,25 @@ class Drone:
     def _micros(self, now: float) -> Micros:
         return micros(now - self._start)
 
-    def _go_on(self, now: float) -> Micros:
-        """Process the due events in the order of their times; the clock never goes back."""
+    def _advance_to(self, now: float) -> Micros:
+        """Process the due events in the order of their times; return the new time.
+
+        The clock never goes back.
+        """
         until = max(self._time, self._micros(now))
         while True:
-            time, happen = self._next_event()
+            time, handle = self._next_event()
             if time > until:
                 break
             self._time = max(self._time, time)
-            happen(self._time)
+            handle(self._time)
         self._time = until
         return until
 
     def _next_event(self) -> tuple[Micros, Callable[[Micros], None]]:
-        """The next event; of several at one time, the first in this list."""
+        """Time and handler of the next event; of simultaneous ones, the first in this list."""
         events = (
-            (self._under_way[0][0] if self._under_way else None, self._arrive),
+            (self._in_transit[0][0] if self._in_transit else None, self._arrive),
             (self._hovers_at, self._hover),
             (self._order.loses_at, self._lose_link),
             (self._listener.leaves_at, self._listener_leaves),
@@ -308,32 +311,32 @@ class Drone:
             (self._next_navdata(), self._stream),
         )
         return min(
-            ((NEVER if time is None else time, happen) for time, happen in events),
+            ((NEVER if time is None else time, handle) for time, handle in events),
             key=lambda event: event[0],
         )
 
     @property
     def _hovers_at(self) -> Micros | None:
-        """Expiry of the last motion command; never in the worst case."""
+        """Time at which the last motion command expires; None in the worst case."""
         flying = self._flight.phase is Phase.FLYING
-        asked = bool(self._under_way) or (flying and not self._flight.hovering)
-        if self.options.worst_case or self._moved_at is None or not asked:
+        moving = bool(self._in_transit) or (flying and not self._flight.hovering)
+        if self.options.worst_case or self._moved_at is None or not moving:
             return None
         return self._moved_at + HOVER_AFTER
 
     def _arrive(self, time: Micros) -> None:
-        _, setpoint = self._under_way.popleft()
+        _, setpoint = self._in_transit.popleft()
         self._flight.follow(time, setpoint)
 
     def _hover(self, time: Micros) -> None:
         """Drop the expired motion command and those in transit."""
-        self._under_way.clear()
+        self._in_transit.clear()
         self._flight.follow(time, HOVER)
 
     def _lose_link(self, time: Micros) -> None:
         self._order.lose()
-        self._under_way.clear()
-        self._asked = self._to_acknowledge = False
+        self._in_transit.clear()
+        self._take_off_requested = self._to_acknowledge = False
         self._listener.commander_left()
         self._bootstrap = True
         self._flight.land(time)

@@ -1,8 +1,8 @@
-"""The flight of the emulated drone: its phases and what its autopilot does in each.
+"""The flight of the emulated drone: its phases and the actions of its autopilot in each.
 
-On the ground; taking off; flying, which follows the setpoints of the link and hovers without any;
-landing; falling with the motors off. The autopilot acts at ticks of 200 Hz, and at once on requests
-of the link.
+The phases are: on the ground; taking off; flying, where it follows the setpoints of the link and
+hovers without them; landing; falling with the motors off. The autopilot acts at ticks of 200 Hz,
+and immediately on requests of the link.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ __all__ = ["TICK", "Flight", "Phase", "Setpoints"]
 #: Time between two steps of the autopilot.
 TICK: Micros = SECOND // 200
 
-#: Durations of a take-off, as of the vehicle: motors, smooth rise, settling.
+#: Durations of a take-off as on the vehicle: motor start, smooth rise, and all of it.
 SPIN_UP: Micros = SECOND
 RISE: Micros = SECOND * 5 // 2
 TAKE_OFF: Micros = SECOND * 9 // 2
 TAKE_OFF_HEIGHT = 0.75
 
-#: Gain of the autopilot for its own heights: climb per error, 1/s.
+#: Gain of the height control of the autopilot: climb per height error, 1/s.
 HEIGHT_GAIN = 3.0
 
 #: Climb of a landing, m/s.
 SINKING = -0.3
 
-#: Flight time of a full battery, ratio of the drain on the ground, and the low charge: the drone
-#: reports it and does not take off; when nearly empty it lands.
+#: Flight time of a full battery, s; discharge on the ground relative to that in flight; charges in
+#: percent: below the low one the drone reports it and does not take off, at the empty one it lands.
 BATTERY_LASTS = 720.0
 IDLE_SHARE = 0.1
 LOW_BATTERY = 20.0
@@ -76,7 +76,7 @@ class Flight:
 
     @property
     def airborne(self) -> bool:
-        """Whether anything moves."""
+        """Whether the drone is in any phase but on the ground."""
         return self.phase is not Phase.LANDED
 
     @property
@@ -107,7 +107,7 @@ class Flight:
             self.airframe.stand(time)
 
     def land(self, time: Micros) -> None:
-        """Land, if in the air under control."""
+        """Land, if the drone takes off or flies."""
         if self.phase in (Phase.TAKING_OFF, Phase.FLYING):
             self._enter(Phase.LANDING, time)
             self._follow(time)
@@ -120,7 +120,7 @@ class Flight:
             self._enter(Phase.FALLING, time)
 
     def follow(self, time: Micros, setpoint: Setpoints) -> None:
-        """Set the setpoint of the link, which is followed in flight only."""
+        """Set the setpoint of the link, which applies only while flying."""
         if self.phase is Phase.FLYING and setpoint != self._requested:
             self._requested = setpoint
             self._follow(time)
@@ -158,7 +158,7 @@ class Flight:
         airframe.settle_tilt(time)
 
     def _within_heights(self, time: Micros, climb: float) -> float:
-        """The climb limited to the range of heights, slower towards its ends."""
+        """The climb, limited so that the height stays in its range and slows towards its ends."""
         lowest, highest = self._settings.heights
         fastest = self._settings.climb_limit
         height = self.airframe.height_at(time)

@@ -1,9 +1,9 @@
-"""Sequence numbers, silence and the one receiver of navdata of an emulated drone.
+"""Sequence numbers, loss of the link, and the one receiver of navdata of an emulated drone.
 
-This link has no authentication. So that it cannot be used to flood others, the emulator answers a
-request for navdata to its sender only, with one packet of 24 bytes until a valid command has come
-from the same host; it sends navdata to one address, and stops after two seconds without activity of
-its host.
+This link has no authentication. So that it cannot be used to flood other hosts, the emulator
+answers a request for navdata only to its sender, with one packet of 24 bytes until a valid command
+has been received from the same host. It sends navdata to one address, and stops after two seconds
+without activity of its host.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ UNICAST = 1
 
 
 class Order:
-    """The sequence numbers of commands, and the silence between them.
+    """The sequence numbers of commands, and the time since the last one.
 
     A command is executed if its number is above the last one; number 1 restarts the count, and so
     does any number after the link was lost.
@@ -59,7 +59,7 @@ class Order:
         return True
 
     def begins(self, number: int) -> bool:
-        """Whether this number would be the first of a client."""
+        """Whether this number is the first one of a client."""
         return number == 0 or (number == 1 and self._last != 0)
 
     @property
@@ -74,16 +74,16 @@ class Order:
         self._last, self.lost = None, True
 
     def late(self, time: Micros) -> bool:
-        """Whether the communication watchdog warns."""
+        """Whether the communication watchdog warns, because commands are late."""
         return self.heard is None or time - self.heard > COM_WATCHDOG
 
 
 class Listener:
-    """The one address for navdata: that of the last request by the host of the commands.
+    """The one address for navdata: that of the last request by the host that sends commands.
 
-    A client is identified by its host. It may use a socket for each command, and request from
-    another one; every command from its host counts as activity. Another host that requests navdata
-    while nobody commands is remembered until one of them sends commands.
+    A client is identified by its host. It may use a different socket for each command and for its
+    request; every command from its host counts as activity. A second host that requests navdata
+    before any command is stored until one of the two sends commands.
     """
 
     def __init__(self) -> None:
@@ -99,15 +99,15 @@ class Listener:
             return False
         if self._commander not in (None, source[0]):
             return False
-        if not self._is_here(self.address, source[0]):
+        if not self._is_free_for(self.address, source[0]):
             self._waiting = source
             return False
         before, self.address, self._heard = self.address, source, time
         return before != source
 
     @staticmethod
-    def _is_here(address: Address | None, host: str) -> bool:
-        """Whether no other host is the receiver."""
+    def _is_free_for(address: Address | None, host: str) -> bool:
+        """Whether an address is unset or on this host."""
         return address is None or address[0] == host
 
     def may_answer(self, source: Address, time: Micros) -> bool:
@@ -127,8 +127,8 @@ class Listener:
         host = source[0]
         if self._commander is None:
             self._commander = host
-            if not self._is_here(self.address, host):
-                self.address = self._waiting if self._is_here(self._waiting, host) else None
+            if not self._is_free_for(self.address, host):
+                self.address = self._waiting if self._is_free_for(self._waiting, host) else None
                 self._waiting, self._heard = None, time
                 return True
         if host == self._commander:
@@ -137,7 +137,7 @@ class Listener:
 
     @property
     def leaves_at(self) -> Micros | None:
-        """Time at which the receiver is removed without activity."""
+        """Time at which the receiver is removed if there is no activity."""
         return None if self.address is None else self._heard + LISTENER_LEAVES_AFTER
 
     def leave(self, time: Micros) -> None:

@@ -1,9 +1,9 @@
-r"""Motion of an emulated vehicle: exact where it is linear, in small fixed steps where it is not.
+r"""Motion of an emulated vehicle: exact for linear plants, and the interface of all motions.
 
 A linear plant x' = A x + B w under a w that is constant since the last change is
 exp(M t) (x, w) with M = [[A, B], [0, 0]]. Times are whole microseconds, so exp(M t) is a product of
-exp(M 2^k us) over the set bits of t: a few dozen exponentials, made once, give every time to
-rounding, at the same cost for any sequence of evaluations.
+exp(M 2^k us) over the set bits of t: a few dozen exponentials, computed once, give the state at any
+time to rounding, at a cost that does not depend on the times of other evaluations.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Motion(ABC):
 
     @abstractmethod
     def settle(self, time: Micros, value: float) -> None:
-        """Be at rest at a value, under the setpoint that keeps it there."""
+        """Set the state to rest at a value, with the setpoint that keeps it there."""
 
     @abstractmethod
     def follow(self, time: Micros, value: float) -> None:
@@ -97,36 +97,36 @@ class LinearMotion(Motion):
         self._since: Micros = 0
         self._state: Row = (0.0,) * (n + 1)
         self._powers: list[tuple[Row, ...]] = []
-        # The last result: autopilot, sensors and navdata evaluate the same time.
-        self._looked: tuple[Micros, Row] = (0, self._state)
+        # The last result, because autopilot, sensors and navdata evaluate the same time.
+        self._last: tuple[Micros, Row] = (0, self._state)
 
     def settle(self, time: Micros, value: float) -> None:
-        """Be at rest at a value, under the setpoint that keeps it there."""
+        """Set the state to rest at a value, with the setpoint that keeps it there."""
         num, den = (part.tolist() for part in self._plant.polynomials())
         state, setpoint = rest(num, den, value)
         self._start(time, (*state.tolist(), float(setpoint)))
 
     def follow(self, time: Micros, value: float) -> None:
         """Change the setpoint from this time on."""
-        self._start(time, (*self._flown(time)[:-1], value))
+        self._start(time, (*self._state_at(time)[:-1], value))
 
     def at(self, time: Micros) -> tuple[float, float]:
         """Value and its rate per second."""
-        state = self._flown(time)
+        state = self._state_at(time)
         return _dot(self._value, state), _dot(self._rate, state)
 
     def _start(self, time: Micros, state: Row) -> None:
-        self._since, self._state, self._looked = time, state, (time, state)
+        self._since, self._state, self._last = time, state, (time, state)
 
-    def _flown(self, time: Micros) -> Row:
-        if time == self._looked[0]:
-            return self._looked[1]
+    def _state_at(self, time: Micros) -> Row:
+        if time == self._last[0]:
+            return self._last[1]
         left, state, k = time - self._since, self._state, 0
         while left:
             if left & 1:
                 state = tuple([_dot(row, state) for row in self._power(k)])
             left, k = left >> 1, k + 1
-        self._looked = (time, state)
+        self._last = (time, state)
         return state
 
     def _power(self, k: int) -> tuple[Row, ...]:
@@ -173,13 +173,13 @@ def linear_plant(name: PlantName) -> Plant:
 
 
 def _exponential(matrix: list[list[float]]) -> tuple[Row, ...]:
-    """The exponential of a small matrix, by Taylor's series of a part of it and squaring.
+    """The exponential of a small matrix, by the Taylor series of a fraction of it and squaring.
 
-    In plain Python: with a threaded BLAS one such product can take as long as ten packets, and
-    other machines give other bits.
+    In plain Python: a product by a threaded BLAS can take as long as ten packets, and its rounding
+    differs between machines.
     """
     size = max(sum(map(abs, row)) for row in matrix)
-    squarings = max(0, math.frexp(size)[1] + 1)  # the part is below a half
+    squarings = max(0, math.frexp(size)[1] + 1)  # the norm of `part` is then below 0.5
     part = [[math.ldexp(x, -squarings) for x in row] for row in matrix]
     n = len(part)
     identity = [[float(i == j) for j in range(n)] for i in range(n)]

@@ -41,17 +41,17 @@ __all__ = ["Reading", "Sensors"]
 ECHO_EVERY: Micros = SECOND // 25
 HEARS_UP_TO = 6.0
 
-#: Noise of the climb (1/s), of the angles (rad/m) and of the accelerations (1/m, in units of the
-#: standard gravity) per noise of the height.
+#: Ratios of the noise of the climb (1/s), of the angles (rad/m) and of the accelerations (1/m, in
+#: units of the standard gravity) to that of the height.
 CLIMB_NOISE = 10.0
 ANGLE_NOISE = 0.4
 FORCE_NOISE = 1.0
 
-#: The accelerometers have 12 bits with 512 counts a g; in recordings of the vehicle at rest the one
-#: that points down counts 2560 and tells -1 g.
+#: The accelerometers have 12 bits with 512 counts per g; in recordings of the vehicle at rest the
+#: one that points down has 2560 counts, which means -1 g.
 ZERO_COUNT, COUNTS_PER_G, LARGEST_COUNT = 2048, 512, 4095
 
-#: Ticks whose noise is drawn together.
+#: Number of ticks for which noise is drawn at once: more take more memory, fewer more calls.
 BLOCK = 1024
 
 #: Bits that are set in a working drone.
@@ -81,7 +81,7 @@ TAGS = {
 #: Control states: the upper half of the word in navdata.
 DEFAULT, LANDED, FLYING, HOVERING, TAKING_OFF, GOING_UP, LANDING = 0, 2, 3, 4, 6, 7, 8
 
-#: Reported motor speed while they turn, of 255; it is not modelled.
+#: Reported motor speed while the motors turn, from 0 to 255; it is not modelled.
 TURNING = 150
 
 EMPTY_VOLTAGE, FULL_VOLTAGE = 10_500.0, 12_500.0
@@ -122,8 +122,8 @@ class _Noise:
     def at(self, count: int) -> tuple[float, ...]:
         number, row = divmod(count, BLOCK)
         if number != self._number:
-            made = np.random.default_rng((self._seed, self._channels, number))
-            self._block, self._number = made.standard_normal((BLOCK, self._channels)), number
+            rng = np.random.default_rng((self._seed, self._channels, number))
+            self._block, self._number = rng.standard_normal((BLOCK, self._channels)), number
         return tuple(self._block[row].tolist())
 
 
@@ -145,7 +145,7 @@ class Sensors:
         self._climb = self._acceleration = 0.0
 
     def tick(self, time: Micros, height: float, climb: float) -> None:
-        """Measure the acceleration, and the ultrasound at its ticks."""
+        """Measure the acceleration, and the height by ultrasound when an echo is due."""
         self._acceleration = (climb - self._climb) / seconds(TICK)
         self._climb = climb
         if time % ECHO_EVERY == 0 and height <= HEARS_UP_TO:
@@ -161,7 +161,8 @@ class Sensors:
     def _forces(self, reading: Reading) -> tuple[float, float, float]:
         """Specific force forward, right and down, in units of the standard gravity.
 
-        Thrust acts along the drone, drag against its speed; on the ground, the ground.
+        Thrust acts along the vertical axis of the drone, drag against its speed; on the ground, its
+        reaction takes the place of thrust.
         """
         pose, noise = reading.pose, self._force_noise.at(reading.time // TICK)
         standing = reading.phase is Phase.LANDED
@@ -171,12 +172,12 @@ class Sensors:
             -DRAG * pose.right,
             -lift / (math.cos(pose.roll) * math.cos(pose.pitch)),
         )
-        most = (LARGEST_COUNT - ZERO_COUNT) / COUNTS_PER_G
-        felt = [
+        largest = (LARGEST_COUNT - ZERO_COUNT) / COUNTS_PER_G
+        measured = [
             force / GRAVITY + self._size * FORCE_NOISE * one
             for force, one in zip(forces, noise, strict=True)
         ]
-        x, y, z = (min(max(one, -most), most) for one in felt)
+        x, y, z = (min(max(one, -largest), largest) for one in measured)
         return x, y, z
 
     def _state(self, reading: Reading) -> int:
@@ -248,7 +249,7 @@ class Sensors:
 
 @lru_cache(maxsize=8)
 def _chosen(bits: int) -> tuple[tuple[int, bytes], ...]:
-    """The options of a mask, with nothing in them yet."""
+    """The empty options whose bits are set in a mask."""
     return tuple(option for option in FULL_OPTIONS if bits >> option[0] & 1)
 
 

@@ -1,8 +1,8 @@
 """The emulated drone on sockets: navdata and commands on UDP, the configuration on TCP.
 
-Two more ports accept connections. That for files reports that there are none, and closes; that for
-the video sends nothing, as with a camera without pictures: some clients fail at the end of a
-stream.
+Two more ports accept connections. The one for files reports that there are none, and closes the
+connection. The one for video sends nothing and stays open, because some clients fail at the end of
+a stream.
 
 It runs in the event loop in which it is opened, in real or virtual time.
 """
@@ -36,7 +36,7 @@ NO_FILES = b"421 This is an emulator: it has no files.\r\n"
 
 
 class _Port(asyncio.DatagramProtocol):
-    """Passes on datagrams; errors of undelivered replies are ignored."""
+    """Passes datagrams of accepted hosts on; errors of undelivered replies are ignored."""
 
     def __init__(
         self, received: Callable[[bytes, Address], None], answers: Callable[[str], bool]
@@ -65,7 +65,7 @@ class Emulator:
         The emulated drone; its `Drone.truth` is for tests and displays.
     host : str
     navdata_port, command_port, control_port : int
-        Where it listens, once it is open.
+        Address and ports on which it listens, once it is open.
     ftp_port, video_port : int or None
         Ports for file and video connections, if there are any.
 
@@ -137,7 +137,7 @@ class Emulator:
             server = await loop.create_server(door, self.host, getattr(self, name))
             self._servers.append(server)
             setattr(self, name, server.sockets[0].getsockname()[1])
-        self._go_on()
+        self._process_events()
 
     async def _listen(
         self, name: str, received: Callable[[bytes, Address], None]
@@ -170,41 +170,41 @@ class Emulator:
 
     def _woken(self, datagram: bytes, source: Address) -> None:
         self.drone.woken(datagram, source, asyncio.get_running_loop().time())
-        self._go_on()
+        self._process_events()
 
     def _commanded(self, datagram: bytes, source: Address) -> None:
         self.drone.commanded(datagram, source, asyncio.get_running_loop().time())
         for door in self._doors.values():
             door.hear(source[0])
         for host, dump in self.drone.dumps():
-            self._tell(host, dump)
-        self._go_on()
+            self._send_configuration(host, dump)
+        self._process_events()
 
-    def _go_on(self) -> None:
+    def _process_events(self) -> None:
         """Process and send what is due, and schedule the next event."""
         loop = asyncio.get_running_loop()
         if self._navdata is None or self._navdata.is_closing():
             return
-        now, own = loop.time(), self._navdata.get_extra_info("sockname")[0]
+        now, local = loop.time(), self._navdata.get_extra_info("sockname")[0]
         self.drone.advance(now)
         for packet, address in self.drone.packets(now, oldest=STALE):
-            self._navdata.sendto(packet, for_socket(address, own))
+            self._navdata.sendto(packet, for_socket(address, local))
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
         due = self.drone.due()
         if due < math.inf:
-            self._timer = loop.call_at(due, self._go_on)
+            self._timer = loop.call_at(due, self._process_events)
 
     def _connected(self, reader: Connection) -> None:
-        asked, dump = self._unread.pop(reader.host, (-math.inf, b""))
-        if asyncio.get_running_loop().time() - asked <= KEPT_FOR:
+        requested_at, dump = self._unread.pop(reader.host, (-math.inf, b""))
+        if asyncio.get_running_loop().time() - requested_at <= KEPT_FOR:
             reader.write(dump)
 
-    def _tell(self, host: str, dump: bytes) -> None:
+    def _send_configuration(self, host: str, dump: bytes) -> None:
         """Send a configuration to the connections of the host that requested it.
 
-        Some clients request first and connect then.
+        Some clients connect only after their request: their configuration is kept for a time.
         """
         readers = self._doors["control_port"].of(host)
         for reader in readers:

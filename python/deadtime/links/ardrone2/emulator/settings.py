@@ -1,9 +1,9 @@
 """The configuration of an emulated drone, and the values it accepts.
 
-A number outside its range is taken as the nearest one inside; a value of the wrong kind and a key
-that can only be read change nothing. Every key of the drone is acknowledged, also where nothing
-changes: the acknowledgement only means that a setting was received, so a client has to read a limit
-back. An unknown key is not acknowledged.
+A number outside its range is replaced by the nearest one inside. A value of the wrong kind is
+ignored, as is any value for a read-only key. Every setting of a known key is acknowledged, even if
+nothing changes: the acknowledgement only means that the setting was received, so a client has to
+read a limit back. An unknown key is not acknowledged.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = ["IDS", "Settings"]
 
 IDS = ("custom:session_id", "custom:profile_id", "custom:application_id")
 
-#: Keys that exist once for indoors and once for outdoors; `control:outdoor` says which holds.
+#: Keys with separate values for indoors and outdoors; `control:outdoor` selects which applies.
 PAIRED = ("euler_angle_max", "control_vz_max", "control_yaw")
 
 
@@ -42,16 +42,16 @@ class Settings:
         """Set a value if it is valid; False if the drone has no such key."""
         if key not in ENTRIES:
             return False
-        accepted = _taken(ENTRIES[key], value)
+        accepted = _accepted(ENTRIES[key], value)
         if accepted is None:
             return True
         self.values[key] = accepted
         section, _, name = key.partition(":")
         if section == "control":
-            self._keep_pairs(name)
+            self._update_pairs(name)
         return True
 
-    def _keep_pairs(self, name: str) -> None:
+    def _update_pairs(self, name: str) -> None:
         place = "outdoor" if self.outdoor else "indoor"
         if name == "outdoor":
             for paired in PAIRED:
@@ -65,7 +65,7 @@ class Settings:
 
     @property
     def ids(self) -> tuple[str, str, str]:
-        """Session, profile (user) and application that the configuration is set for."""
+        """Session, profile (user) and application to which the configuration belongs."""
         session, user, application = (self.values[key] for key in IDS)
         return session, user, application
 
@@ -76,7 +76,7 @@ class Settings:
 
     @property
     def outdoor(self) -> bool:
-        """Whether the outdoor limits hold."""
+        """Whether the outdoor limits apply."""
         return self.values["control:outdoor"] == "TRUE"
 
     @property
@@ -91,17 +91,17 @@ class Settings:
 
     @property
     def climb_limit(self) -> float:
-        """The climb for one unit of gaz, m/s."""
+        """The climb for a gaz of 1, m/s."""
         return float(self.values["control:control_vz_max"]) / 1000.0
 
     @property
     def angle_limit(self) -> float:
-        """The roll or pitch for one unit, rad."""
+        """The angle for a roll or pitch of 1, rad."""
         return float(self.values["control:euler_angle_max"])
 
     @property
     def turn_limit(self) -> float:
-        """The turning speed for one unit of yaw, rad/s."""
+        """The turning speed for a yaw of 1, rad/s."""
         return float(self.values["control:control_yaw"])
 
     @property
@@ -113,8 +113,8 @@ class Settings:
         )
 
 
-def _taken(entry: Entry, value: str) -> str | None:
-    """The accepted value, None if it is refused."""
+def _accepted(entry: Entry, value: str) -> str | None:
+    """The value as it is stored; None if it is refused."""
     value = value.strip()
     if entry.kind == "truth" and value.upper() in ("TRUE", "FALSE"):
         return value.upper()

@@ -5,14 +5,14 @@ their speed, T = 4 k Omega^2 with equal speeds Omega, and
 
     m z'' = T cos(roll) cos(pitch) - m g.
 
-Two parts are not in these equations and are in every vehicle: the speed of a rotor follows its
-setpoint with a lag, Omega' = (Omega_set - Omega) / lag, within a range; and a loop on board sets
-the speed that gives the thrust m (g + c (climb_set - z')). Linearised at hover, with the rotor's
-lag, that is a climb of c / (lag s^2 + s + c) times its setpoint: two equal lags of 2 lag where
-c = 1 / (4 lag), their sum 1 / c.
+Every vehicle also has two parts that are not in these equations: the speed of a rotor follows its
+setpoint with a lag, Omega' = (Omega_set - Omega) / lag, within a range; and a controller on board
+sets the speed that gives the thrust m (g + c (climb_set - z')). Linearised at hover, the climb is
+c / (lag s^2 + s + c) times its setpoint. With c = 1 / (4 lag) this has two equal lags of 2 lag,
+whose sum is 1 / c.
 
-Integrated by the classical Runge-Kutta formula in steps that end at whole milliseconds of the
-drone's clock and where the setpoint changes.
+The equations are integrated by the classical Runge-Kutta method in steps that end at whole
+milliseconds of the drone's clock and where the setpoint changes.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from deadtime.links.ardrone2.emulator.motion import GRAVITY, Motion
 
 __all__ = ["ThrustMotion", "Thruster"]
 
-#: The steps of the integration.
+#: Largest step of the integration: a shorter one is more accurate and slower.
 STEP: Micros = 1000
 
-#: Motor speeds in revolutions per minute, and the gear between motor and rotor.
+#: Motor speeds in revolutions per minute, and the gear ratio between motor and rotor.
 HOVERING_RPM, SLOWEST_RPM, FASTEST_RPM = 28_500.0, 10_350.0, 41_400.0
 GEAR = 8.75
 
@@ -51,11 +51,11 @@ class Thruster:
     mass : float
         In kg.
     hover_speed, slowest, fastest : float
-        Speeds of a rotor, rad/s: the one that carries the weight, and the range.
+        Speeds of a rotor, rad/s: at hover, and the ends of its range.
     motor_lag : float
-        Time constant with which a rotor's speed follows, s.
+        Time constant of the speed of a rotor, s.
     speed_gain : float
-        Gain of the loop on board, 1/s: commanded acceleration per error of the climb.
+        Gain of the controller on board, 1/s: commanded acceleration per error of the climb.
 
     Raises
     ------
@@ -124,7 +124,7 @@ class ThrustMotion(Motion):
         self._upright = 1.0
 
     def settle(self, time: Micros, value: float) -> None:
-        """Hover at a height."""
+        """Set the state to hover at a height."""
         self._time, self._state = time, (value, 0.0, self.thruster.hover_speed)
         self._setpoint = 0.0
 
@@ -141,7 +141,8 @@ class ThrustMotion(Motion):
 
     def at(self, time: Micros) -> tuple[float, float]:
         """Height and climb."""
-        # Only whole steps are kept, so that the path does not depend on the times of evaluation.
+        # The state is stored only at whole steps, so that it does not depend on the times of
+        # evaluation.
         whole = time - time % STEP
         if whole > self._time:
             self._go_to(whole)
@@ -180,8 +181,8 @@ class ThrustMotion(Motion):
         model = self.thruster
         hover = model.hover_speed
         # Thrusts as accelerations, so that the mass cancels: T / m = g (Omega / Omega_hover)^2.
-        asked = max(0.0, GRAVITY + model.speed_gain * (self._setpoint - climb))
-        requested = hover * math.sqrt(asked / GRAVITY)
+        lift = max(0.0, GRAVITY + model.speed_gain * (self._setpoint - climb))
+        requested = hover * math.sqrt(lift / GRAVITY)
         requested = min(max(requested, model.slowest), model.fastest)
         thrust = GRAVITY * (speed / hover) ** 2
         return climb, thrust * self._upright - GRAVITY, (requested - speed) / model.motor_lag
