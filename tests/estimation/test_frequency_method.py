@@ -1,4 +1,4 @@
-"""Maximum likelihood in the frequency domain: periods and single records, bias, cover, refusals."""
+"""Maximum likelihood in the frequency domain: periods, single records, bias, coverage, refusals."""
 
 import deadtime as dtm
 import numpy as np
@@ -19,7 +19,7 @@ PERIOD = 5.2
 
 
 def multisine(lag=0.0, noise=0.0, seed=0, periods=5, lines=12, gain=1.0, delay=0.36, offset=0.0):
-    """A periodic flight, and what is known of its loop."""
+    """A periodic recording, and the known part of its loop."""
     loop = dtm.ControlLoop(dtm.Integrator(gain, lag), dtm.P(1.31), delay=delay, sample_time=TS)
     wave = dtm.Experiment.multisine(0.4, PERIOD, lines, periods)
     flight = wave.run(loop, noise=noise, seed=seed)
@@ -82,7 +82,7 @@ def test_the_benchmark_of_single_records(case, published):
 
 
 @pytest.mark.survey
-def test_single_records_cover_with_gain_and_start_unknown():
+def test_intervals_of_single_records_cover_with_gain_and_start_unknown():
     errors, found = delay_errors("1 %", 150, "frequency", free=("delay", "gain"))
     # The bound with gain and offset free is 3.58 ms.
     assert root_mean_square(errors) == pytest.approx(3.58, rel=0.2)
@@ -94,7 +94,7 @@ def test_single_records_cover_with_gain_and_start_unknown():
 
 @pytest.mark.survey
 @pytest.mark.parametrize("free", [("delay", "gain"), ("delay", "gain", "lag")])
-def test_periods_cover(free):
+def test_intervals_of_periodic_records_cover(free):
     lag = 0.06 if "lag" in free else 0.0
     held, errors, said, adequate = 0, [], [], 0
     runs = 60 if lag else 120
@@ -112,7 +112,7 @@ def test_periods_cover(free):
     assert root_mean_square(errors) == pytest.approx(np.mean(said), rel=0.25)
 
 
-def test_a_lag_that_is_none_is_at_its_bound():
+def test_an_absent_lag_is_estimated_at_its_bound():
     at_bound = 0
     for seed in range(20):
         flight, known = multisine(noise=0.01, seed=seed)
@@ -120,21 +120,21 @@ def test_a_lag_that_is_none_is_at_its_bound():
         at_bound += fit.lag == 0.0
         assert fit.ci(0.95, "lag")[0] == 0.0
         assert fit.delay_plus_lag == pytest.approx(0.36, abs=0.012)
-    # half of the time noise would have the lag below zero
+    # In half of the recordings noise would make the lag negative.
     assert 4 <= at_bound <= 16
 
 
-def test_the_profile_says_what_the_interval_is_made_of():
+def test_the_profile_reaches_the_t_quantile_at_the_ends_of_the_interval():
     flight, known = multisine(0.06, noise=0.01, seed=2)
     fit = estimate(flight, known, ("delay", "gain", "lag"))
     for name in ("delay", "lag", "delay+lag"):
         ends = fit.ci(0.95, name)
         _, t = fit.profile(name, ends)
         inside = [value for value, end in zip(t, ends, strict=True) if end > 0.0]
-        np.testing.assert_allclose(inside, 2.07, rtol=0.05)  # t of 21 degrees of freedom
+        np.testing.assert_allclose(inside, 2.07, rtol=0.05)  # t quantile of 21 degrees of freedom
 
 
-def test_a_lag_that_is_left_out_is_noticed():
+def test_a_lag_missing_from_the_model_is_detected():
     flight, known = multisine(0.2, noise=0.003, periods=9)
     fit = estimate(flight, known)
     assert not fit.adequate
@@ -143,7 +143,7 @@ def test_a_lag_that_is_left_out_is_noticed():
     assert estimate(flight, known, ("delay", "gain", "lag")).adequate
 
 
-def test_lines_can_be_left_out():
+def test_high_lines_can_be_excluded():
     flight, known = multisine(noise=0.003)
     fit = estimate(flight, known, highest=1.0)
     assert fit.details["lines"] == "5 of 4 periods"
@@ -159,7 +159,7 @@ def test_a_continuous_loop_has_no_interval():
         fit.ci()
 
 
-# --- how it fails ---------------------------------------------------------------------------
+# --- refusals -------------------------------------------------------------------------------
 
 
 def test_what_cannot_be_estimated_is_refused():

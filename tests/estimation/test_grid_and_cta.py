@@ -1,4 +1,4 @@
-"""The cost over a grid of delays, and Chebyshev's approximation of the delay."""
+"""The cost over a grid of delays, and the Chebyshev approximation of the delay."""
 
 import deadtime as dtm
 import numpy as np
@@ -21,7 +21,7 @@ METHODS = ("grid", "cta")
 
 
 @pytest.mark.parametrize("ts", [None, TS])
-def test_the_grid_is_exact_where_the_model_is(ts):
+def test_the_grid_method_is_exact_for_an_exact_model(ts):
     flight, known = record_step(gain=0.8, lag=0.15, ts=ts, dt=TS, duration=6.0)
     fit = dtm.estimate_delay(
         flight, known.replace(gain=1.0), method="grid", free=("delay", "gain", "lag")
@@ -32,7 +32,7 @@ def test_the_grid_is_exact_where_the_model_is(ts):
     assert fit.adequate
 
 
-def test_the_curve_is_kept_and_its_local_minima_are_named():
+def test_the_cost_curve_is_kept_and_its_local_minima_are_named():
     # In a limit cycle a delay that is off by a period fits almost as well.
     flight, known = record_step(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, noise_in_loop=False)
     fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
@@ -44,7 +44,7 @@ def test_the_curve_is_kept_and_its_local_minima_are_named():
     assert lowest in fit.details["local_minima"]
 
 
-def test_a_grid_of_ones_own():
+def test_a_grid_may_be_given():
     flight, known = record_step()
     grid = np.linspace(0.2, 0.6, 9)
     fit = dtm.estimate_delay(flight, known, method=Grid(delays=grid), free=("delay",))
@@ -68,13 +68,13 @@ def test_a_grid_of_ones_own():
         ("1 %, Kp 3, no limit", 1.04),
     ],
 )
-def test_the_benchmark_of_the_waveform(case, published):
-    # 24 flights: the root mean square is known to 14 %.
+def test_the_errors_of_the_grid_are_those_of_the_benchmark(case, published):
+    # 24 recordings: the root mean square is known to 14 %.
     errors, _ = delay_errors(case, 24, Grid(initial_output=0.0))
     assert root_mean_square(errors) < 1.2 * published * 1.14
 
 
-def test_the_curvature_is_the_spread_where_noise_does_not_circulate():
+def test_the_curvature_gives_the_spread_for_noise_outside_the_loop():
     errors, said = [], []
     for seed in range(24):
         flight, known = record_step(noise=0.01, seed=seed, noise_in_loop=False)
@@ -91,7 +91,7 @@ def test_the_curvature_is_the_spread_where_noise_does_not_circulate():
 # --- cta ------------------------------------------------------------------------------------
 
 
-def test_the_matrix_differentiates_polynomials():
+def test_the_differentiation_matrix_is_exact_for_polynomials():
     points = np.cos(np.pi * np.arange(7) / 6)
     for power in range(7):
         slope = power * points ** max(0, power - 1)
@@ -102,7 +102,7 @@ def test_the_matrix_differentiates_polynomials():
     ("Kp", "published"),
     [(1.31, (-4.2, -0.21, 0.004, 0.000)), (3.0, (-15.7, -1.6, 0.05, 0.000))],
 )
-def test_the_published_bias_of_few_intervals(Kp, published):
+def test_few_intervals_have_the_published_bias(Kp, published):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), delay=0.36, delay_path="measurement")
     time = np.arange(0.0, 5.0, 0.01)
     flight = dtm.Recording(time, np.ones(time.size), loop.simulate(time, 1.0).outputs)
@@ -132,7 +132,7 @@ def test_chebyshev_with_a_lag_and_two_steps():
     assert fit.lag == pytest.approx(0.1, abs=1e-5)
 
 
-def test_chebyshev_in_noise_is_the_fit_of_the_waveform():
+def test_chebyshev_with_noise_equals_the_fit_of_the_waveform():
     for case, published in (("continuous, Kp 1.31", 0.90), ("continuous, Kp 3", 0.14)):
         errors, _ = delay_errors(case, 5, CTA(initial_output=0.0))
         assert root_mean_square(errors) < 1.2 * published * 1.4
@@ -150,11 +150,11 @@ def test_chebyshev_is_for_linear_continuous_loops(change, words):
         dtm.estimate_delay(flight, known, method=CTA(intervals=0))
 
 
-# --- what both refuse -----------------------------------------------------------------------
+# --- refusals of both -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_nothing_to_fit_is_refused(method):
+def test_recordings_without_information_are_refused(method):
     flight, known = record_step(
         ts=None, dt=0.04, limit=None, rest=1.0, noise=0.003, noise_in_loop=False
     )

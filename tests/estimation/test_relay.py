@@ -1,4 +1,4 @@
-"""The limit cycle under a relay: period, hold, lag, noise, and what is no limit cycle."""
+"""The limit cycle under a relay: period, hold, lag, noise, and refusals."""
 
 import deadtime as dtm
 import numpy as np
@@ -10,7 +10,7 @@ from step_recordings import TS, noise_for_output, record_step, replace_signals, 
 
 
 def relay(delay=0.36, lag=0.0, ts=TS, noise=0.0, seed=0, duration=20.0, dt=0.02):
-    """A flight with a relay of 0.5 m/s, and what is known of its loop."""
+    """A recording with a relay of 0.5 m/s, and the known part of its loop."""
     loop = dtm.ControlLoop(dtm.Integrator(1.0, lag), dtm.P(1.31), delay=delay, sample_time=ts)
     flight = dtm.Experiment.relay(duration, 0.5, sample_time=ts or dt).run(
         loop, noise=noise, seed=seed, noise_in_loop=ts is not None
@@ -25,12 +25,12 @@ def test_the_delay_of_a_sampled_loop_is_exact(delay):
     fit = dtm.estimate_delay(flight, known, method="relay")
     assert fit.delay == pytest.approx(delay, abs=1e-9)
     assert fit.adequate
-    # The wait for the next sample is there, between none and a whole one.
+    # The wait for the next sample counts, between zero and one sample time.
     assert 0.0 <= fit.details["wait_of_hold"] <= TS + 1e-12
     assert fit.details["period"] == pytest.approx(4 * (delay + fit.details["wait_of_hold"]))
 
 
-def test_a_quarter_of_the_period_without_a_hold():
+def test_the_delay_is_a_quarter_of_the_period_without_a_hold():
     flight, known = relay(ts=None)
     fit = dtm.estimate_delay(flight, known, method="relay")
     assert fit.delay == pytest.approx(0.36, abs=1e-7)
@@ -49,14 +49,14 @@ def test_a_lag_counts_as_delay_unless_it_is_known():
     fit = dtm.estimate_delay(flight, known.replace(lag=0.06), method="relay")
     assert fit.delay == pytest.approx(0.36, abs=1e-5)
     assert fit.delay_plus_lag == pytest.approx(0.42, abs=1e-5)
-    # Where the lag is not short any more, the quarter is less than their sum; known, it still fits.
+    # With a longer lag a quarter period is less than the sum; with the lag known it is exact.
     flight, known = relay(delay=0.1, lag=0.06, ts=None, dt=0.01)
     assert dtm.estimate_delay(flight, known, method="relay").delay < 0.158
     fit = dtm.estimate_delay(flight, known.replace(lag=0.06), method="relay")
     assert fit.delay == pytest.approx(0.1, abs=1e-4)
 
 
-def test_a_relay_that_was_not_logged():
+def test_the_relay_s_command_may_be_missing():
     flight, known = relay()
     fit = dtm.estimate_delay(
         replace_signals(flight, command=None), known, method=Relay(amplitude=0.5)
@@ -79,7 +79,7 @@ def test_noise_is_averaged_over_the_cycles(ts, within):
         fit.ci()
 
 
-def test_what_is_no_limit_cycle_is_refused():
+def test_recordings_without_a_limit_cycle_are_refused():
     flight, known = relay()
 
     def estimate(recording, loop=known, **options):

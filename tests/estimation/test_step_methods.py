@@ -1,4 +1,4 @@
-"""Methods that read one step: peaks, tail, the straight beginning; exact, noisy and refused."""
+"""Methods that evaluate one step by peaks, tail or initial slope: exactness, noise, refusals."""
 
 import itertools
 
@@ -40,7 +40,7 @@ def test_the_held_plant_has_the_poles_of_the_sampled_loop(delay, lag, Kp):
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize("lag", [0.0, 0.1])
 @pytest.mark.parametrize("x", [0.6, 0.9, 1.2])
-def test_the_rightmost_root_tells_delay_and_gain(ts, lag, x):
+def test_the_rightmost_root_gives_delay_and_gain(ts, lag, x):
     loop = dtm.ControlLoop(dtm.Integrator(1.0, lag), dtm.P(x / 0.36), delay=0.36, sample_time=ts)
     root = max(loop.rightmost().roots, key=lambda root: root.imag)
     assert loop_with_root(complex(root), lag, ts) == pytest.approx((0.36, x / 0.36), rel=1e-9)
@@ -48,7 +48,7 @@ def test_the_rightmost_root_tells_delay_and_gain(ts, lag, x):
 
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize("Kp", [1.6, 2.5, 3.4])
-def test_peaks_tell_delay_and_gain(ts, Kp):
+def test_peaks_give_delay_and_gain(ts, Kp):
     flight, known = record_step(
         Kp=Kp, ts=ts, dt=0.01 if ts is None else ts, limit=None, duration=9.0
     )
@@ -56,20 +56,20 @@ def test_peaks_tell_delay_and_gain(ts, Kp):
     # Cubics through five or six samples of a peak: 0.3 ms where both numbers are read.
     assert fit.delay == pytest.approx(0.36, abs=3e-4)
     assert fit.gain == pytest.approx(1.0, abs=1e-3)
-    # A gain that is known makes it ten times as sharp.
+    # A known gain makes the delay ten times as accurate.
     fit = dtm.estimate_delay(flight, known, method="decrement", free=("delay",))
     assert fit.delay == pytest.approx(0.36, abs=3e-5)
 
 
-def test_peaks_in_noise():
-    # The paper's overshoot is off by 45 ms here, and by 115 ms within the limit.
+def test_peaks_with_noise():
+    # The errors of the paper's overshoot are 45 ms here, and 115 ms with the limit.
     errors, _ = delay_errors("1 %, Kp 3, no limit", 40, "decrement", rest=1.0)
     assert root_mean_square(errors) < 5.0
     errors, _ = delay_errors("1 %, Kp 3", 40, "decrement", rest=1.0)
     assert root_mean_square(errors) < 13.0
 
 
-def test_a_gain_that_is_off_is_seen_by_the_decrement():
+def test_a_wrong_gain_is_detected_by_the_decrement():
     flight, known = record_step(gain=0.8, Kp=3.5, noise=0.003, limit=None, duration=8.0, rest=1.0)
     fit = dtm.estimate_delay(flight, known.replace(gain=1.0), method="decrement")
     assert fit.gain == pytest.approx(0.8, abs=0.02)
@@ -85,13 +85,13 @@ def test_a_gain_that_is_off_is_seen_by_the_decrement():
         ({"Kp": 4.5, "limit": 0.3, "duration": 6.0}, "at its limit of 0.3"),
     ],
 )
-def test_the_decrement_refuses_by_name(change, words):
+def test_the_decrement_method_refuses_by_name(change, words):
     flight, known = record_step(**change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
         dtm.estimate_delay(flight, known, method="decrement")
 
 
-def test_the_decrement_has_no_lag_to_give():
+def test_the_decrement_method_does_not_estimate_a_lag():
     flight, known = record_step(Kp=3.0)
     with pytest.raises(ValueError, match="fix the lag"):
         dtm.estimate_delay(flight, known, method="decrement", free=("delay", "lag"))
@@ -102,13 +102,13 @@ def test_the_decrement_has_no_lag_to_give():
 
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize(("x", "tail", "within"), [(0.1, 0.3, 1e-9), (0.2, 0.1, 1e-6)])
-def test_the_tail_tells_the_delay(ts, x, tail, within):
+def test_the_decay_of_the_tail_gives_the_delay(ts, x, tail, within):
     flight, known = record_step(Kp=x / 0.36, ts=ts, dt=TS, limit=None, duration=25.0)
     fit = dtm.estimate_delay(flight, known, method=Decay(tail=tail))
     assert fit.delay == pytest.approx(0.36, abs=within)
 
 
-def test_close_to_one_over_e_a_later_tail_is_purer():
+def test_close_to_one_over_e_a_later_tail_has_less_bias():
     flight, known = record_step(Kp=0.3 / 0.36, limit=0.5, duration=25.0)
     off = [
         abs(dtm.estimate_delay(flight, known, method=Decay(tail=tail)).delay - 0.36)
@@ -124,7 +124,7 @@ def test_the_decay_with_a_known_lag():
     assert fit.delay == pytest.approx(0.36, abs=1e-4)
 
 
-def test_the_standard_error_of_the_decay_is_that_of_repeated_flights():
+def test_the_standard_error_of_the_decay_is_that_of_repeated_recordings():
     errors, said = [], []
     for seed in range(60):
         flight, known = record_step(Kp=0.55, noise=0.01, seed=seed, duration=10.0, rest=1.0)
@@ -145,7 +145,7 @@ def test_the_standard_error_of_the_decay_is_that_of_repeated_flights():
         ({"Kp": 0.8, "noise": 0.05, "duration": 4.0}, 1.0, "tail|follow"),
     ],
 )
-def test_the_decay_refuses_by_name(change, known_gain, words):
+def test_the_decay_method_refuses_by_name(change, known_gain, words):
     flight, known = record_step(limit=None, **change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
         dtm.estimate_delay(flight, known.replace(gain=known_gain), method=Decay(tail=0.2))
@@ -161,7 +161,7 @@ def test_the_decay_refuses_by_name(change, known_gain, words):
     st.sampled_from([None, 0.4]),
     st.sampled_from([None, TS]),
 )
-def test_the_tangent_is_exact_under_hold_and_limit(delay, Kp, limit, ts):
+def test_the_tangent_is_exact_with_hold_and_limit(delay, Kp, limit, ts):
     flight, known = record_step(delay, Kp=Kp, limit=limit, ts=ts, dt=ts or 0.02, duration=12.0)
     fit = dtm.estimate_delay(flight, known, method="graphical")
     assert fit.delay == pytest.approx(delay, abs=1e-9)
@@ -175,8 +175,8 @@ def test_the_other_constructions():
     assert 0.36 < first.delay <= 0.36 + TS
 
 
-def test_the_tangent_in_noise():
-    # Nine flights of ten within 20 ms where the paper's overshoot has 35 ms.
+def test_the_tangent_with_noise():
+    # Nine of ten errors are below 20 ms, where those of the paper's overshoot are 35 ms.
     errors, _ = delay_errors("1 %", 40, "graphical", rest=1.0)
     assert root_mean_square(errors) < 12.0
     errors, _ = delay_errors("continuous, Kp 1.31", 20, "graphical", rest=1.0)
@@ -215,7 +215,7 @@ def test_graphical_options_are_checked():
         )
 
 
-# --- what all of them refuse ----------------------------------------------------------------
+# --- refusals of all methods ----------------------------------------------------------------
 
 LINEAR = (
     "overshoot",
@@ -229,8 +229,8 @@ LINEAR = (
 
 
 @pytest.mark.parametrize("method", LINEAR)
-def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method):
-    # The overshoot of a loop that its limit alone keeps in bounds was read as that of a stable one.
+def test_methods_for_linear_loops_refuse_a_limit_cycle(method):
+    # The limit alone bounds this loop, so its overshoot is not that of a stable linear loop.
     flights = ((0.0, 5.0), (0.01, 5.0), (0.03, 20.0))
     for Kp, (noise, duration) in itertools.product((4.2, 4.5, 6.0), flights):
         flight, known = record_step(Kp=Kp, noise=noise, duration=duration, rest=1.0)
@@ -239,7 +239,7 @@ def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method):
 
 
 @pytest.mark.parametrize("method", LINEAR)
-def test_a_loop_that_still_rings_is_no_limit_cycle(method):
+def test_a_decaying_oscillation_is_not_taken_for_a_limit_cycle(method):
     for Kp, seed in itertools.product((3.0, 3.6), range(5)):
         flight, known = record_step(Kp=Kp, noise=0.01, duration=12.0, rest=1.0, seed=seed)
         if method == "decay":
@@ -249,14 +249,14 @@ def test_a_loop_that_still_rings_is_no_limit_cycle(method):
             assert dtm.estimate_delay(flight, known, method=method).delay > 0.0
 
 
-def test_the_saturated_map_knows_the_limit_and_reads_a_limit_cycle():
+def test_the_saturated_map_is_exact_for_a_limit_cycle():
     flight, known = record_step(Kp=4.5, duration=12.0)
     fit = dtm.estimate_delay(flight, known, method=Overshoot(map="saturated"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_nothing_to_read_is_refused(method):
+def test_recordings_without_information_are_refused(method):
     flight, known = record_step(Kp=0.8, duration=10.0)
 
     def read(recording, loop=known, **options):
@@ -277,7 +277,7 @@ def test_nothing_to_read_is_refused(method):
         read(flight, known.replace(delay=0.3), free=("gain",))
 
 
-def test_no_interval_and_why():
+def test_no_interval_is_given_and_the_summary_says_so():
     flight, known = record_step(Kp=2.5, noise=0.003, duration=8.0, rest=1.0)
     for method in ("decrement", "graphical"):
         fit = dtm.estimate_delay(flight, known, method=method)
