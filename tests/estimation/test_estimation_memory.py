@@ -31,14 +31,14 @@ def suitable_recording(method, rows):
         "decrement": {"Kp": 3.0, "limit": None},
     }.get(method, {})
     duration = 7.0 if "dt" in special else 0.065 * rows - 1.0
-    flight, known = record_step(noise=0.005, rest=1.0, duration=duration, **special)
-    return flight, known, method
+    recording, known = record_step(noise=0.005, rest=1.0, duration=duration, **special)
+    return recording, known, method
 
 
 def peak(method, rows):
-    flight, known, method = suitable_recording(method, rows)
+    recording, known, method = suitable_recording(method, rows)
     tracemalloc.start()
-    dtm.estimate_delay(flight, known, method=method)
+    dtm.estimate_delay(recording, known, method=method)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return most

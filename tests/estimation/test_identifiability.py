@@ -36,9 +36,11 @@ def held_loop(Kp=1.31, delay=0.36, lag=0.0, gain=1.0, sample_time=TS, limit=1.0)
 )
 def test_sensitivities_of_the_plant_are_those_of_the_held_response(delay, lag, gain, seed):
     loop = held_loop(1.0, delay, lag, gain)
-    flight = dtm.Experiment.prbs(5.0, 0.4, 0.4, seed=seed).run(loop)
-    found = from_the_command(loop, flight, ("delay", "gain", "lag"), offset=True)
-    truth = HeldResponse(flight.time, flight.command).at(flight.time - delay - 1e-9 * TS, lag)
+    recording = dtm.Experiment.prbs(5.0, 0.4, 0.4, seed=seed).run(loop)
+    found = from_the_command(loop, recording, ("delay", "gain", "lag"), offset=True)
+    truth = HeldResponse(recording.time, recording.command).at(
+        recording.time - delay - 1e-9 * TS, lag
+    )
     np.testing.assert_allclose(found["delay"], -gain * truth.rate, atol=1e-7)
     np.testing.assert_allclose(found["gain"], truth.value, atol=1e-8)
     np.testing.assert_allclose(found["lag"], gain * truth.by_lag, atol=1e-7)
@@ -49,12 +51,12 @@ def test_sensitivities_of_any_plant_are_difference_quotients():
     plant = dtm.FirstOrder(1.4, time_constant=0.7)
     loop = dtm.ControlLoop(plant, dtm.P(1.2), delay=0.2, sample_time=0.05)
     experiment = dtm.Experiment.square(6.0, 1.0, 1.1, sample_time=0.05)
-    flight = experiment.run(loop)
-    found = from_the_command(loop, flight, ("delay", "gain", "time_constant"), offset=False)
+    recording = experiment.run(loop)
+    found = from_the_command(loop, recording, ("delay", "gain", "time_constant"), offset=False)
 
     def answer(delay=0.2, gain=1.4, time_constant=0.7):
         system = dtm.FirstOrder(gain, time_constant).transfer_function() * dtm.delay(delay)
-        return system.simulate(flight.time, flight.command, input_time=flight.time).outputs
+        return system.simulate(recording.time, recording.command, input_time=recording.time).outputs
 
     step = 1e-6
     # The delay is a whole number of samples, so only an increase has a derivative.
@@ -290,8 +292,8 @@ def test_coverage_counts_the_intervals_that_contain_the_true_value(lag):
     held = dict.fromkeys(tried.coverage, 0)
     for i in range(12):
         seed = np.random.SeedSequence(5, spawn_key=(i,))
-        flight = plan.experiment.run(loop, 0.01, seed)
-        fit = dtm.estimate_delay(flight, loop.replace(delay=None), free=free)
+        recording = plan.experiment.run(loop, 0.01, seed)
+        fit = dtm.estimate_delay(recording, loop.replace(delay=None), free=free)
         for name in held:
             low, high = fit.ci(level, name)
             held[name] += low <= tried.truth[name] <= high
