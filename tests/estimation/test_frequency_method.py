@@ -96,7 +96,7 @@ def test_intervals_of_single_records_cover_with_gain_and_start_unknown():
 @pytest.mark.parametrize("free", [("delay", "gain"), ("delay", "gain", "lag")])
 def test_intervals_of_periodic_records_cover(free):
     lag = 0.06 if "lag" in free else 0.0
-    held, errors, said, adequate = 0, [], [], 0
+    held, errors, stderrs, adequate = 0, [], [], 0
     runs = 60 if lag else 120
     for seed in range(runs):
         recording, known = multisine(lag, noise=0.01, seed=seed)
@@ -105,11 +105,11 @@ def test_intervals_of_periodic_records_cover(free):
         held += low <= 0.36 <= high
         adequate += fit.adequate
         errors.append(fit.delay - 0.36)
-        said.append(fit.stderr["delay"])
+        stderrs.append(fit.stderr["delay"])
     # 95 % expected, with a deviation of 2.0 or 2.8 %.
     assert held >= 0.88 * runs
     assert adequate >= 0.88 * runs
-    assert root_mean_square(errors) == pytest.approx(np.mean(said), rel=0.25)
+    assert root_mean_square(errors) == pytest.approx(np.mean(stderrs), rel=0.25)
 
 
 def test_an_absent_lag_is_estimated_at_its_bound():

@@ -75,15 +75,15 @@ def test_the_errors_of_the_grid_are_those_of_the_benchmark(case, published):
 
 
 def test_the_curvature_gives_the_spread_for_noise_outside_the_loop():
-    errors, said = [], []
+    errors, stderrs = [], []
     for seed in range(24):
         recording, known = record_step(noise=0.01, seed=seed, noise_in_loop=False)
         fit = dtm.estimate_delay(recording, known, method="grid", free=("delay",))
         errors.append(fit.delay - 0.36)
-        said.append(fit.stderr["delay"])
+        stderrs.append(fit.stderr["delay"])
         low, high = fit.details["curvature_interval_95"]
         assert low < fit.delay < high
-    assert root_mean_square(errors) / np.mean(said) == pytest.approx(1.0, abs=0.4)
+    assert root_mean_square(errors) / np.mean(stderrs) == pytest.approx(1.0, abs=0.4)
     with pytest.raises(ValueError, match="does not act on"):
         fit.ci()
 

@@ -361,8 +361,8 @@ def test_an_interrupt_ends_all_processes_cleanly(tmp_path):
     # A terminal sends the signal to all of them.
     os.killpg(run.pid, signal.SIGINT)
     begin = time.monotonic()
-    told, errors = run.communicate(timeout=60)
-    assert told.splitlines()[-1] == "interrupted", errors
+    output, errors = run.communicate(timeout=60)
+    assert output.splitlines()[-1] == "interrupted", errors
     assert "Traceback" not in errors
     assert time.monotonic() - begin < 60
 

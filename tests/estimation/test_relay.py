@@ -67,14 +67,14 @@ def test_the_relay_s_command_may_be_missing():
 
 @pytest.mark.parametrize(("ts", "within"), [(TS, 3.0), (None, 0.5)])
 def test_noise_is_averaged_over_the_cycles(ts, within):
-    errors, said = [], []
+    errors, stderrs = [], []
     for seed in range(40):
         recording, known = relay(ts=ts, noise=0.01, seed=seed)
         fit = dtm.estimate_delay(recording, known, method="relay")
         errors.append(1e3 * (fit.delay - 0.36))
-        said.append(1e3 * fit.stderr["delay"])
+        stderrs.append(1e3 * fit.stderr["delay"])
     assert root_mean_square(errors) < within
-    assert np.mean(said) == pytest.approx(root_mean_square(errors), rel=0.5)
+    assert np.mean(stderrs) == pytest.approx(root_mean_square(errors), rel=0.5)
     with pytest.raises(ValueError, match="lag or a drift"):
         fit.ci()
 
@@ -85,14 +85,14 @@ def test_recordings_without_a_limit_cycle_are_refused():
     def estimate(recording, loop=known, **options):
         return dtm.estimate_delay(recording, loop, method="relay", **options)
 
-    ringing, its = record_step(Kp=3.5, limit=None, duration=12.0)
+    oscillating, its_loop = record_step(Kp=3.5, limit=None, duration=12.0)
     with pytest.raises(dtm.NotIdentifiableError, match="not that of a relay"):
-        estimate(ringing, its)
+        estimate(oscillating, its_loop)
     with pytest.raises(dtm.NotIdentifiableError, match="decays from"):
-        estimate(replace_signals(ringing, command=None), its)
-    calm, its = record_step(Kp=1.0)
+        estimate(replace_signals(oscillating, command=None), its_loop)
+    damped, its_loop = record_step(Kp=1.0)
     with pytest.raises(dtm.NotIdentifiableError, match="no limit cycle"):
-        estimate(replace_signals(calm, command=None), its)
+        estimate(replace_signals(damped, command=None), its_loop)
     with pytest.raises(dtm.NotIdentifiableError, match="too short"):
         estimate(recording, window=(0.0, 3.0))
     with pytest.raises(dtm.NotIdentifiableError, match="does not move"):

@@ -127,13 +127,13 @@ def test_the_decay_with_a_known_lag():
 
 
 def test_the_standard_error_of_the_decay_is_that_of_repeated_recordings():
-    errors, said = [], []
+    errors, stderrs = [], []
     for seed in range(60):
         recording, known = record_step(Kp=0.55, noise=0.01, seed=seed, duration=10.0, rest=1.0)
         fit = dtm.estimate_delay(recording, known, method="decay")
         errors.append(fit.delay - 0.36)
-        said.append(fit.stderr["delay"])
-    assert np.std(errors) / np.mean(said) == pytest.approx(1.0, abs=0.35)
+        stderrs.append(fit.stderr["delay"])
+    assert np.std(errors) / np.mean(stderrs) == pytest.approx(1.0, abs=0.35)
     with pytest.raises(ValueError, match="given gain"):
         fit.ci()
 

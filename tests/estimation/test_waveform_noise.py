@@ -17,18 +17,18 @@ def record_step(
     time = np.arange(0.0, 8.0, TS)
     reference = np.where(time < 1.0 - 1e-9, 0.0, 1.0)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
-    seen = reference - error if noise_in_loop else reference
+    measured = reference - error if noise_in_loop else reference
     if late:
         # A sample dated t by the clock of the output was taken at t - late.
         fine = loop.simulate(
             np.r_[-1.0, time - late],
-            np.r_[0.0, seen],
+            np.r_[0.0, measured],
             reference_time=np.r_[-1.0, time],
             sample_phase=1.0 % TS if ts else 0.0,
         )
         output = fine.outputs[1:]
     else:
-        output = loop.simulate(time, seen, reference_time=time, initial_output=0.0).outputs
+        output = loop.simulate(time, measured, reference_time=time, initial_output=0.0).outputs
     known = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=ts, limit=limit)
     return dtm.Recording(time, reference, output + error), known
 
@@ -67,7 +67,7 @@ def test_a_recording_may_begin_with_its_step():
 
 def test_a_known_initial_output_reduces_the_standard_error():
     recording, known = record_step(0.01, seed=3, noise_in_loop=False)
-    free, told = (
+    free, fixed = (
         dtm.estimate_delay(
             recording,
             known,
@@ -76,10 +76,10 @@ def test_a_known_initial_output_reduces_the_standard_error():
         )
         for start in (None, 0.0)
     )
-    assert told.crb.free == ("delay",)
+    assert fixed.crb.free == ("delay",)
     assert free.crb.free == ("delay", "initial output")
-    assert told.stderr["delay"] < free.stderr["delay"]
-    assert told.details["initial_output"] == 0.0
+    assert fixed.stderr["delay"] < free.stderr["delay"]
+    assert fixed.details["initial_output"] == 0.0
 
 
 def test_a_delay_of_the_measurement_is_estimated_like_one_of_the_command():
