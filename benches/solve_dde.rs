@@ -57,23 +57,21 @@ impl Equation for Drone {
     }
 }
 
-fn problem(initial: Vec<f64>, delay: f64, end: f64, rtol: f64, neutral: bool) -> Problem {
+fn problem(y0: Vec<f64>, delay: f64, end: f64, rtol: f64, neutral: bool) -> Problem {
     Problem {
         end,
         delays: vec![delay],
         neutral,
-        history: History::new(vec![
-            Piece::new(-delay, 0.0, 1, initial.clone()).with_slopes(),
-        ]),
-        initial,
+        history: History::new(vec![Piece::new(-delay, 0.0, 1, y0.clone()).with_slopes()]),
+        y0,
         breaks: vec![BreakingPoint {
             time: 0.0,
             order: 1,
         }],
         rtol,
         atol: vec![0.1 * rtol],
-        longest: f64::INFINITY,
-        times: Some(vec![end]),
+        max_step: f64::INFINITY,
+        t_eval: Some(vec![end]),
         ..Problem::default()
     }
 }

@@ -1,4 +1,4 @@
-"""The commands that stand in for a vehicle."""
+"""``deadtime emulate``: commands that emulate a vehicle."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ emulators = typer.Typer(
     rich_markup_mode=None,
 )
 
-#: Between two looks at the drone, s: for the status line, and for the record.
+#: Periods of the status line and of the record, s.
 SHOWN_EVERY, RECORDED_EVERY = 0.2, 0.02
 
 COLUMNS = ("time_s", "height_m", "climb_m_s", "setpoint_m_s", "battery_percent", "landed")
@@ -157,7 +157,7 @@ async def _emulate(
 
 
 def tell(emulator: Emulator, as_json: bool) -> None:
-    """Say where the drone is, when it is."""
+    """Print the addresses and ports of the drone once it listens."""
     options = emulator.options
     warning = (
         f"{options.host} can be reached by others. Only {', '.join(options.clients)} is answered, "
@@ -179,7 +179,7 @@ def tell(emulator: Emulator, as_json: bool) -> None:
         }
         print(json.dumps(found), flush=True)
         return
-    # Not by the shared console: its lines would be wrapped in files.
+    # The shared console would wrap the line in a file.
     Console(soft_wrap=True, highlight=False).print(
         f"An AR.Drone 2.0 (plant {options.plant}, transport delay {options.transport_delay:g} s) "
         f"is on {emulator.host}: navdata on UDP {emulator.navdata_port}, commands on UDP "

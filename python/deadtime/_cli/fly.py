@@ -1,4 +1,4 @@
-"""``deadtime fly``: the paper's experiment, on an emulator or on a drone."""
+"""``deadtime fly``: the experiment of the paper, with an emulator or a drone."""
 
 from __future__ import annotations
 
@@ -32,16 +32,17 @@ __all__ = ["emulated_drone", "fly_drone"]
 
 Plant = Literal["kit", "paper", "real", "thrust"]
 
-#: Largest climb that is commanded: of the paper, and of a vehicle that can hurt.
+#: Largest commanded climb in m/s: on an emulator, as in the paper, and on a drone, which can hurt.
 EMULATED_CLIMB, REAL_CLIMB = 1.0, 0.5
 
-#: Navdata, commands, control.
+#: UDP ports of navdata and commands, TCP port of the control connection.
 Ports = tuple[int, int, int]
 
-#: Seeds of one run are so far apart that those of the next are others.
-APART = 1_000_003
+#: Difference between the noise seeds of successive links. It is large, so that runs with different
+#: values of --seed share none.
+SEED_STEP = 1_000_003
 
-#: Where recordings go without a word.
+#: Default folder for recordings.
 FOLDER = "flight"
 
 
@@ -101,7 +102,7 @@ def fly_drone(
         limits=Limits(max_climb=max_climb, max_height=max_height),
     )
     plan.check()
-    check_matplotlib()  # for the report, and before anything flies
+    check_matplotlib()  # needed for the report; fail before anything flies
     if host is not None:
         _ask_for_consent(host, plan, consent, virtual_time)
     elif not as_json:
@@ -112,27 +113,27 @@ def fly_drone(
     ports = (navdata_port, command_port, control_port)
     try:
         with (
-            _flown_on(host, plant, seed, virtual_time, plan, ports) as flown,
+            _vehicle(host, plant, seed, virtual_time, plan, ports) as vehicle,
             stages(plan.flights + 2, quiet=as_json) as begin,
         ):
-            study = fly_experiment(flown.connect, plan, where, begin, flown.run, _say)
+            study = fly_experiment(vehicle.connect, plan, where, begin, vehicle.run, _print_note)
     except BaseException as error:
         for note in getattr(error, "__notes__", ()):
-            _say(note)
-        _tell_what_is_kept(where)
+            _print_note(note)
+        _print_kept_recordings(where)
         raise
     page = where / "report.html"
-    told = {"flown_on": flown.name, **study.to_dict(), "report": page, "folder": where}
-    text = json.dumps(plain(told), indent=2, ensure_ascii=False, allow_nan=False)
+    result = {"flown_on": vehicle.name, **study.to_dict(), "report": page, "folder": where}
+    text = json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False)
     (where / "result.json").write_text(text + "\n", encoding="utf-8")
-    write_flight_page(study, page, flown.name)
+    write_flight_page(study, page, vehicle.name)
     if as_json:
-        print_json(told)
+        print_json(result)
     else:
         _print_study(study, page)
 
 
-def _say(sentence: str) -> None:
+def _print_note(sentence: str) -> None:
     ERRORS.print(f"deadtime: {sentence}", highlight=False, markup=False, soft_wrap=True)
 
 
@@ -169,8 +170,8 @@ def _ask_for_consent(host: str, plan: FlightPlan, consent: bool, virtual_time: b
 
 
 @dataclass(frozen=True)
-class _FlownOn:
-    """How the vehicle is reached, what it is called, and in which time."""
+class _Vehicle:
+    """A vehicle: how to connect to it, its name, and what runs it in real or virtual time."""
 
     connect: Connect
     name: str
@@ -178,24 +179,24 @@ class _FlownOn:
 
 
 @contextmanager
-def _flown_on(
+def _vehicle(
     host: str | None,
     plant: Plant,
     seed: int,
     virtual_time: bool,
     plan: FlightPlan,
     ports: Ports,
-) -> Iterator[_FlownOn]:
+) -> Iterator[_Vehicle]:
     name = f"an emulated AR.Drone 2.0 ({plant})"
     if virtual_time:
-        yield _FlownOn(emulated_drone(plant, seed, plan.limits), name, run_virtual)
+        yield _Vehicle(emulated_drone(plant, seed, plan.limits), name, run_virtual)
     elif host is not None:
         with terminated_like_interrupted():
-            yield _FlownOn(lambda: _client(host, plan.limits, ports), host, run_landing)
+            yield _Vehicle(lambda: _client(host, plan.limits, ports), host, run_landing)
     else:
         with terminated_like_interrupted(), own_emulator(plant, seed) as own:
             here = EmulatorOptions().host
-            yield _FlownOn(lambda: _client(here, plan.limits, own), name, run_landing)
+            yield _Vehicle(lambda: _client(here, plan.limits, own), name, run_landing)
 
 
 def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
@@ -204,8 +205,8 @@ def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
 
 
 def emulated_drone(plant: Plant, seed: int, limits: Limits) -> Connect:
-    """Connects to an emulator in the same event loop; each link has noise of its own."""
-    seeds = itertools.count(seed, APART)
+    """Connect to an emulator in the same event loop; each link has a different noise seed."""
+    seeds = itertools.count(seed, SEED_STEP)
 
     @asynccontextmanager
     async def connect() -> AsyncIterator[Vehicle]:
@@ -220,7 +221,7 @@ def emulated_drone(plant: Plant, seed: int, limits: Limits) -> Connect:
     return connect
 
 
-def _tell_what_is_kept(folder: Path) -> None:
+def _print_kept_recordings(folder: Path) -> None:
     kept = sorted(folder.glob("flight-*.csv"))
     if kept:
         ERRORS.print(

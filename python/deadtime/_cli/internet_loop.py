@@ -1,4 +1,4 @@
-"""``deadtime internet-loop``: a loop over UDP, its delay estimated and measured."""
+"""``deadtime internet-loop``: estimate and measure the delay of a control loop over UDP."""
 
 from __future__ import annotations
 
@@ -93,12 +93,12 @@ def run_loop(
     as_json: opt.As_json = False,
 ) -> None:
     """Control an integrator over UDP, estimate the loop's delay, and measure it."""
-    way = network_of(delays, delay, jitter, loss, burst, duplication, ordered)
+    path = network_of(delays, delay, jitter, loss, burst, duplication, ordered)
     gains = tuple(gain) if gain else GAINS
     trial = Trial(
         gain=gains[0],
-        forward_path=way,
-        return_path=way,
+        forward_path=path,
+        return_path=path,
         seed=seed,
         sample_time=sample_time,
         duration=duration,
@@ -133,8 +133,8 @@ def run_loop(
         return
     print_table(_table(found, printed))
     console.print("means, 95 % intervals, and what was measured, in ms", style="dim")
-    for name, said in _spreads(found).items():
-        console.print(f"{name:<20}{said}", highlight=False, markup=False)
+    for name, text in _spreads(found).items():
+        console.print(f"{name:<20}{text}", highlight=False, markup=False)
     for sentence in found.explanation():
         console.print(f"• {sentence}", highlight=False, markup=False)
     for run in found.runs:
@@ -165,7 +165,9 @@ def _table(found: InternetLoop, printed: dict[float, float]) -> Table:
 
 def _row(run: InternetRun, printed: dict[float, float]) -> list[str]:
     gain, trip, link = run.trial.gain, run.round_trip, run.plant["link"]
-    told = [f"{PRINTED_OVERSHOOTS[int(gain)]:g} %", _ms(printed[gain])] if gain in printed else []
+    table_1 = (
+        [f"{PRINTED_OVERSHOOTS[int(gain)]:g} %", _ms(printed[gain])] if gain in printed else []
+    )
     return [
         f"{gain:g}",
         f"{_ms(trip['p50'])} / {_ms(trip['p95'])}",
@@ -174,7 +176,7 @@ def _row(run: InternetRun, printed: dict[float, float]) -> list[str]:
         _ms(run.age),
         f"{100 * run.overshoot:.1f} %" if math.isfinite(run.overshoot) else "–",
         *(_estimate(run, method) for method in METHODS),
-        *(told or ["–", "–"]),
+        *(table_1 or ["–", "–"]),
     ]
 
 
@@ -188,13 +190,14 @@ def _ms(value: float | None) -> str:
 
 
 def _spreads(found: InternetLoop) -> dict[str, str]:
-    """By each method the mean of the runs, its interval, and what was measured."""
+    """For each method the mean over the runs, its interval, and the measured delay."""
     return {
-        LABELS[method]: _told(found.spread(method), found.expected(method)) for method in METHODS
+        LABELS[method]: _spread_text(found.spread(method), found.expected(method))
+        for method in METHODS
     }
 
 
-def _told(spread: Spread, expected: float) -> str:
+def _spread_text(spread: Spread, expected: float) -> str:
     interval = ""
     if math.isfinite(spread.low):
         how = "corrected by replaying" if spread.replayed else "by the spread of the runs"

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and a closed terminal while something flies: they land it, and it stays so."""
+"""Ctrl-C, SIGTERM and a closed terminal during a flight: the vehicle is landed first."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ T = TypeVar("T")
 
 Stop: TypeAlias = Callable[[], None]
 
-#: What ends a flight: Ctrl-C, a polite kill, and a terminal that was closed or lost; SIGBREAK is
-#: Windows' word for the last. Each system has some of them.
+#: Signals that end a flight: Ctrl-C, a request to terminate, and a closed or lost terminal
+#: (SIGBREAK on Windows). No system has all of them.
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 def run_landing(main: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine that lands what it flies when it is cancelled.
+    """Run a coroutine that lands its vehicle when it is cancelled.
 
-    Each signal cancels it. Landing is not interrupted by more of them; it takes a bounded time.
+    Each of the signals cancels it. Further signals do not interrupt the landing, which takes a
+    bounded time.
 
     Raises
     ------
     KeyboardInterrupt
-        If a signal came.
+        If a signal was received.
     """
 
     async def guarded() -> T:
@@ -39,10 +40,10 @@ def run_landing(main: Coroutine[Any, Any, T]) -> T:
 
         def stop() -> None:
             task.cancel()
-            with suppress(OSError):  # whoever read it may be gone
+            with suppress(OSError):  # standard error may be closed
                 print("deadtime: landing first", file=sys.stderr, flush=True)
 
-        before = {one: signal.getsignal(one) or signal.SIG_DFL for one in _heeded()}
+        before = {one: signal.getsignal(one) or signal.SIG_DFL for one in _handled_signals()}
         for one in before:
             _handle(loop, one, stop)
         try:
@@ -57,27 +58,29 @@ def run_landing(main: Coroutine[Any, Any, T]) -> T:
         return asyncio.run(guarded())
     except asyncio.CancelledError as cancelled:
         interrupt = KeyboardInterrupt()
-        for note in getattr(cancelled, "__notes__", ()):  # such as a landing that nobody confirmed
+        for note in getattr(cancelled, "__notes__", ()):  # for example an unconfirmed landing
             interrupt.add_note(note)
         raise interrupt from None
 
 
 def _handle(loop: asyncio.AbstractEventLoop, number: signal.Signals, stop: Stop) -> None:
-    """Call `stop` in the event loop when a signal comes."""
+    """Call `stop` in the event loop when the signal is received."""
     try:
         loop.add_signal_handler(number, stop)
-    except NotImplementedError:  # Windows: the interpreter takes it, and hands it on
+    except NotImplementedError:  # on Windows the interpreter handles it and calls the event loop
         signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop))
 
 
 @contextmanager
 def terminated_like_interrupted() -> Iterator[None]:
-    """The other signals raise what Ctrl-C does, so that what was started is ended."""
+    """Let the other signals raise KeyboardInterrupt, as Ctrl-C does, so that cleanup is done."""
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    before = {one: signal.signal(one, interrupt) for one in _heeded() if one != signal.SIGINT}
+    before = {
+        one: signal.signal(one, interrupt) for one in _handled_signals() if one != signal.SIGINT
+    }
     try:
         yield
     finally:
@@ -85,8 +88,8 @@ def terminated_like_interrupted() -> Iterator[None]:
             signal.signal(one, handler)
 
 
-def _heeded() -> list[signal.Signals]:
-    """The signals that end; a closed terminal does not where `nohup` has had that ignored."""
+def _handled_signals() -> list[signal.Signals]:
+    """The signals of this system that end a flight, except for ignored ones (as by ``nohup``)."""
     here = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
     return [
         one for one in here if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN

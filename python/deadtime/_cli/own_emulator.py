@@ -1,4 +1,4 @@
-"""An emulator that a command starts for itself, and ends whatever happens."""
+"""An emulator in a process of its own, which a command starts and always ends."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from deadtime._base.errors import LinkError
 
 __all__ = ["own_emulator"]
 
-#: How long it may take to start, and to end when asked to, s.
+#: Longest time to start, and to end after a request, s.
 STARTING, ENDING = 30.0, 3.0
 
 
@@ -21,8 +21,8 @@ STARTING, ENDING = 30.0, 3.0
 def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
     """Run ``deadtime emulate ardrone2`` on free ports: navdata, command and control.
 
-    It has a session of its own: Ctrl-C in the terminal must not end it before what flies it has
-    been landed.
+    It runs in a separate session, so that Ctrl-C in the terminal does not end it before the drone
+    has been landed.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
     """
     command = [sys.executable, "-m", "deadtime", "emulate", "ardrone2", "--json"]
     command += ["--port-base", "0", "--plant", plant, "--seed", str(seed)]
-    # Its input ends with this process, however that ends.
+    # Its standard input is closed when this process ends, for whatever reason.
     command.append("--until-input-ends")
     process = subprocess.Popen(
         command,
@@ -39,7 +39,7 @@ def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        # What Windows has in place of sessions.
+        # The equivalent of a session on Windows.
         creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
     )
     try:
@@ -57,8 +57,8 @@ def _ports(process: subprocess.Popen[str]) -> tuple[int, int, int]:
     finally:
         late.cancel()
     try:
-        told = json.loads(line)
-        return int(told["navdata_port"]), int(told["command_port"]), int(told["control_port"])
+        ports = json.loads(line)
+        return int(ports["navdata_port"]), int(ports["command_port"]), int(ports["control_port"])
     except (ValueError, KeyError, TypeError):
         raise LinkError(
             f"the emulator did not start within {STARTING:g} s: run 'deadtime emulate ardrone2' "

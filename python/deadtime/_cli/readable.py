@@ -1,4 +1,4 @@
-"""Text on terminals that cannot show all of it: what they lack is put in other characters."""
+"""Output on terminals that lack some characters: these are replaced by ASCII text."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import unicodedata
 
 __all__ = ["make_readable", "shows"]
 
-#: What stands for a character where its name says nothing shorter.
+#: Replacements of characters for which `_spelled` has no rule, or a longer one.
 INSTEAD = {
     "−": "-", "–": "-", "—": "-", "×": "x", "·": "*", "•": "*", "≤": "<=", "≥": ">=", "≈": "~",
     "±": "+-", "∞": "inf", "°": " deg", "→": "->", "⇒": "=>", "′": "'", "…": "...", "√": "sqrt",
@@ -18,7 +18,7 @@ INSTEAD = {
 
 
 def make_readable() -> None:
-    """Have standard output and standard error take every character."""
+    """Let standard output and standard error accept every character."""
     codecs.register_error("deadtime.readable", _instead)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -26,7 +26,7 @@ def make_readable() -> None:
 
 
 def shows(text: str) -> bool:
-    """Whether standard output has all these characters."""
+    """Whether standard output can encode all these characters."""
     try:
         text.encode(getattr(sys.stdout, "encoding", None) or "utf-8")
     except UnicodeEncodeError:
@@ -37,12 +37,12 @@ def shows(text: str) -> bool:
 def _instead(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    lacking = error.object[error.start : error.end]
-    return "".join(map(_spelled, lacking)), error.end
+    missing = error.object[error.start : error.end]
+    return "".join(map(_spelled, missing)), error.end
 
 
 def _spelled(character: str) -> str:
-    """A character in ASCII: by the table, a Greek letter by its name, others without accents."""
+    """A character in ASCII: from the table, by its name if Greek, else without its accents."""
     if character in INSTEAD:
         return INSTEAD[character]
     name = unicodedata.name(character, "")

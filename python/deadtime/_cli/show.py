@@ -1,4 +1,4 @@
-"""How results look in a terminal."""
+"""Output of results in a terminal: JSON, tables, figures and progress bars."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def print_json(found: Mapping[str, Any]) -> None:
-    """Print plain values as JSON; what is not finite becomes null."""
+    """Print values as JSON; numbers that are not finite become null."""
     text = json.dumps(plain(found), indent=2, ensure_ascii=False, allow_nan=False)
     print(text if shows(text) else json.dumps(json.loads(text), indent=2))
 
 
 def plain(value: Any) -> Any:
-    """Values that JSON has; what is not finite becomes null."""
+    """Convert to types of JSON; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
@@ -61,13 +61,13 @@ def plain(value: Any) -> Any:
 
 
 def print_table(table: Table) -> None:
-    """Print a table in its full width: where a terminal is too narrow, digits are not left out."""
+    """Print a table in its full width, so that a narrow terminal does not cut digits off."""
     needed = Console(width=1000).measure(table).maximum
     Console(width=max(console.width, needed)).print(table, soft_wrap=True)
 
 
 def check_picture(path: Path) -> None:
-    """Refuse a file that no figure can be written to, before long work for the figure begins."""
+    """Refuse a file to which no figure can be written; called before the long computation."""
     check_matplotlib()
     if path.suffix.lower() not in PICTURES:
         raise ValueError(f"{path} is no picture: end it in {', '.join(PICTURES)}")
@@ -76,7 +76,7 @@ def check_picture(path: Path) -> None:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure to a file whose suffix says the format."""
+    """Write a figure to a file; its suffix determines the format."""
     check_picture(path)
     figure.savefig(path, dpi=150)
 
@@ -85,7 +85,7 @@ ERRORS = Console(stderr=True)
 
 
 def _bar() -> Progress:
-    """A progress bar on standard error that leaves nothing behind."""
+    """A progress bar on standard error that is removed at its end."""
     return Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),
@@ -98,7 +98,7 @@ def _bar() -> Progress:
 
 @contextmanager
 def counted(what: str, total: int, quiet: bool) -> Iterator[bool | Callable[[int], object]]:
-    """A progress bar over `total` items; call it with the number that is done."""
+    """A progress bar over `total` items; call it with the number of finished items."""
     if quiet or not ERRORS.is_terminal:
         yield False
         return

@@ -1,4 +1,4 @@
-"""What the commands say about the stability of a loop."""
+"""Sentences of the commands about the stability of a loop and about lists of roots."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ __all__ = ["listed", "verdict"]
 
 
 def verdict(loop: ControlLoop) -> str:
-    """Stable or unstable, with the root or the chain of roots that shows it; or neither proved."""
+    """Stable; unstable, with the root or chain of roots that proves it; or neither is proved."""
     abscissa = loop.spectral_abscissa()
     if loop.is_stable():
         return f"stable: spectral abscissa {abscissa:.6g} 1/s"
     rightmost = loop.rightmost()
     for root, radius in zip(rightmost.roots.tolist(), rightmost.radii.tolist(), strict=True):
         if root.real > radius:
-            turning = f" ± {abs(root.imag):.6g}j" if root.imag else ""
+            imaginary = f" ± {abs(root.imag):.6g}j" if root.imag else ""
             return (
-                f"unstable: a root at {root.real:.6g}{turning} grows by a factor e in "
+                f"unstable: a root at {root.real:.6g}{imaginary} grows by a factor e in "
                 f"{1.0 / root.real:.3g} s"
             )
     chain = -math.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
@@ -32,22 +32,25 @@ def verdict(loop: ControlLoop) -> str:
     )
 
 
-def listed(found: RootSet, wanted: int | None, chain: float) -> str:
-    """How many roots a list holds and where these are all; `wanted` is None for a region."""
+def listed(found: RootSet, requested: int | None, chain: float) -> str:
+    """Number of roots in a list and the region in which these are all roots.
+
+    `requested` is the number of rightmost roots asked for, None for the roots of a region.
+    """
     number = f"{found.counted} {'root' if found.counted == 1 else 'roots'}"
     (low, high), (bottom, top) = found.region
-    if wanted is None:
+    if requested is None:
         return (
             f"{number} in re=({low:g}, {high:g}), im=({bottom:g}, {top:g}): all there are, proved"
         )
     upper = sum(1 for root in found.roots.tolist() if root.imag >= 0.0)
     if not math.isfinite(low):
         return f"{number}: all there are, proved"
-    if upper >= wanted:
+    if upper >= requested:
         return f"{number}: all right of Re s = {low:.6g}, proved"
     if math.isfinite(chain):
         return (
-            f"{number}, not {wanted}: all right of Re s = {low:.6g}, proved; the next ones are "
+            f"{number}, not {requested}: all right of Re s = {low:.6g}, proved; the next ones are "
             "those of the chain"
         )
-    return f"{number}, not {wanted}: all right of Re s = {low:.6g}, proved"
+    return f"{number}, not {requested}: all right of Re s = {low:.6g}, proved"

@@ -1,4 +1,4 @@
-"""A loop run in fixed steps, as block-diagram tools run it, to compare their figures with."""
+"""Simulation of a loop in fixed steps, as block-diagram tools do it, to compare their results."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ __all__ = ["simulate_fixed_step"]
 
 Vector = NDArray[np.float64]
 
-#: Distance of a time to a whole number of steps, in steps, that counts as rounding.
+#: A time counts as a whole number of steps if it differs by less than this, in steps: rounding of
+#: decimal step sizes must pass, a wrong step size must not.
 _WHOLE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class FixedStepSettings:
-    """What surrounds plant and controller, and how the run is made."""
+    """Delay, limit and sampling of the loop, and settings of the run."""
 
     delay: float
     delay_path: str
@@ -40,7 +41,7 @@ class FixedStepSettings:
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Straight lines between the steps: what such a tool plots."""
+    """Linear interpolation between the steps, as such a tool plots it."""
 
     times: Vector
     values: Vector
@@ -60,30 +61,31 @@ def simulate_fixed_step(
     reference_before: float | None = None,
     reference_time: ArrayLike | None = None,
 ) -> Response:
-    """Run a loop in fixed steps, with the errors that a block diagram run so would have.
+    """Simulate a loop in fixed steps, with the errors of a block diagram run in this way.
 
-    For comparison with figures that were made in Simulink and its like; `ControlLoop.simulate` is
-    exact. The delay is a transport delay as there: a buffer of the values at whole steps, read by
-    straight lines, and beyond its newest value (a delay shorter than a stage of the formula) by
-    prolonging the last one. Every stage reads the reference at its own time, no jump is hit but by
-    chance, and an ideal derivative is the difference quotient since the latest whole step. The
-    buffer alone limits the order to two, jumps between steps to one.
+    For comparison with results of Simulink and similar tools; `ControlLoop.simulate` is exact. The
+    delay is a transport delay as in these tools: a buffer of the values at whole steps with linear
+    interpolation, and linear extrapolation beyond its newest value if the delay is shorter than a
+    stage of the formula. Every stage reads the reference at its own time, steps do not end at jumps
+    of the reference, and an ideal derivative is the difference quotient since the latest whole
+    step. The buffer alone limits the order to two, jumps between steps to one.
 
     Parameters
     ----------
     loop : ControlLoop
-        With a delay. Its `delay_path` says whether the buffer holds command or measurement; its
-        sample time, if it has one, is a whole number of steps.
+        A loop with a known delay. Its `delay_path` decides whether the buffer holds the command or
+        the measurement; its sample time, if any, is a whole number of steps.
     end : float
         Time of the last step in s; rounded up to a whole number of steps.
     reference : float or array_like, shape (m,)
-        A number: a step to it at time 0. An array: values that hold from `reference_time` on.
+        A number: a step to it at time 0. An array: values that hold from the times in
+        `reference_time` on.
     step : float
         Length of a step in s.
     solver : {"ode1", "ode2", "ode3", "ode4", "ode5", "ode8"}
         Euler, Heun, Bogacki and Shampine, Kutta, Dormand and Prince of order 5 and 8.
     initial_output : float
-        Output at which the plant rests at the start.
+        Output of the plant, which is at rest at the start.
     reference_before : float, optional
         Reference before its first jump; `initial_output` by default.
     reference_time : array_like, shape (m,), optional
@@ -92,7 +94,7 @@ def simulate_fixed_step(
     Returns
     -------
     Response
-        At times 0, step, 2 step, ...; between them straight lines.
+        At times 0, step, 2 step, ..., with linear interpolation between them.
 
     Raises
     ------

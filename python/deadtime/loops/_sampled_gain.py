@@ -1,16 +1,16 @@
 """Loop gain of a sampled loop, cut at the command, on the unit circle.
 
-Between samples the plant moves by matrix exponentials, and the command u_k arrives m samples and
-a fraction of one later. With the state x_k of plant, controller and the commands that are under
-way within the fraction,
+Between samples the state of the plant follows from matrix exponentials, and the command u_k arrives
+m samples and a fraction of one later. With the state x_k of plant, controller and the commands in
+transit within this fraction,
 
     x_{k+1} = T x_k + b v_k,   u_k = c x_k,   L(z) = -z^(-m) c (z I - T)^(-1) b:
 
-closed by v = u the poles are the zeros of 1 + L. T, b and c are read off the transition matrices
-of the loop with its feedback cut and closed (Åström and Wittenmark, Computer-Controlled Systems,
-3rd ed. 1997, section 2.3, for the fractional delay). L is exact up to rounding at any frequency up
-to pi/Ts; nothing of the hold is approximated. As Ts goes to 0, L(e^(j omega Ts)) goes to the loop
-gain of the continuous loop.
+if the loop is closed by v = u, its poles are the zeros of 1 + L. T, b and c are taken from the
+transition matrices of the open and the closed loop (Åström and Wittenmark, Computer-Controlled
+Systems, 3rd ed. 1997, section 2.3, for the fractional delay). L is exact up to rounding at any
+frequency up to pi/Ts, without any approximation of the hold. As Ts goes to 0, L(e^(j omega Ts))
+goes to the loop gain of the continuous loop.
 """
 
 from __future__ import annotations
@@ -30,30 +30,49 @@ __all__ = ["SampledLoopGain"]
 
 Vector = NDArray[np.float64]
 
-#: A pole so close to z = 1 stands on it: a double one is computed with the root of the rounding.
+#: A pole this close to z = 1 counts as an integrator: the error of a computed double pole is about
+#: the square root of the rounding error.
 _ON_ONE = 1e-6
 
-#: Points from the lowest angle to a half turn in equal ratios and in equal steps, for each half
-#: turn of a sample of delay, and around each pole and zero of L on a scale that begins at a quarter
-#: of its distance from the circle.
+#: A generalised eigenvalue alpha/beta with beta below this fraction of alpha is a zero at infinity.
+_AT_INFINITY = 1e-9
+
+#: Lowest angle, as a fraction of the distance from z = 1 to the nearest pole or zero, or of one
+#: over the samples of delay: a lower one resolves more and takes more points.
+_LOWEST = 1e-3
+
+#: Lower limit of the lowest angle, which is reduced by this factor at a time until it lies below
+#: the crossover of a loop with an integrator.
+_LEAST_ANGLE = 1e-12
+_LOWER_BY = 0.01
+
+#: Numbers of angles: in equal ratios and in equal steps from the lowest one to pi, for each half
+#: turn of a sample of delay, and on each side of each pole and zero of L, in equal ratios from
+#: _FIRST_AROUND of its distance from the circle, which counts as at least _LEAST_DISTANCE. More
+#: resolve narrower resonances and take longer.
 _POINTS = 200
 _EVEN = 50
 _PER_TURN = 16
 _AROUND = 40
+_FIRST_AROUND = 0.25
+_LEAST_DISTANCE = 1e-12
 
-#: Peaks of abs(L) lower than this are not looked for: between angles so dense none comes to one.
+#: Peaks of abs(L) below this at the angles are not refined: with angles this dense, abs(L) does not
+#: reach one between them. A smaller one refines more peaks.
 _LOW_PEAK = 0.3
 
-#: How often the place of a peak of abs(L) is closed in, by a factor of four.
+#: A peak of abs(L) is enclosed by this many rounds of this many points, each of which makes the
+#: interval four times shorter: more rounds give a more accurate peak.
 _ZOOMS = 6
+_ZOOM_POINTS = 9
 
-#: Most angles at which L is looked at.
+#: Upper limit on the number of angles (bounds memory and time).
 _MOST = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class SampledLoopGain:
-    """L(z) of a loop with `sample_time` in s; its matrices, and whole samples of delay."""
+    """L(z) of a loop: T, b and c, the whole samples of delay, and `sample_time` in s."""
 
     T: Vector
     b: Vector
@@ -75,22 +94,23 @@ class SampledLoopGain:
             cut = replace(model, K=row, L=direct)
             return cut.native(part, sample_time).transition_matrix()
 
-        # What drives the plant at the sample is the last state; fed back alone, it shows b.
+        # The command is the last state: the change of its column under unit feedback is b.
         T = matrix(none, 0.0)
         b = matrix(none, 1.0)[:, -1] - T[:, -1]
         c = matrix(model.K, float(model.L))[n]
-        # In units of states and command that make the matrices small, which changes no L.
+        # Scale states and command so that the matrices are balanced, which does not change L.
         joined = np.block([[T, b[:, None]], [c, np.zeros(1)]])
-        with np.errstate(invalid="ignore"):  # units beyond integers, read as places as well
+        with np.errstate(invalid="ignore"):  # scipy converts scales to integers, which may overflow
             _, (unit, _) = matrix_balance(joined, permute=False, separate=True)
-        unit, own = unit[:-1], unit[-1]
-        return cls(T * unit / unit[:, None], b * own / unit, c * unit / own, whole, sample_time)
+        unit, command = unit[:-1], unit[-1]
+        T, b, c = T * unit / unit[:, None], b * command / unit, c * unit / command
+        return cls(T, b, c, whole, sample_time)
 
     def at(self, angle: Vector) -> NDArray[np.complex128]:
         """L(e^(j angle)); infinite at a pole."""
         z = np.exp(1j * angle)
         size = len(self.b)
-        # z I - T = (z - 1) I - (T - I), which loses no digits where all of it is close to z = 1.
+        # z I - T = (z - 1) I - (T - I), which loses no digits if z and the poles are close to 1.
         matrices = np.expm1(1j * angle)[:, None, None] * np.eye(size) - (self.T - np.eye(size))
         with np.errstate(divide="ignore", invalid="ignore"):
             try:
@@ -109,14 +129,14 @@ class SampledLoopGain:
 
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
-        """Poles of L but those at zero of the whole samples."""
+        """Poles of L, except for those at z = 0 that the whole samples of delay add."""
         from scipy.linalg import eigvals
 
         return np.asarray(eigvals(self.T), dtype=np.complex128)
 
     @cached_property
     def zeros(self) -> NDArray[np.complex128]:
-        """Zeros of L that are finite."""
+        """Finite zeros of L."""
         from scipy.linalg import eigvals
 
         size = len(self.b)
@@ -124,38 +144,38 @@ class SampledLoopGain:
         pencil = np.vstack([upper, np.append(self.c, 0.0)])
         rest = np.diag(np.append(np.ones(size), 0.0))
         found = cast(Any, eigvals)(pencil, rest, homogeneous_eigvals=True)
-        finite = np.abs(found[1]) > 1e-9 * np.abs(found[0])
+        finite = np.abs(found[1]) > _AT_INFINITY * np.abs(found[0])
         return np.asarray(found[0][finite] / found[1][finite], dtype=np.complex128)
 
     @property
     def integrators(self) -> int:
-        """Poles at z = 1."""
+        """Number of poles at z = 1."""
         return int(np.count_nonzero(np.abs(self.poles - 1.0) < _ON_ONE))
 
     @cached_property
     def corners(self) -> Vector:
-        """Angles in (0, pi] so close that no pole or zero lies between two, whatever the delay."""
+        """Angles in (0, pi], dense enough to resolve every pole and zero for any delay."""
         places = np.concatenate([self.poles, self.zeros])
         away = np.abs(places - 1.0)
-        low = 1e-3 * min(1.0 / (self.whole + 1.0), away[away > _ON_ONE].min(initial=1.0))
-        while self.integrators and abs(self.at(np.array([low]))[0]) < 1.0 and low > 1e-12:
-            low *= 0.01  # below an integrator's crossover
+        low = _LOWEST * min(1.0 / (self.whole + 1.0), away[away > _ON_ONE].min(initial=1.0))
+        while self.integrators and abs(self.at(np.array([low]))[0]) < 1.0 and low > _LEAST_ANGLE:
+            low *= _LOWER_BY
         pieces = [np.geomspace(low, np.pi, _POINTS), np.linspace(low, np.pi, _EVEN)]
         for place in places[places.imag > 0.0]:
-            near = max(abs(1.0 - abs(place)), 1e-12)
-            reach = np.geomspace(0.25 * near, np.pi, _AROUND)
-            pieces += [np.angle(place) - reach, np.angle(place) + reach]
+            near = max(abs(1.0 - abs(place)), _LEAST_DISTANCE)
+            offsets = np.geomspace(_FIRST_AROUND * near, np.pi, _AROUND)
+            pieces += [np.angle(place) - offsets, np.angle(place) + offsets]
         found = np.unique(np.concatenate(pieces))
         found = found[(found >= low) & (found <= np.pi)]
         return np.unique(np.append(found, self._peaks(found)))
 
     def _peaks(self, angle: Vector) -> Vector:
-        """Where abs(L) is largest, next to those of `angle` at which it is larger than around."""
+        """Local maxima of abs(L), each between the neighbours of a largest one of `angle`."""
         sizes = np.abs(self.at(angle))
         highest = 1 + np.flatnonzero((sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:]))
         highest = highest[(sizes[highest] > _LOW_PEAK) & np.isfinite(sizes[highest])]
         low, high = angle[highest - 1], angle[highest + 1]
-        share = np.linspace(0.0, 1.0, 9)
+        share = np.linspace(0.0, 1.0, _ZOOM_POINTS)
         rows = np.arange(len(low))
         for _ in range(_ZOOMS):
             inner = low[:, None] + share * (high - low)[:, None]
@@ -166,24 +186,25 @@ class SampledLoopGain:
 
     @cached_property
     def angles(self) -> Vector:
-        """`corners` and so many between them that no turn of the delay lies between two."""
-        return self._turned(np.full(len(self.corners) - 1, True))
+        """`corners`, and enough angles between them to resolve every turn due to the delay."""
+        return self._with_turns(np.full(len(self.corners) - 1, True))
 
     @cached_property
     def resolved(self) -> Vector:
-        """As `angles`, but turns are told apart only where abs(L) may come to one."""
+        """As `angles`, but turns are resolved only where abs(L) may reach one."""
         sizes = np.abs(self.at(self.corners))
         with np.errstate(invalid="ignore"):
             change = np.abs(np.diff(sizes))
-            # Peaks are corners, so beyond its ends abs(L) goes by less than it does between them.
-            around = np.pad(change, 1)
-            reach = np.maximum(sizes[1:], sizes[:-1]) + np.max(
-                [around[:-2], change, around[2:]], axis=0
+            # Peaks are corners, so between two corners abs(L) exceeds both by less than it changes
+            # in this gap or the ones beside it.
+            padded = np.pad(change, 1)
+            bound = np.maximum(sizes[1:], sizes[:-1]) + np.max(
+                [padded[:-2], change, padded[2:]], axis=0
             )
-            return self._turned(~(reach < 1.0))
+            return self._with_turns(~(bound < 1.0))
 
-    def _turned(self, chosen: NDArray[np.bool_]) -> Vector:
-        """Part the gaps between corners that are `chosen` by the turns of the delay in them."""
+    def _with_turns(self, chosen: NDArray[np.bool_]) -> Vector:
+        """Divide the `chosen` gaps between corners so that the turns of the delay are resolved."""
         gaps = np.diff(self.corners)
         parts = np.ceil(gaps * (_PER_TURN * (self.whole + 1.0) / np.pi))
         parts = np.where(chosen, np.maximum(parts, 1.0), 1.0)
@@ -204,19 +225,19 @@ class SampledLoopGain:
         return self.at(angle.ravel()).reshape(angle.shape)
 
     def phase(self, omega: ArrayLike) -> Vector:
-        """Argument of L in rad, continuous from a quarter turn down for each integrator on."""
+        """Argument of L in rad, continuous; with n integrators it starts close to -n pi/2."""
         angle = self._angle(omega)
         every = np.unique(np.append(self.angles, angle[angle > 0.0].ravel()))
         turned = np.unwrap(np.angle(self.at(every)))
         start = turned[0]
         if self.integrators:
-            wanted = -0.5 * np.pi * self.integrators
-            start = wanted + math.remainder(turned[0] - wanted, 2.0 * np.pi)
+            expected = -0.5 * np.pi * self.integrators
+            start = expected + math.remainder(turned[0] - expected, 2.0 * np.pi)
         return np.asarray(np.interp(angle, every, turned - turned[0] + start))
 
     def _angle(self, omega: ArrayLike) -> Vector:
         given = real_array("omega", omega) * self.sample_time
-        # The half turn itself is asked for in numbers that were divided and multiplied.
+        # pi/sample_time times sample_time may exceed pi by rounding.
         if given.size and not (given.min() >= 0.0 and given.max() <= np.pi * (1.0 + 1e-12)):
             raise ValueError(
                 f"omega from {given.min() / self.sample_time:g} to "

@@ -1,17 +1,17 @@
 """Margins of a sampled loop, from all crossings of its loop gain on the upper unit circle.
 
-The poles move continuously with a factor k on L or a turn e^(-j phi) of it, so that a stable loop
-first loses stability where a pole comes to the unit circle:
+The poles are continuous functions of a factor k on L and of a rotation e^(-j phi) of it, so that a
+stable loop first loses stability where a pole reaches the unit circle:
 
-    k = 1/abs(L) where L(e^(j angle)) is real and negative (angles 0 and pi among these),
+    k = 1/abs(L) where L(e^(j angle)) is real and negative (angles 0 and pi included),
     phi = pi + arg L where abs(L) = 1.
 
-A further delay changes the fraction of a sample and with it L itself, so the delay margin is not
-read off L: it is the first loss of stability of the loop as its delay grows.
+A further delay changes the fraction of a sample and with it L itself, so the delay margin does not
+follow from L: it is the first loss of stability of the loop as its delay grows.
 
-Crossings are sought between angles that keep poles, zeros and turns of the delay apart, and at
-the extrema between them; they are refined to rounding. A pair of crossings closer together than
-that, with an extremum that no angle shows, would be missed: this is no proof.
+Crossings are searched between angles that separate poles, zeros and turns of the delay, and around
+the extrema between them; they are refined to rounding. A pair of crossings between two angles whose
+extremum does not show at the angles would be missed: this is no proof.
 """
 
 from __future__ import annotations
@@ -29,6 +29,13 @@ __all__ = ["sampled_margins"]
 
 Vector = NDArray[np.float64]
 
+#: Relative tolerance of the angle of an extremum between two angles: a smaller one finds closer
+#: pairs of crossings and takes longer.
+_EXTREMUM = 1e-9
+
+#: Absolute and relative tolerance of the angle of a crossing, about the rounding error.
+_CROSSING, _CROSSING_RELATIVE = 1e-15, 1e-14
+
 
 def sampled_margins(
     gain: SampledLoopGain, stable: bool, further_delay: Callable[[], tuple[float, float]]
@@ -43,7 +50,7 @@ def sampled_margins(
     crossovers, turn = _gain_crossovers(gain)
     degrees = np.degrees(np.where(turn > np.pi, turn - 2.0 * np.pi, turn))
 
-    # L is real at both ends of the half circle, at 0 unless a pole stands there.
+    # L is real at both ends of the half circle, unless it has a pole at angle 0.
     inner = gain.angles[:-1]
     ends = [np.pi] if gain.integrators else [0.0, np.pi]
     places = np.unique(np.append(_crossings(side, inner), ends))
@@ -79,13 +86,13 @@ def sampled_margins(
 
 
 def _gain_crossovers(gain: SampledLoopGain) -> tuple[Vector, Vector]:
-    """Angles at which abs(L) = 1, and by how much L may turn there, in [0, 2 pi)."""
+    """Angles at which abs(L) = 1, and the rotation phi in [0, 2 pi) that moves L to -1 there."""
     found = _crossings(lambda angle: np.log(np.abs(gain.at(angle))), gain.angles)
     return found, np.mod(np.pi + np.angle(gain.at(found)), 2.0 * np.pi)
 
 
 def _crossings(f: Callable[[Vector], Vector], angles: Vector) -> Vector:
-    """Zeros of `f` between `angles`, pairs around an extremum between two of them included."""
+    """Zeros of `f` between `angles`, including pairs around an extremum between two of them."""
     from scipy.optimize import brentq, minimize_scalar
 
     values = f(angles)
@@ -103,11 +110,13 @@ def _crossings(f: Callable[[Vector], Vector], angles: Vector) -> Vector:
             lambda angle, sign=sign: sign * one(angle),
             bounds=(angles[i - 1], angles[i + 1]),
             method="bounded",
-            options={"xatol": 1e-9 * angles[i]},
+            options={"xatol": _EXTREMUM * angles[i]},
         )
         if found.fun < 0.0:
             brackets += [(angles[i - 1], found.x), (found.x, angles[i + 1])]
-    zeros = [brentq(one, low, high, xtol=1e-15, rtol=1e-14) for low, high in brackets]
+    zeros = [
+        brentq(one, low, high, xtol=_CROSSING, rtol=_CROSSING_RELATIVE) for low, high in brackets
+    ]
     exact = angles[values == 0.0]
     return np.unique(np.append(np.array(zeros, dtype=np.float64), exact))
 
@@ -115,7 +124,7 @@ def _crossings(f: Callable[[Vector], Vector], angles: Vector) -> Vector:
 def _first_loss(
     values: Vector, places: Vector, allowed: NDArray[np.bool_], sign: float, none: float
 ) -> tuple[float, float]:
-    """The smallest (or with sign -1 the largest) allowed value and its place."""
+    """The smallest allowed value (with sign -1 the largest) and its entry of `places`."""
     if not allowed.any():
         return none, math.nan
     chosen = np.flatnonzero(allowed)

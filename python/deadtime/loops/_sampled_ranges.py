@@ -1,8 +1,8 @@
-"""Ranges of the numbers of a sampled loop, and the further delay that it bears.
+"""Stable ranges of the numbers of a sampled loop, and its delay margin.
 
-Each end is the first loss of stability that `_sampled_march` meets. An end is infinite only where
-none can come: the loop gain does not depend on the number, or stays below one on the unit circle
-for every fraction of a sample, so that no delay turns it to -1.
+Each end is the first loss of stability that `_sampled_march` finds. An end is infinite only if
+stability cannot be lost: the loop gain does not depend on the number, or stays below one on the
+unit circle for every fraction of a sample, so that it is not -1 for any delay.
 """
 
 from __future__ import annotations
@@ -19,18 +19,32 @@ from deadtime.loops._sampled_march import Loss, first_loss
 
 __all__ = ["SampledNumber", "further_delay"]
 
-#: First step of a march, as a part of the value.
+#: First step of a march, relative to the value: a larger one starts faster, but is refused sooner.
 _FIRST_STEP = 1.0 / 16.0
 
-#: Fractions of a sample at which the loop gain is looked at before any delay is said to be borne.
+#: Number of delays, in equal fractions of a sample, for which the loop gain is evaluated to find
+#: whether the loop is stable for any delay; and of further ones just below a whole sample, at
+#: distances in equal ratios between these two. More miss fewer peaks between them.
 _FRACTIONS = 33
+_LATE_FRACTIONS = 9
+_LATEST, _LATE = 1e-9, 0.1
 
-#: A largest gain this close to one is neither above nor below it.
+#: Largest difference from one at which rounding leaves open whether a gain is above or below one.
 _ROUNDING = 1e-12
+
+#: Changes of a number, relative to it, for which the loop is compared to find whether it depends on
+#: the number: any two that are not special values.
+_CHANGES = (0.37, 0.71)
+
+#: The fastest mode of the plant limits the steps of a delay if it turns by more than _SLOW radians
+#: in a sample. It then turns by this angle in the longest step, in radians: a larger one is faster
+#: and could miss an oscillation.
+_SLOW = 0.5
+_STEP_OF_MODE = 0.25
 
 
 class SampledNumber:
-    """The loop gain over one named number, the others as in `values`."""
+    """The loop gain as a function of one named number; the others are those in `values`."""
 
     def __init__(
         self,
@@ -53,14 +67,13 @@ class SampledNumber:
 
     @property
     def is_idle(self) -> bool:
-        """Whether the loop gain is the same whatever the number is."""
+        """Whether the loop gain does not depend on the number."""
         if self.name in ("delay", "sample_time"):
             return False
         here = self._here
         size = abs(self.value) if self.value != 0.0 else 1.0
         there = (
-            self._build({**self._values, self.name: self.value + part * size})
-            for part in (0.37, 0.71)
+            self._build({**self._values, self.name: self.value + part * size}) for part in _CHANGES
         )
         return all(
             np.array_equal(getattr(here, matrix), getattr(other, matrix))
@@ -79,17 +92,20 @@ class SampledNumber:
 
     @property
     def bears_any_delay(self) -> bool:
-        """Whether the loop gain stays below one on the circle, whatever the delay is.
+        """Whether the loop gain stays below one on the unit circle for every delay.
 
         Raises
         ------
         ValueError
-            If double precision does not tell.
+            If double precision is not enough to decide it.
         """
         period = self._values["sample_time"]
         model = self._here
         parts = np.unique(
-            np.append(np.linspace(0.0, 1.0, _FRACTIONS), 1.0 - np.geomspace(1e-9, 0.1, 9))
+            np.append(
+                np.linspace(0.0, 1.0, _FRACTIONS),
+                1.0 - np.geomspace(_LATEST, _LATE, _LATE_FRACTIONS),
+            )
         )
         gains = (SampledLoopGain.of(model, part * period, period) for part in parts)
         largest = max(float(np.abs(gain.at(gain.corners)).max()) for gain in gains)
@@ -105,7 +121,7 @@ class SampledNumber:
         return self._values["sample_time"] if self.name == "delay" else 1.0
 
     def _jumps(self, low: float, high: float) -> tuple[float, ...]:
-        """Values at which a command arrives at the very sample, if that is read at once."""
+        """Values at which a command arrives exactly at a sample and so affects its measurement."""
         delay, period = self._values["delay"], self._values["sample_time"]
         model = self._here
         if model.L == 0.0 or self.name not in ("delay", "sample_time"):
@@ -121,16 +137,16 @@ class SampledNumber:
         )
 
     def _longest(self, value: float) -> float:
-        """A step that a mode of the plant does not swing through unseen."""
+        """Longest step, short compared with the oscillation of the fastest mode of the plant."""
         if self.name != "delay":
             return math.inf
         fastest = float(np.abs(np.linalg.eigvals(self._here.A).imag).max(initial=0.0))
         period = self._values["sample_time"]
-        return 0.25 / fastest if fastest * period > 0.5 else math.inf
+        return _STEP_OF_MODE / fastest if fastest * period > _SLOW else math.inf
 
 
 def further_delay(number: SampledNumber) -> tuple[float, float]:
-    """How much more delay a stable loop bears, and the frequency in rad/s it then swings at."""
+    """Delay margin of a stable loop in s, and the frequency in rad/s of its oscillation there."""
     if number.bears_any_delay:
         return math.inf, math.nan
     found = number.loss(math.inf)

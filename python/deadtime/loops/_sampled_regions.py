@@ -18,8 +18,7 @@ def sampled_poles_in(
 ) -> RootSet:
     """Return the poles s = ln(z)/sample_time of a transition matrix in a region.
 
-    Poles at z = 0 lie in no region. Real poles belong to a region that has the real axis as its
-    edge.
+    Poles at z = 0 are in no region. Real poles belong to a region whose edge is the real axis.
 
     Raises
     ------

@@ -1,11 +1,11 @@
 """Whether a response that is in its settling band at the end of a run stays there.
 
 A response may pass through the band, or leave it slowly after the end of the run. It counts as
-settled where it has been inside for three of the slowest time constants of the closed
-loop, 1/abs(abscissa). Poles of a loop cost many times what its simulation does, so that they are
-only asked for where the native part did not see the response die down well within the band, or
-where a pole or zero of plant or controller is slow against the time simulated: closed-loop poles
-are slow near these, or near the stability limit, where the response rings.
+settled if it has been inside for three of the slowest time constants of the closed loop,
+1/abs(abscissa). The poles of a loop take much longer to compute than its simulation, so they are
+computed in two cases only: if the response had not decayed to well within the band, or if a pole or
+zero of plant or controller is slow compared with the simulated time. Closed-loop poles are slow
+close to these, or close to the stability limit, where the response oscillates.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ __all__ = ["TIME_CONSTANTS", "abscissae", "slowest_times"]
 
 Vector = NDArray[np.float64]
 
-#: Slowest time constants that a response must have been in its band to count as settled.
+#: Time for which a response must have been in its band to count as settled, in slowest time
+#: constants of the closed loop: more misjudge fewer responses, and take longer simulations.
 TIME_CONSTANTS = 3.0
 
 
 def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None) -> Vector:
-    """Spectral abscissa in 1/s of each set, limit left out; NaN where it cannot be found."""
+    """Spectral abscissa in 1/s of each set without its limit; NaN if it cannot be found."""
     count = max(np.size(value) for value in numbers.values())
     moving = {name: value for name, value in numbers.items() if name != "limit"}
     if loop.is_sampled:
@@ -47,7 +48,7 @@ def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None
 
 
 def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any], count: int) -> Vector:
-    """Upper bound on the longest 1/abs(root) of plant and controller, roots at zero left out, s.
+    """Upper bound in s on 1/abs(root) of plant and controller, except for roots at zero.
 
     1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... (Fujiwara 1916).
     """
@@ -57,7 +58,7 @@ def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any], count: int) -> 
         rising = [np.abs(np.broadcast_to(c, count)) for c in coefficients[::-1]]
         open_ = np.ones(count, dtype=bool)
         for low, c in enumerate(rising[:-1]):
-            # The first coefficient that is not zero: what lies below it are roots at zero.
+            # c_0 is the first coefficient that is not zero: lower powers are roots at zero.
             here = open_ & (c > 0.0)
             for k, other in enumerate(rising[low + 1 :], 1):
                 ratio = np.divide(other, c, out=np.zeros(count), where=here)

@@ -1,7 +1,7 @@
-"""Step responses of many loops at once: one loop a set of numbers, their figures or their outputs.
+"""Step responses of many loops at once, one for each set of numbers: their metrics or outputs.
 
-The matrices of all sets are built together, the equations of a loop being evaluated on arrays, and
-handed to the native part in blocks, so that memory stays bounded.
+The equations of a loop are evaluated on arrays, which gives the matrices of all sets together. They
+are passed to the native part in blocks, so that memory stays bounded.
 """
 
 from __future__ import annotations
@@ -29,18 +29,26 @@ __all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
 
 Vector = NDArray[np.float64]
 
-#: Sets built and simulated together.
+#: Number of sets that are built and simulated together: more take more memory, fewer more calls.
 _BLOCK = 1 << 15
 
-# Sets that have not settled are measured over a longer time, up to so many steps of it. It lasts
-# until the output has been in its band for long enough, or so many of the slowest time constants
-# where it is still outside: an answer of the size of the step has then come down and stayed there.
-# Times are powers of the square root of 2, so that the sets of one time run together.
+# Sets that have not settled are simulated again over a longer time. The simulation times are the
+# first one times powers of 2^(1/_PER_DOUBLING), so that sets with the same time run together: a
+# larger number fits the times better to the sets and makes smaller groups. _MOST_STEPS is the
+# largest power: a larger one settles slower loops and takes longer.
 _PER_DOUBLING = 2
 _MOST_STEPS = 10 * _PER_DOUBLING
+
+# Simulation time of a set whose output is outside its band at the end, in slowest time constants of
+# its closed loop. A deviation as large as the step has then decayed to 3e-4 of it (e^-8): fewer
+# repeat the simulation more often, more make it longer.
 _TO_SETTLE = 8.0
 
-# What the native part gives where the response was inside its band at the end, and did not show
+# Added to a number of steps before it is rounded up, so that a rounding error does not make the
+# time too short.
+_STEP_ROUNDING = 1e-6
+
+# Status given by the native part to a response that is inside its band at the end, without evidence
 # that it stays there.
 _DOUBTFUL = 4
 
@@ -59,18 +67,19 @@ _METRICS = (
 
 
 class SweepStatus(IntEnum):
-    """What became of one set of a `Sweep`."""
+    """Outcome of one set of a `Sweep`."""
 
     OK = 0
-    """Simulated to the end; where metrics were asked for, settled."""
+    """Simulated to the end; if metrics were requested, the response has settled."""
     UNSETTLED = 1
     """Outside its settling band at the end, or inside it for less than three of the slowest time
-    constants of the closed loop: the settling time is NaN, and the rise time where the step was
-    not climbed either. An unstable loop held by its limit ends here."""
+    constants of the closed loop: the settling time is NaN, and so is the rise time if the output
+    did not rise through the step. An unstable loop with a bounded output is among these."""
     DIVERGED = 2
-    """Grown beyond 1e150 before the end: all NaN."""
+    """The response exceeded 1e150 before the end: all values are NaN."""
     REFUSED = 3
-    """Not simulated: the numbers make no loop that can be simulated, or endless work: all NaN."""
+    """Not simulated, because a loop with these numbers cannot be simulated or would take far too
+    much work: all values are NaN."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,17 +89,17 @@ class Sweep(ReadOnlyArrays):
     Attributes
     ----------
     values : dict of str to ndarray
-        The numbers that vary, each as it was given; they broadcast to `shape`.
+        The numbers that vary, as arrays that broadcast to `shape`.
     shape : tuple of int
         Shape of the sets.
     time : ndarray, shape (n,)
-        Output times, or first and last time of what was measured, in s.
+        Output times, or the first and last time of the measured interval, in s.
     status : ndarray of uint8, shape `shape`
         `SweepStatus` of each set.
     metrics : dict of str to ndarray, each of shape `shape`
-        The figures of `Response.info`; empty where outputs were asked for.
+        The metrics of `Response.info`; empty if outputs were requested.
     outputs : ndarray, shape (..., n), or None
-        Outputs, behind the axes of `shape`, where they were asked for.
+        Outputs, time on the last axis, if they were requested.
 
     Examples
     --------
@@ -113,13 +122,13 @@ class Sweep(ReadOnlyArrays):
 
     def __repr__(self) -> str:
         sets = "x".join(map(str, self.shape)) or "1"
-        told = [
+        counts = [
             f"{int(np.count_nonzero(self.status == status))} {status.name.lower()}"
             for status in SweepStatus
             if status and np.any(self.status == status)
         ]
         names = ", ".join(self.values)
-        return f"<Sweep: {', '.join([f'{sets} sets over {names}', *told])}>"
+        return f"<Sweep: {', '.join([f'{sets} sets over {names}', *counts])}>"
 
     def __getitem__(self, name: str) -> Vector:
         try:
@@ -146,7 +155,7 @@ class Sweep(ReadOnlyArrays):
         KeyError
             If there is no such metric.
         ValueError
-            If no set has one.
+            If the metric is NaN for every set.
         """
         measured = self[metric]
         if not np.isfinite(measured).any():
@@ -172,36 +181,35 @@ def sweep(
 ) -> Sweep:
     """Simulate the step response of a loop for many sets of its numbers.
 
-    Every set starts at rest at zero when the reference steps to `amplitude`, as in
-    `ControlLoop.step_response`, and is simulated as exactly.
+    Every set starts at rest at zero when the reference steps to `amplitude`, and is simulated as
+    exactly as by `ControlLoop.step_response`.
 
     Parameters
     ----------
     loop : ControlLoop
-        What all sets have in common.
+        The loop, with the numbers that are the same in all sets.
     values : mapping of str to (low, high, n) or array_like
         Numbers that vary, by their names in `ControlLoop.parameters`, or ``delay``,
         ``sample_time`` and ``limit``. Each range ``(low, high, n)`` of n points is an axis of the
         results, in the order given; two of them make a grid. Arrays broadcast against one another
-        behind these axes: arrays of one length are sets of numbers.
+        on the axes after these: arrays of equal length give one set for each index.
     time : float or array_like, shape (n,)
         For metrics, the time in s up to which responses are measured, from zero; of an array, the
-        first and the last time. By default ten times the longest delay or time constant, and for
-        the sets that have not settled by then as long as their closed-loop poles ask for, up to a
-        thousand times that. For responses, the output times, increasing, the first one being that
-        of the step.
+        first and the last time. By default ten times the longest delay or time constant; for sets
+        that have not settled by then, as long as their closed-loop poles require, up to a thousand
+        times that. For responses, the output times, increasing; the step is at the first one.
     responses : bool
         Return outputs instead of metrics.
     amplitude : float
         Height of the step, not zero.
     settling : float
-        Half width of the settling band as a part of the step.
+        Half width of the settling band as a fraction of the step.
     rise : (float, float)
-        Parts of the step between which the rise time is measured.
+        Fractions of the step between which the rise time is measured.
     threads : int, optional
         Number of threads; by default ``DEADTIME_NUM_THREADS``, else all cores.
     progress : bool or callable
-        True for a progress bar; or called now and then with the number of finished sets.
+        True for a progress bar; a callable is called repeatedly with the number of finished sets.
 
     Returns
     -------
@@ -213,22 +221,22 @@ def sweep(
         If the loop has no such number, a number is out of its range, the arrays do not broadcast,
         or no delay is known.
     TypeError
-        If `loop` is no `ControlLoop` or `values` no mapping.
+        If `loop` is not a `ControlLoop` or `values` is not a mapping.
 
     Notes
     -----
-    Metrics are those of `Response.info`, but measured on the response itself instead of a grid of
-    times: no peak is missed and the settling range begins where the rise ends, not at the first
-    output after it. A set that diverges has NaN for all metrics, and `Sweep.status` says so; NaN
-    elsewhere is what `Response.info` gives: a settling or rise time that was not reached. A
-    settling time is given only where the output was in the band for three of the slowest time
-    constants 1/abs(abscissa) of the closed loop before the end, or had died down to a twentieth of
-    the band with no slow pole or zero of plant or controller in play. That is evidence and no
-    proof: `design` proves what follows.
+    Metrics are those of `Response.info`, but measured on the continuous response instead of on a
+    grid of times: no peak is missed, and the interval for ``settling_min`` and ``settling_max``
+    begins exactly where the rise ends. A set that diverges has NaN for all metrics and its status
+    in `Sweep.status`; other NaN mean the same as in `Response.info`: the settling or rise time was
+    not reached. A settling time is given only if the output was in the band for three of the
+    slowest time constants 1/abs(abscissa) of the closed loop before the end, or if it had decayed
+    to a twentieth of the band and neither plant nor controller has a slow pole or zero. This is
+    evidence, not a proof; `design` proves the stability of its result.
 
-    Sampled loops with a plain integrator run in vector registers, one set a lane; the others one
-    by one on all threads. The result for a set does not depend on which other sets there are, on
-    the number of threads or on the machine's instruction set.
+    Sampled loops with a plain integrator are computed with SIMD instructions, several sets at once;
+    the others one at a time on each thread. The result for a set does not depend on the other sets,
+    on the number of threads or on the machine's instruction set.
 
     Examples
     --------
@@ -267,18 +275,18 @@ def sweep(
 
 
 class LoopSets(NamedTuple):
-    """Loops of one structure, a row a loop, and the step of their reference."""
+    """Loops with the same states, one row of `rows` each, and the step of their reference."""
 
     states: int
     rows: Vector
     amplitude: float
-    #: Whether the output runs ahead of the clock of the stepper by the delay.
+    #: Whether the output is ahead of the time of the native simulation by the delay.
     is_ahead: bool
 
 
 @dataclass(frozen=True, eq=False)
 class _Sets:
-    """What `sweep` was asked for, checked."""
+    """The arguments of `sweep`, checked."""
 
     loop: ControlLoop
     arrays: Mapping[str, Vector]
@@ -289,7 +297,7 @@ class _Sets:
     threads: int | None
 
     def only(self, places: NDArray[np.intp]) -> _Sets:
-        """Some of the sets, in one row."""
+        """The sets at `places`, as a one-dimensional array of sets."""
         arrays = {
             name: np.broadcast_to(array, self.shape).reshape(-1)[places]
             for name, array in self.arrays.items()
@@ -299,7 +307,7 @@ class _Sets:
     def blocks(
         self, progress: Report | None
     ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any], LoopSets, Any]]:
-        """Places, numbers, sets for the native part, and its progress, block by block."""
+        """Yield for each block its places, numbers, native sets and progress function."""
         flat = {name: np.broadcast_to(a, self.shape).ravel() for name, a in self.arrays.items()}
         loop, done = self.loop, 0
         for place, part in _blocks(loop, flat, math.prod(self.shape)):
@@ -323,7 +331,7 @@ class _Sets:
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
     def measured(self, times: Vector, progress: Report | None = None) -> Sweep:
-        """Metrics; the status tells of sets that are in the band, but may leave it later."""
+        """Metrics; sets that are in the band but may leave it later have the status _DOUBTFUL."""
         count, span = math.prod(self.shape), float(times[-1] - times[0])
         metrics = {name: np.full(count, np.nan) for name in _METRICS}
         status = np.empty(count, dtype=np.uint8)
@@ -347,7 +355,7 @@ class _Sets:
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), shaped)
 
     def decided(self, times: Vector, progress: Report | None) -> Sweep:
-        """Metrics; doubtful sets are decided by how long they have been in the band."""
+        """Metrics; a doubtful set counts as settled if it was in the band for long enough."""
         found = self.measured(times, progress)
         status, settled = found.status.flatten(), found.metrics["settling_time"].ravel()
         doubtful = np.flatnonzero(status == _DOUBTFUL)
@@ -355,10 +363,10 @@ class _Sets:
             inside = float(times[-1] - times[0]) - settled[doubtful]
             stays = inside * self.only(doubtful).rates() >= TIME_CONSTANTS
             status[doubtful[stays]] = SweepStatus.OK
-        return self._told(found, times, found.metrics, status)
+        return self._final(found, times, found.metrics, status)
 
     def until_settled(self, progress: Report | None) -> Sweep:
-        """Metrics of all sets, over a longer time where a set has not settled."""
+        """Metrics of all sets; sets that have not settled are simulated over a longer time."""
         loop = self.loop
         numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
         waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
@@ -369,51 +377,51 @@ class _Sets:
         ]
         span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
         found = self.measured(np.array([0.0, span]), progress)
-        metrics = {name: figures.flatten() for name, figures in found.metrics.items()}
+        metrics = {name: array.flatten() for name, array in found.metrics.items()}
         settled, status = metrics["settling_time"], found.status.flatten()
 
         def run_on(places: NDArray[np.intp], step: float) -> None:
             longer = self.only(places).measured(np.array([0.0, span * _longer(step)]))
             done = longer.status != SweepStatus.REFUSED
-            for name, figures in longer.metrics.items():
-                metrics[name][places[done]] = figures[done]
+            for name, array in longer.metrics.items():
+                metrics[name][places[done]] = array[done]
             status[places] = np.where(done, longer.status, SweepStatus.UNSETTLED)
 
         due, longest = np.flatnonzero(_is_open(status)), 0.0
         if due.size:
-            # Most settle soon after the first time: only then are poles asked for.
+            # Poles are expensive, and most of these sets settle within twice the first time.
             longest = float(_PER_DOUBLING)
             run_on(due, longest)
             due = due[_is_open(status[due])]
         rates = self.only(due).rates() if due.size else np.empty(0)
         steps = np.full(due.size, longest)
         while due.size:
-            # NaN where the output is outside at the end.
+            # NaN if the output is outside the band at the end.
             since = settled[due]
             stays = (span * _longer(steps) - since) * rates >= TIME_CONSTANTS
             status[due[stays]] = SweepStatus.OK
             more = ~stays & (rates > 0.0) & (steps < _MOST_STEPS)
             due, rates, steps, since = due[more], rates[more], steps[more], since[more]
             lasts = np.where(np.isnan(since), _TO_SETTLE / rates, since + TIME_CONSTANTS / rates)
-            wanted = np.ceil(_PER_DOUBLING * np.log2(lasts / span) + 1e-6)
-            steps = np.minimum(np.maximum(wanted, steps + 1.0), _MOST_STEPS)
+            needed = np.ceil(_PER_DOUBLING * np.log2(lasts / span) + _STEP_ROUNDING)
+            steps = np.minimum(np.maximum(needed, steps + 1.0), _MOST_STEPS)
             longest = max(longest, steps.max(initial=0.0))
             for step in np.unique(steps):
                 run_on(due[steps == step], step)
             late = _is_open(status[due])
             due, rates, steps = due[late], rates[late], steps[late]
-        return self._told(found, np.array([0.0, span * _longer(longest)]), metrics, status)
+        return self._final(found, np.array([0.0, span * _longer(longest)]), metrics, status)
 
-    def _told(
+    def _final(
         self, found: Sweep, times: Vector, metrics: dict[str, Vector], status: NDArray[np.uint8]
     ) -> Sweep:
-        """What is known in the end: sets still in doubt have not settled."""
+        """The result: doubtful sets count as unsettled, and these have no settling time."""
         status = np.where(status == _DOUBTFUL, SweepStatus.UNSETTLED, status).astype(np.uint8)
         status = status.reshape(self.shape)
         late = status == SweepStatus.UNSETTLED
-        told = {name: np.array(figures).reshape(self.shape) for name, figures in metrics.items()}
-        told["settling_time"][late] = np.nan
-        return replace(found, time=times, metrics=told, status=status)
+        shaped = {name: np.array(array).reshape(self.shape) for name, array in metrics.items()}
+        shaped["settling_time"][late] = np.nan
+        return replace(found, time=times, metrics=shaped, status=status)
 
     def rates(self) -> Vector:
         """Decay rate of the slowest root of each set, 1/s."""
@@ -427,12 +435,12 @@ def _is_open(status: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def _longer(steps: Any) -> Any:
-    """How much longer than the first simulation one of so many steps is."""
+    """Ratio of the simulation time after `steps` steps to the first one."""
     return 2.0 ** (steps / _PER_DOUBLING)
 
 
 def require_loop(loop: object) -> None:
-    """Raise where something else was given in the place of a loop."""
+    """Raise TypeError if `loop` is not a `ControlLoop`."""
     if not isinstance(loop, ControlLoop):
         raise TypeError(
             f"a {type(loop).__name__} is no ControlLoop: write the plant as Integrator, FirstOrder "
@@ -463,7 +471,7 @@ def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int
 
 
 def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
-    """Have the loop itself refuse what lies outside its ranges; the loop with numbers of all."""
+    """Set extreme values of each array in the loop, which refuses invalid ones; return the loop."""
     gains = loop.controller.gains
     for name, array in arrays.items():
         flat = array.ravel()
@@ -499,11 +507,11 @@ def _times(time: ArrayLike | None, responses: bool) -> Vector:
 def _blocks(
     loop: ControlLoop, flat: Mapping[str, Vector], count: int
 ) -> Iterator[tuple[NDArray[np.intp], dict[str, Vector]]]:
-    """Places and numbers of sets of one structure, not too many at a time."""
+    """Yield places and numbers of at most `_BLOCK` sets that have the same number of states."""
     for first in range(0, count, _BLOCK):
         places = np.arange(first, min(first + _BLOCK, count))
         part = {name: array[places] for name, array in flat.items()}
-        # A leading coefficient of zero, such as a lag of none, takes a state away.
+        # A leading coefficient of zero, for example with a lag of zero, removes a state.
         orders = np.zeros(len(places), dtype=np.int64)
         for coefficients in loop.plant._polynomials(loop.parameters | part):
             leads = np.ones(len(places), dtype=bool)
@@ -516,7 +524,7 @@ def _blocks(
 
 
 def _steady(loop: ControlLoop, numbers: Mapping[str, Any], amplitude: float) -> Any:
-    """Steady output of every set, NaN where there is none within the limit."""
+    """Steady output of every set; NaN if the command it needs exceeds the limit."""
     output, command = rest_of(loop.plant, loop.controller, numbers)
     limit = numbers.get("limit", np.inf)
     return np.where(np.abs(command * amplitude) <= limit, output * amplitude, np.nan)
