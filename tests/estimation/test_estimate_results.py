@@ -1,4 +1,4 @@
-"""What the result of every method can do: be read, written, drawn, sent to another process."""
+"""Results of every method can be read, written, plotted, and sent to another process."""
 
 import json
 import math
@@ -16,7 +16,7 @@ KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=
 
 
 def suitable_recording(method):
-    """A flight that suits a method, and the method with its options."""
+    """A recording that suits a method, and the method with its options."""
     truth = KNOWN.replace(delay=0.36)
     if method == "relay":
         return dtm.Experiment.relay(15.0, 0.5).run(truth, noise=0.005), KNOWN, method
@@ -28,15 +28,15 @@ def suitable_recording(method):
         "decay": {"Kp": 0.6, "duration": 12.0},
         "decrement": {"Kp": 3.0, "limit": None, "duration": 8.0},
     }
-    flight, known = record_step(noise=0.005, rest=1.0, **special.get(method, {}))
-    return flight, known, method
+    recording, known = record_step(noise=0.005, rest=1.0, **special.get(method, {}))
+    return recording, known, method
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_result_is_whole(method):
-    # A relay's could not be drawn, one of the frequency method not be sent to another process.
-    flight, known, method = suitable_recording(method)
-    fit = dtm.estimate_delay(flight, known, method=method)
+def test_every_result_is_complete(method):
+    # Every result can be plotted, converted and pickled, whatever its method.
+    recording, known, method = suitable_recording(method)
+    fit = dtm.estimate_delay(recording, known, method=method)
     assert "nan" not in fit.summary().lower().replace("dominant", "")
     assert math.isfinite(json.loads(json.dumps(fit.to_dict(), allow_nan=False))["delay"])
     axes = fit.plot()
@@ -57,22 +57,22 @@ def test_every_result_is_whole(method):
 
 
 @pytest.mark.parametrize("method", ["output_error", "waveform", "grid"])
-def test_a_lag_that_is_not_there_leaves_the_other_numbers_exact(method):
-    # The profile of an exact fit had no sign change, and the grid could not part delay and lag.
-    flight, known = record_step(rest=1.0)
-    fit = dtm.estimate_delay(flight, known, method=method, free=("delay", "gain", "lag"))
+def test_an_absent_lag_leaves_the_other_numbers_exact(method):
+    # The profile of an exact fit may lack a sign change, and the grid must separate delay and lag.
+    recording, known = record_step(rest=1.0)
+    fit = dtm.estimate_delay(recording, known, method=method, free=("delay", "gain", "lag"))
     assert fit.delay == pytest.approx(0.36, abs=1e-8)
     assert fit.lag == pytest.approx(0.0, abs=1e-8)
     if fit.calibrated:
         assert fit.ci() == pytest.approx((0.36, 0.36), abs=1e-8)
 
 
-def test_the_profile_of_a_fit_without_lag_holds_the_best_delay():
-    # Profiles of continuous loops knew lags from the shortest on only, none at all was left out.
-    flight, known = record_step(
+def test_the_profile_of_a_fit_without_lag_contains_the_best_delay():
+    # Profiles of continuous loops must include a lag of exactly zero.
+    recording, known = record_step(
         Kp=2.0, ts=None, dt=0.05, limit=None, noise=0.005, rest=1.0, noise_in_loop=False
     )
-    fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "gain", "lag"))
+    fit = dtm.estimate_delay(recording, known, method="waveform", free=("delay", "gain", "lag"))
     assert fit.lag == 0.0
     low, high = fit.ci()
     assert low < fit.delay < high
@@ -80,7 +80,7 @@ def test_the_profile_of_a_fit_without_lag_holds_the_best_delay():
 
 
 @pytest.mark.parametrize("window", [3, (1.0,), "1 to 3"])
-def test_a_window_that_is_none_is_shown(window):
-    flight, known = record_step(rest=1.0)
+def test_an_invalid_window_is_refused_with_the_expected_form(window):
+    recording, known = record_step(rest=1.0)
     with pytest.raises(TypeError, match=r"give a range \(low, high\)"):
-        dtm.estimate_delay(flight, known, window=window)
+        dtm.estimate_delay(recording, known, window=window)

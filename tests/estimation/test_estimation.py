@@ -1,4 +1,4 @@
-"""Delay estimation: the paper's numbers, exact recovery, coverage, and what is refused."""
+"""Delay estimation: the paper's numbers, exact recovery, coverage, and refusals."""
 
 import math
 
@@ -43,7 +43,7 @@ def record_step(
     dt=None,
     noise_in_loop=True,
 ):
-    """A simulated flight and what is known of its loop."""
+    """A simulated recording and the known part of its loop."""
     loop = dtm.ControlLoop(
         dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=ts, limit=limit
     )
@@ -82,7 +82,7 @@ def test_the_papers_table_1(gain, overshoot, delay):
 
 @given(st.floats(1e-4, 0.98))
 def test_the_dominant_map_is_the_lambert_w_root(overshoot):
-    # eqs. 3 and 6 as they stand: s = W0(-x)/Td has the damping ratio of eq. 5
+    # Equations 3 and 6 of the paper: s = W0(-x)/Td has the damping ratio of equation 5.
     x = dominant_x(overshoot)
     root = mpmath.lambertw(-x, 0)
     zeta = float(abs(root.real) / abs(root))
@@ -90,11 +90,11 @@ def test_the_dominant_map_is_the_lambert_w_root(overshoot):
 
 
 @pytest.mark.parametrize("x", [1.0, 1.2, 1.5, 2.5])
-def test_the_exact_overshoot_is_x_minus_a_half_from_one_on(x):
+def test_the_exact_overshoot_is_x_minus_a_half_from_x_1_on(x):
     assert exact_overshoot(x) == pytest.approx(x - 0.5, rel=1e-14)
 
 
-def test_the_exact_overshoot_in_its_second_piece():
+def test_the_exact_overshoot_in_its_second_interval():
     for x in np.linspace(2 - math.sqrt(2), 1.0, 9):
         w = 1 - math.sqrt(2 * x - 1)
         piece = 2 * x - x**2 / 2 + (1 - x) * w - w**2 / 2 + w**3 / 6 - 1
@@ -123,12 +123,12 @@ def test_there_is_no_overshoot_up_to_one_over_e():
 
 
 @given(st.floats(1e-5, 3.0))
-def test_the_exact_map_and_its_inverse_belong_together(overshoot):
+def test_the_exact_map_and_its_inverse_are_inverse_to_each_other(overshoot):
     assert exact_overshoot(exact_x(overshoot)) == pytest.approx(overshoot, abs=1e-12)
 
 
 @pytest.mark.parametrize("value", [0.0, -0.1, 1.0, 1.7, math.nan])
-def test_no_damping_ratio_without_a_solution(value):
+def test_a_damping_ratio_without_a_solution_is_refused(value):
     with pytest.raises(dtm.NotIdentifiableError, match="between 0 and 100"):
         dtm.damping_ratio(value)
 
@@ -137,68 +137,70 @@ def test_no_damping_ratio_without_a_solution(value):
 
 
 def test_exact_overshoot_of_a_noise_free_continuous_loop_has_no_bias():
-    flight, known = record_step(Kp=1.31, ts=None, dt=0.002, duration=8.0)
-    fit = dtm.estimate_delay(flight, known, method=Overshoot(map="exact"))
-    # the largest of samples 2 ms apart misses the peak by 1e-6 of the step at most
+    recording, known = record_step(Kp=1.31, ts=None, dt=0.002, duration=8.0)
+    fit = dtm.estimate_delay(recording, known, method=Overshoot(map="exact"))
+    # The largest of samples 2 ms apart is below the peak by at most 1e-6 of the step.
     assert fit.delay == pytest.approx(0.36, abs=2e-5)
-    dominant = dtm.estimate_delay(flight, known, method=Overshoot(map="dominant"))
-    # the one pair of roots reads 0.3 % too long at x = 0.47
+    dominant = dtm.estimate_delay(recording, known, method=Overshoot(map="dominant"))
+    # The dominant pair of roots alone gives a delay that is 0.3 % too long at x = 0.47.
     assert dominant.delay / 0.36 - 1 == pytest.approx(0.0031, abs=2e-4)
 
 
-def test_the_saturated_map_undoes_hold_and_limit():
-    flight, known = record_step(Kp=2.4, limit=1.0, size=1.0)
-    fit = dtm.estimate_delay(flight, known, method=Overshoot(map="saturated"))
+def test_the_saturated_map_accounts_for_hold_and_limit():
+    recording, known = record_step(Kp=2.4, limit=1.0, size=1.0)
+    fit = dtm.estimate_delay(recording, known, method=Overshoot(map="saturated"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
-    # what the maps without them make of it
-    exact = dtm.estimate_delay(flight, known, method=Overshoot(map="exact"))
+    # The maps without hold and limit give these errors.
+    exact = dtm.estimate_delay(recording, known, method=Overshoot(map="exact"))
     assert abs(exact.delay - 0.36) > 0.02
 
 
-def test_the_paper_at_its_own_overshoot_with_the_limit():
-    # the paper's "numerical method" without its coarse step: 0.36864 s from Mo = 2.30 %
+def test_the_saturated_map_at_the_overshoot_of_the_paper():
+    # The paper's "numerical method" without its coarse step: 0.36864 s from Mo = 2.30 %
     known = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), limit=1.0)
     time = np.arange(0.0, 9.0, 0.001)
     reference = np.where(time < 1.0, 0.0, 1.0)
     truth = known.replace(delay=0.36864)
     output = truth.simulate(time, reference, reference_time=time, initial_output=0.0).outputs
     assert output.max() - 1 == pytest.approx(0.0230, abs=2e-6)
-    flight = dtm.Recording(time, reference, output)
-    fit = dtm.estimate_delay(flight, known, method=Overshoot(map="saturated"))
+    recording = dtm.Recording(time, reference, output)
+    fit = dtm.estimate_delay(recording, known, method=Overshoot(map="saturated"))
     assert fit.delay == pytest.approx(0.36864, abs=1e-6)
 
 
 def test_the_overshoot_method_gives_no_interval_and_says_why():
-    flight, known = record_step(Kp=2.0, noise=0.002)
-    fit = dtm.estimate_delay(flight, known, method="overshoot")
+    recording, known = record_step(Kp=2.0, noise=0.002)
+    fit = dtm.estimate_delay(recording, known, method="overshoot")
     assert not fit.calibrated
     with pytest.raises(ValueError, match="biased upwards"):
         fit.ci(0.95)
     assert "no interval" in fit.summary()
 
 
-def test_no_overshoot_is_refused_by_name():
-    flight, known = record_step(Kp=0.9)  # x = 0.324 < 1/e
+def test_a_step_without_overshoot_is_refused_by_name():
+    recording, known = record_step(Kp=0.9)  # x = 0.324 < 1/e
     with pytest.raises(dtm.NotIdentifiableError, match=r"no overshoot.*1/e"):
-        dtm.estimate_delay(flight, known, method="overshoot")
+        dtm.estimate_delay(recording, known, method="overshoot")
 
 
 def test_an_overshoot_within_the_noise_is_refused():
-    flight, known = record_step(Kp=1.2, noise=0.01, seed=3)
+    recording, known = record_step(Kp=1.2, noise=0.01, seed=3)
     with pytest.raises(dtm.NotIdentifiableError, match="noise"):
-        dtm.estimate_delay(flight, known, method="overshoot")
+        dtm.estimate_delay(recording, known, method="overshoot")
 
 
 def test_the_overshoot_method_is_for_an_integrator_under_p_control():
-    flight, known = record_step(Kp=2.0)
+    recording, known = record_step(Kp=2.0)
     with pytest.raises(ValueError, match="Integrator under P control"):
-        dtm.estimate_delay(flight, known.replace(controller=dtm.PV(2.0, 0.1)), method="overshoot")
+        dtm.estimate_delay(
+            recording, known.replace(controller=dtm.PV(2.0, 0.1)), method="overshoot"
+        )
 
 
 def test_two_steps_in_the_window_are_refused():
-    flight, known = record_step(Kp=2.0)
+    recording, known = record_step(Kp=2.0)
     twice = dtm.Recording(
-        flight.time, np.where(flight.time > 6, 2.0, flight.reference), flight.output
+        recording.time, np.where(recording.time > 6, 2.0, recording.reference), recording.output
     )
     with pytest.raises(dtm.NotIdentifiableError, match="2 steps"):
         dtm.estimate_delay(twice, known, method="overshoot")
@@ -211,41 +213,43 @@ def test_two_steps_in_the_window_are_refused():
 @pytest.mark.parametrize(
     ("delay", "gain", "lag"), [(0.36, 1.0, 0.0), (0.05, 1.0, 0.0), (0.26, 0.85, 0.17)]
 )
-def test_a_noise_free_flight_is_recovered_exactly(delay, gain, lag, ts):
-    flight, known = record_step(
+def test_a_noise_free_recording_is_recovered_exactly(delay, gain, lag, ts):
+    recording, known = record_step(
         delay, gain, lag, Kp=2.0, ts=ts, dt=TS, limit=None if ts is None else 1.0
     )
     free = ("delay", "gain", "lag") if lag else ("delay", "gain")
-    fit = dtm.estimate_delay(flight, known, free=free)
-    # far below the 0.01 ms that would show a jump between two grid points
+    fit = dtm.estimate_delay(recording, known, free=free)
+    # The tolerance is far below the 0.01 ms of a jump between two grid points.
     assert fit.delay == pytest.approx(delay, abs=1e-7)
     assert fit.gain == pytest.approx(gain, abs=1e-6)
     assert fit.lag == pytest.approx(lag, abs=1e-6)
     assert fit.adequate
 
 
-def test_all_of_the_step_may_be_at_the_limit_at_first():
-    flight, known = record_step(0.4, 0.9, Kp=2.4, limit=0.5, size=2.0, duration=15.0)
-    fit = dtm.estimate_delay(flight, known)
+def test_the_whole_step_may_begin_at_the_limit():
+    recording, known = record_step(0.4, 0.9, Kp=2.4, limit=0.5, size=2.0, duration=15.0)
+    fit = dtm.estimate_delay(recording, known)
     assert (fit.delay, fit.gain) == pytest.approx((0.4, 0.9), abs=1e-7)
 
 
 @pytest.mark.survey
-def test_intervals_cover_what_they_say():
-    # Noise that does not circulate: residuals are white and 95 % intervals should hold the truth
-    # 95 times in 100. Fewer than 86 of 100 happens once in 2000 with right intervals.
+def test_intervals_cover_as_often_as_stated():
+    # Noise outside the loop: residuals are white, and 95 % intervals should contain the true value
+    # in 95 of 100. With correct intervals fewer than 86 of 100 occurs once in 2000 times.
     held = 0
     for seed in range(100):
-        flight, known = record_step(0.36, noise=0.01, seed=seed, noise_in_loop=False, duration=8.0)
-        fit = dtm.estimate_delay(flight, known, free=("delay",))
+        recording, known = record_step(
+            0.36, noise=0.01, seed=seed, noise_in_loop=False, duration=8.0
+        )
+        fit = dtm.estimate_delay(recording, known, free=("delay",))
         low, high = fit.ci(0.95)
         held += low <= 0.36 <= high
     assert held >= 86
 
 
 def test_the_standard_error_is_the_cramer_rao_bound_when_residuals_are_white():
-    flight, known = record_step(0.36, noise=0.01, seed=1, noise_in_loop=False)
-    fit = dtm.estimate_delay(flight, known)
+    recording, known = record_step(0.36, noise=0.01, seed=1, noise_in_loop=False)
+    fit = dtm.estimate_delay(recording, known)
     assert fit.whiteness.white
     assert fit.crb.free == ("delay", "gain", "initial output")
     assert fit.stderr["delay"] == fit.crb.stderr["delay"]
@@ -255,9 +259,9 @@ def test_the_standard_error_is_the_cramer_rao_bound_when_residuals_are_white():
     def output(**change):
         loop = fit.loop.replace(**change)
         return loop.simulate(
-            flight.time,
-            flight.reference,
-            reference_time=flight.time,
+            recording.time,
+            recording.reference,
+            reference_time=recording.time,
             initial_output=fit.details["initial_output"],
         ).outputs
 
@@ -266,9 +270,9 @@ def test_the_standard_error_is_the_cramer_rao_bound_when_residuals_are_white():
         for name, value in (("delay", fit.delay), ("gain", fit.gain))
     ]
     shifted = fit.loop.simulate(
-        flight.time,
-        flight.reference,
-        reference_time=flight.time,
+        recording.time,
+        recording.reference,
+        reference_time=recording.time,
         initial_output=fit.details["initial_output"] + step,
     ).outputs
     columns.append((shifted - output()) / step)
@@ -277,22 +281,22 @@ def test_the_standard_error_is_the_cramer_rao_bound_when_residuals_are_white():
     assert fit.crb.stderr["delay"] == pytest.approx(bound, rel=1e-3)
 
 
-def test_a_lag_that_is_left_out_is_noticed():
-    flight, known = record_step(0.26, 0.9, 0.2, Kp=2.0, noise=0.001, seed=2)
-    without = dtm.estimate_delay(flight, known, free=("delay", "gain"))
+def test_a_lag_missing_from_the_model_is_detected():
+    recording, known = record_step(0.26, 0.9, 0.2, Kp=2.0, noise=0.001, seed=2)
+    without = dtm.estimate_delay(recording, known, free=("delay", "gain"))
     assert not without.adequate
     assert without.stderr["delay"] > without.crb.stderr["delay"]
     assert "lag" in without.message
-    with_lag = dtm.estimate_delay(flight, known, free=("delay", "gain", "lag"))
+    with_lag = dtm.estimate_delay(recording, known, free=("delay", "gain", "lag"))
     assert with_lag.delay == pytest.approx(0.26, abs=0.02)
     assert with_lag.rms < 0.5 * without.rms
-    # the sum is known far better than its parts
+    # The sum is known far better than its parts.
     assert with_lag.stderr["delay+lag"] < 0.5 * with_lag.stderr["delay"]
 
 
-def test_a_lag_that_is_not_there_comes_out_at_its_bound_and_is_said_so():
-    flight, known = record_step(0.36, 1.0, 0.0, Kp=2.0, noise=0.002, seed=5)
-    fit = dtm.estimate_delay(flight, known, free=("delay", "gain", "lag"))
+def test_an_absent_lag_is_estimated_at_its_bound():
+    recording, known = record_step(0.36, 1.0, 0.0, Kp=2.0, noise=0.002, seed=5)
+    fit = dtm.estimate_delay(recording, known, free=("delay", "gain", "lag"))
     assert fit.lag >= 0.0
     assert fit.delay_plus_lag == pytest.approx(0.36, abs=0.01)
     assert fit.ci(0.95, "lag")[0] == 0.0
@@ -301,16 +305,16 @@ def test_a_lag_that_is_not_there_comes_out_at_its_bound_and_is_said_so():
 @settings(max_examples=15)
 @given(st.floats(0.02, 0.8), st.floats(0.4, 2.0), st.floats(0.3, 1.3))
 def test_any_stable_loop_is_recovered(delay, gain, x):
-    flight, known = record_step(delay, gain, Kp=x / (gain * (delay + TS)), duration=20.0)
-    fit = dtm.estimate_delay(flight, known)
+    recording, known = record_step(delay, gain, Kp=x / (gain * (delay + TS)), duration=20.0)
+    fit = dtm.estimate_delay(recording, known)
     assert fit.delay == pytest.approx(delay, abs=1e-6)
     assert fit.gain == pytest.approx(gain, rel=1e-6)
 
 
-def test_a_window_that_begins_in_flight_knows_the_commands_before_it():
-    flight, known = record_step(0.36, 0.9, Kp=2.4, duration=20.0)
+def test_a_window_that_begins_in_motion_uses_the_commands_before_it():
+    recording, known = record_step(0.36, 0.9, Kp=2.4, duration=20.0)
     moving = dtm.Recording(
-        flight.time, np.where(flight.time > 10, 1.5, flight.reference), flight.output
+        recording.time, np.where(recording.time > 10, 1.5, recording.reference), recording.output
     )
     loop = known.replace(delay=0.36, gain=0.9)
     moving = dtm.Recording(
@@ -320,7 +324,7 @@ def test_a_window_that_begins_in_flight_knows_the_commands_before_it():
             moving.time, moving.reference, reference_time=moving.time, initial_output=0.0
         ).outputs,
     )
-    # 3 s after the first step commands of 1e-2 are still on their way
+    # 3 s after the first step, commands of 1e-2 are still in transit.
     fit = dtm.estimate_delay(moving, known, window=(4.0, 20.0))
     assert fit.delay == pytest.approx(0.36, abs=1e-5)
 
@@ -337,20 +341,20 @@ def test_a_window_that_begins_in_flight_knows_the_commands_before_it():
     ],
 )
 def test_what_cannot_be_estimated_is_refused_with_the_reason(change, words):
-    flight, known = record_step(Kp=2.0)
+    recording, known = record_step(Kp=2.0)
     with pytest.raises((dtm.DeadtimeError, ValueError), match=words):
-        dtm.estimate_delay(flight, known, **change)
+        dtm.estimate_delay(recording, known, **change)
 
 
-def test_a_name_is_the_short_form_of_the_object_with_its_default_options():
-    flight, known = record_step(Kp=2.0, noise=0.01)
+def test_a_method_name_means_the_method_with_default_options():
+    recording, known = record_step(Kp=2.0, noise=0.01)
     for name, kind in METHODS.items():
         assert kind().name == name
-    by_name = dtm.estimate_delay(flight, known, method="waveform")
-    by_object = dtm.estimate_delay(flight, known, method=Waveform())
+    by_name = dtm.estimate_delay(recording, known, method="waveform")
+    by_object = dtm.estimate_delay(recording, known, method=Waveform())
     assert by_name == by_object
     with pytest.raises(TypeError, match=r"such as Waveform\(\), got ABCMeta"):
-        dtm.estimate_delay(flight, known, method=Waveform)
+        dtm.estimate_delay(recording, known, method=Waveform)
 
 
 @pytest.mark.parametrize(
@@ -377,27 +381,27 @@ def test_options_are_checked_when_the_method_is_made(kind, options, words):
         kind(**options)
 
 
-def test_an_output_that_never_moves_is_refused():
-    flight, known = record_step(Kp=2.0)
-    still = dtm.Recording(flight.time, flight.reference, 0.0 * flight.time)
+def test_a_constant_output_is_refused():
+    recording, known = record_step(Kp=2.0)
+    still = dtm.Recording(recording.time, recording.reference, 0.0 * recording.time)
     with pytest.raises(dtm.NotIdentifiableError, match="did not move"):
         dtm.estimate_delay(still, known)
 
 
 def test_a_reference_that_copies_the_output_is_refused():
     # As autopilots log it while a mode is inactive; cross-correlation would say 0.000 s.
-    flight, known = record_step(Kp=2.0, noise=0.01)
-    copy = dtm.Recording(flight.time, flight.output, flight.output)
+    recording, known = record_step(Kp=2.0, noise=0.01)
+    copy = dtm.Recording(recording.time, recording.output, recording.output)
     with pytest.raises(dtm.NotIdentifiableError, match="setpoint is inactive"):
         dtm.estimate_delay(copy, known)
 
 
 def test_wrong_types_are_named():
-    flight, known = record_step(Kp=2.0)
+    recording, known = record_step(Kp=2.0)
     with pytest.raises(TypeError, match="must be a Recording"):
         dtm.estimate_delay([1, 2], known)
     with pytest.raises(TypeError, match="must be a ControlLoop"):
-        dtm.estimate_delay(flight, 2.0)
+        dtm.estimate_delay(recording, 2.0)
 
 
 # --- residuals ------------------------------------------------------------------------------
@@ -412,14 +416,14 @@ def test_white_residuals_pass_and_coloured_ones_do_not():
     assert whiteness_of(np.zeros(50)).white
 
 
-def test_white_residuals_are_rejected_about_as_often_as_promised():
+def test_white_residuals_are_rejected_at_the_stated_rate():
     rng = np.random.default_rng(1)
     rejected = sum(not whiteness_of(rng.normal(size=200)).white for _ in range(600))
     # 1 % of 600 is 6; more than 18 has probability below 1e-4
     assert rejected <= 18
 
 
-def test_robust_standard_errors_hold_under_colour_and_white_ones_do_not():
+def test_robust_standard_errors_are_right_for_coloured_noise_and_white_ones_are_not():
     # Mean of an AR(1) process: its standard deviation is known, sigma sqrt((1+rho)/(1-rho)/n).
     rng = np.random.default_rng(2)
     n, rho = 2000, 0.7
@@ -439,17 +443,19 @@ def test_robust_standard_errors_hold_under_colour_and_white_ones_do_not():
 # --- real flights ---------------------------------------------------------------------------
 
 
-def real(name, Kp):
-    flight = dtm.read_recording(flight_path(name), time="t_s", reference="ref_m", output="height_m")
-    return flight, dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=TS, limit=1.0)
+def real_flight(name, Kp):
+    recording = dtm.read_recording(
+        flight_path(name), time="t_s", reference="ref_m", output="height_m"
+    )
+    return recording, dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=TS, limit=1.0)
 
 
 def test_a_real_flight_with_overshoot():
-    flight, loop = real("ardrone2_height_step_2_4_0_25.csv", 2.4)
+    recording, loop = real_flight("ardrone2_height_step_2_4_0_25.csv", 2.4)
     window = (13, 25.5)
-    paper = dtm.estimate_delay(flight, loop, method="overshoot", window=window)
+    paper = dtm.estimate_delay(recording, loop, method="overshoot", window=window)
     assert paper.delay == pytest.approx(0.339, abs=0.01)
-    fit = dtm.estimate_delay(flight, loop, window=window)
+    fit = dtm.estimate_delay(recording, loop, window=window)
     assert 0.42 <= fit.delay <= 0.44
     assert 0.74 <= fit.gain <= 0.76
     assert not fit.adequate
@@ -458,28 +464,28 @@ def test_a_real_flight_with_overshoot():
     assert fit.crb.stderr["delay"] == pytest.approx(0.0036, abs=0.0005)
     low, high = fit.ci(0.95)
     assert low < 0.43 < high
-    lagged = dtm.estimate_delay(flight, loop, window=window, free=("delay", "gain", "lag"))
+    lagged = dtm.estimate_delay(recording, loop, window=window, free=("delay", "gain", "lag"))
     assert lagged.delay == pytest.approx(0.232, abs=0.01)
     assert lagged.lag == pytest.approx(0.227, abs=0.01)
     assert lagged.gain == pytest.approx(0.85, abs=0.01)
 
 
 def test_a_real_flight_without_overshoot():
-    flight, loop = real("ardrone2_height_step_0_5_1_0.csv", 0.5)
+    recording, loop = real_flight("ardrone2_height_step_0_5_1_0.csv", 0.5)
     window = (13, 25.5)
     with pytest.raises(dtm.NotIdentifiableError, match="no overshoot"):
-        dtm.estimate_delay(flight, loop, method="overshoot", window=window)
-    fit = dtm.estimate_delay(flight, loop, window=window)
+        dtm.estimate_delay(recording, loop, method="overshoot", window=window)
+    fit = dtm.estimate_delay(recording, loop, window=window)
     assert 0.235 <= fit.delay <= 0.28
     assert fit.gain == pytest.approx(0.71, abs=0.01)
-    other, other_loop = real("ardrone2_height_step_2_4_0_25.csv", 2.4)
+    other, other_loop = real_flight("ardrone2_height_step_2_4_0_25.csv", 2.4)
     better = dtm.estimate_delay(other, other_loop, window=window)
     assert fit.stderr["delay"] > 2 * better.stderr["delay"]
 
 
 @pytest.mark.parametrize("free", [("delay",), ("delay", "gain"), ("delay", "gain", "lag")])
-def test_a_search_for_a_delay_that_is_not_there_comes_to_an_end(free):
-    """A continuous fit drifted to ever shorter delays and lags, each dearer to simulate."""
+def test_a_search_for_an_absent_delay_terminates(free):
+    """A continuous fit must not approach zero delay and lag by ever more costly simulations."""
     time = np.arange(0.0, 12.0, 0.065)
     reference = np.where(time >= 3.0, 1.0, 0.0)
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.4))

@@ -1,4 +1,4 @@
-"""Estimation takes memory in proportion to the rows of a recording, by every method."""
+"""The memory of every estimation method is proportional to the rows of a recording."""
 
 import tracemalloc
 
@@ -13,12 +13,12 @@ from step_recordings import record_step
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
 
-#: Bytes a row, some 250 doubles: one matrix of rows by rows would be 12 kB a row.
+#: Bytes per row, about 250 doubles: a square matrix of the rows would take 12 kB per row.
 MOST = 2000
 
 
 def suitable_recording(method, rows):
-    """A flight of so many rows that suits a method, and the method with its options."""
+    """A recording with this many rows that suits a method, and the method with its options."""
     truth = KNOWN.replace(delay=0.36)
     if method == "relay":
         return dtm.Experiment.relay(0.065 * rows, 0.5).run(truth, noise=0.005), KNOWN, method
@@ -31,24 +31,24 @@ def suitable_recording(method, rows):
         "decrement": {"Kp": 3.0, "limit": None},
     }.get(method, {})
     duration = 7.0 if "dt" in special else 0.065 * rows - 1.0
-    flight, known = record_step(noise=0.005, rest=1.0, duration=duration, **special)
-    return flight, known, method
+    recording, known = record_step(noise=0.005, rest=1.0, duration=duration, **special)
+    return recording, known, method
 
 
 def peak(method, rows):
-    flight, known, method = suitable_recording(method, rows)
+    recording, known, method = suitable_recording(method, rows)
     tracemalloc.start()
-    dtm.estimate_delay(flight, known, method=method)
+    dtm.estimate_delay(recording, known, method=method)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return most
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_memory_grows_with_the_rows_not_with_their_square(method):
-    # The full factor of a singular value decomposition took 20 GB for 50 000 rows, and the ARX
-    # scan kept the command once for every delay.
-    peak(method, 400)  # what is imported on the way counts once
+def test_memory_grows_linearly_with_the_rows(method):
+    # A full singular value decomposition would take 20 GB for 50 000 rows, and an ARX scan must
+    # not keep one copy of the command for each delay.
+    peak(method, 400)  # Modules imported by the first call count only once.
     assert (peak(method, 1600) - peak(method, 400)) / 1200 < MOST
 
 

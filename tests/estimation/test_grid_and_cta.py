@@ -1,4 +1,4 @@
-"""The cost over a grid of delays, and Chebyshev's approximation of the delay."""
+"""The cost over a grid of delays, and the Chebyshev approximation of the delay."""
 
 import deadtime as dtm
 import numpy as np
@@ -21,10 +21,10 @@ METHODS = ("grid", "cta")
 
 
 @pytest.mark.parametrize("ts", [None, TS])
-def test_the_grid_is_exact_where_the_model_is(ts):
-    flight, known = record_step(gain=0.8, lag=0.15, ts=ts, dt=TS, duration=6.0)
+def test_the_grid_method_is_exact_for_an_exact_model(ts):
+    recording, known = record_step(gain=0.8, lag=0.15, ts=ts, dt=TS, duration=6.0)
     fit = dtm.estimate_delay(
-        flight, known.replace(gain=1.0), method="grid", free=("delay", "gain", "lag")
+        recording, known.replace(gain=1.0), method="grid", free=("delay", "gain", "lag")
     )
     assert fit.delay == pytest.approx(0.36, abs=1e-7)
     assert fit.gain == pytest.approx(0.8, abs=1e-7)
@@ -32,10 +32,10 @@ def test_the_grid_is_exact_where_the_model_is(ts):
     assert fit.adequate
 
 
-def test_the_curve_is_kept_and_its_local_minima_are_named():
+def test_the_cost_curve_is_kept_and_its_local_minima_are_named():
     # In a limit cycle a delay that is off by a period fits almost as well.
-    flight, known = record_step(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, noise_in_loop=False)
-    fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
+    recording, known = record_step(Kp=4.6, limit=0.5, noise=0.01, duration=9.0, noise_in_loop=False)
+    fit = dtm.estimate_delay(recording, known, method="grid", free=("delay",))
     delays, costs = np.array(fit.details["delays"]), np.array(fit.details["costs"])
     assert delays.shape == costs.shape
     assert fit.delay == pytest.approx(0.36, abs=0.01)
@@ -44,16 +44,16 @@ def test_the_curve_is_kept_and_its_local_minima_are_named():
     assert lowest in fit.details["local_minima"]
 
 
-def test_a_grid_of_ones_own():
-    flight, known = record_step()
+def test_a_grid_may_be_given():
+    recording, known = record_step()
     grid = np.linspace(0.2, 0.6, 9)
-    fit = dtm.estimate_delay(flight, known, method=Grid(delays=grid), free=("delay",))
+    fit = dtm.estimate_delay(recording, known, method=Grid(delays=grid), free=("delay",))
     assert fit.details["delays"] == pytest.approx(grid.tolist())
     assert fit.delay == pytest.approx(0.36, abs=1e-9)
     with pytest.raises(dtm.NotIdentifiableError, match="other `delays`"):
-        dtm.estimate_delay(flight, known, method=Grid(delays=[0.1, 0.15, 0.2]), free=("delay",))
+        dtm.estimate_delay(recording, known, method=Grid(delays=[0.1, 0.15, 0.2]), free=("delay",))
     with pytest.raises(ValueError, match="three"):
-        dtm.estimate_delay(flight, known, method=Grid(delays=[0.1, 0.2]))
+        dtm.estimate_delay(recording, known, method=Grid(delays=[0.1, 0.2]))
 
 
 @pytest.mark.parametrize(
@@ -68,22 +68,22 @@ def test_a_grid_of_ones_own():
         ("1 %, Kp 3, no limit", 1.04),
     ],
 )
-def test_the_benchmark_of_the_waveform(case, published):
-    # 24 flights: the root mean square is known to 14 %.
+def test_the_errors_of_the_grid_are_those_of_the_benchmark(case, published):
+    # 24 recordings: the root mean square is known to 14 %.
     errors, _ = delay_errors(case, 24, Grid(initial_output=0.0))
     assert root_mean_square(errors) < 1.2 * published * 1.14
 
 
-def test_the_curvature_is_the_spread_where_noise_does_not_circulate():
-    errors, said = [], []
+def test_the_curvature_gives_the_spread_for_noise_outside_the_loop():
+    errors, stderrs = [], []
     for seed in range(24):
-        flight, known = record_step(noise=0.01, seed=seed, noise_in_loop=False)
-        fit = dtm.estimate_delay(flight, known, method="grid", free=("delay",))
+        recording, known = record_step(noise=0.01, seed=seed, noise_in_loop=False)
+        fit = dtm.estimate_delay(recording, known, method="grid", free=("delay",))
         errors.append(fit.delay - 0.36)
-        said.append(fit.stderr["delay"])
+        stderrs.append(fit.stderr["delay"])
         low, high = fit.details["curvature_interval_95"]
         assert low < fit.delay < high
-    assert root_mean_square(errors) / np.mean(said) == pytest.approx(1.0, abs=0.4)
+    assert root_mean_square(errors) / np.mean(stderrs) == pytest.approx(1.0, abs=0.4)
     with pytest.raises(ValueError, match="does not act on"):
         fit.ci()
 
@@ -91,7 +91,7 @@ def test_the_curvature_is_the_spread_where_noise_does_not_circulate():
 # --- cta ------------------------------------------------------------------------------------
 
 
-def test_the_matrix_differentiates_polynomials():
+def test_the_differentiation_matrix_is_exact_for_polynomials():
     points = np.cos(np.pi * np.arange(7) / 6)
     for power in range(7):
         slope = power * points ** max(0, power - 1)
@@ -102,13 +102,13 @@ def test_the_matrix_differentiates_polynomials():
     ("Kp", "published"),
     [(1.31, (-4.2, -0.21, 0.004, 0.000)), (3.0, (-15.7, -1.6, 0.05, 0.000))],
 )
-def test_the_published_bias_of_few_intervals(Kp, published):
+def test_few_intervals_have_the_published_bias(Kp, published):
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), delay=0.36, delay_path="measurement")
     time = np.arange(0.0, 5.0, 0.01)
-    flight = dtm.Recording(time, np.ones(time.size), loop.simulate(time, 1.0).outputs)
+    recording = dtm.Recording(time, np.ones(time.size), loop.simulate(time, 1.0).outputs)
     for intervals, bias in zip((2, 3, 4, 6), published, strict=True):
         fit = dtm.estimate_delay(
-            flight,
+            recording,
             loop.replace(delay=None),
             method=CTA(intervals=intervals, initial_output=0.0),
             free=("delay",),
@@ -132,7 +132,7 @@ def test_chebyshev_with_a_lag_and_two_steps():
     assert fit.lag == pytest.approx(0.1, abs=1e-5)
 
 
-def test_chebyshev_in_noise_is_the_fit_of_the_waveform():
+def test_chebyshev_with_noise_equals_the_fit_of_the_waveform():
     for case, published in (("continuous, Kp 1.31", 0.90), ("continuous, Kp 3", 0.14)):
         errors, _ = delay_errors(case, 5, CTA(initial_output=0.0))
         assert root_mean_square(errors) < 1.2 * published * 1.4
@@ -143,19 +143,19 @@ def test_chebyshev_in_noise_is_the_fit_of_the_waveform():
     [({"sample_time": TS}, "a hold"), ({"limit": 1.0}, "a limit")],
 )
 def test_chebyshev_is_for_linear_continuous_loops(change, words):
-    flight, known = record_step(ts=None, dt=0.02, limit=None)
+    recording, known = record_step(ts=None, dt=0.02, limit=None)
     with pytest.raises(ValueError, match=words):
-        dtm.estimate_delay(flight, known.replace(**change), method="cta")
+        dtm.estimate_delay(recording, known.replace(**change), method="cta")
     with pytest.raises(ValueError, match="intervals"):
-        dtm.estimate_delay(flight, known, method=CTA(intervals=0))
+        dtm.estimate_delay(recording, known, method=CTA(intervals=0))
 
 
-# --- what both refuse -----------------------------------------------------------------------
+# --- refusals of both -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_nothing_to_fit_is_refused(method):
-    flight, known = record_step(
+def test_recordings_without_information_are_refused(method):
+    recording, known = record_step(
         ts=None, dt=0.04, limit=None, rest=1.0, noise=0.003, noise_in_loop=False
     )
 
@@ -163,13 +163,13 @@ def test_nothing_to_fit_is_refused(method):
         return dtm.estimate_delay(recording, known, method=method, **options)
 
     with pytest.raises(dtm.NotIdentifiableError, match="does not excite"):
-        estimate(flight, window=(4.8, 6.0))
+        estimate(recording, window=(4.8, 6.0))
     with pytest.raises(dtm.NotIdentifiableError, match="did not move"):
-        estimate(replace_signals(flight, output=np.zeros(len(flight))))
+        estimate(replace_signals(recording, output=np.zeros(len(recording))))
     with pytest.raises(dtm.NotIdentifiableError, match="too few"):
-        estimate(flight, window=(0.5, 1.1))
+        estimate(recording, window=(0.5, 1.1))
     with pytest.raises(ValueError, match="unknown"):
-        estimate(flight, free=("gain",))
+        estimate(recording, free=("gain",))
     for seed in range(4):
         with pytest.raises(dtm.NotIdentifiableError):
-            estimate(noise_for_output(flight, seed), free=("delay", "gain"))
+            estimate(noise_for_output(recording, seed), free=("delay", "gain"))

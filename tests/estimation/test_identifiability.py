@@ -1,4 +1,4 @@
-"""The bound of an experiment before it is flown: closed forms, and that estimates come out so."""
+"""The Cramér-Rao bound of a planned experiment: closed forms, and the errors of estimates."""
 
 import copy
 import os
@@ -24,7 +24,7 @@ def held_loop(Kp=1.31, delay=0.36, lag=0.0, gain=1.0, sample_time=TS, limit=1.0)
     return dtm.ControlLoop(plant, dtm.P(Kp), delay=delay, sample_time=sample_time, limit=limit)
 
 
-# --- slopes ---------------------------------------------------------------------------------
+# --- sensitivities --------------------------------------------------------------------------
 
 
 @settings(max_examples=25)
@@ -34,30 +34,32 @@ def held_loop(Kp=1.31, delay=0.36, lag=0.0, gain=1.0, sample_time=TS, limit=1.0)
     gain=st.floats(0.3, 2.0),
     seed=st.integers(0, 1000),
 )
-def test_slopes_of_the_plant_are_those_of_the_held_response(delay, lag, gain, seed):
+def test_sensitivities_of_the_plant_are_those_of_the_held_response(delay, lag, gain, seed):
     loop = held_loop(1.0, delay, lag, gain)
-    flight = dtm.Experiment.prbs(5.0, 0.4, 0.4, seed=seed).run(loop)
-    found = from_the_command(loop, flight, ("delay", "gain", "lag"), offset=True)
-    truth = HeldResponse(flight.time, flight.command).at(flight.time - delay - 1e-9 * TS, lag)
+    recording = dtm.Experiment.prbs(5.0, 0.4, 0.4, seed=seed).run(loop)
+    found = from_the_command(loop, recording, ("delay", "gain", "lag"), offset=True)
+    truth = HeldResponse(recording.time, recording.command).at(
+        recording.time - delay - 1e-9 * TS, lag
+    )
     np.testing.assert_allclose(found["delay"], -gain * truth.rate, atol=1e-7)
     np.testing.assert_allclose(found["gain"], truth.value, atol=1e-8)
     np.testing.assert_allclose(found["lag"], gain * truth.by_lag, atol=1e-7)
     assert (found["initial output"] == 1.0).all()
 
 
-def test_slopes_of_any_plant_are_difference_quotients():
+def test_sensitivities_of_any_plant_are_difference_quotients():
     plant = dtm.FirstOrder(1.4, time_constant=0.7)
     loop = dtm.ControlLoop(plant, dtm.P(1.2), delay=0.2, sample_time=0.05)
     experiment = dtm.Experiment.square(6.0, 1.0, 1.1, sample_time=0.05)
-    flight = experiment.run(loop)
-    found = from_the_command(loop, flight, ("delay", "gain", "time_constant"), offset=False)
+    recording = experiment.run(loop)
+    found = from_the_command(loop, recording, ("delay", "gain", "time_constant"), offset=False)
 
     def answer(delay=0.2, gain=1.4, time_constant=0.7):
         system = dtm.FirstOrder(gain, time_constant).transfer_function() * dtm.delay(delay)
-        return system.simulate(flight.time, flight.command, input_time=flight.time).outputs
+        return system.simulate(recording.time, recording.command, input_time=recording.time).outputs
 
     step = 1e-6
-    # The delay is a whole number of samples: only longer ones have a slope.
+    # The delay is a whole number of samples, so only an increase has a derivative.
     slope = (answer(delay=0.2 + step) - answer(delay=0.2)) / step
     np.testing.assert_allclose(found["delay"], slope, atol=1e-5)
     for name in ("gain", "time_constant"):
@@ -66,7 +68,7 @@ def test_slopes_of_any_plant_are_difference_quotients():
         np.testing.assert_allclose(found[name], slope, atol=1e-8)
 
 
-def test_slopes_of_the_loop_are_difference_quotients_also_by_the_start():
+def test_sensitivities_of_the_loop_are_difference_quotients_also_by_the_start():
     loop, experiment = held_loop(lag=0.1), dtm.Experiment.square(5.0, 0.6, 0.9)
     found = from_the_reference(loop, experiment, ("delay", "gain", "lag"), True, noise=0.01)
 
@@ -99,7 +101,7 @@ def test_slopes_of_the_loop_are_difference_quotients_also_by_the_start():
     ("noise", "alone", "with_gain_and_offset"),
     [(0.003, 0.81e-3, 1.07e-3), (0.01, 2.70e-3, 3.58e-3), (0.03, 8.10e-3, 10.7e-3)],
 )
-def test_the_bounds_of_a_step_are_known(noise, alone, with_gain_and_offset):
+def test_the_bounds_of_a_step_are_those_of_the_closed_form(noise, alone, with_gain_and_offset):
     loop, step = held_loop(), dtm.Experiment.step(5.0)
     known = dtm.identifiability(loop, step, noise=noise, free=("delay",), initial_output=0.0)
     assert known.stderr["delay"] == pytest.approx(alone, rel=0.006)
@@ -128,7 +130,7 @@ def test_the_bounds_of_a_step_are_known(noise, alone, with_gain_and_offset):
         (held_loop(delay=0.30, lag=0.06), 0.01, 2.76),
     ],
 )
-def test_the_bounds_of_other_loops_are_known(loop, noise, expected):
+def test_the_bounds_of_other_loops_are_the_published_ones(loop, noise, expected):
     # The continuous loops without a limit are logged every 10 ms.
     between = loop.sample_time or (0.01 if loop.limit is None else TS)
     step = dtm.Experiment.step(5.0, sample_time=between)
@@ -144,7 +146,7 @@ def over_sequences(duration):
     ("experiments", "Kp", "expected", "tolerance"),
     [
         ([dtm.Experiment.step(5.0)], 1.31, (2.66, 18.3, 2.81), 0.005),
-        # A sample more or less in the record is 0.7 %.
+        # One sample more or less in the record changes the bound by 0.7 %.
         ([dtm.Experiment.relay(5.0, 0.5)], 1.31, (2.61, 13.2, 2.87), 0.01),
         ([dtm.Experiment.square(20.0, 0.25, 0.8)], 3.0, (0.65, 3.8, 0.72), 0.02),
         # A binary sequence is one of many: the mean over eight of them, whose bounds scatter by
@@ -154,7 +156,7 @@ def over_sequences(duration):
         (over_sequences(20.0), 3.0, (0.72, 3.1, 0.75), 0.08),
     ],
 )
-def test_designs_determine_what_they_are_known_to(experiments, Kp, expected, tolerance):
+def test_designs_have_the_published_bounds(experiments, Kp, expected, tolerance):
     loop = held_loop(Kp, lag=0.06)
     found = []
     for experiment in experiments:
@@ -163,13 +165,13 @@ def test_designs_determine_what_they_are_known_to(experiments, Kp, expected, tol
         free = dtm.identifiability(loop, experiment, **options).stderr
         found.append([alone, free["delay"], free["delay+lag"]])
     mean = 1e3 * np.mean(found, axis=0)
-    # Half of the last digit that is printed is no error either.
+    # Half of the last printed digit is not an error.
     np.testing.assert_allclose(
         mean, expected, rtol=tolerance, atol=0.05 if max(expected) > 3 else 0
     )
 
 
-def test_a_longer_step_tells_nothing_more():
+def test_a_longer_step_gives_no_more_information():
     short, long = (
         dtm.identifiability(
             held_loop(lag=0.06),
@@ -183,18 +185,18 @@ def test_a_longer_step_tells_nothing_more():
     assert short == pytest.approx(long, rel=1e-4)
 
 
-def test_the_sum_is_known_where_the_parts_are_not():
+def test_the_sum_of_delay_and_lag_is_known_where_the_parts_are_not():
     plan = dtm.identifiability(held_loop(lag=0.06), dtm.Experiment.step(), noise=0.01)
     assert plan.correlation < -0.98
     assert plan.stderr["delay"] > 5 * plan.stderr["delay+lag"]
-    # The error of the sum is that of its parts with their correlation.
+    # The error of the sum follows from those of its parts and their correlation.
     of = plan.stderr
     sum_of_squares = of["delay"] ** 2 + of["lag"] ** 2
     mixed = 2 * plan.correlation * of["delay"] * of["lag"]
     assert of["delay+lag"] == pytest.approx(np.sqrt(sum_of_squares + mixed))
 
 
-def test_the_mean_information_of_noisy_runs_is_near_that_of_the_quiet_one():
+def test_the_mean_information_of_noisy_runs_is_near_that_of_the_noise_free_run():
     for experiment, change in (
         (dtm.Experiment.step(), 0.02),
         (dtm.Experiment.relay(5.0, 0.5), 0.2),
@@ -218,7 +220,7 @@ def test_a_continuous_loop_has_the_bound_of_its_reference_alone():
     assert "continuous" in plan.summary()
 
 
-def test_a_filter_on_samples_leaves_the_bound_of_the_command():
+def test_a_sampled_filter_has_only_the_bound_with_the_command():
     smooth = dtm.DerivativeFilter(20.0, discretisation="tustin")
     loop = held_loop(lag=0.06).replace(controller=dtm.PV(1.3, 0.1, smooth))
     plan = dtm.identifiability(loop, dtm.Experiment.step(), noise=0.01)
@@ -227,7 +229,7 @@ def test_a_filter_on_samples_leaves_the_bound_of_the_command():
     assert plan.stderr["delay"] > 0.0
 
 
-def test_what_is_found_is_told_in_words_and_drawn():
+def test_a_plan_has_a_summary_and_plots():
     plan = dtm.identifiability(held_loop(lag=0.06), dtm.Experiment.step(), noise=0.01)
     text = plan.summary()
     for part in ("step of 1", "command logged", "reference only", "delay+lag s", "-0.9"):
@@ -247,10 +249,10 @@ def test_what_is_found_is_told_in_words_and_drawn():
         again.cov[0, 0] = 1.0
 
 
-# --- estimates come out as planned ----------------------------------------------------------
+# --- estimates agree with the plan ----------------------------------------------------------
 
 
-def test_estimates_scatter_as_the_bound_says_and_not_by_the_number_of_processes():
+def test_estimates_scatter_as_the_bound_says_for_any_number_of_processes():
     plan = dtm.identifiability(
         held_loop(), dtm.Experiment.step(), noise=0.01, free=("delay",), initial_output=0.0
     )
@@ -271,7 +273,7 @@ def test_estimates_scatter_as_the_bound_says_and_not_by_the_number_of_processes(
     )
 
 
-def test_a_gain_alone_is_estimated_with_the_delay_as_it_is():
+def test_the_gain_alone_is_estimated_with_the_true_delay():
     plan = dtm.identifiability(
         held_loop(), dtm.Experiment.step(), noise=0.01, free=("gain",), initial_output=0.0
     )
@@ -282,7 +284,7 @@ def test_a_gain_alone_is_estimated_with_the_delay_as_it_is():
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.06])
-def test_coverage_is_that_of_the_intervals(lag):
+def test_coverage_counts_the_intervals_that_contain_the_true_value(lag):
     loop, level = held_loop(lag=lag), 0.5
     free = ("delay", "gain", "lag") if lag else ("delay", "gain")
     plan = dtm.identifiability(loop, dtm.Experiment.prbs(8.0, 0.4, 0.2), noise=0.01, free=free)
@@ -290,8 +292,8 @@ def test_coverage_is_that_of_the_intervals(lag):
     held = dict.fromkeys(tried.coverage, 0)
     for i in range(12):
         seed = np.random.SeedSequence(5, spawn_key=(i,))
-        flight = plan.experiment.run(loop, 0.01, seed)
-        fit = dtm.estimate_delay(flight, loop.replace(delay=None), free=free)
+        recording = plan.experiment.run(loop, 0.01, seed)
+        fit = dtm.estimate_delay(recording, loop.replace(delay=None), free=free)
         for name in held:
             low, high = fit.ci(level, name)
             held[name] += low <= tried.truth[name] <= high
@@ -304,7 +306,7 @@ def test_other_methods_are_tried_by_name():
         held_loop(lag=0.06), dtm.Experiment.step(rest=1.04), noise=0.01, free=("delay", "gain")
     )
     tried = plan.monte_carlo(6, "waveform", known=held_loop().replace(delay=None))
-    # Without its lag the model takes that for delay.
+    # The model without a lag attributes it to the delay.
     assert tried.bias["delay"] == pytest.approx(0.06, abs=0.02)
     assert tried.bias["delay+lag"] == pytest.approx(0.0, abs=0.02)
 
@@ -322,7 +324,7 @@ def test_refusals_are_counted_by_their_reason():
     assert f"{refused} refused" in tried.summary()
 
 
-def test_a_method_that_is_refused_every_time_says_why():
+def test_a_method_that_always_refuses_reports_why():
     loop = held_loop(Kp=0.5)
     step = dtm.Experiment.step(12.0, rest=1.0)
     plan = dtm.identifiability(loop, step, noise=1e-5, free=("delay",))
@@ -355,17 +357,17 @@ def test_an_interrupt_ends_all_processes_cleanly(tmp_path):
         text=True,
         start_new_session=True,
     )
-    assert run.stdout.readline()  # the processes are at work
-    # As a terminal does: to all of them.
+    assert run.stdout.readline()  # The processes are running.
+    # A terminal sends the signal to all of them.
     os.killpg(run.pid, signal.SIGINT)
     begin = time.monotonic()
-    told, errors = run.communicate(timeout=60)
-    assert told.splitlines()[-1] == "interrupted", errors
+    output, errors = run.communicate(timeout=60)
+    assert output.splitlines()[-1] == "interrupted", errors
     assert "Traceback" not in errors
     assert time.monotonic() - begin < 60
 
 
-def test_a_script_that_would_start_itself_again_is_told_what_to_do(tmp_path):
+def test_a_script_without_a_main_guard_gets_an_error_with_advice(tmp_path):
     script = tmp_path / "unguarded.py"
     plain = INTERRUPTED.replace('if __name__ == "__main__":', "if True:").replace("50_000", "200")
     script.write_text(plain)
@@ -376,7 +378,7 @@ def test_a_script_that_would_start_itself_again_is_told_what_to_do(tmp_path):
     assert "processes=1" in run.stderr.splitlines()[-1]
 
 
-def test_what_the_loop_has_is_free_unless_said():
+def test_the_parameters_of_the_loop_are_free_by_default():
     experiment = dtm.Experiment.step()
     plain = dtm.identifiability(held_loop(), experiment, noise=0.01)
     assert plain.free == ("delay", "gain")
@@ -384,7 +386,7 @@ def test_what_the_loop_has_is_free_unless_said():
     assert lagging.free == ("delay", "gain", "lag")
 
 
-# --- how it fails ---------------------------------------------------------------------------
+# --- refusals -------------------------------------------------------------------------------
 
 
 def flat(value=0.0):
@@ -418,7 +420,7 @@ def flat(value=0.0):
         ),
     ],
 )
-def test_what_an_experiment_cannot_tell_is_refused_with_the_reason(
+def test_what_an_experiment_cannot_identify_is_refused_with_the_reason(
     loop, experiment, options, match
 ):
     with pytest.raises(dtm.NotIdentifiableError, match=match):
@@ -437,7 +439,7 @@ def test_what_an_experiment_cannot_tell_is_refused_with_the_reason(
         ({"experiment": np.zeros(9)}, "not an Experiment"),
     ],
 )
-def test_bad_arguments_are_refused(change, match):
+def test_invalid_arguments_are_refused(change, match):
     given = {"loop": held_loop(lag=0.1), "experiment": dtm.Experiment.step(), "noise": 0.01}
     given |= change
     with pytest.raises((ValueError, TypeError), match=match):
@@ -453,7 +455,7 @@ def test_bad_arguments_are_refused(change, match):
         ({"method": "guess"}, "not one of"),
     ],
 )
-def test_bad_arguments_of_many_flights_are_refused(options, match):
+def test_invalid_arguments_of_repeated_runs_are_refused(options, match):
     plan = dtm.identifiability(
         held_loop(), dtm.Experiment.step(), noise=0.01, free=("delay",), initial_output=0.0
     )

@@ -1,4 +1,4 @@
-"""Output error with the logged command: on the Cramér-Rao bound, and honest about a lag."""
+"""Output error with the logged command: it reaches the Cramér-Rao bound and covers with a lag."""
 
 import deadtime as dtm
 import numpy as np
@@ -15,7 +15,7 @@ TS = 0.065
 
 
 def record_step(delay=0.36, gain=1.0, lag=0.0, Kp=1.31, noise=0.0, seed=0, limit=1.0, duration=6.0):
-    """A flight whose sensor noise the controller acts on, its command logged, and what is known."""
+    """A recording with sensor noise in the loop and a logged command, and its loop as known."""
     loop = dtm.ControlLoop(
         dtm.Integrator(gain, lag), dtm.P(Kp), delay=delay, sample_time=TS, limit=limit
     )
@@ -37,15 +37,15 @@ def test_the_response_is_that_of_a_fine_simulation(lag):
     fine = np.linspace(0.0, 2.0, 20001)
     held = command[np.searchsorted(time, fine, side="right") - 1]
     system = ([1.0], [lag, 1.0, 0.0] if lag else [1.0, 0.0])
-    # lsim draws lines between samples, so a jump is smeared over one step of 1e-4.
+    # lsim interpolates linearly between samples, so a jump is smeared over one step of 1e-4.
     truth = lsim(system, held, fine)[1]
     found = HeldResponse(time, command).at(fine, lag)
     np.testing.assert_allclose(found.value, truth, rtol=0, atol=2e-4)
 
 
 @pytest.mark.parametrize("lag", [0.003, 0.06, 2.0])
-def test_even_and_uneven_commands_give_one_response(lag):
-    # One command a little late leaves the filters for the recursion.
+def test_equidistant_and_other_commands_give_the_same_response(lag):
+    # With one command slightly late the recursion is used instead of the filters.
     time = TS * np.arange(200)
     command = np.random.default_rng(0).normal(size=200)
     late = time + np.where(np.arange(200) == 150, 1e-10, 0.0)
@@ -76,16 +76,16 @@ def test_the_derivatives_are_those_of_the_response(steps, lag, seed):
         np.testing.assert_allclose(now.by_lag, slope, atol=1e-7 / lag + 1e-7)
 
 
-# --- what is found --------------------------------------------------------------------------
+# --- estimates ------------------------------------------------------------------------------
 
 
 @settings(max_examples=25)
 @given(delay=st.floats(0.0, 0.8), gain=st.floats(0.3, 2.0), lag=st.floats(0.02, 0.5))
-def test_a_noise_free_flight_is_recovered_exactly(delay, gain, lag):
+def test_a_noise_free_recording_is_recovered_exactly(delay, gain, lag):
     plain, known = record_step(delay, gain)
     fit = dtm.estimate_delay(plain, known)
-    assert fit.method == "output_error"  # what the default takes when there is a command
-    # The cost is that of an exact model: the delay comes out to rounding of the clock.
+    assert fit.method == "output_error"  # the default for a logged command
+    # The model is exact, so the delay is recovered to the rounding of the clock.
     assert fit.delay == pytest.approx(delay, abs=1e-9)
     assert fit.gain == pytest.approx(gain, abs=1e-9)
     assert fit.adequate
@@ -149,7 +149,7 @@ def test_the_sum_of_delay_and_lag_is_known_when_the_parts_are_not():
     assert fit.delay_plus_lag == pytest.approx(0.36, abs=3 * fit.stderr["delay+lag"])
 
 
-def test_profiles_meet_the_interval_where_they_say():
+def test_the_profile_reaches_the_t_quantile_at_the_ends_of_the_interval():
     flight, known = record_step(0.30, lag=0.06, noise=0.01, seed=5)
     fit = dtm.estimate_delay(flight, known, free=("delay", "gain", "lag"))
     assert "profile likelihood" in fit.message
@@ -165,28 +165,28 @@ def test_profiles_meet_the_interval_where_they_say():
     assert t.min() < 0.2
 
 
-def test_profile_and_gauss_agree_where_both_hold():
+def test_the_profile_agrees_with_the_normal_interval_where_both_are_valid():
     flight, known = record_step(noise=0.01, seed=7)
     fit = dtm.estimate_delay(flight, known)
     low, high = fit.ci()
     _, t = fit.profile("delay", [low, high])
-    # Nearly linear in the delay: corners of the response at samples bend the profile a little.
+    # Nearly linear in the delay, except that corners of the response at samples bend the profile.
     np.testing.assert_allclose(t, 1.99, rtol=0.1)
 
 
-def test_a_window_in_flight_knows_the_commands_before_it():
+def test_a_window_that_begins_in_motion_uses_the_commands_before_it():
     flight, known = record_step(0.36, 0.9)
     fit = dtm.estimate_delay(flight, known, window=(1.4, 4.0))
     assert (fit.delay, fit.gain) == pytest.approx((0.36, 0.9), abs=1e-9)
 
 
-# --- how it fails ---------------------------------------------------------------------------
+# --- refusals -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("Kp", "known"), [(1.31, 1.50), (3.0, 2.6)])
-def test_a_continuous_command_is_not_taken_as_held(Kp, known):
-    # Taken as held it moves half a sample, and 1.50 and 2.6 ms were the errors; the bounds are
-    # 0.88 and 0.16 ms.
+def test_a_continuous_command_is_not_treated_as_held(Kp, known):
+    # Treated as held it would shift by half a sample, with errors of 1.50 and 2.6 ms; the bounds
+    # are 0.88 and 0.16 ms.
     errors = []
     for seed in range(40):
         flight, loop = step_recordings.record_step(
@@ -199,12 +199,12 @@ def test_a_continuous_command_is_not_taken_as_held(Kp, known):
     assert np.sqrt(np.mean(np.square(errors))) < 0.8 * known
 
 
-def test_a_lag_that_is_left_out_is_noticed():
+def test_a_lag_missing_from_the_model_is_detected():
     flight, known = record_step(0.30, lag=0.15, noise=0.002, seed=1)
     fit = dtm.estimate_delay(flight, known)
     assert not fit.adequate
     assert "free=('delay', 'gain', 'lag')" in fit.message
-    # The delay takes the lag over.
+    # The delay includes the lag.
     assert fit.delay == pytest.approx(0.45, abs=0.03)
 
 
@@ -251,7 +251,7 @@ def test_what_cannot_be_estimated_is_refused_with_the_reason(change, match):
 
 @pytest.mark.parametrize("method", ["output_error", "waveform"])
 @pytest.mark.parametrize("free", [("delay",), ("delay", "gain"), ("delay", "gain", "lag")])
-def test_noise_alone_is_no_answer_to_a_command(method, free):
+def test_noise_alone_is_not_taken_for_a_response(method, free):
     flight, known = record_step(noise=0.001)
     for seed in range(6):
         output = np.random.default_rng(seed).normal(size=len(flight))
@@ -262,7 +262,7 @@ def test_noise_alone_is_no_answer_to_a_command(method, free):
             dtm.estimate_delay(noise, known, method=method, free=free)
 
 
-def test_an_estimate_without_a_profile_says_so():
+def test_an_estimate_without_a_profile_raises():
     flight, known = record_step(noise=0.001, Kp=2.0)
     fit = dtm.estimate_delay(flight, known, method="overshoot")
     with pytest.raises(ValueError, match="output_error"):

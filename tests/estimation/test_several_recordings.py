@@ -1,4 +1,4 @@
-"""Several recordings of one vehicle, fitted by one set of numbers."""
+"""Several recordings of one vehicle, fitted with the same parameters."""
 
 import deadtime as dtm
 import numpy as np
@@ -19,7 +19,7 @@ def record_step(Kp, noise, seed, size=1.0, lag=0.0, limit=1.0):
 
 @pytest.mark.parametrize("method", ["output_error", "waveform"])
 @pytest.mark.parametrize("lag", [0.0, 0.12])
-def test_noise_free_flights_are_recovered_exactly(method, lag):
+def test_noise_free_recordings_are_recovered_exactly(method, lag):
     flights, loops = zip(
         *(record_step(Kp, 0.0, 0, lag=lag) for Kp in (0.8, 1.31, 2.0)), strict=True
     )
@@ -33,8 +33,8 @@ def test_noise_free_flights_are_recovered_exactly(method, lag):
     assert "3 recordings together" in fit.summary()
 
 
-def test_two_like_flights_are_worth_twice_one():
-    # The bound on white noise is 1/sqrt(2) of that of one flight, and the errors keep to it.
+def test_two_recordings_halve_the_variance_of_one():
+    # The bound with white noise is 1/sqrt(2) of that of one recording, and the errors agree.
     errors, bounds, single = [], [], []
     for seed in range(60):
         pairs = [record_step(1.31, 0.01, 2 * seed + k) for k in range(2)]
@@ -48,21 +48,21 @@ def test_two_like_flights_are_worth_twice_one():
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.mean(bounds), rel=0.3)
 
 
-def test_a_noisy_flight_counts_by_its_noise():
+def test_a_recording_is_weighted_by_its_noise():
     quiet, loop = record_step(1.31, 0.002, 1)
     loud, _ = record_step(1.31, 0.05, 2)
     alone = dtm.estimate_delay(quiet, loop)
     both = dtm.estimate_delay([quiet, loud], loop)
     assert both.whiteness.white
-    # Information adds: 1/625 of it comes from the loud one.
+    # Information adds: 1/625 of it comes from the recording with more noise.
     assert both.stderr["delay"] <= alone.stderr["delay"] * 1.02
     assert abs(both.delay - alone.delay) < 0.2 * alone.stderr["delay"]
     # Residuals are those of the recordings, not the weighted ones of the search.
     assert both.runs[1].residuals.std() == pytest.approx(0.05, rel=0.2)
 
 
-def test_coloured_misfit_counts_by_the_size_of_the_step():
-    # A lag that is left out grows with the motion: a small and a large step say the same of it.
+def test_coloured_misfit_is_weighted_by_the_size_of_the_step():
+    # The misfit of a missing lag is proportional to the step, so both steps give the same delay.
     small, loop = record_step(1.31, 0.0, 0, size=0.25, lag=0.3, limit=None)
     large, _ = record_step(1.31, 0.0, 0, size=1.0, lag=0.3, limit=None)
     alone = dtm.estimate_delay(small, loop)
@@ -71,7 +71,7 @@ def test_coloured_misfit_counts_by_the_size_of_the_step():
     assert both.delay == pytest.approx(alone.delay, abs=1e-6)
 
 
-def test_the_joint_model_is_its_parts():
+def test_the_joint_model_consists_of_the_models_of_its_recordings():
     from deadtime.estimation.data._runs import paired_runs
     from deadtime.estimation.methods._waveform import _model
 
@@ -99,7 +99,7 @@ def test_the_joint_model_is_its_parts():
         (("two", "plants"), ValueError, "different plants"),
     ],
 )
-def test_what_does_not_fit_together_is_refused(arguments, error, match):
+def test_inconsistent_arguments_are_refused(arguments, error, match):
     flight, loop = record_step(1.31, 0.01, 0)
     other = loop.replace(plant=dtm.FirstOrder())
     named = {"two": [flight, flight], "loop": loop, "plants": [loop, other]}
@@ -112,15 +112,15 @@ def test_what_does_not_fit_together_is_refused(arguments, error, match):
         dtm.estimate_delay(recording, its_loop, window=window[0] if window else None)
 
 
-def test_methods_for_one_recording_say_so():
+def test_methods_for_one_recording_refuse_several():
     flight, loop = record_step(2.0, 0.001, 0)
     with pytest.raises(ValueError, match="one recording, not 2"):
         dtm.estimate_delay([flight, flight], loop, method="overshoot")
 
 
-def test_the_two_real_flights_together():
+def test_the_two_real_flights_are_fitted_together():
     # Two independent fits put these at 0.424 s with gain 0.734, with a lag at 0.327 + 0.105 s with
-    # gain 0.747, a second digit each.
+    # gain 0.747, each to about two digits.
     flights, loops = [], []
     for name, Kp in (("2_4_0_25", 2.4), ("0_5_1_0", 0.5)):
         path = flight_path(f"ardrone2_height_step_{name}.csv")

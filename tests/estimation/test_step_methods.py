@@ -1,4 +1,4 @@
-"""Methods that read one step: peaks, tail, the straight beginning; exact, noisy and refused."""
+"""Methods that evaluate one step by peaks, tail or initial slope: exactness, noise, refusals."""
 
 import itertools
 
@@ -40,7 +40,7 @@ def test_the_held_plant_has_the_poles_of_the_sampled_loop(delay, lag, Kp):
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize("lag", [0.0, 0.1])
 @pytest.mark.parametrize("x", [0.6, 0.9, 1.2])
-def test_the_rightmost_root_tells_delay_and_gain(ts, lag, x):
+def test_the_rightmost_root_gives_delay_and_gain(ts, lag, x):
     loop = dtm.ControlLoop(dtm.Integrator(1.0, lag), dtm.P(x / 0.36), delay=0.36, sample_time=ts)
     root = max(loop.rightmost().roots, key=lambda root: root.imag)
     assert loop_with_root(complex(root), lag, ts) == pytest.approx((0.36, x / 0.36), rel=1e-9)
@@ -48,30 +48,32 @@ def test_the_rightmost_root_tells_delay_and_gain(ts, lag, x):
 
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize("Kp", [1.6, 2.5, 3.4])
-def test_peaks_tell_delay_and_gain(ts, Kp):
-    flight, known = record_step(
+def test_peaks_give_delay_and_gain(ts, Kp):
+    recording, known = record_step(
         Kp=Kp, ts=ts, dt=0.01 if ts is None else ts, limit=None, duration=9.0
     )
-    fit = dtm.estimate_delay(flight, known.replace(gain=0.5), method="decrement")
+    fit = dtm.estimate_delay(recording, known.replace(gain=0.5), method="decrement")
     # Cubics through five or six samples of a peak: 0.3 ms where both numbers are read.
     assert fit.delay == pytest.approx(0.36, abs=3e-4)
     assert fit.gain == pytest.approx(1.0, abs=1e-3)
-    # A gain that is known makes it ten times as sharp.
-    fit = dtm.estimate_delay(flight, known, method="decrement", free=("delay",))
+    # A known gain makes the delay ten times as accurate.
+    fit = dtm.estimate_delay(recording, known, method="decrement", free=("delay",))
     assert fit.delay == pytest.approx(0.36, abs=3e-5)
 
 
-def test_peaks_in_noise():
-    # The paper's overshoot is off by 45 ms here, and by 115 ms within the limit.
+def test_peaks_with_noise():
+    # The errors of the paper's overshoot are 45 ms here, and 115 ms with the limit.
     errors, _ = delay_errors("1 %, Kp 3, no limit", 40, "decrement", rest=1.0)
     assert root_mean_square(errors) < 5.0
     errors, _ = delay_errors("1 %, Kp 3", 40, "decrement", rest=1.0)
     assert root_mean_square(errors) < 13.0
 
 
-def test_a_gain_that_is_off_is_seen_by_the_decrement():
-    flight, known = record_step(gain=0.8, Kp=3.5, noise=0.003, limit=None, duration=8.0, rest=1.0)
-    fit = dtm.estimate_delay(flight, known.replace(gain=1.0), method="decrement")
+def test_a_wrong_gain_is_detected_by_the_decrement():
+    recording, known = record_step(
+        gain=0.8, Kp=3.5, noise=0.003, limit=None, duration=8.0, rest=1.0
+    )
+    fit = dtm.estimate_delay(recording, known.replace(gain=1.0), method="decrement")
     assert fit.gain == pytest.approx(0.8, abs=0.02)
     assert fit.delay == pytest.approx(0.36, abs=0.02)
 
@@ -85,16 +87,16 @@ def test_a_gain_that_is_off_is_seen_by_the_decrement():
         ({"Kp": 4.5, "limit": 0.3, "duration": 6.0}, "at its limit of 0.3"),
     ],
 )
-def test_the_decrement_refuses_by_name(change, words):
-    flight, known = record_step(**change)
+def test_the_decrement_method_refuses_by_name(change, words):
+    recording, known = record_step(**change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
-        dtm.estimate_delay(flight, known, method="decrement")
+        dtm.estimate_delay(recording, known, method="decrement")
 
 
-def test_the_decrement_has_no_lag_to_give():
-    flight, known = record_step(Kp=3.0)
+def test_the_decrement_method_does_not_estimate_a_lag():
+    recording, known = record_step(Kp=3.0)
     with pytest.raises(ValueError, match="fix the lag"):
-        dtm.estimate_delay(flight, known, method="decrement", free=("delay", "lag"))
+        dtm.estimate_delay(recording, known, method="decrement", free=("delay", "lag"))
 
 
 # --- decay ----------------------------------------------------------------------------------
@@ -102,16 +104,16 @@ def test_the_decrement_has_no_lag_to_give():
 
 @pytest.mark.parametrize("ts", [None, TS])
 @pytest.mark.parametrize(("x", "tail", "within"), [(0.1, 0.3, 1e-9), (0.2, 0.1, 1e-6)])
-def test_the_tail_tells_the_delay(ts, x, tail, within):
-    flight, known = record_step(Kp=x / 0.36, ts=ts, dt=TS, limit=None, duration=25.0)
-    fit = dtm.estimate_delay(flight, known, method=Decay(tail=tail))
+def test_the_decay_of_the_tail_gives_the_delay(ts, x, tail, within):
+    recording, known = record_step(Kp=x / 0.36, ts=ts, dt=TS, limit=None, duration=25.0)
+    fit = dtm.estimate_delay(recording, known, method=Decay(tail=tail))
     assert fit.delay == pytest.approx(0.36, abs=within)
 
 
-def test_close_to_one_over_e_a_later_tail_is_purer():
-    flight, known = record_step(Kp=0.3 / 0.36, limit=0.5, duration=25.0)
+def test_close_to_one_over_e_a_later_tail_has_less_bias():
+    recording, known = record_step(Kp=0.3 / 0.36, limit=0.5, duration=25.0)
     off = [
-        abs(dtm.estimate_delay(flight, known, method=Decay(tail=tail)).delay - 0.36)
+        abs(dtm.estimate_delay(recording, known, method=Decay(tail=tail)).delay - 0.36)
         for tail in (0.3, 0.03, 0.001)
     ]
     assert off[0] > 10 * off[1] > 100 * off[2]
@@ -119,19 +121,19 @@ def test_close_to_one_over_e_a_later_tail_is_purer():
 
 
 def test_the_decay_with_a_known_lag():
-    flight, known = record_step(Kp=0.5, lag=0.2, limit=None, duration=30.0)
-    fit = dtm.estimate_delay(flight, known.replace(lag=0.2), method=Decay(tail=0.01))
+    recording, known = record_step(Kp=0.5, lag=0.2, limit=None, duration=30.0)
+    fit = dtm.estimate_delay(recording, known.replace(lag=0.2), method=Decay(tail=0.01))
     assert fit.delay == pytest.approx(0.36, abs=1e-4)
 
 
-def test_the_standard_error_of_the_decay_is_that_of_repeated_flights():
-    errors, said = [], []
+def test_the_standard_error_of_the_decay_is_that_of_repeated_recordings():
+    errors, stderrs = [], []
     for seed in range(60):
-        flight, known = record_step(Kp=0.55, noise=0.01, seed=seed, duration=10.0, rest=1.0)
-        fit = dtm.estimate_delay(flight, known, method="decay")
+        recording, known = record_step(Kp=0.55, noise=0.01, seed=seed, duration=10.0, rest=1.0)
+        fit = dtm.estimate_delay(recording, known, method="decay")
         errors.append(fit.delay - 0.36)
-        said.append(fit.stderr["delay"])
-    assert np.std(errors) / np.mean(said) == pytest.approx(1.0, abs=0.35)
+        stderrs.append(fit.stderr["delay"])
+    assert np.std(errors) / np.mean(stderrs) == pytest.approx(1.0, abs=0.35)
     with pytest.raises(ValueError, match="given gain"):
         fit.ci()
 
@@ -145,10 +147,10 @@ def test_the_standard_error_of_the_decay_is_that_of_repeated_flights():
         ({"Kp": 0.8, "noise": 0.05, "duration": 4.0}, 1.0, "tail|follow"),
     ],
 )
-def test_the_decay_refuses_by_name(change, known_gain, words):
-    flight, known = record_step(limit=None, **change)
+def test_the_decay_method_refuses_by_name(change, known_gain, words):
+    recording, known = record_step(limit=None, **change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
-        dtm.estimate_delay(flight, known.replace(gain=known_gain), method=Decay(tail=0.2))
+        dtm.estimate_delay(recording, known.replace(gain=known_gain), method=Decay(tail=0.2))
 
 
 # --- graphical ------------------------------------------------------------------------------
@@ -161,22 +163,22 @@ def test_the_decay_refuses_by_name(change, known_gain, words):
     st.sampled_from([None, 0.4]),
     st.sampled_from([None, TS]),
 )
-def test_the_tangent_is_exact_under_hold_and_limit(delay, Kp, limit, ts):
-    flight, known = record_step(delay, Kp=Kp, limit=limit, ts=ts, dt=ts or 0.02, duration=12.0)
-    fit = dtm.estimate_delay(flight, known, method="graphical")
+def test_the_tangent_is_exact_with_hold_and_limit(delay, Kp, limit, ts):
+    recording, known = record_step(delay, Kp=Kp, limit=limit, ts=ts, dt=ts or 0.02, duration=12.0)
+    fit = dtm.estimate_delay(recording, known, method="graphical")
     assert fit.delay == pytest.approx(delay, abs=1e-9)
 
 
 def test_the_other_constructions():
-    flight, known = record_step(duration=10.0)
-    two = dtm.estimate_delay(flight, known, method=Graphical(construction="two_point"))
+    recording, known = record_step(duration=10.0)
+    two = dtm.estimate_delay(recording, known, method=Graphical(construction="two_point"))
     assert two.delay == pytest.approx(0.36, abs=1e-9)
-    first = dtm.estimate_delay(flight, known, method=Graphical(construction="first_movement"))
+    first = dtm.estimate_delay(recording, known, method=Graphical(construction="first_movement"))
     assert 0.36 < first.delay <= 0.36 + TS
 
 
-def test_the_tangent_in_noise():
-    # Nine flights of ten within 20 ms where the paper's overshoot has 35 ms.
+def test_the_tangent_with_noise():
+    # Nine of ten errors are below 20 ms, where those of the paper's overshoot are 35 ms.
     errors, _ = delay_errors("1 %", 40, "graphical", rest=1.0)
     assert root_mean_square(errors) < 12.0
     errors, _ = delay_errors("continuous, Kp 1.31", 20, "graphical", rest=1.0)
@@ -184,8 +186,8 @@ def test_the_tangent_in_noise():
 
 
 def test_a_lag_counts_as_delay():
-    flight, known = record_step(lag=0.1)
-    fit = dtm.estimate_delay(flight, known, method="graphical")
+    recording, known = record_step(lag=0.1)
+    fit = dtm.estimate_delay(recording, known, method="graphical")
     assert 0.40 < fit.delay < 0.46
     assert not fit.adequate
     assert "lag" in fit.message
@@ -200,22 +202,22 @@ def test_a_lag_counts_as_delay():
     ],
 )
 def test_the_tangent_refuses_by_name(change, words):
-    flight, known = record_step(**change)
+    recording, known = record_step(**change)
     with pytest.raises(dtm.NotIdentifiableError, match=words):
-        dtm.estimate_delay(flight, known, method="graphical")
+        dtm.estimate_delay(recording, known, method="graphical")
 
 
 def test_graphical_options_are_checked():
-    flight, known = record_step()
+    recording, known = record_step()
     with pytest.raises(ValueError, match="not one of"):
-        dtm.estimate_delay(flight, known, method=Graphical(construction="ruler"))
+        dtm.estimate_delay(recording, known, method=Graphical(construction="ruler"))
     with pytest.raises(ValueError, match="increase"):
         dtm.estimate_delay(
-            flight, known, method=Graphical(construction="two_point", shares=(0.3, 0.1))
+            recording, known, method=Graphical(construction="two_point", shares=(0.3, 0.1))
         )
 
 
-# --- what all of them refuse ----------------------------------------------------------------
+# --- refusals of all methods ----------------------------------------------------------------
 
 LINEAR = (
     "overshoot",
@@ -229,58 +231,58 @@ LINEAR = (
 
 
 @pytest.mark.parametrize("method", LINEAR)
-def test_the_delay_was_half_of_what_it_is_in_a_limit_cycle(method):
-    # The overshoot of a loop that its limit alone keeps in bounds was read as that of a stable one.
+def test_methods_for_linear_loops_refuse_a_limit_cycle(method):
+    # The limit alone bounds this loop, so its overshoot is not that of a stable linear loop.
     flights = ((0.0, 5.0), (0.01, 5.0), (0.03, 20.0))
     for Kp, (noise, duration) in itertools.product((4.2, 4.5, 6.0), flights):
-        flight, known = record_step(Kp=Kp, noise=noise, duration=duration, rest=1.0)
+        recording, known = record_step(Kp=Kp, noise=noise, duration=duration, rest=1.0)
         with pytest.raises(dtm.NotIdentifiableError, match=r"limit cycle.*'output_error'"):
-            dtm.estimate_delay(flight, known, method=method)
+            dtm.estimate_delay(recording, known, method=method)
 
 
 @pytest.mark.parametrize("method", LINEAR)
-def test_a_loop_that_still_rings_is_no_limit_cycle(method):
+def test_a_decaying_oscillation_is_not_taken_for_a_limit_cycle(method):
     for Kp, seed in itertools.product((3.0, 3.6), range(5)):
-        flight, known = record_step(Kp=Kp, noise=0.01, duration=12.0, rest=1.0, seed=seed)
+        recording, known = record_step(Kp=Kp, noise=0.01, duration=12.0, rest=1.0, seed=seed)
         if method == "decay":
             with pytest.raises(dtm.NotIdentifiableError, match="overshoots"):
-                dtm.estimate_delay(flight, known, method=method)
+                dtm.estimate_delay(recording, known, method=method)
         else:
-            assert dtm.estimate_delay(flight, known, method=method).delay > 0.0
+            assert dtm.estimate_delay(recording, known, method=method).delay > 0.0
 
 
-def test_the_saturated_map_knows_the_limit_and_reads_a_limit_cycle():
-    flight, known = record_step(Kp=4.5, duration=12.0)
-    fit = dtm.estimate_delay(flight, known, method=Overshoot(map="saturated"))
+def test_the_saturated_map_is_exact_for_a_limit_cycle():
+    recording, known = record_step(Kp=4.5, duration=12.0)
+    fit = dtm.estimate_delay(recording, known, method=Overshoot(map="saturated"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_nothing_to_read_is_refused(method):
-    flight, known = record_step(Kp=0.8, duration=10.0)
+def test_recordings_without_information_are_refused(method):
+    recording, known = record_step(Kp=0.8, duration=10.0)
 
     def read(recording, loop=known, **options):
         return dtm.estimate_delay(recording, loop, method=method, **options)
 
     with pytest.raises(dtm.NotIdentifiableError, match="no step"):
-        read(replace_signals(flight, reference=np.ones(len(flight))))
+        read(replace_signals(recording, reference=np.ones(len(recording))))
     with pytest.raises(dtm.NotIdentifiableError, match="does not follow"):
-        read(replace_signals(flight, output=np.zeros(len(flight))))
+        read(replace_signals(recording, output=np.zeros(len(recording))))
     for seed in range(10):
         with pytest.raises(dtm.NotIdentifiableError):
-            read(noise_for_output(flight, seed))
+            read(noise_for_output(recording, seed))
     with pytest.raises(dtm.NotIdentifiableError, match="widen"):
-        read(flight, window=(0.0, 0.6))
+        read(recording, window=(0.0, 0.6))
     with pytest.raises(ValueError, match="Integrator under P"):
-        read(flight, known.replace(plant=dtm.FirstOrder()))
+        read(recording, known.replace(plant=dtm.FirstOrder()))
     with pytest.raises(ValueError, match="delay"):
-        read(flight, known.replace(delay=0.3), free=("gain",))
+        read(recording, known.replace(delay=0.3), free=("gain",))
 
 
-def test_no_interval_and_why():
-    flight, known = record_step(Kp=2.5, noise=0.003, duration=8.0, rest=1.0)
+def test_no_interval_is_given_and_the_summary_says_so():
+    recording, known = record_step(Kp=2.5, noise=0.003, duration=8.0, rest=1.0)
     for method in ("decrement", "graphical"):
-        fit = dtm.estimate_delay(flight, known, method=method)
+        fit = dtm.estimate_delay(recording, known, method=method)
         assert not fit.calibrated
         assert "no interval" in fit.summary()
         assert fit.to_dict()["interval_95"] is None

@@ -1,4 +1,4 @@
-"""The waveform method's further options: where the noise goes, the start time, hold and limit."""
+"""Further options of the waveform method: where the noise enters, start time, hold and limit."""
 
 import deadtime as dtm
 import numpy as np
@@ -17,26 +17,26 @@ def record_step(
     time = np.arange(0.0, 8.0, TS)
     reference = np.where(time < 1.0 - 1e-9, 0.0, 1.0)
     error = np.random.default_rng(seed).normal(0.0, noise, time.size) if noise else 0.0 * time
-    seen = reference - error if noise_in_loop else reference
+    measured = reference - error if noise_in_loop else reference
     if late:
-        # What the clock of the output calls t was at t - late.
+        # A sample dated t by the clock of the output was taken at t - late.
         fine = loop.simulate(
             np.r_[-1.0, time - late],
-            np.r_[0.0, seen],
+            np.r_[0.0, measured],
             reference_time=np.r_[-1.0, time],
             sample_phase=1.0 % TS if ts else 0.0,
         )
         output = fine.outputs[1:]
     else:
-        output = loop.simulate(time, seen, reference_time=time, initial_output=0.0).outputs
+        output = loop.simulate(time, measured, reference_time=time, initial_output=0.0).outputs
     known = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=ts, limit=limit)
     return dtm.Recording(time, reference, output + error), known
 
 
-def test_innovations_are_white_where_simulated_residuals_are_not():
-    flight, known = record_step(0.01, seed=2, Kp=3.0)
+def test_innovations_are_white_where_simulation_residuals_are_not():
+    recording, known = record_step(0.01, seed=2, Kp=3.0)
     plain, innovations = (
-        dtm.estimate_delay(flight, known, method=Waveform(noise=noise), free=("delay",))
+        dtm.estimate_delay(recording, known, method=Waveform(noise=noise), free=("delay",))
         for noise in ("recording", "loop")
     )
     assert innovations.method == "waveform"
@@ -46,54 +46,54 @@ def test_innovations_are_white_where_simulated_residuals_are_not():
 
 
 @pytest.mark.parametrize("noise_in_loop", [True, False])
-def test_where_the_noise_goes_is_found_out(noise_in_loop):
+def test_the_entry_of_the_noise_is_detected(noise_in_loop):
     right = 0
     for seed in range(20):
-        flight, known = record_step(0.01, seed, Kp=3.0, noise_in_loop=noise_in_loop)
-        fit = dtm.estimate_delay(flight, known, method="waveform")
+        recording, known = record_step(0.01, seed, Kp=3.0, noise_in_loop=noise_in_loop)
+        fit = dtm.estimate_delay(recording, known, method="waveform")
         right += fit.details["noise"] == ("loop" if noise_in_loop else "recording")
-    # Likelihoods of single records come close now and then: in 7 % of them here.
+    # Likelihoods of single records are sometimes close: in 7 % of the records here.
     assert right >= 16
 
 
 def test_a_recording_may_begin_with_its_step():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36, sample_time=TS, limit=1.0)
-    flight = dtm.Experiment.step(6.0).run(loop)
-    fit = dtm.estimate_delay(flight, loop.replace(delay=None), method="waveform")
+    recording = dtm.Experiment.step(6.0).run(loop)
+    fit = dtm.estimate_delay(recording, loop.replace(delay=None), method="waveform")
     assert (fit.delay, fit.gain) == pytest.approx((0.36, 1.0), abs=1e-6)
     with pytest.raises(dtm.NotIdentifiableError, match="does not excite"):
-        dtm.estimate_delay(flight, loop, method="waveform", window=(3.0, 6.0))
+        dtm.estimate_delay(recording, loop, method="waveform", window=(3.0, 6.0))
 
 
-def test_a_known_start_sharpens_the_waveform():
-    flight, known = record_step(0.01, seed=3, noise_in_loop=False)
-    free, told = (
+def test_a_known_initial_output_reduces_the_standard_error():
+    recording, known = record_step(0.01, seed=3, noise_in_loop=False)
+    free, fixed = (
         dtm.estimate_delay(
-            flight,
+            recording,
             known,
             method=Waveform(noise="recording", initial_output=start),
             free=("delay",),
         )
         for start in (None, 0.0)
     )
-    assert told.crb.free == ("delay",)
+    assert fixed.crb.free == ("delay",)
     assert free.crb.free == ("delay", "initial output")
-    assert told.stderr["delay"] < free.stderr["delay"]
-    assert told.details["initial_output"] == 0.0
+    assert fixed.stderr["delay"] < free.stderr["delay"]
+    assert fixed.details["initial_output"] == 0.0
 
 
-def test_a_delay_in_the_measurement_is_as_good_as_one_in_the_command():
-    flight, known = record_step(0.0)
-    fit = dtm.estimate_delay(flight, known.replace(delay_path="measurement"), method="waveform")
+def test_a_delay_of_the_measurement_is_estimated_like_one_of_the_command():
+    recording, known = record_step(0.0)
+    fit = dtm.estimate_delay(recording, known.replace(delay_path="measurement"), method="waveform")
     assert fit.delay == pytest.approx(0.36, abs=1e-7)
     assert fit.loop.delay_path == "measurement"
 
 
-def test_intervals_cover_where_the_noise_circulates():
+def test_intervals_cover_with_noise_in_the_loop():
     held = 0
     for seed in range(200):
-        flight, known = record_step(0.01, seed, Kp=3.0)
-        fit = dtm.estimate_delay(flight, known, method=Waveform(noise="loop"), free=("delay",))
+        recording, known = record_step(0.01, seed, Kp=3.0)
+        fit = dtm.estimate_delay(recording, known, method=Waveform(noise="loop"), free=("delay",))
         low, high = fit.ci()
         held += low <= 0.36 <= high
     # 190 of 200 expected, with a deviation of 3.1.
@@ -109,52 +109,52 @@ def test_intervals_cover_where_the_noise_circulates():
     ],
 )
 def test_innovations_need_a_command_that_can_be_computed(loop, match):
-    flight, _ = record_step(0.01)
+    recording, _ = record_step(0.01)
     with pytest.raises(dtm.NotIdentifiableError, match=match):
-        dtm.estimate_delay(flight, loop, method=Waveform(noise="loop"))
+        dtm.estimate_delay(recording, loop, method=Waveform(noise="loop"))
 
 
 @pytest.mark.parametrize("ts", [TS, None])
 @pytest.mark.parametrize("late", [0.04, 0.2])
-def test_a_clock_that_runs_late_is_recovered(ts, late):
-    flight, known = record_step(late=late, ts=ts, limit=None)
-    fit = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "start"))
+def test_a_late_clock_is_estimated(ts, late):
+    recording, known = record_step(late=late, ts=ts, limit=None)
+    fit = dtm.estimate_delay(recording, known, method="waveform", free=("delay", "start"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
     assert fit.details["start"] == pytest.approx(late, abs=1e-6)
     assert "start" in fit.summary()
     assert fit.ci(0.95, "start")[0] <= fit.details["start"]
-    # Without it the delay takes part of it over.
-    plain = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
+    # Without it the delay includes a part of it.
+    plain = dtm.estimate_delay(recording, known, method="waveform", free=("delay",))
     assert abs(plain.delay - 0.36) > 0.1 * late
 
 
-def test_a_start_that_is_not_known_costs_as_much_as_the_bound_says():
-    # 0.77 ms become 1.22 ms at 0.3 % of noise: about 1.6 times.
-    flight, known = record_step(0.003, noise_in_loop=False, ts=None)
-    alone = dtm.estimate_delay(flight, known, method="waveform", free=("delay",))
-    both = dtm.estimate_delay(flight, known, method="waveform", free=("delay", "start"))
+def test_an_unknown_start_increases_the_error_as_the_bound_says():
+    # The standard error rises from 0.77 to 1.22 ms at 0.3 % of noise, about 1.6 times.
+    recording, known = record_step(0.003, noise_in_loop=False, ts=None)
+    alone = dtm.estimate_delay(recording, known, method="waveform", free=("delay",))
+    both = dtm.estimate_delay(recording, known, method="waveform", free=("delay", "start"))
     ratio = both.crb.stderr["delay"] / alone.crb.stderr["delay"]
     assert 1.2 < ratio < 2.2
 
 
-def test_a_start_cannot_be_told_from_the_delay_where_the_command_is_logged():
-    flight, known = record_step(0.01)
+def test_a_start_cannot_be_separated_from_the_delay_where_the_command_is_logged():
+    recording, known = record_step(0.01)
     with pytest.raises(ValueError, match="choose from"):
-        dtm.estimate_delay(flight, known, method="output_error", free=("delay", "start"))
+        dtm.estimate_delay(recording, known, method="output_error", free=("delay", "start"))
 
 
-def test_a_limit_is_recovered():
-    flight, known = record_step(limit=0.7)
+def test_a_limit_is_estimated():
+    recording, known = record_step(limit=0.7)
     fit = dtm.estimate_delay(
-        flight, known.replace(limit=1.0), method="waveform", free=("delay", "limit")
+        recording, known.replace(limit=1.0), method="waveform", free=("delay", "limit")
     )
     assert fit.loop.limit == pytest.approx(0.7, abs=1e-6)
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
 
 
-def test_profiles_of_the_waveform_meet_its_intervals():
-    flight, known = record_step(0.01, seed=2, noise_in_loop=False)
-    fit = dtm.estimate_delay(flight, known, method=Waveform(noise="recording"), free=("delay",))
+def test_the_profile_reaches_the_t_quantile_at_the_ends_of_the_interval():
+    recording, known = record_step(0.01, seed=2, noise_in_loop=False)
+    fit = dtm.estimate_delay(recording, known, method=Waveform(noise="recording"), free=("delay",))
     low, high = fit.ci()
     _, t = fit.profile("delay", [low, fit.delay, high])
     assert t[1] == pytest.approx(0.0, abs=1e-3)
@@ -172,11 +172,11 @@ def test_profiles_of_the_waveform_meet_its_intervals():
         (dtm.kit_plant(), ([0.15265, 5.1529], [1.0, 5.820, 0.0])),
     ],
 )
-def test_the_path_of_a_plant_is_that_of_a_fine_simulation(plant, system):
+def test_the_response_of_a_plant_is_that_of_a_fine_simulation(plant, system):
     time, command = np.array([0.0, 0.3, 0.9, 1.4]), np.array([0.0, 1.0, -2.0, 0.5])
     fine = np.linspace(0.0, 3.0, 30001)
     held = command[np.searchsorted(time, fine, side="right") - 1]
-    # lsim draws lines between samples, so a jump of 3 is smeared over one step of 1e-4.
+    # lsim interpolates linearly, so a jump of 3 is smeared over one step of 1e-4.
     truth = lsim(system, held, fine)[1]
     path = path_of(plant, time, command)
     found = path.value(fine, plant.parameters)
@@ -193,9 +193,9 @@ def test_the_delay_of_a_first_order_plant_from_its_command():
     plant = dtm.FirstOrder(0.8, 0.3)
     path = path_of(plant, time, command).value(time - 0.17, plant.parameters)
     output = 0.8 * path + 0.05 + rng.normal(0.0, 0.002, time.size)
-    flight = dtm.Recording(time, 0.0 * time, output, command)
+    recording = dtm.Recording(time, 0.0 * time, output, command)
     loop = dtm.ControlLoop(dtm.FirstOrder(1.0, 0.5), dtm.P(1.0))
-    fit = dtm.estimate_delay(flight, loop, free=("delay", "gain", "time_constant"))
+    fit = dtm.estimate_delay(recording, loop, free=("delay", "gain", "time_constant"))
     assert fit.method == "output_error"
     for name, truth in (("delay", 0.17), ("gain", 0.8), ("time_constant", 0.3)):
         low, high = fit.ci(0.999, name)

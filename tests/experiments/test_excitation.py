@@ -96,9 +96,9 @@ def test_a_multisine_can_have_odd_lines_only_and_low_peaks():
 
 
 def test_the_logged_command_is_that_of_the_controller():
-    flight = dtm.Experiment.prbs(10.0, 0.4, 0.4).run(held_loop(dtm.P(2.0)), noise=0.02, seed=4)
-    made = np.clip(2.0 * (flight.reference - flight.output), -1.0, 1.0)
-    np.testing.assert_allclose(flight.command, made, atol=1e-12)
+    recording = dtm.Experiment.prbs(10.0, 0.4, 0.4).run(held_loop(dtm.P(2.0)), noise=0.02, seed=4)
+    made = np.clip(2.0 * (recording.reference - recording.output), -1.0, 1.0)
+    np.testing.assert_allclose(recording.command, made, atol=1e-12)
 
 
 def by_hand(controller, experiment, error, delay_samples, gain=0.9, limit=1.0):
@@ -127,9 +127,9 @@ def test_noise_in_the_loop_passes_the_filter_of_a_pv_controller():
     experiment = dtm.Experiment.square(5.0, 0.3, 0.8)
     error = np.random.default_rng(7).normal(0.0, 0.03, len(experiment))
     outputs, commands = by_hand(controller, experiment, error, delay_samples=4)
-    flight = experiment.run(held_loop(controller, 4 * TS), noise=0.03, seed=7)
-    np.testing.assert_allclose(flight.output, outputs, atol=1e-12)
-    np.testing.assert_allclose(flight.command, commands, atol=1e-11)
+    recording = experiment.run(held_loop(controller, 4 * TS), noise=0.03, seed=7)
+    np.testing.assert_allclose(recording.output, outputs, atol=1e-12)
+    np.testing.assert_allclose(recording.command, commands, atol=1e-11)
 
 
 def test_a_continuous_filter_receives_held_noise():
@@ -138,14 +138,14 @@ def test_a_continuous_filter_receives_held_noise():
     smooth = dtm.DerivativeFilter(20.0, 1.0)
     loop = held_loop(dtm.PV(1.5, 0.2, smooth), limit=None)
     quiet = dtm.Experiment.step(3.0)
-    flight = quiet.run(loop, noise=0.03, seed=2)
+    recording = quiet.run(loop, noise=0.03, seed=2)
     error = np.random.default_rng(2).normal(0.0, 0.03, len(quiet))
     # The same loop with PD, which takes held noise as its reference.
     both = loop.replace(controller=dtm.PD(1.5, 0.2, smooth)).simulate(
         quiet.time, -error, reference_time=quiet.time, reference_before=0.0, initial_output=0.0
     )
     alone = quiet.run(loop)
-    np.testing.assert_allclose(flight.output - error - alone.output, both.outputs, atol=1e-12)
+    np.testing.assert_allclose(recording.output - error - alone.output, both.outputs, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -165,18 +165,18 @@ def test_noise_outside_the_loop_does_not_change_the_loop(controller):
 def test_a_relay_gives_the_limit_cycle_of_theory():
     delay, size = 0.36, 0.5
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(3.0), delay=delay, limit=2.0)
-    flight = dtm.Experiment.relay(20.0, size, sample_time=0.005, reference=1.0).run(loop)
-    assert set(np.abs(flight.command)) == {size}
-    rises = flight.time[1:][(flight.command[1:] > 0) & (flight.command[:-1] < 0)]
+    recording = dtm.Experiment.relay(20.0, size, sample_time=0.005, reference=1.0).run(loop)
+    assert set(np.abs(recording.command)) == {size}
+    rises = recording.time[1:][(recording.command[1:] > 0) & (recording.command[:-1] < 0)]
     np.testing.assert_allclose(np.diff(rises[1:]), 4 * delay, atol=0.006)
-    late = flight.output[flight.time > 5.0]
+    late = recording.output[recording.time > 5.0]
     assert (late.max() - late.min()) / 2 == pytest.approx(size * delay, rel=0.02)
 
 
 def test_a_relay_in_a_sampled_loop_switches_at_samples_only():
-    flight = dtm.Experiment.relay(10.0, 0.5).run(held_loop(dtm.P(1.0), delay=0.36, limit=1.0))
+    recording = dtm.Experiment.relay(10.0, 0.5).run(held_loop(dtm.P(1.0), delay=0.36, limit=1.0))
     np.testing.assert_array_equal(
-        flight.command, np.where(flight.reference - flight.output >= -1e-9, 0.5, -0.5)
+        recording.command, np.where(recording.reference - recording.output >= -1e-9, 0.5, -0.5)
     )
 
 

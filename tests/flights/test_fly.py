@@ -69,8 +69,8 @@ def test_the_speed_filter_starts_at_rest():
 
 def test_a_programme_gives_the_reference_at_each_sample():
     programme = StepProgramme((1.0, 1.25, 1.0), (0.5, 0.2, 0.2), 0.1)
-    told = [programme.reference(k * 0.1) for k in range(programme.samples)]
-    assert told == [1.0] * 5 + [1.25] * 2 + [1.0] * 2
+    references = [programme.reference(k * 0.1) for k in range(programme.samples)]
+    assert references == [1.0] * 5 + [1.25] * 2 + [1.0] * 2
     with pytest.raises(ValueError, match=r"may come to 1\.5 m, outside"):
         programme.check(Limits(max_height=1.4))
     with pytest.raises(ValueError, match="shorter sample time"):
@@ -122,7 +122,7 @@ ABORTS = {
 @pytest.mark.parametrize("reason", ABORTS)
 def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
     vehicle = vehicle_with(ABORTS[reason])
-    said = "tilted" if reason == "pitch is no number" else reason
+    message = "tilted" if reason == "pitch is no number" else reason
     if reason == "more than 0.475 m apart":  # The height drifts there, so that it does not jump.
         began = []
 
@@ -140,8 +140,8 @@ def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
             return state if since < 3.0 else replace(state, height=1.0 - 0.9 * (since - 3.0))
 
         vehicle = SimulatedVehicle(change_state=sink)
-        said = "m apart|outside 0.2"
-    with pytest.raises(FlightAbortedError, match=said):
+        message = "m apart|outside 0.2"
+    with pytest.raises(FlightAbortedError, match=message):
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert vehicle.log == ["connected", "took off", "hovers", "landed", "closed"]
     rows = columns_of(tmp_path / "flight-1-P.csv")
@@ -314,17 +314,17 @@ def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
         return replace(state, height=state.height + 0.004 * math.sin(2.5 * max(since, 0.0)))
 
     def warn(doubt):
-        said.append(doubt)
+        warnings.append(doubt)
         flights.append(len(list(tmp_path.glob("flight-?-*P.csv"))))
 
-    said, flights = [], []
+    warnings, flights = [], []
     random = np.random.default_rng(2)
     vehicle = SimulatedVehicle(noise=0.001, random=random, change_state=gusts)
     plan = FlightPlan(gains=(2.4,), settle=2.5, hold=3.5, checked_hold=2.0)
     found = fly_experiment(lambda: vehicle, plan, tmp_path, run=run, warn=warn)
     assert found.learned.fit.adequate is False
     assert flights == [1]
-    assert "margin is not assured" in said[0]
+    assert "margin is not assured" in warnings[0]
     _print_study(found, tmp_path / "report.html")
     assert "not adequate (adequate=False)" in " ".join(capsys.readouterr().out.split())
     fine = replace(found.learned, fit=replace(found.learned.fit, adequate=True))

@@ -38,21 +38,21 @@ def test_the_whole_experiment_in_virtual_time(tmp_path):
     folder = tmp_path / "new" / "flight"
     done = run_fly("--virtual-time", "--folder", folder, "--seed", 3, "--json")
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
-    assert 0.33 < told["overshoot_method"][1] < 0.38
-    assert told["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
-    assert told["transport"]["delay"] == pytest.approx(0.26, abs=0.01)
-    assert told["vehicle_delay"] == pytest.approx(0.142, abs=0.015)
-    low, high = told["vehicle"]["interval_95"]["time_constant"]
-    assert low < told["vehicle_delay"] < high
-    last = told["flights"][-1]
+    result = json.loads(done.stdout)
+    assert result["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
+    assert 0.33 < result["overshoot_method"][1] < 0.38
+    assert result["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
+    assert result["transport"]["delay"] == pytest.approx(0.26, abs=0.01)
+    assert result["vehicle_delay"] == pytest.approx(0.142, abs=0.015)
+    low, high = result["vehicle"]["interval_95"]["time_constant"]
+    assert low < result["vehicle_delay"] < high
+    last = result["flights"][-1]
     assert last["overshoot"] < 5.0
-    assert last["settling_time"] < min(one["settling_time"] for one in told["flights"][:-1])
+    assert last["settling_time"] < min(one["settling_time"] for one in result["flights"][:-1])
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 3
-    assert told["verdict"].split(".")[0] in page
-    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == told
+    assert result["verdict"].split(".")[0] in page
+    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == result
     again = run_fly("--virtual-time", "--folder", folder)
     assert again.returncode == 1
     assert "holds recordings already" in again.stderr
@@ -75,7 +75,7 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (("--gains", "1.2,3"), "Kp = 3 is above 2.47"),
         (("--gains", "fast"), "numbers with commas"),
@@ -88,10 +88,10 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),
     ],
 )
-def test_unsafe_or_invalid_options_are_refused(options, said, tmp_path):
+def test_unsafe_or_invalid_options_are_refused(options, message, tmp_path):
     done = run_fly("--folder", tmp_path, *options)
     assert done.returncode == 1
-    assert said in " ".join(done.stderr.split())
+    assert message in " ".join(done.stderr.split())
     assert list(tmp_path.iterdir()) == []
 
 

@@ -60,9 +60,9 @@ def test_with_constant_delays_every_method_finds_the_measured_delay(constant_del
 
 def test_the_loop_is_that_of_the_paper_s_reproduction(constant_delays):
     run = constant_delays.runs[3]
-    there = internet_loop(8.0, delay=0.1, sample_time=0.01, duration=5.0)
-    here = run.recordings["plant"]
-    assert here.output == pytest.approx(there.output[: len(here)], abs=1e-9)
+    reproduction = internet_loop(8.0, delay=0.1, sample_time=0.01, duration=5.0)
+    recording = run.recordings["plant"]
+    assert recording.output == pytest.approx(reproduction.output[: len(recording)], abs=1e-9)
 
 
 def test_the_dominant_root_method_estimates_a_longer_delay_at_a_larger_gain(constant_delays):
@@ -73,11 +73,11 @@ def test_the_dominant_root_method_estimates_a_longer_delay_at_a_larger_gain(cons
 
 
 def test_the_report_converts_to_plain_values(constant_delays):
-    said = constant_delays.to_dict()
-    json.dumps(plain(said), allow_nan=False)
-    assert said["runs"][0]["plant"]["link"]["round_trip"]["p50"] == pytest.approx(0.1)
-    assert said["expected"]["waveform"] == pytest.approx(0.1)
-    assert len(said["explanation"]) == 3
+    report = constant_delays.to_dict()
+    json.dumps(plain(report), allow_nan=False)
+    assert report["runs"][0]["plant"]["link"]["round_trip"]["p50"] == pytest.approx(0.1)
+    assert report["expected"]["waveform"] == pytest.approx(0.1)
+    assert len(report["explanation"]) == 3
 
 
 def test_a_lag_is_estimated_apart_from_the_delay():
@@ -255,7 +255,7 @@ def test_a_killed_controller_leaves_the_plant_safe_and_can_be_restarted(tmp_path
 
 
 def test_each_part_reports_errors_in_one_line(capsys):
-    def said(*arguments):
+    def error_of(*arguments):
         try:
             code = main(arguments)
         except SystemExit as ended:
@@ -263,13 +263,15 @@ def test_each_part_reports_errors_in_one_line(capsys):
         assert code != 0
         return capsys.readouterr().err.strip().splitlines()[-1]
 
-    assert "HOST:PORT" in said("plant", "--controller", "nowhere")
-    assert "above zero" in said("plant", "--controller", "127.0.0.1:9", "--sample-time", "0")
-    assert "needs a time" in said("plant", "--controller", "127.0.0.1:9", "--policy", "drop-late")
-    assert "--gain" in said("controller")
-    assert "probability" in said("relay", "--to", "127.0.0.1:9", "--loss", "2")
-    assert "above zero" in said("relay", "--to", "127.0.0.1:9", "--duration", "nan")
-    assert "port 0" in said("plant", "--controller", "127.0.0.1:0", "--duration", "1")
+    assert "HOST:PORT" in error_of("plant", "--controller", "nowhere")
+    assert "above zero" in error_of("plant", "--controller", "127.0.0.1:9", "--sample-time", "0")
+    assert "needs a time" in error_of(
+        "plant", "--controller", "127.0.0.1:9", "--policy", "drop-late"
+    )
+    assert "--gain" in error_of("controller")
+    assert "probability" in error_of("relay", "--to", "127.0.0.1:9", "--loss", "2")
+    assert "above zero" in error_of("relay", "--to", "127.0.0.1:9", "--duration", "nan")
+    assert "port 0" in error_of("plant", "--controller", "127.0.0.1:0", "--duration", "1")
 
 
 def test_each_part_prints_its_address_and_on_ctrl_c_its_report():
@@ -281,8 +283,8 @@ def test_each_part_prints_its_address_and_on_ctrl_c_its_report():
         with part(name, arguments) as running:
             assert running.address()[0] == "127.0.0.1"
             running.process.send_signal(signal.SIGINT)
-            told = running.report(within=20.0)
-            assert {"relay": "overflowed", "plant": "applied"}.get(name, "answered") in told
+            report = running.report(within=20.0)
+            assert {"relay": "overflowed", "plant": "applied"}.get(name, "answered") in report
 
 
 def test_a_part_ends_with_the_process_that_started_it():
@@ -308,8 +310,8 @@ def test_a_part_ends_with_the_process_that_started_it():
 
 def test_the_reason_why_a_part_ended_is_reported():
     options = ["--controller", "127.0.0.1:9", "--recording", "/dev/null"]
-    said = pytest.raises(LinkError, match=r"exit code 1\).*/dev/null")
-    with part("plant", options) as running, said:
+    refusal = pytest.raises(LinkError, match=r"exit code 1\).*/dev/null")
+    with part("plant", options) as running, refusal:
         running.report(within=20.0)
 
 

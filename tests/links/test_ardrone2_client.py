@@ -327,13 +327,13 @@ def test_a_drone_that_stops_answering_ends_the_context_in_bounded_time():
                 async with client_of(emulated) as drone:
                     await drone.take_off()
                     await emulated.close()
-                    stranded.append(now())
+                    closed_at.append(now())
                     await read_states(drone)
 
-            stranded = []
+            closed_at = []
             with pytest.raises(LinkError, match="nothing received"):
                 await fly_until_silence()
-            assert now() - stranded[0] < 5.0
+            assert now() - closed_at[0] < 5.0
 
     run(fly())
 
@@ -386,17 +386,17 @@ def test_navdata_from_another_port_are_ignored():
             state = await drone.state()
             forged = build_navdata(Navdata(1 << 31, state.sequence + 50))
             loop = asyncio.get_running_loop()
-            door = drone._link._navdata.get_extra_info("sockname")
-            stranger, _ = await loop.create_datagram_endpoint(
+            address = drone._link._navdata.get_extra_info("sockname")
+            sender, _ = await loop.create_datagram_endpoint(
                 asyncio.DatagramProtocol, local_addr=("127.0.0.1", 0)
             )
             for _ in range(20):
-                stranger.sendto(forged, door)
+                sender.sendto(forged, address)
                 drone.hover()
                 await asyncio.sleep(0.02)
                 assert not (await drone.state()).emergency
             assert drone.statistics.implausible == 0
-            stranger.close()
+            sender.close()
 
     run(fly())
 
@@ -405,12 +405,12 @@ def test_datagrams_from_another_address_are_counted_and_dropped():
     # The system may filter less than it should, so the protocol checks address and port itself.
     async def fly():
         async with connected() as (_, drone):
-            door = _PeerFilter(drone._link.take, drone._link.reader.refuse)
-            door._peer = ("127.0.0.1", 5554)
+            peer_filter = _PeerFilter(drone._link.take, drone._link.reader.refuse)
+            peer_filter._peer = ("127.0.0.1", 5554)
             before = (await drone.state()).sequence
             forged = build_navdata(Navdata(1 << 31, before + 1))
-            door.datagram_received(forged, ("127.0.0.1", 5555))
-            door.datagram_received(forged, ("127.0.0.2", 5554))
+            peer_filter.datagram_received(forged, ("127.0.0.1", 5555))
+            peer_filter.datagram_received(forged, ("127.0.0.2", 5554))
             assert drone.statistics.foreign == 2
             assert not (await drone.state()).emergency
 
@@ -451,10 +451,10 @@ def test_a_setting_that_is_never_acknowledged_ends_the_handshake(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("piece", "said"),
+    ("piece", "message"),
     [(b"x" * 100_000, "no end within 65536 bytes"), (b"x", "nothing received for 2 s")],
 )
-def test_a_configuration_without_end_is_not_waited_for(piece, said):
+def test_a_configuration_without_end_is_not_waited_for(piece, message):
     async def send_without_end(reader, writer):
         for _ in range(6):
             writer.write(piece)
@@ -467,7 +467,7 @@ def test_a_configuration_without_end_is_not_waited_for(piece, said):
             drone = client_of(emulated)
             drone.control_port = server.sockets[0].getsockname()[1]
             begun = now()
-            with pytest.raises(LinkError, match=said):
+            with pytest.raises(LinkError, match=message):
                 await drone.connect()
             assert now() - begun < 10.0
             await asyncio.sleep(3.5)

@@ -53,13 +53,13 @@ def test_options_of_short_packets_can_be_chosen():
 
 def test_the_setpoint_appears_in_navdata_when_it_reaches_the_vehicle():
     pilot = Pilot().connect(demo=False).fly()
-    asked = pilot.time
+    commanded = pilot.time
     pilot.sent.clear()
     pilot.wait(1.0, UP, Move(gaz=0.5), every=0.02)
-    told = [parse_navdata(packet) for packet in pilot.sent]
-    follows = [one.clock for one in told if one.climb_setpoint > 0.0]
-    assert min(follows) == pytest.approx(asked + 0.02 + 0.26, abs=0.005)
-    last = told[-1]
+    parsed = [parse_navdata(packet) for packet in pilot.sent]
+    follows = [one.clock for one in parsed if one.climb_setpoint > 0.0]
+    assert min(follows) == pytest.approx(commanded + 0.02 + 0.26, abs=0.005)
+    last = parsed[-1]
     assert last.climb_setpoint == pytest.approx(0.35)
     assert last.climb == pytest.approx(pilot.truth.climb, abs=1e-4)
     assert last.altitude.altitude_vz == pytest.approx(-last.kalman_pressure.est_zdot)
@@ -77,8 +77,8 @@ def test_the_ultrasonic_height_changes_25_times_a_second():
 
 
 def accelerations(pilot):
-    said = pilot.last.physical_measures
-    return said.acceleration_x, said.acceleration_y, said.acceleration_z
+    measures = pilot.last.physical_measures
+    return measures.acceleration_x, measures.acceleration_y, measures.acceleration_z
 
 
 def test_accelerometers_measure_one_g_at_rest_and_in_hover():
@@ -98,10 +98,10 @@ def test_accelerometers_measure_the_change_of_the_climb(plant):
     pilot = Pilot(plant=plant, delay=0.0).connect(demo=False).fly()
     pilot.sent.clear()
     pilot.wait(2.0, UP, Move(gaz=0.5))
-    told = [parse_navdata(packet) for packet in pilot.sent]
-    felt = np.array([packet.physical_measures.acceleration_z for packet in told])
-    climb = np.array([packet.kalman_pressure.est_zdot for packet in told])
-    gained = np.cumsum(-felt[1:] - 1.0) * GRAVITY * 0.005
+    parsed = [parse_navdata(packet) for packet in pilot.sent]
+    measured = np.array([packet.physical_measures.acceleration_z for packet in parsed])
+    climb = np.array([packet.kalman_pressure.est_zdot for packet in parsed])
+    gained = np.cumsum(-measured[1:] - 1.0) * GRAVITY * 0.005
     assert gained == pytest.approx(climb[1:] - climb[0], abs=0.002)
     pilot.send(Ref(take_off=True, emergency=True))  # In free fall.
     pilot.wait(0.1, Ref(take_off=True, emergency=True))
@@ -262,7 +262,7 @@ def test_thrust_plant_does_not_depend_on_when_it_is_read():
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"plant": "kite"}, "none of kit, paper, real, thrust"),
         ({"delay": -0.1}, "delay"),
@@ -275,8 +275,8 @@ def test_thrust_plant_does_not_depend_on_when_it_is_read():
         ({"navdata_port": 70000}, "no port"),
     ],
 )
-def test_invalid_options_are_refused_with_the_reason(given, told):
-    with pytest.raises(ValueError, match=told):
+def test_invalid_options_are_refused_with_the_reason(given, message):
+    with pytest.raises(ValueError, match=message):
         EmulatorOptions(**given)
 
 

@@ -143,15 +143,15 @@ def test_navdata_go_to_the_host_of_the_commands(waits):
     if not waits:
         pilot.wake()
     assert len(pilot.sent) == 1  # This answers the wake-up of the other host.
-    told = []
+    received = []
     for _ in range(50):
         pilot.drone.commanded(encode([Watchdog()], pilot.number), COMMANDS, pilot.time)
         pilot.number += 1
         pilot.time = round(pilot.time + 0.02, 6)
         pilot.drone.advance(pilot.time)
-        told += pilot.take()
-    assert {address for _, address in told} == {NAVDATA}
-    numbers = [parse_navdata(packet).sequence for packet, _ in told]
+        received += pilot.take()
+    assert {address for _, address in received} == {NAVDATA}
+    numbers = [parse_navdata(packet).sequence for packet, _ in received]
     assert numbers == list(range(1, 201))
 
 
@@ -391,7 +391,7 @@ def test_the_communication_watchdog_is_reported_after_fifty_milliseconds():
     for _ in range(20):
         pilot.wait(0.005)
         warned[round(pilot.last.clock - 0.1, 6)] = pilot.last.com_watchdog
-    assert {late for late, told in warned.items() if not told} == {
+    assert {late for late, reported in warned.items() if not reported} == {
         round(0.005 * k, 6) for k in range(1, 11)
     }
     pilot.wait(0.01, Watchdog(), every=0.005)
@@ -602,14 +602,14 @@ def test_hosts_that_are_not_named_are_ignored_and_not_answered():
     async def call(host):
         loop = asyncio.get_running_loop()
         async with Emulator(EmulatorOptions(clients=("127.0.0.1",))) as emulator:
-            for port, said in (
+            for port, datagram in (
                 (5554, WAKE),
                 (5556, encode([Config("general:navdata_demo", "TRUE"), UP], 1)),
             ):
                 ear, _ = await loop.create_datagram_endpoint(
                     Receiver, local_addr=(host, 0), remote_addr=("127.0.0.1", port)
                 )
-                ear.sendto(said)
+                ear.sendto(datagram)
             await asyncio.sleep(0.5)
             return emulator.truth()
 

@@ -228,14 +228,14 @@ def test_the_configuration_is_read_over_tcp():
         found = []
         async with Emulator(EmulatorOptions(**FREE)) as emulator:
             _, _, commands, _ = await sockets_of(emulator)
-            here = (emulator.host, emulator.control_port)
-            reader, writer = await asyncio.open_connection(*here)
+            address = (emulator.host, emulator.control_port)
+            reader, writer = await asyncio.open_connection(*address)
             commands.sendto(encode([Config("control:control_vz_max", "1000"), Control(4)], 1))
             found.append(await reader.readuntil(b"\0"))
             writer.close()
             commands.sendto(encode([Control(4)], 3))  # Some ask before they connect.
             await asyncio.sleep(0.1)
-            reader, writer = await asyncio.open_connection(*here)
+            reader, writer = await asyncio.open_connection(*address)
             found.append(await reader.readuntil(b"\0"))
             commands.sendto(encode([Control(6)], 4))
             found.append(await reader.readuntil(b"\0"))
@@ -256,24 +256,24 @@ def test_the_configuration_is_read_over_tcp():
 def test_the_number_of_connections_is_limited():
     async def connect():
         async with Emulator(EmulatorOptions(**FREE)) as emulator:
-            open_ones = []
+            connections = []
             for _ in range(6):
-                open_ones.append(
+                connections.append(
                     await asyncio.open_connection(emulator.host, emulator.control_port)
                 )
             await asyncio.sleep(0.1)
             _, _, commands, _ = await sockets_of(emulator)
             commands.sendto(encode([Control(4)], 1))
             await asyncio.sleep(0.1)
-            told = []
-            for reader, writer in open_ones:
+            received = []
+            for reader, writer in connections:
                 writer.close()
                 try:
-                    told.append(await asyncio.wait_for(reader.read(1), 1.0))
+                    received.append(await asyncio.wait_for(reader.read(1), 1.0))
                 except (TimeoutError, ConnectionError):
-                    told.append(b"")
+                    received.append(b"")
             commands.close()
-            return sum(map(bool, told))
+            return sum(map(bool, received))
 
     assert dtl.run(connect()) == 4
 
@@ -302,9 +302,9 @@ def test_it_listens_on_an_ipv6_address_and_accepts_any_spelling_of_a_client():
         loop = asyncio.get_running_loop()
         options = EmulatorOptions(host=called, clients=("0:0::1",), **FREE)
         async with Emulator(options) as emulator:
-            there = (called, emulator.navdata_port), (called, emulator.command_port)
-            line, heard = await loop.create_datagram_endpoint(Receiver, remote_addr=there[0])
-            commands, _ = await loop.create_datagram_endpoint(Receiver, remote_addr=there[1])
+            addresses = (called, emulator.navdata_port), (called, emulator.command_port)
+            line, heard = await loop.create_datagram_endpoint(Receiver, remote_addr=addresses[0])
+            commands, _ = await loop.create_datagram_endpoint(Receiver, remote_addr=addresses[1])
             line.sendto(b"\x01")
             await until(lambda: heard.received)
             reader, writer = await asyncio.open_connection(called, emulator.control_port)
@@ -366,16 +366,16 @@ def test_the_command_prints_its_ports_and_ends_when_its_input_ends(tmp_path):
     truth = tmp_path / "truth.csv"
     given = ("--json", "--until-input-ends", "--plant", "real", "--record", str(truth))
     with started(*given, stdin=subprocess.PIPE) as process:
-        told = json.loads(process.stdout.readline())
-        assert told["plant"] == "real"
-        assert told["delay"] == 0.34
-        assert told["worst_case"] is True
-        with socket.create_connection((told["host"], told["ftp_port"]), 20.0) as files:
+        printed = json.loads(process.stdout.readline())
+        assert printed["plant"] == "real"
+        assert printed["delay"] == 0.34
+        assert printed["worst_case"] is True
+        with socket.create_connection((printed["host"], printed["ftp_port"]), 20.0) as files:
             assert files.recv(100).startswith(b"421 ")
-        socket.create_connection((told["host"], told["video_port"]), 20.0).close()
+        socket.create_connection((printed["host"], printed["video_port"]), 20.0).close()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
             line.settimeout(20.0)
-            line.sendto(b"\x01", (told["host"], told["navdata_port"]))
+            line.sendto(b"\x01", (printed["host"], printed["navdata_port"]))
             assert parse_navdata(line.recv(4096)).bootstrap
         process.stdin.close()
         assert process.wait(20.0) == 0
@@ -393,8 +393,8 @@ def test_the_command_may_end_before_its_input(end, listens_to_ctrl_c):
         if end == "Ctrl-C":
             process.send_signal(signal.SIGINT)
         assert process.wait(20.0) == (130 if end == "Ctrl-C" else 0)
-        said = process.stderr.read()
-    assert said == ("deadtime: interrupted\n" if end == "Ctrl-C" else "")
+        errors = process.stderr.read()
+    assert errors == ("deadtime: interrupted\n" if end == "Ctrl-C" else "")
 
 
 def test_the_command_ends_at_once_without_input():

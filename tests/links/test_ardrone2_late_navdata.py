@@ -37,9 +37,9 @@ def test_motors_are_cut_once_however_late_the_confirmation(late):
 
 
 @settings(max_examples=40, deadline=None)
-@given(way=st.floats(0.0, 0.95), share=st.floats(0.0, 1.0))
-def test_motors_that_are_cut_never_start_again(way, share):
-    found = cut(late=way * share, uplink=way * (1.0 - share))
+@given(total=st.floats(0.0, 0.95), share=st.floats(0.0, 1.0))
+def test_motors_that_are_cut_never_start_again(total, share):
+    found = cut(late=total * share, uplink=total * (1.0 - share))
     assert found == {"cut": [True], "cleared": [True, False]}
 
 

@@ -72,8 +72,8 @@ class Client:
     async def at(self, name, *arguments):
         if self.line is None or not self.one_socket:
             self.line = await open_receiver(self.port)
-        told = "".join(f",{argument}" for argument in arguments)
-        self.line.transport.sendto(f"AT*{name}={self.number}{told}\r".encode())
+        text = "".join(f",{argument}" for argument in arguments)
+        self.line.transport.sendto(f"AT*{name}={self.number}{text}\r".encode())
         self.number, self.last = self.number + 1, self.clock()
         if not self.one_socket:
             self.line.transport.close()
@@ -144,15 +144,15 @@ async def fly_python_ardrone():
         assert not await has_ended(video)  # The client never stops reading a closed stream.
         assert not await has_ended(control)
         settings = await settings_of(emulator, client)
-        truths = (hovering, climbed, flying, emulator.truth())
-        return truths, settings, [t - begun for t, _ in navdata.heard], navdata.heard[-1][1]
+        states = (hovering, climbed, flying, emulator.truth())
+        return states, settings, [t - begun for t, _ in navdata.heard], navdata.heard[-1][1]
 
 
 def test_python_ardrone_keeps_receiving_navdata_with_a_new_socket_for_each_command():
-    truths, settings, times, last = links.run(fly_python_ardrone())
+    states, settings, times, last = links.run(fly_python_ardrone())
     assert max(b - a for a, b in itertools.pairwise(times)) < 0.1
     assert times[-1] > 27.9
-    hovering, climbed, flying, landed = truths
+    hovering, climbed, flying, landed = states
     assert climbed.height - hovering.height == pytest.approx(0.2 * 0.7 * 2.0 * 0.885, rel=0.3)
     assert flying.phase is Phase.FLYING
     assert flying.climb == pytest.approx(0.0, abs=1e-6)
@@ -165,7 +165,7 @@ async def fly_ps_drone():
     async with AsyncExitStack() as stack:
         emulator = await stack.enter_async_context(Emulator(EmulatorOptions(noise=0.0, **FREE)))
         async with connection(emulator.ftp_port) as files:  # The client checks this port.
-            said = await files.read()
+            answer = await files.read()
         client = Client(emulator, first=3)
         line = client.line = await open_receiver(emulator.command_port)
         for raw in (b"\r", b"AT*PMODE=1,2\rAT*MISC=2,2,20,2000,3000\r"):
@@ -197,13 +197,13 @@ async def fly_ps_drone():
         flown = emulator.truth()
         await client.at("REF", 290717696)
         await client.sleep(6.0, every=0.1)
-        return said, settings, begun, flown, emulator.truth()
+        return answer, settings, begun, flown, emulator.truth()
 
 
 def test_ps_drone_starts_and_flies_on_one_command_for_two_seconds():
     """ps_drone needs an answer on TCP port 21, and `moveUp` is a single command."""
-    said, settings, begun, flown, landed = links.run(fly_ps_drone())
-    assert said.startswith(b"421 ")
+    answer, settings, begun, flown, landed = links.run(fly_ps_drone())
+    assert answer.startswith(b"421 ")
     assert settings["general:navdata_demo"] == "TRUE"
     assert flown.height - begun.height == pytest.approx(0.2 * 0.7 * 2.0 * 0.885, rel=0.02)
     assert landed.phase is Phase.LANDED
@@ -267,22 +267,22 @@ async def idle_connections(port_name, host_speaks):
         port = getattr(emulator, port_name)
         kept = [await stack.enter_async_context(connection(port)) for _ in range(10)]
         await asyncio.sleep(0.1)
-        open_ones = 10 - sum([await has_ended(reader) for reader in kept])
+        open_connections = 10 - sum([await has_ended(reader) for reader in kept])
         settings = await settings_of(emulator, client)
         for _ in range(60):
             await asyncio.sleep(1.0)
             if host_speaks:
                 await client.at("COMWDG")
         left = 10 - sum([await has_ended(reader) for reader in kept])
-        return open_ones, settings, left
+        return open_connections, settings, left
 
 
 @pytest.mark.parametrize("host_speaks", [True, False])
 @pytest.mark.parametrize("port_name", ["control_port", "video_port"])
 def test_idle_connections_are_limited_time_out_and_block_nobody(port_name, host_speaks):
     """Four idle connections must not keep other clients from the configuration."""
-    open_ones, settings, left = links.run(idle_connections(port_name, host_speaks))
-    assert open_ones == 4
+    open_connections, settings, left = links.run(idle_connections(port_name, host_speaks))
+    assert open_connections == 4
     assert "control:altitude_max" in settings
     assert left == ((3 if port_name == "control_port" else 4) if host_speaks else 0)
 

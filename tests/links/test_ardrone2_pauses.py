@@ -23,11 +23,11 @@ def now():
     return asyncio.get_running_loop().time()
 
 
-def refs(told):
+def refs(received):
     """For each datagram: when it was sent, and whether it requests flight (None: no REF in it)."""
-    for sent, commands, _ in told:
-        said = [one.take_off for one in commands if isinstance(one, Ref)]
-        yield sent, said[0] if said else None
+    for sent, commands, _ in received:
+        requests = [one.take_off for one in commands if isinstance(one, Ref)]
+        yield sent, requests[0] if requests else None
 
 
 async def continue_program(client, how, times=1):
@@ -79,9 +79,11 @@ def test_after_a_short_pause_flight_is_requested_only_when_the_drone_is_known_to
                 await asyncio.sleep(0.02)
                 client.command(0.3)
             # The first navdata sent after the pause arrive 0.1 s later.
-            asked = [(sent - went_on, up) for sent, up in refs(drone.received) if sent >= went_on]
-            assert all(up is None for passed, up in asked if passed < 0.1)
-            assert all(up is True for passed, up in asked if passed > 0.1 + 3 * CYCLE)
+            requests = [
+                (sent - went_on, up) for sent, up in refs(drone.received) if sent >= went_on
+            ]
+            assert all(up is None for passed, up in requests if passed < 0.1)
+            assert all(up is True for passed, up in requests if passed > 0.1 + 3 * CYCLE)
             moves = [
                 one.flag
                 for sent, commands, _ in drone.received
@@ -256,15 +258,15 @@ def test_a_client_process_that_was_stopped_in_flight_does_not_restart_a_landed_d
                         break
                 assert emulated.truth().phase is Phase.LANDED
                 await asyncio.sleep(0.3)
-                asked, plain = [], emulated.drone.commanded
+                datagrams, plain = [], emulated.drone.commanded
                 emulated.drone.commanded = lambda data, source, at: (
-                    asked.append(data),
+                    datagrams.append(data),
                     plain(data, source, at),
                 )
                 process.send_signal(signal.SIGCONT)
                 _, error = await asyncio.wait_for(process.communicate(), 60.0)
-                assert asked
-                assert not any(b"AT*REF" in one and b",290718208\r" in one for one in asked)
+                assert datagrams
+                assert not any(b"AT*REF" in one and b",290718208\r" in one for one in datagrams)
                 assert emulated.truth().phase is Phase.LANDED
                 assert process.returncode == 1
                 assert "FlightAbortedError: this program was paused for" in error.decode()

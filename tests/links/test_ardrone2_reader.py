@@ -33,8 +33,8 @@ def read_all(*packets, every=0.005):
 def test_sequence_numbers_must_rise():
     reader, states = read_all(*(packet(k) for k in (1, 2, 2, 5, 3, 6)))
     assert [s and s.sequence for s in states] == [1, 2, None, 5, None, 6]
-    told = reader.statistics
-    assert (told.duplicates, told.reordered, told.missing, told.states) == (1, 1, 1, 4)
+    counts = reader.statistics
+    assert (counts.duplicates, counts.reordered, counts.missing, counts.states) == (1, 1, 1, 4)
     assert reader.newest.missing == 2  # The longest run of bad packets that the rules allow.
 
 
@@ -67,9 +67,9 @@ def test_a_height_that_jumps_in_flight_is_rejected():
     assert [s and s.height for s in states] == [1.0, None, 1.02]
     assert reader.statistics.implausible == 1
     # At most 5 m/s, here for 20 ms, and a tolerance of 0.1 m.
-    for height, believed in ((1.19, True), (1.21, False), (0.81, True), (0.79, False)):
+    for height, accepted in ((1.19, True), (1.21, False), (0.81, True), (0.79, False)):
         _, states = read_all(packet(1), packet(2, height=height), every=0.02)
-        assert (states[1] is not None) is believed
+        assert (states[1] is not None) is accepted
     # On the ground it may jump, because a drone may be carried.
     on_ground = [packet(k, height=z, state=0) for k, z in ((1, 0.0), (2, 2.0))]
     assert read_all(*on_ground)[1][1].height == 2.0
@@ -143,11 +143,11 @@ def replayed():
 
 def test_a_recorded_flight_is_read_without_errors():
     reader, states = replayed()
-    told = reader.statistics
-    assert told.packets == 500
-    assert told.broken <= 1
+    statistics = reader.statistics
+    assert statistics.packets == 500
+    assert statistics.broken <= 1
     assert len(states) >= 498
-    assert told.implausible == told.reordered == told.restarts == 0
+    assert statistics.implausible == statistics.reordered == statistics.restarts == 0
     assert all(0 < state.battery <= 100 for state in states)
     assert {state.flying for state in states} == {True, False}
     assert all(state.fault is None for state in states)
@@ -170,8 +170,8 @@ def test_a_recorded_flight_divides_into_link_delay_and_vehicle_lag():
     time -= time[0]
     columns = np.array([[s.climb_setpoint, s.climb, s.height] for s in flown]).T
     rows = (time > 0.6) & (time < 13.5)  # Before the reference changes.
-    told = telemetry_of((time[rows], *columns[:, rows]), time[rows], 1.0 - columns[2][rows])
-    split = split_delay([told])
+    telemetry = telemetry_of((time[rows], *columns[:, rows]), time[rows], 1.0 - columns[2][rows])
+    split = split_delay([telemetry])
     low, high = split.transport.ci(0.95)
     assert low < 0.12
     assert high > 0.07

@@ -55,9 +55,9 @@ def test_a_second_client_of_the_emulator_is_named_in_the_error_of_the_first():
 
 
 @pytest.mark.parametrize("number", [1, 5000])
-@pytest.mark.parametrize("wish", [Ref(), Ref(take_off=True)])
+@pytest.mark.parametrize("ref", [Ref(), Ref(take_off=True)])
 @pytest.mark.parametrize("short", [False, True])
-def test_a_datagram_of_another_client_is_detected_if_the_drone_reports_it(number, wish, short):
+def test_a_datagram_of_another_client_is_detected_if_the_drone_reports_it(number, ref, short):
     # Short navdata have no number of the last REF: only the landing itself can be seen.
     async def fly():
         async with connected_drone(tick=0.005, options=("short",) if short else ()) as (
@@ -69,8 +69,8 @@ def test_a_datagram_of_another_client_is_detected_if_the_drone_reports_it(number
             before = len(drone.received)
             while len(drone.received) == before:  # until this client sends again
                 await asyncio.sleep(0.001)
-            drone.receive_commands(encode([wish, Move(flag=0)], number), None)
-            if short and wish.take_off:
+            drone.receive_commands(encode([ref, Move(flag=0)], number), None)
+            if short and ref.take_off:
                 return
             with pytest.raises(FlightAbortedError, match="another client commands this drone"):
                 await hover_until_error(client)
@@ -111,14 +111,14 @@ def test_own_commands_are_not_attributed_to_another_client():
 FAULTS = [(State.BATTERY_LOW, "its battery"), (State.MOTORS_PROBLEM, "a motor")]
 
 
-@pytest.mark.parametrize(("fault", "said"), FAULTS)
-def test_a_landing_for_a_fault_is_not_attributed_to_another_client(fault, said):
+@pytest.mark.parametrize(("fault", "message"), FAULTS)
+def test_a_landing_for_a_fault_is_not_attributed_to_another_client(fault, message):
     async def fly():
         async with connected_drone(tick=0.005) as (drone, client):
             await client.take_off()
             drone.fault = fault
             drone._enter("landing", drone.time)
-            with pytest.raises(FlightAbortedError, match=f"lands by itself: {said}"):
+            with pytest.raises(FlightAbortedError, match=f"lands by itself: {message}"):
                 await hover_until_error(client)
 
     run(fly())

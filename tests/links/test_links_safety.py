@@ -151,13 +151,13 @@ def test_a_height_that_jumps_is_rejected():
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_height_may_change_by_the_fastest_climb_plus_the_tolerance(passed, most, sign):
     # The tolerance is added, not subtracted.
-    for share, believed in ((0.99, True), (1.01, False)):
+    for share, accepted in ((0.99, True), (1.01, False)):
         watch = Watch(Limits())
         start = replace(STATE, height=1.5)
         watch.check(start, now=10.0)
         later = replace(later_by(passed, sequence=8), height=1.5 + sign * share * most)
-        assert jumps(1.5, later.height, passed, 5.0) is not believed
-        if believed:
+        assert jumps(1.5, later.height, passed, 5.0) is not accepted
+        if accepted:
             watch.check(later, now=10.0 + passed)
         else:
             with pytest.raises(FlightAbortedError, match="jumps"):

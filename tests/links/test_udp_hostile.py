@@ -51,13 +51,13 @@ class Peer(asyncio.DatagramProtocol):
     """The other end of the link: it keeps what it receives."""
 
     def __init__(self):
-        self.came = []
+        self.received = []
 
     def connection_made(self, transport):
         self.transport = transport
 
     def datagram_received(self, data, addr):
-        self.came.append(LoopPacket.decode(data))
+        self.received.append(LoopPacket.decode(data))
 
 
 async def other_end(port=0):
@@ -73,7 +73,7 @@ async def controller_among(changes):
         number = 0
         while loop.time() < DURATION:
             number += 1
-            last = plant.came[-1] if plant.came else LoopPacket(0, 0.0)
+            last = plant.received[-1] if plant.received else LoopPacket(0, 0.0)
             true = LoopPacket(number, 100.0 + loop.time(), last.sequence, last.sent, 0.0, 0.5, 1.0)
             for change in changes if number in (3, 30) else ():
                 plant.transport.sendto(raw(true, change), controller.address)
@@ -81,7 +81,7 @@ async def controller_among(changes):
             await asyncio.sleep(0.01)
         report = controller.report()
     plant.transport.close()
-    return report, plant.came
+    return report, plant.received
 
 
 async def plant_among(changes):
@@ -96,19 +96,19 @@ async def plant_among(changes):
     plant, number = asyncio.ensure_future(run_plant(options)), 0
     while not plant.done():
         await asyncio.sleep(0.01)
-        if not controller.came:
+        if not controller.received:
             continue
         number += 1
-        last = controller.came[-1]
+        last = controller.received[-1]
         true = LoopPacket(number, loop.time() - 50.0, last.sequence, last.sent, 0.0, 0.5, 1.0)
         controller.transport.sendto(true.encode(), options.listen)
         for change in changes if number in (3, 30) else ():
             controller.transport.sendto(raw(true, change), options.listen)
     controller.transport.close()
-    return plant.result(), controller.came
+    return plant.result(), controller.received
 
 
-def check(report, came):
+def check(report, received):
     """Check what holds of every report and of all that is sent, whatever the peer sent."""
     json.dumps(plain(report.to_dict()), allow_nan=False)
     link = report.link
@@ -119,7 +119,7 @@ def check(report, came):
         math.isfinite(bound) for bound in (*link.forward_delay, *link.return_delay, link.jitter)
     )
     assert 0.0 <= report.largest_command <= LIMIT
-    assert all(math.isfinite(packet.value) for packet in came)
+    assert all(math.isfinite(packet.value) for packet in received)
 
 
 @given(CHANGES)
@@ -128,9 +128,9 @@ def check(report, came):
 @example([{"value": 1.7e308, "reference": -1.7e308}])
 @settings(max_examples=30)
 def test_no_packet_of_its_plant_ends_a_controller_without_a_report(changes):
-    report, came = virtual_time.run(controller_among(changes))
-    check(report, came)
-    assert all(abs(packet.value) <= LIMIT for packet in came)
+    report, received = virtual_time.run(controller_among(changes))
+    check(report, received)
+    assert all(abs(packet.value) <= LIMIT for packet in received)
     assert report.answered > 0
 
 
@@ -139,8 +139,8 @@ def test_no_packet_of_its_plant_ends_a_controller_without_a_report(changes):
 @example([{"sent": 1e308}, {"sent": -1e308}])
 @settings(max_examples=30)
 def test_no_packet_of_its_controller_ends_a_plant_without_a_report(changes):
-    report, came = virtual_time.run(plant_among(changes))
-    check(report, came)
+    report, received = virtual_time.run(plant_among(changes))
+    check(report, received)
     assert abs(report.recording.command).max() <= LIMIT
     assert math.isfinite(report.age)
 
@@ -198,8 +198,10 @@ def step(controller_host, listen="::1", plant=None):
     async def run():
         options = ControllerOptions(gain=4.0, listen=(listen, 0), plant=plant)
         async with Controller(options) as controller:
-            there = (controller_host, controller.address[1])
-            options = PlantOptions(controller=there, listen=("::1", 0), duration=0.6, rest=0.0)
+            controller_address = (controller_host, controller.address[1])
+            options = PlantOptions(
+                controller=controller_address, listen=("::1", 0), duration=0.6, rest=0.0
+            )
             report = await run_plant(options)
             return report, controller.report()
 
@@ -238,11 +240,11 @@ def test_a_controller_on_a_socket_of_ipv6_answers_a_plant_of_ipv4():
         listen = ("::ffff:127.0.0.1", 0)  # IPv6, but reachable from this machine only
         options = ControllerOptions(gain=4.0, listen=listen, plant=("127.0.0.1", port))
         async with Controller(options) as controller:
-            there = ("127.0.0.1", controller.address[1])
-            async with Relay(RelayOptions(("::ffff:127.0.0.1", there[1]))) as relay:
+            controller_address = ("127.0.0.1", controller.address[1])
+            async with Relay(RelayOptions(("::ffff:127.0.0.1", controller_address[1]))) as relay:
                 assert relay.address[0] == "127.0.0.1"
             plant = PlantOptions(
-                controller=there, listen=("127.0.0.1", port), duration=0.6, rest=0.0
+                controller=controller_address, listen=("127.0.0.1", port), duration=0.6, rest=0.0
             )
             return await run_plant(plant)
 

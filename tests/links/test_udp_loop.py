@@ -112,11 +112,12 @@ def test_measured_delays_are_exact():
 
 
 def test_a_run_is_determined_by_its_seed_to_the_byte(tmp_path):
-    way = Network(delay=Normal(0.05, 0.01), loss=0.05, duplication=0.1)
+    network = Network(delay=Normal(0.05, 0.01), loss=0.05, duplication=0.1)
 
     def written(seed, folder):
         report = run(
-            Trial(gain=8.0, forward_path=way, return_path=way, seed=seed), folder=tmp_path / folder
+            Trial(gain=8.0, forward_path=network, return_path=network, seed=seed),
+            folder=tmp_path / folder,
         )
         files = sorted((tmp_path / folder).iterdir())
         return [file.read_bytes() for file in files], repr(report.to_dict())
@@ -150,15 +151,15 @@ def test_a_recording_that_cannot_be_written_ends_the_run(tmp_path):
 
 
 def test_an_end_that_cannot_record_releases_its_port(tmp_path):
-    there = tmp_path / "there.csv"
-    there.touch()
-    here = ("127.0.0.1", 40_000)
+    existing = tmp_path / "existing.csv"
+    existing.touch()
+    address = ("127.0.0.1", 40_000)
 
     async def twice(end, **more):
         with pytest.raises(FileExistsError):
-            async with end(**more, listen=here, recording=there):
+            async with end(**more, listen=address, recording=existing):
                 pass
-        async with end(**more, listen=here) as second:
+        async with end(**more, listen=address) as second:
             return second.address
 
     for end, options, more in (
@@ -166,13 +167,13 @@ def test_an_end_that_cannot_record_releases_its_port(tmp_path):
         (Plant, PlantOptions, {"controller": ("127.0.0.1", 9)}),
     ):
         made = partial(lambda end, options, **given: end(options(**given)), end, options)
-        assert in_virtual_time(twice(made, **more)) == here
+        assert in_virtual_time(twice(made, **more)) == address
 
 
 def test_losses_are_counted_exactly():
     relays = []
-    way = Network(delay=0.05, loss=0.1, duplication=0.1)
-    trial = Trial(gain=6.0, forward_path=way, return_path=way, seed=5)
+    network = Network(delay=0.05, loss=0.1, duplication=0.1)
+    trial = Trial(gain=6.0, forward_path=network, return_path=network, seed=5)
     report = run(trial, meanwhile=lambda relay, controller: relays.append(relay))
     (relay,) = relays
     # Packets in transit at the end, or lost after the last that arrived, are not counted.
@@ -184,9 +185,11 @@ def test_losses_are_counted_exactly():
 
 
 def test_a_jitter_buffer_makes_a_random_delay_constant():
-    way = Network(delay=Normal(0.05, 0.01))
-    wild = Trial(gain=6.0, forward_path=way, return_path=way, seed=2)
-    tame = Trial(gain=6.0, forward_path=way, return_path=way, seed=2, policy=JitterBuffer(0.16))
+    network = Network(delay=Normal(0.05, 0.01))
+    wild = Trial(gain=6.0, forward_path=network, return_path=network, seed=2)
+    tame = Trial(
+        gain=6.0, forward_path=network, return_path=network, seed=2, policy=JitterBuffer(0.16)
+    )
     assert run(wild).plant.age_when_applied.p95 > run(wild).plant.age_when_applied.p50 + 0.01
     report = run(tame)
     ages = report.plant.age_when_applied
@@ -200,9 +203,14 @@ def test_a_jitter_buffer_makes_a_random_delay_constant():
 
 
 def test_answers_may_take_as_long_as_the_watchdog_allows():
-    way = Network(delay=2.4)
+    network = Network(delay=2.4)
     trial = Trial(
-        gain=0.1, forward_path=way, return_path=way, sample_time=1e-3, watchdog=5.0, duration=6.0
+        gain=0.1,
+        forward_path=network,
+        return_path=network,
+        sample_time=1e-3,
+        watchdog=5.0,
+        duration=6.0,
     )
     report = run(trial)
     assert report.plant.link.invalid == 0
@@ -211,8 +219,8 @@ def test_answers_may_take_as_long_as_the_watchdog_allows():
 
 
 def test_late_commands_are_dropped_if_requested():
-    way = Network(delay=ShiftedGamma(0.03, 0.05, 0.02))
-    report = run(Trial(gain=6.0, forward_path=way, return_path=way, policy=DropLate(0.1)))
+    network = Network(delay=ShiftedGamma(0.03, 0.05, 0.02))
+    report = run(Trial(gain=6.0, forward_path=network, return_path=network, policy=DropLate(0.1)))
     assert report.plant.age_when_applied.largest <= 0.1
     assert report.plant.link.late > 20
     assert report.plant.link.lateness.largest > 0.0
@@ -222,8 +230,8 @@ def test_late_commands_are_dropped_if_requested():
 
 
 def test_a_command_without_successor_is_released():
-    back = Network(delay=0.05, blackouts=((1.2, 3.0),))
-    trial = Trial(gain=2.0, forward_path=WAY, return_path=back, policy=HoldThenZero(5))
+    return_path = Network(delay=0.05, blackouts=((1.2, 3.0),))
+    trial = Trial(gain=2.0, forward_path=WAY, return_path=return_path, policy=HoldThenZero(5))
     recording = run(trial).plant.recording
     # What was sent before the blackout arrives until 1.25 s, and holds for five samples of 10 ms.
     held = (recording.time > 1.20) & (recording.time < 1.29)
@@ -233,8 +241,8 @@ def test_a_command_without_successor_is_released():
 
 
 def test_the_watchdog_applies_the_safe_command_in_time_and_releases_it_again():
-    back = Network(delay=0.05, blackouts=((1.2, 3.0),))
-    trial = Trial(gain=2.0, forward_path=WAY, return_path=back, watchdog=0.3, safe=-0.1)
+    return_path = Network(delay=0.05, blackouts=((1.2, 3.0),))
+    trial = Trial(gain=2.0, forward_path=WAY, return_path=return_path, watchdog=0.3, safe=-0.1)
     report = run(trial)
     recording = report.plant.recording
     safe = recording.time[recording.command == -0.1]
@@ -246,8 +254,8 @@ def test_the_watchdog_applies_the_safe_command_in_time_and_releases_it_again():
 
 
 def test_a_controller_without_measurements_commands_the_plant_to_be_safe():
-    there = Network(delay=0.05, blackouts=((1.2, 9.0),))
-    trial = Trial(gain=2.0, forward_path=there, return_path=WAY, watchdog=0.4, safe=0.25)
+    forward_path = Network(delay=0.05, blackouts=((1.2, 9.0),))
+    trial = Trial(gain=2.0, forward_path=forward_path, return_path=WAY, watchdog=0.4, safe=0.25)
     report = run(trial)
     recording = report.plant.recording
     safe = recording.time[(recording.command == 0.25) & (recording.time > 1.0)]
@@ -283,11 +291,11 @@ def test_a_controller_announces_its_end_and_a_new_one_takes_over():
 @pytest.mark.parametrize("fault", FAULTS)
 def test_no_fault_of_the_relay_makes_the_plant_unsafe(fault, policy):
     for seed in range(8):
-        way = FAULTS[fault]
+        network = FAULTS[fault]
         trial = Trial(
             gain=8.0,
-            forward_path=way,
-            return_path=way,
+            forward_path=network,
+            return_path=network,
             seed=seed,
             limit=LIMIT,
             watchdog=WATCHDOG,
@@ -313,7 +321,7 @@ def test_no_fault_of_the_relay_makes_the_plant_unsafe(fault, policy):
 def test_no_schedule_of_faults_makes_the_plant_unsafe(
     delay, deviation, loss, burst, duplication, blackout, groups, ordered, gain, policy, seed
 ):
-    way = Network(
+    network = Network(
         delay=Normal(delay, deviation),
         loss=Bursts.of(loss, burst),
         duplication=duplication,
@@ -323,8 +331,8 @@ def test_no_schedule_of_faults_makes_the_plant_unsafe(
     )
     trial = Trial(
         gain=gain,
-        forward_path=way,
-        return_path=way,
+        forward_path=network,
+        return_path=network,
         seed=seed,
         limit=LIMIT,
         watchdog=WATCHDOG,
@@ -353,9 +361,9 @@ def check_safety(trial, report):
 
 
 def test_twenty_seeds_of_a_bad_network_leave_the_output_bounded():
-    way = Network(delay=Normal(0.05, 0.01), loss=Bursts.of(0.05, 4.0))
+    network = Network(delay=Normal(0.05, 0.01), loss=Bursts.of(0.05, 4.0))
     for seed in range(20):
-        report = run(Trial(gain=6.0, forward_path=way, return_path=way, seed=seed))
+        report = run(Trial(gain=6.0, forward_path=network, return_path=network, seed=seed))
         assert report.plant.largest_output < 2.0
         assert abs(report.plant.recording.output[-1] - 1.0) < 0.5
 
@@ -375,15 +383,15 @@ class Attacker(asyncio.DatagramProtocol):
 async def attacked(packets, *, from_the_peer=True):
     """Report of the plant when `packets`, made from a measurement, arrive while it runs."""
     loop = asyncio.get_running_loop()
-    _, hostile = await loop.create_datagram_endpoint(Attacker, local_addr=("127.0.0.1", 41_000))
+    _, attacker = await loop.create_datagram_endpoint(Attacker, local_addr=("127.0.0.1", 41_000))
     peer = ("127.0.0.1", 41_000 if from_the_peer else 42_000)
     options = PlantOptions(controller=peer, listen=("127.0.0.1", 40_000), duration=1.0)
     plant = asyncio.ensure_future(run_plant(options))
     await asyncio.sleep(0.505)
-    for packet in packets(hostile.heard):
-        hostile.transport.sendto(packet, options.listen)
+    for packet in packets(attacker.heard):
+        attacker.transport.sendto(packet, options.listen)
     report = await plant
-    hostile.transport.close()
+    attacker.transport.close()
     return report
 
 
@@ -518,9 +526,9 @@ def test_other_hosts_work_and_cause_a_warning(capsys):
 
     report = in_virtual_time(two_computers())
     assert report.recording.output[-1] == pytest.approx(1.0, abs=1e-3)
-    said = capsys.readouterr().err
-    assert "192.0.2.1" in said
-    assert "every host that reaches" in said
+    errors = capsys.readouterr().err
+    assert "192.0.2.1" in errors
+    assert "every host that reaches" in errors
 
 
 def test_this_host_causes_no_warning(capsys):
