@@ -19,18 +19,15 @@ from deadtime.loops._model import LoopRun
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
+from deadtime.systems._run import first_duration
 
-__all__ = ["LEAST", "SHORTEST", "reference_jumps", "settled_step", "simulate_loop"]
+__all__ = ["reference_jumps", "settled_step", "simulate_loop"]
 
 Vector = NDArray[np.float64]
 
 #: Output times of a step response by default.
 _POINTS = 501
-#: Its first duration, as a multiple of the slowest time constant of the loop, at least LEAST,
-#: in s.
-SHORTEST = 10.0
-LEAST = 0.01
-#: The duration is doubled, at most this many times, until the last quarter stays within _SETTLED of
+#: Its duration is doubled, at most this many times, until the last quarter stays within _SETTLED of
 #: the goal or the response is _LOST times as far away from it.
 _DOUBLINGS = 10
 _SETTLED = 0.005
@@ -134,8 +131,7 @@ def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -
 def settled_step(loop: LoopSpecification, amplitude: float) -> Response:
     """Step response up to where it has settled, found by doubling the time."""
     delay = loop.known_delay
-    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(loop.model.A) if abs(pole) > 0.0]
-    span = SHORTEST * max([delay + (loop.sample_time or 0.0), *slowest, LEAST])
+    span = first_duration(loop.model.A, delay + (loop.sample_time or 0.0))
     for _ in range(_DOUBLINGS):
         response = simulate_loop(loop, np.linspace(0.0, span, _POINTS), amplitude)
         goal = response.outputs[-1] if response.steady_state is None else response.steady_state

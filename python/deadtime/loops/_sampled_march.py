@@ -223,14 +223,14 @@ def _keeps_count(
     here: _Curve,
     there: _Curve,
     jumps: Callable[[float, float], Collection[float]],
-    apart: tuple[float, float] = (math.inf, math.inf),
+    left_out: tuple[float, float] = (math.inf, math.inf),
 ) -> bool:
     """Whether the number of poles outside the circle stays the same over a step, at jumps too.
 
-    Frequencies in the range `apart` are left out.
+    Frequencies in the range `left_out` are left out.
     """
     warped = np.union1d(here.warped, there.warped)
-    warped = warped[(warped < apart[0]) | (warped > apart[1])]
+    warped = warped[(warped < left_out[0]) | (warped > left_out[1])]
     start = _at(gains, here.value, warped)
     clear = np.minimum(np.abs(1.0 + start), 1.0)
     length = there.value - here.value
@@ -307,11 +307,11 @@ def _newton_loss(
     period = gains(value).sample_time
     width = max(_LEFT_OUT * abs(value - here.value) / abs(value), _LEAST_LEFT_OUT)
     highest = angle * (1.0 + width)
-    apart = (
+    left_out = (
         math.tan(0.5 * angle * (1.0 - width)) / period,
         math.tan(0.5 * highest) / period if highest < math.pi else math.inf,
     )
-    if width > _MOST_LEFT_OUT or not _keeps_count(gains, here, there, jumps, apart):
+    if width > _MOST_LEFT_OUT or not _keeps_count(gains, here, there, jumps, left_out):
         return None
     return Loss(value, angle)
 

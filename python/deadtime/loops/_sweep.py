@@ -22,8 +22,8 @@ from deadtime._base.validation import finite, increasing, positive, real_array, 
 from deadtime._deadtime import sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._model import refuse_discretised, rest_of
-from deadtime.loops._run import LEAST, SHORTEST
 from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
+from deadtime.systems._run import first_duration
 
 __all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
 
@@ -370,12 +370,8 @@ class _Sets:
         loop = self.loop
         numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
         waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
-        slowest = [
-            1.0 / abs(pole)
-            for pole in np.linalg.eigvals(loop.specification.model.A)
-            if abs(pole) > 0.0
-        ]
-        span = SHORTEST * max([float(np.max(waits, initial=0.0)), *slowest, LEAST])
+        longest_wait = float(np.max(waits, initial=0.0))
+        span = first_duration(loop.specification.model.A, longest_wait)
         found = self.measured(np.array([0.0, span]), progress)
         metrics = {name: array.flatten() for name, array in found.metrics.items()}
         settled, status = metrics["settling_time"], found.status.flatten()

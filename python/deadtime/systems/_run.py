@@ -19,7 +19,7 @@ from deadtime._deadtime import Signal
 from deadtime.systems._realisation import Realisable, Realisation
 from deadtime.systems._response import Response
 
-__all__ = ["Given", "impulse_response", "respond", "step_response"]
+__all__ = ["Given", "first_duration", "impulse_response", "respond", "step_response"]
 
 Vector = NDArray[np.float64]
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
@@ -136,6 +136,13 @@ def respond(
     )
 
 
+def first_duration(A: NDArray[np.float64], delay: float) -> float:
+    """First duration of a step response in s, by its longest delay and its slowest pole."""
+    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(A) if abs(pole) > 0.0]
+    duration: float = _SHORTEST * max([delay, *slowest, _LEAST])
+    return duration
+
+
 def step_response(
     system: Realisable,
     time: ArrayLike | None,
@@ -151,8 +158,7 @@ def step_response(
     height[index] = finite("amplitude", amplitude)
     if time is not None:
         return respond(system, time, height)
-    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(model.A) if abs(pole) > 0.0]
-    span = _SHORTEST * max([model.longest, *slowest, _LEAST])
+    span = first_duration(model.A, model.longest)
     for _ in range(_DOUBLINGS):
         response = respond(system, np.linspace(0.0, span, _POINTS), height)
         rest, outputs = response.steady_state, np.atleast_2d(response.outputs)

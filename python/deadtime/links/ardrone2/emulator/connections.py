@@ -117,9 +117,8 @@ class Door:
             self.leave(connection)
             connection.abort()
         else:
-            self._open[connection] = loop.call_at(
-                end, self._check_activity, connection
-            )  # keeps its position
+            # The connection keeps its position in the order of age.
+            self._open[connection] = loop.call_at(end, self._check_activity, connection)
 
     def hear(self, host: str) -> None:
         """Note activity of a host."""
