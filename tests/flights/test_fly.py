@@ -294,7 +294,7 @@ def test_a_vehicle_that_reports_no_climb_is_controlled_with_the_filter(tmp_path)
     vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), reports_climb=False)
     found = fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert found.learned.split is None
-    assert "does not tell" in found.learned.unsplit
+    assert "does not report" in found.learned.unsplit
     assert found.learned.designed.loop.controller.filter == PAPER_FILTER
     assert found.after.overshoot < 5.0
     assert found.after.settling_time < found.before.settling_time
