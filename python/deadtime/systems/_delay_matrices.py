@@ -193,7 +193,7 @@ class DelayMatrices:
 
         Returns
         -------
-        ndarray of complex, shape (n_outputs, n_inputs, *omega.shape)
+        ndarray of complex, shape ``(n_outputs, n_inputs, *omega.shape)``
 
         Raises
         ------

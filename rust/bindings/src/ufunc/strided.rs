@@ -90,7 +90,9 @@ fn compute<L: Loop>(operands: &Operands) -> PyResult<()> {
         if start.elapsed() * u32::try_from(length / SAMPLE).unwrap_or(u32::MAX) > WORTHWHILE {
             let threads = runtime::thread_count(LIMIT.get())?;
             if threads > 1 {
-                return in_pool::<L>(operands, done, threads);
+                in_pool::<L>(operands, done, threads)?;
+                // A loop that is shorter than the pool's interval of polling is not polled there.
+                return listen(length);
             }
         }
     }
