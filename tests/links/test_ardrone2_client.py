@@ -1,4 +1,7 @@
-"""The client of the AR.Drone 2.0 on the emulator, in virtual time."""
+"""The client of the AR.Drone 2.0 on the emulator, in virtual time.
+
+One subject, kept in one file: every test connects the same client to the same emulator.
+"""
 
 import asyncio
 import itertools

@@ -1,4 +1,7 @@
-"""The emulated AR.Drone 2.0 without sockets: links, states, watchdogs, configuration."""
+"""The emulated AR.Drone 2.0 without sockets: links, states, watchdogs, configuration.
+
+One subject, kept in one file: every test drives the same drone through the same helpers.
+"""
 
 import asyncio
 import math

@@ -1,4 +1,7 @@
-"""Plant and controller over UDP in virtual time: exact with constant delays, safe with faults."""
+"""Plant and controller over UDP in virtual time: exact with constant delays, safe with faults.
+
+One subject, kept in one file: every test runs the same trial with other options.
+"""
 
 import asyncio
 import math

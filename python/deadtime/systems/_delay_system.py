@@ -404,9 +404,6 @@ class _Differentiated:
     def _realised(self) -> Realisation:
         return self.system._realise(differentiated=True)
 
-    def _differentiated(self) -> Realisable:
-        raise NotImplementedError
-
     def _gains_at_rest(self) -> Matrix | None:
         """Zero where the system comes to rest."""
         gains = self.system._gains_at_rest()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["FrequencyDomain"]
 
 
-class FrequencyDomain:
+class FrequencyDomain(ABC):
     """Base of `TransferFunction`: what is asked on the imaginary axis."""
 
     __slots__ = ()
@@ -27,8 +28,8 @@ class FrequencyDomain:
     _num: QuasiPolynomial
     _den: QuasiPolynomial
 
-    def __call__(self, s: Any) -> Any:
-        raise NotImplementedError
+    @abstractmethod
+    def __call__(self, s: Any) -> Any: ...
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """Value on the imaginary axis, G(j omega).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from typing import SupportsFloat
 
@@ -20,22 +21,22 @@ from deadtime.roots._matrix_roots import MatrixDeterminant
 __all__ = ["HasPoles"]
 
 
-class HasPoles:
+class HasPoles(ABC):
     """Base of systems; the poles are the roots of `_determinant`, hidden ones included."""
 
     __slots__ = ()
 
+    @abstractmethod
     def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
         """Give the characteristic function."""
-        raise NotImplementedError
 
     def _robust_determinant(self) -> QuasiPolynomial | MatrixDeterminant:
         """Give it in the form in which strong stability is judged."""
         return self._determinant()
 
+    @abstractmethod
     def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
         """Give the characteristic function with parameters."""
-        raise NotImplementedError
 
     def count(
         self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: Edge = "error"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from deadtime._deadtime import LinearSystem
 from deadtime.roots import QuasiPolynomial
 
-__all__ = ["Realisable", "Realisation", "of_matrices", "of_ratio"]
+__all__ = ["Differentiable", "Realisable", "Realisation", "of_matrices", "of_ratio"]
 
 Group = Mapping[float, NDArray[np.float64]]
 _Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
@@ -53,11 +53,15 @@ class Realisable(Protocol):
 
     def _realised(self) -> Realisation: ...
 
-    def _differentiated(self) -> Realisable:
-        """Give the system whose outputs are the derivatives of those of this one."""
-
     def _gains_at_rest(self) -> NDArray[np.float64] | None:
         """Steady-state gains, shape (n_outputs, n_inputs); None if there are none."""
+
+
+class Differentiable(Protocol):
+    """A system whose impulse response is the step response of its derivative."""
+
+    def _differentiated(self) -> Realisable:
+        """Give the system whose outputs are the derivatives of those of this one."""
 
 
 @dataclass(frozen=True, eq=False)

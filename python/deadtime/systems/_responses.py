@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from typing import Literal
 
@@ -15,19 +16,19 @@ from deadtime.systems._run import Given, impulse_response, respond, step_respons
 __all__ = ["HasResponses"]
 
 
-class HasResponses:
+class HasResponses(ABC):
     """Base of systems that can be simulated, exactly to rounding."""
 
     __slots__ = ()
 
-    def _realised(self) -> Realisation:
-        raise NotImplementedError
+    @abstractmethod
+    def _realised(self) -> Realisation: ...
 
-    def _differentiated(self) -> Realisable:
-        raise NotImplementedError
+    @abstractmethod
+    def _differentiated(self) -> Realisable: ...
 
-    def _gains_at_rest(self) -> NDArray[np.float64] | None:
-        raise NotImplementedError
+    @abstractmethod
+    def _gains_at_rest(self) -> NDArray[np.float64] | None: ...
 
     def simulate(
         self,

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 import deadtime.systems._signals as signals
 from deadtime._base.validation import finite, increasing, positive, real_array
 from deadtime._deadtime import Signal
-from deadtime.systems._realisation import Realisable, Realisation
+from deadtime.systems._realisation import Differentiable, Realisable, Realisation
 from deadtime.systems._response import Response
 
 __all__ = ["Given", "first_duration", "impulse_response", "respond", "step_response"]
@@ -172,7 +172,7 @@ def step_response(
     return response
 
 
-def impulse_response(system: Realisable, time: ArrayLike | None, input: int) -> Response:  # noqa: A002
+def impulse_response(system: Differentiable, time: ArrayLike | None, input: int) -> Response:  # noqa: A002
     """Response to an impulse: the derivative of the step response."""
     found = step_response(system._differentiated(), time, 1.0, input)
     return replace(found, inputs=np.zeros_like(found.inputs), states=None)

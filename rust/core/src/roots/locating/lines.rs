@@ -4,6 +4,7 @@
 //! line: just left of the roots wanted. Where it finds nothing, the lines move to the left, by
 //! growing steps that never reach the chains of a neutral equation or a line that could not be
 //! counted, and back by bisection. A first line that cannot be counted is moved to the right.
+//! One search with one state: its steps are not used elsewhere, so they share a file.
 
 use std::f64::consts::PI;
 

@@ -10,6 +10,7 @@
 //! norm, bounded by the Frobenius norm and by √(‖·‖₁ ‖·‖_∞). The spectral radius is
 //! plurisubharmonic (Vesentini 1968), as is ‖C^k‖: a bound on the torus holds for all smaller
 //! moduli, hence right of σ, and ‖(I + C)⁻¹‖ ≤ Π (1 + N_2^i)/(1 − N_k).
+//! Both ends are one argument over the same boxes and bounds, so they share a file.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
