@@ -6,6 +6,8 @@ import pytest
 from deadtime.estimation import GCC, ARXScan
 from deadtime.estimation.data._commands import commands_over_samples
 from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
+from deadtime.estimation.methods._arx_scan import F_TEST_LEVEL, _check_response
+from deadtime.estimation.methods._gcc import _whitener
 from deadtime.estimation.models._held_response import HeldResponse
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -79,6 +81,15 @@ def test_other_plants_are_correlated_without_compensation():
     assert "not inverted" in fit.message
     with pytest.raises(ValueError, match="RationalPlant"):
         dtm.estimate_delay(recording, loop, method=ARXScan(fractional=True))
+
+
+def test_the_order_of_a_whitener_is_that_of_akaike():
+    # For white noise his criterion takes no coefficient with a probability of exp(-sum P(X_i >
+    # 2 i)/i) = 0.712, X_i chi-square with i degrees of freedom (Shibata 1976).
+    random = np.random.default_rng(0)
+    orders = [_whitener(random.normal(size=400)).size - 1 for _ in range(200)]
+    # 200 draws: a deviation of 0.032.
+    assert np.mean(np.equal(orders, 0)) == pytest.approx(0.712, abs=0.096)
 
 
 def test_the_mean_command_of_a_continuous_loop_stops_before_a_jump():
@@ -190,6 +201,15 @@ def test_recordings_without_a_response_to_the_command_are_refused(method):
         except dtm.NotIdentifiableError:
             refused += 1
     assert refused >= 38
+
+
+def test_the_significance_of_two_coefficients_has_a_closed_form():
+    # For two coefficients and f degrees of freedom p is (least/none)^(f/2).
+    samples, numbers, none = 90, 4, 3.0
+    least = none * F_TEST_LEVEL ** (2.0 / (samples - numbers))
+    _check_response(0.999 * least, none, samples, numbers)
+    with pytest.raises(dtm.NotIdentifiableError, match="no more than with noise"):
+        _check_response(1.001 * least, none, samples, numbers)
 
 
 def test_options_are_checked():

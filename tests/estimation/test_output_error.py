@@ -269,6 +269,17 @@ def test_an_estimate_without_a_profile_raises():
         fit.profile()
 
 
+@pytest.mark.parametrize(
+    ("sample_time", "words"), [(None, "continuous controller"), (0.02, "are not its samples")]
+)
+def test_a_command_that_rows_do_not_determine_is_not_computed(sample_time, words):
+    flight, known = record_step(noise=0.001)
+    silent = dtm.Recording(flight.time, flight.reference, flight.output)
+    loop = known.replace(sample_time=sample_time)
+    with pytest.raises(dtm.NotIdentifiableError, match=words):
+        dtm.estimate_delay(silent, loop, method="output_error")
+
+
 # --- real flights ---------------------------------------------------------------------------
 
 

@@ -56,6 +56,27 @@ def test_the_entry_of_the_noise_is_detected(noise_in_loop):
     assert right >= 16
 
 
+def test_the_entry_of_the_noise_does_not_depend_on_the_unit_of_the_output():
+    recording, known = record_step(0.01, Kp=3.0, noise_in_loop=False)
+    # Metres and micrometres: powers of two keep every digit.
+    for unit in (1.0, 2.0**-20):
+        scaled = dtm.Recording(recording.time, unit * recording.reference, unit * recording.output)
+        fit = dtm.estimate_delay(scaled, known.replace(limit=unit), method="waveform")
+        assert fit.details["noise"] == "recording"
+        assert fit.delay == pytest.approx(0.361, abs=1e-3)
+
+
+def test_innovations_are_taken_from_the_output_where_the_command_is_logged_too():
+    recording, known = record_step(0.01, seed=2, Kp=3.0)
+    logged = dtm.Recording(
+        recording.time, recording.reference, recording.output, np.sin(recording.time)
+    )
+    method = Waveform(noise="loop")
+    fit, plain = (dtm.estimate_delay(one, known, method=method) for one in (logged, recording))
+    assert fit.details["command"] == "computed from reference and output"
+    assert fit.delay == plain.delay
+
+
 def test_a_recording_may_begin_with_its_step():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36, sample_time=TS, limit=1.0)
     recording = dtm.Experiment.step(6.0).run(loop)

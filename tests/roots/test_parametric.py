@@ -85,6 +85,12 @@ def test_some_values_leave_a_family(fixed):
     np.testing.assert_allclose(whole.delays, h.at(**point).delays, rtol=1e-15)
 
 
+def test_numbers_in_place_of_some_parameters_read_like_numbers():
+    h = s**2 + (Kp**2 + Kv * s) * delay(T) + Kp * Kv * s * delay(T)
+    assert repr(h.at(Kp=2.0)) == "s^2 + (4 + 3 Kv s) exp(-T s)"
+    assert h.at(Kp=2.0).at(T=0.5) == h.at(T=0.5, Kp=2.0) == s**2 + (4 + 3 * Kv * s) * delay(0.5)
+
+
 def test_negative_delays_are_refused_where_they_arise():
     h = s + delay(T - 0.1)
     with pytest.raises(ValueError, match=r"T=0\.05.*not be negative"):

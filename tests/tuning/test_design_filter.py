@@ -40,6 +40,15 @@ def test_the_fastest_filter_that_is_quiet_enough():
     assert found.value > found.ideal.value
 
 
+def test_noise_without_a_bound_of_the_command_is_only_reported():
+    plain, noisy = (
+        dtm.design_filter(LOOP, fixed={"Kp": 2.0}, loss=0.2, noise=noise, omegas=[40.0, 160.0])
+        for noise in (None, 0.01)
+    )
+    assert noisy.rule == plain.rule == "the slowest that loses at most 20 %"
+    assert (noisy.omega, noisy.noise) == (plain.omega, 0.01)
+
+
 def test_design_chooses_a_filter_itself(choice):
     best = dtm.design(LOOP, fixed={"Kp": 2.0}, filter="auto")
     assert best.filter_choice.omega == choice.omega
