@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import pickle
+from fractions import Fraction
 from pathlib import Path
 
 import deadtime
@@ -15,8 +16,9 @@ from ball_certificate import ball_count
 from deadtime import CertificateError, ContourError, QuasiPolynomial, delay, s
 from deadtime.roots import Certificate
 from deadtime.roots.certificate._enclosures import angle, cos_sin, dyadic, exponential, pi
+from deadtime.roots.certificate._function import ExactFunction
 from deadtime.roots.certificate._parts import Monotone, Segment
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from root_cases import CASES, ROOT_ON_AN_EDGE
 
@@ -371,6 +373,78 @@ def test_angles_are_enclosed(x, y):
     assume(x or y)
     with mp.workprec(500):
         assert abs(angle(x, y) - mp.atan2(y, x) * 2**64) <= 8
+
+
+def exact(rows, delays, s, index, order=1):
+    """Derivatives of h e^(s tau_index), by Leibniz's rule."""
+    s, found = mp.mpmathify(s), []
+    for k in range(order + 1):
+        total = mp.mpf(0)
+        for row, tau in zip(rows, delays, strict=True):
+            gap = mp.mpf(tau) - mp.mpf(delays[index])
+            for j in range(k + 1):
+                falling = [c * mp.ff(n, j) * s ** (n - j) for n, c in enumerate(row) if n >= j]
+                total += math.comb(k, j) * (-gap) ** (k - j) * sum(falling) * mp.exp(-gap * s)
+        found.append(total)
+    return found
+
+
+DIGITS = st.floats(-9, 9).map(lambda x: round(x, 2))
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    rows=st.lists(st.lists(DIGITS, min_size=1, max_size=4).filter(any), min_size=2, max_size=2),
+    place=st.complex_numbers(max_magnitude=9.0),
+    index=st.integers(0, 1),
+)
+@example(rows=[[0.0, 2.0**100], [1.0]], place=2.0**-100 * (1.1 + 0.7j), index=0)
+@example(rows=[[1.0], [0.0, 0.0, 0.0, 2.0**80]], place=2.0**-60 * (1.1 + 0.7j), index=1)
+def test_a_function_and_its_slope_are_enclosed_with_digits_to_spare(rows, place, index):
+    delays = [0.1, 0.8]
+    found = ExactFunction(rows, delays, 0, 0).enclose(place, index, 1.0)
+    with mp.workprec(1500):
+        value, slope = (
+            part * mp.mpf(2) ** found.bits for part in exact(rows, delays, place, index)
+        )
+        assert abs(found.vr - value.real) <= found.lost
+        assert abs(found.vi - value.imag) <= found.lost
+        assert abs(found.wr - slope.real) <= found.worse
+        assert abs(found.wi - slope.imag) <= found.worse
+        steepest = found.slope_above() * Fraction(1 << found.bits)
+        assert abs(slope) <= int(steepest) + 1 <= abs(slope) + 4 * found.worse + 4
+    # Errors are far below values of about 1.
+    assert max(found.lost, found.worse) << 80 < 1 << found.bits
+
+
+def test_bounds_on_derivatives_are_attained_where_all_terms_are_positive():
+    # With the last delay as reference every term grows to the right, so the bound is the value
+    # at the right end of the disc.
+    rows, delays = [[0.3, 2.0, 0.7, 1.1], [1.7, 0.2]], [0.1, 0.9]
+    h = ExactFunction(rows, delays, 0, 0)
+    for middle, radius in ((1.3, 0.5), (0.2, 2.0**-20), (40.0, 3.0)):
+        with mp.workprec(300):
+            _, slope, bend = exact(rows, delays, middle + radius, 1, 2)
+        assert float(h.bend(complex(middle), Fraction(radius), 1)) == pytest.approx(
+            float(bend), rel=1e-14
+        )
+        steepest = float(h.steepness(complex(middle), Fraction(radius), 1, 1.0))
+        # The remainder of the Taylor polynomial, of order 9, makes it larger.
+        assert float(slope) <= steepest * (1 + 1e-14)
+        if radius < 1.0:
+            assert steepest == pytest.approx(float(slope), rel=1e-5)
+
+
+def test_a_value_is_within_a_disc_of_a_center_to_its_last_digit():
+    found = ExactFunction([[3.0, 4.0]], [0.0], 0, 0).enclose(1j, 0, 5.0)
+    center, room = (Fraction(0), Fraction(1)), Fraction(2 * found.lost, 1 << found.bits)
+    # 3 + 4i is sqrt(18) from i.
+    length = Fraction(math.isqrt(18 << 200), 1 << 100)
+    assert not found.is_within(center, length)
+    assert found.is_within(center, length + 2 * room + Fraction(1, 1 << 90))
+    assert not found.is_within((Fraction(0), Fraction(0)), Fraction(4))
+    assert not found.is_within((Fraction(3), Fraction(0)), Fraction(39, 10))
+    assert not found.is_within((Fraction(0), Fraction(4)), Fraction(29, 10))
 
 
 def test_numbers_out_of_range():
