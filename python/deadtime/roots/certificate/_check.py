@@ -178,7 +178,7 @@ class _Checker:
         return _dominates_rightward(self.function.rows_exact, self.function.delays_exact, x, height)
 
     def _is_left_edge(self, x: float, height: float) -> bool:
-        """As `_is_right_edge`, for h(-s) e^(-s tau_last), whose coefficients have the same moduli."""
+        """As `_is_right_edge`, for h(-s) e^(-s tau_last); its coefficients have the same moduli."""
         rows, last = self.function.rows_exact[::-1], self.function.delays_exact[-1]
         delays = [last - tau for tau in reversed(self.function.delays_exact)]
         return _dominates_rightward(rows, delays, -x, height)
