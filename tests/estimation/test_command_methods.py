@@ -11,6 +11,7 @@ from deadtime.estimation.methods._gcc import _whitener
 from deadtime.estimation.models._held_response import HeldResponse
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import kstest
 from step_recordings import (
     CASES,
     TS,
@@ -145,6 +146,16 @@ def test_feedback_is_detected_in_closed_loops_only():
     held = [open_loop(seed, hold=1 + seed % 4)[0] for seed in range(60)]
     # One false detection in a thousand is expected.
     assert sum(feedback_p_value(recording) < FEEDBACK for recording in held) <= 2
+
+
+def test_without_feedback_all_p_values_are_equally_likely():
+    random = np.random.default_rng(5)
+    time, values = np.arange(80) * TS, []
+    for _ in range(200):
+        command, output, reference = random.normal(size=(3, time.size))
+        values.append(feedback_p_value(dtm.Recording(time, reference, output, command)))
+    # The distribution function of 200 uniform numbers is off by 0.12 in one of 200 cases.
+    assert kstest(values, "uniform").statistic < 0.12
 
 
 def test_feedback_is_reported():

@@ -25,6 +25,7 @@ from deadtime.estimation.methods._overshoot import dominant_x, exact_overshoot, 
 from flights import flight_path
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 TS = 0.065
 
@@ -438,6 +439,16 @@ def test_robust_standard_errors_are_right_for_coloured_noise_and_white_ones_are_
     white = math.sqrt(white_covariance(ones, residuals)[0, 0])
     assert robust == pytest.approx(truth, rel=0.25)
     assert white < 0.6 * truth
+
+
+def test_the_bandwidth_grows_with_the_correlation():
+    # With Andrews' bandwidth of 41 lags Bartlett's kernel loses a quarter of the variance.
+    rng = np.random.default_rng(3)
+    n, rho = 500, 0.9
+    processes = lfilter([1.0], [1.0, -rho], rng.normal(size=(60, n + 200)))[:, 200:]
+    ones = np.ones((n, 1))
+    found = [robust_covariance(ones, one - one.mean())[0, 0] for one in processes]
+    assert np.mean(found) * n * (1 - rho) ** 2 == pytest.approx(0.7, abs=0.12)
 
 
 # --- real flights ---------------------------------------------------------------------------

@@ -146,8 +146,14 @@ def test_chebyshev_is_for_linear_continuous_loops(change, words):
     recording, known = record_step(ts=None, dt=0.02, limit=None)
     with pytest.raises(ValueError, match=words):
         dtm.estimate_delay(recording, known.replace(**change), method="cta")
-    with pytest.raises(ValueError, match="intervals"):
-        dtm.estimate_delay(recording, known, method=CTA(intervals=0))
+
+
+def test_the_delay_line_has_1_to_24_intervals():
+    for intervals in (1, 24):
+        assert CTA(intervals=intervals).intervals == intervals
+    for intervals in (0, 25):
+        with pytest.raises(ValueError, match="intervals"):
+            CTA(intervals=intervals)
 
 
 # --- refusals of both -----------------------------------------------------------------------

@@ -38,6 +38,12 @@ def test_sequence_numbers_must_rise():
     assert reader.newest.missing == 2  # The longest run of bad packets that the rules allow.
 
 
+def test_a_packet_from_before_the_first_one_was_not_missing():
+    reader, states = read_all(*(packet(k) for k in (5, 3, 6)))
+    assert [s and s.sequence for s in states] == [5, None, 6]
+    assert (reader.statistics.reordered, reader.statistics.missing) == (1, 0)
+
+
 def test_a_number_far_ahead_is_rejected_and_later_packets_are_accepted():
     reader, states = read_all(packet(1), packet(2**31), packet(2))
     assert states[1] is None

@@ -289,6 +289,13 @@ def test_poles_of_a_sampled_loop_in_a_region_are_its_eigenvalues():
     assert loop.count() == np.count_nonzero(z)
 
 
+def test_the_rightmost_poles_of_a_sampled_loop_name_the_strip_they_were_sought_in():
+    loop = dtm.ControlLoop(INTEGRATOR, dtm.P(5.0), delay=0.36, sample_time=0.065)
+    found = loop.rightmost(2)
+    half = math.pi / 0.065
+    assert found.region == ((found.roots.real.min(), math.inf), (-half, half))
+
+
 def test_a_pole_of_a_sampled_loop_on_the_edge_is_refused():
     loop = dtm.ControlLoop(INTEGRATOR, dtm.P(5.0), delay=0.36, sample_time=0.065)
     pole = loop.rightmost().roots[0]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.loops._sampled_margins import sampled_margins
+from deadtime.loops._sampled_margins import _crossings, sampled_margins
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -161,9 +161,26 @@ def test_an_unstable_sampled_loop_has_no_margins_but_crossings():
     assert "not stable" in repr(found)
 
 
+def test_a_pole_among_the_frequencies_leaves_the_others_as_they_are():
+    found = LOOPS[0].frequency_response([0.0, 1.0])
+    assert np.isinf(found[0])
+    assert found[1] == pytest.approx(LOOPS[0].frequency_response(1.0), rel=1e-12)
+
+
+def test_a_pair_of_crossings_between_two_angles_is_found():
+    def f(angle):
+        return (angle - 1.03) ** 2 - 1e-4
+
+    angles = np.linspace(0.5, 2.0, 7)
+    assert (f(angles) > 0.0).all()
+    np.testing.assert_allclose(_crossings(f, angles), [1.02, 1.04], rtol=1e-12)
+    np.testing.assert_allclose(_crossings(lambda a: -f(a), angles), [1.02, 1.04], rtol=1e-12)
+
+
 def test_frequencies_beyond_half_the_sampling_rate_are_refused():
-    with pytest.raises(ValueError, match=r"from 0 to 48\.3"):
-        LOOPS[0].frequency_response(50.0)
+    for omega in (50.0, -1.0, [-1.0, 50.0]):
+        with pytest.raises(ValueError, match=r"from 0 to 48\.3"):
+            LOOPS[0].frequency_response(omega)
     with pytest.raises(ValueError, match="None"):
         LOOPS[0].replace(delay=None).margin()
 

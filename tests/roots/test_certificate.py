@@ -15,6 +15,7 @@ import pytest
 from ball_certificate import ball_count
 from deadtime import CertificateError, ContourError, QuasiPolynomial, delay, s
 from deadtime.roots import Certificate
+from deadtime.roots.certificate._check import _dominates_rightward
 from deadtime.roots.certificate._enclosures import angle, cos_sin, dyadic, exponential, pi
 from deadtime.roots.certificate._function import ExactFunction
 from deadtime.roots.certificate._parts import Monotone, Segment
@@ -231,6 +232,15 @@ def test_false_statements_about_open_sides_fail():
     (a, b), im = strip.closed
     for re in ((0.5 * a, b), (a, 1e-3 * b), (a, -b), (-math.inf, b)):
         assert_false(dataclasses.replace(strip, closed=(re, im)), re)
+
+
+@pytest.mark.parametrize("tau", [0.5, 2.0])
+def test_no_right_edge_lies_left_of_a_chain(tau):
+    # s (1 + 5 e^(-s tau)) has its chain at ln(5)/tau; its leading terms alone decide.
+    rows, delays = [[Fraction(0), Fraction(1)], [Fraction(0), Fraction(5)]], [0, Fraction(tau)]
+    chain = math.log(5.0) / tau
+    assert not _dominates_rightward(rows, delays, 0.99 * chain, 0.0)
+    assert _dominates_rightward(rows, delays, 1.01 * chain, 0.0)
 
 
 def test_false_statements_about_the_real_axis_fail():

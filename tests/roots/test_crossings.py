@@ -226,6 +226,7 @@ REFUSED = [
     (s - 1.0 + delay(T), {"T": (0, 2)}, None, "stays at s = 0"),
     ((s**2 + 1.0) * (s + delay(T)), {"T": (0, 2)}, None, "stays at omega = 1 "),
     (s + delay(T), {"T": (-1, 2)}, None, "delays must not be negative"),
+    (s + delay(1.0 - T), {"T": (0, 2)}, None, "a delay is -1 s at T=2"),
 ]
 
 

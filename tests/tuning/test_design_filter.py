@@ -79,6 +79,7 @@ def test_the_noise_gain_is_what_a_simulated_loop_shows():
         ({"controller": dtm.PI}, "no derivative"),
         ({"command_noise": 0.1}, "both"),
         ({"omegas": [3.0, 2.0]}, "omegas"),
+        ({"omegas": [0.0, 2.0]}, "two increasing corners above zero"),
         ({"omegas": [1.0, 2.0], "loss": 0.01}, "loses as little as 1 %"),
         ({"noise": 1.0, "command_noise": 0.1, "omegas": [10.0, 20.0]}, "noise gain"),
         ({"loss": -1.0}, "loss"),
