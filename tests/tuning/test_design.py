@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from deadtime.tuning import critical_gain
 from deadtime.tuning._margin_estimate import MarginEstimate
-from deadtime.tuning._objectives import dominant_damping
+from deadtime.tuning._objectives import _rounded, dominant_damping
 from deadtime.tuning._problem import pose
 from deadtime.tuning._specification import DesignSpecification
+from deadtime.tuning._survey import Survey
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
 SAMPLED = dtm.ControlLoop(
@@ -169,8 +170,30 @@ def test_margins_that_nothing_meets_are_refused_with_the_best_there_is():
 
 @pytest.mark.parametrize("loop", [LOOP, LOOP.replace(sample_time=0.065), SAMPLED])
 def test_estimates_of_margins_are_close_to_the_exact_ones(loop):
+    problem = posed(loop, SMOOTH)
+    estimate = MarginEstimate(problem)
+    for gains in ([1.0, 0.1], [2.0, 0.2], [2.5, 0.4], [0.3, -0.02]):
+        exact = problem.at(gains).margin()
+        found = estimate.of(np.array([gains]), problem.corners)[0]
+        assert found[0] == pytest.approx(exact.gain_margin, rel=2e-3)
+        assert found[1] == pytest.approx(exact.phase_margin, rel=2e-3)
+        # A turn is not quite a delay where the hold's fraction of a sample matters.
+        assert found[2] == pytest.approx(exact.delay_margin, rel=5e-2)
+
+
+@pytest.mark.parametrize("share", [0.2, 1.0, 1.8])
+def test_a_gain_margin_at_half_the_sampling_rate_is_estimated(share):
+    # Without a delay the pole 1 - Kp Ts leaves the circle at -1.
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.0, sample_time=0.065)
+    problem = posed(loop, dtm.P)
+    gains = np.array([[share / 0.065]])
+    found = MarginEstimate(problem).of(gains, problem.corners)[0]
+    assert found[0] == pytest.approx(2.0 / share, rel=1e-9)
+
+
+def posed(loop, controller):
     asked = DesignSpecification(
-        controller=SMOOTH,
+        controller=controller,
         delay=None,
         gain=None,
         objective="abscissa",
@@ -183,15 +206,7 @@ def test_estimates_of_margins_are_close_to_the_exact_ones(loop):
         amplitude=1.0,
         threads=None,
     )
-    problem = pose(loop, asked)
-    estimate = MarginEstimate(problem)
-    for gains in ([1.0, 0.1], [2.0, 0.2], [2.5, 0.4], [0.3, -0.02]):
-        exact = problem.at(gains).margin()
-        found = estimate.of(np.array([gains]), problem.corners)[0]
-        assert found[0] == pytest.approx(exact.gain_margin, rel=2e-3)
-        assert found[1] == pytest.approx(exact.phase_margin, rel=2e-3)
-        # A turn is not quite a delay where the hold's fraction of a sample matters.
-        assert found[2] == pytest.approx(exact.delay_margin, rel=5e-2)
+    return pose(loop, asked)
 
 
 # What is not known
@@ -292,6 +307,26 @@ def swept_settling(loop, gains):
         named = zip(gains.items(), signs, strict=True)
         every.append({name: values * sign for (name, values), sign in named})
     return np.max([dtm.sweep(loop, one, 20.0)["settling_time"] for one in every], axis=0)
+
+
+def test_gains_are_judged_with_neighbours_on_every_side():
+    (around,) = _rounded(np.array([[2.0, -4.0]]))
+    here, beside = around[0], around[1:]
+    assert here.tolist() == [2.0, -4.0]
+    np.testing.assert_allclose(np.sort(np.abs(beside), axis=0).mean(axis=0), [2.0, 4.0])
+    assert len({tuple(row) for row in np.sign(beside - here)}) == len(beside) == 4
+
+
+def test_a_search_by_simulation_keeps_gains_off_zero():
+    # With an integral gain of zero the loop is another one, and may not settle.
+    axes = (np.linspace(0.0, 4.0, 5), np.linspace(-1.0, 0.0, 5), np.linspace(-1.0, 1.0, 3))
+    survey = Survey(axes, np.zeros((5, 5, 3)))
+    low, high = survey.off_zero(np.array([2.0, -0.5, 0.5]))
+    assert 0.0 < low[0] < 1.0
+    assert -0.25 < high[1] < 0.0
+    assert (high[0], low[1], low[2], high[2]) == (4.0, -1.0, -1.0, 1.0)
+    # A gain that is to be zero may stay there.
+    assert survey.off_zero(np.array([0.0, -0.5, 0.5]))[0][0] == 0.0
 
 
 def test_the_settling_time_is_that_of_the_simulated_loop():
