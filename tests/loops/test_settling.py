@@ -1,10 +1,14 @@
 """Settling times of designs and sweeps against long runs of an independent simulation."""
 
+from dataclasses import replace
+
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.loops._model import LoopRun
+from deadtime.tuning._fundamental import Fundamental
 from deadtime.tuning._tail import tail_bound
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from loops import loops
 from scipy.linalg import expm
@@ -113,6 +117,54 @@ def test_the_tail_is_bounded(loop, times):
         assert response.steady_state is not None
         after = np.abs(response.outputs - response.steady_state)[response.time >= end].max()
         assert after <= bound * (1.0 + 1e-6) + 1e-11
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    loop=loops(),
+    state=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5),
+    pulse=st.sampled_from([0.0, 1.0]),
+    delays=st.sampled_from([1, 2, 4]),
+)
+@example(loop=LAGGING, state=[0.0] * 5, pulse=1.0, delays=1)
+@example(loop=LAGGING.replace(lag=0.0, Kp=12.0), state=[1.0] * 5, pulse=0.0, delays=2)
+@example(
+    loop=LAGGING.replace(lag=0.0, controller=dtm.PI(12.0, 0.1)),
+    state=[1.0, 0.0, 0.0, 0.0, 0.0],
+    pulse=0.0,
+    delays=2,
+)
+def test_a_period_is_bounded_by_what_it_begins_with(loop, state, pulse, delays):
+    assume(loop.delay > 0.0)
+    model, late = loop.continuous().specification.model, loop.delay
+    n = len(model.B)
+    Q, outputs, commands = Fundamental(model, late).bounds(delays)
+    # Either nothing is under way when the period begins, or a pulse of the reference is.
+    h, begin = late / FINE, FINE if pulse else 0
+    time = h * np.arange(begin + delays * FINE + 1)
+    jumps = h * np.array([0.0, FINE - 4, FINE])
+    run = LoopRun(np.array(state[:n]), 0.0, 0.0, np.array([0.0, pulse, 0.0]), jumps)
+    rows = [replace(model, C=row, D=0.0) for row in np.eye(n)]
+    x = np.array([one.native(late, None, None).outputs(time, run) for one in rows])
+    # Commands from one delay before the first time on.
+    u = np.concatenate([np.zeros(FINE), model.K @ x])
+    u[2 * FINE - 4 : 2 * FINE] += model.M * pulse
+    for i in range(2 * FINE, u.size):
+        u[i] += model.L * u[i - FINE]
+    y = model.C @ x + model.D * u[: x.shape[1]]
+
+    def sizes(i, under_way, least):
+        parts = h * least(under_way[1:], under_way[:-1])
+        return np.array([*np.abs(x[:, i]), parts.sum(), under_way.max()])
+
+    first = np.abs(u[begin : begin + FINE + 1])
+    if not pulse:
+        first[-1] = 0.0
+    before = sizes(begin, first, np.maximum) * (1.0 + 1e-9) + 1e-12
+    after = sizes(-1, np.abs(u[-FINE - 1 :]), np.minimum)
+    assert (after <= Q @ before).all()
+    assert np.abs(y[begin:]).max() <= outputs @ before
+    assert np.abs(u[begin + FINE :]).max() <= commands @ before
 
 
 def test_the_tail_bound_is_of_use():
