@@ -8,7 +8,7 @@ import deadtime as dtm
 import matplotlib.pyplot
 import numpy as np
 import pytest
-from deadtime.estimation import Frequency
+from deadtime.estimation import Frequency, compare_methods
 from deadtime.estimation._estimate import METHODS
 from step_recordings import record_step
 
@@ -39,6 +39,7 @@ def test_every_result_is_complete(method):
     fit = dtm.estimate_delay(recording, known, method=method)
     assert "nan" not in fit.summary().lower().replace("dominant", "")
     assert math.isfinite(json.loads(json.dumps(fit.to_dict(), allow_nan=False))["delay"])
+    assert fit.residuals.shape == fit.recording.time.shape
     axes = fit.plot()
     axes[0].figure.canvas.draw()
     assert fit.plot(axes) == axes
@@ -50,10 +51,23 @@ def test_every_result_is_complete(method):
     if fit.calibrated:
         low, high = again.ci(0.95)
         assert low < 0.36 < high
-        assert np.isfinite(again.profile()[1]).all()
+        values, t = again.profile()
+        assert values[0] < fit.delay < values[-1]
+        # Four standard errors, where the profile is nearly a parabola.
+        np.testing.assert_allclose(t[[0, -1]], 4.0, rtol=0.1)
     else:
         with pytest.raises(ValueError, match=r"use method='(output_error|waveform)'"):
             fit.ci(0.95)
+
+
+def test_a_comparison_fits_a_lag_where_the_plant_has_one():
+    loop = KNOWN.replace(delay=0.36, limit=None, Kp=2.0)
+    other = loop.replace(plant=dtm.FirstOrder(1.0, 0.5))
+    for one, expected in ((loop, {"waveform with lag", "output_error with lag"}), (other, set())):
+        recording = dtm.Experiment.step(6.0).run(one, noise=0.003)
+        found = compare_methods(recording, one.replace(delay=None)).estimates
+        assert {name for name in found if name.endswith("with lag")} == expected
+        assert "waveform" in found
 
 
 @pytest.mark.parametrize("method", ["output_error", "waveform", "grid"])

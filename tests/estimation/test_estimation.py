@@ -178,6 +178,15 @@ def test_the_overshoot_method_gives_no_interval_and_says_why():
     assert "no interval" in fit.summary()
 
 
+def test_the_standard_error_by_the_exact_map_has_a_closed_form():
+    # From x = 1 on, x is the overshoot plus a half: the delay is as uncertain as it, over K.
+    recording, known = record_step(Kp=3.0, noise=0.002, ts=None, dt=0.01)
+    fit = dtm.estimate_delay(recording, known, method=Overshoot(map="exact"))
+    noise = fit.details["overshoot_noise"]
+    assert noise == pytest.approx(0.002 * math.sqrt(1.0 + 1.0 / 100), rel=0.2)
+    assert fit.stderr["delay"] == pytest.approx(noise / 3.0, rel=1e-6)
+
+
 def test_a_step_without_overshoot_is_refused_by_name():
     recording, known = record_step(Kp=0.9)  # x = 0.324 < 1/e
     with pytest.raises(dtm.NotIdentifiableError, match=r"no overshoot.*1/e"):
