@@ -134,6 +134,15 @@ def test_the_profile_reaches_the_t_quantile_at_the_ends_of_the_interval():
         np.testing.assert_allclose(inside, 2.07, rtol=0.05)  # t quantile of 21 degrees of freedom
 
 
+def test_p_values_of_the_right_model_are_neither_small_nor_large():
+    # The variances are estimated from four periods, which widens the statistic by 3/2.
+    found = [estimate(*multisine(noise=0.01, seed=seed)) for seed in range(20)]
+    # The mean of 20 uniform numbers has a deviation of 0.065.
+    assert np.mean([fit.details["p_value_of_model"] for fit in found]) == pytest.approx(
+        0.5, abs=0.2
+    )
+
+
 def test_a_lag_missing_from_the_model_is_detected():
     recording, known = multisine(0.2, noise=0.003, periods=9)
     fit = estimate(recording, known)

@@ -120,6 +120,13 @@ def test_close_to_one_over_e_a_later_tail_has_less_bias():
     assert off[2] < 1e-5
 
 
+def test_a_tail_begins_where_no_limited_command_arrives_any_more():
+    # Up to 36 % of the step are left where the command leaves its limit.
+    recording, known = record_step(Kp=0.1 / 0.36, limit=0.1, duration=25.0)
+    fit = dtm.estimate_delay(recording, known, method=Decay(tail=0.6))
+    assert fit.delay == pytest.approx(0.36, abs=1e-3)
+
+
 def test_the_decay_with_a_known_lag():
     recording, known = record_step(Kp=0.5, lag=0.2, limit=None, duration=30.0)
     fit = dtm.estimate_delay(recording, known.replace(lag=0.2), method=Decay(tail=0.01))

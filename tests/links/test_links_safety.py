@@ -76,6 +76,7 @@ def test_the_largest_gain_is_half_of_that_of_instability():
     loop = dtm.ControlLoop(dtm.Integrator(0.8), dtm.P(1.0), delay=0.3)
     limit = loop.stable_range("Kp")[1]
     assert largest_gain(0.3, 0.8) == pytest.approx(limit / 2.0, rel=1e-9)
+    assert largest_gain(0.3) == largest_gain(0.3, 1.0)
     for wrong in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(ValueError, match="delay"):
             largest_gain(wrong)

@@ -6,6 +6,7 @@ import tracemalloc
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.loops._stability import _highest_crossing
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -112,6 +113,29 @@ def test_an_ideal_derivative_loses_stability_at_a_whole_number_of_samples():
     high = loop.stable_range("delay")[1]
     assert max(radius(loop, delay=delay) for delay in np.linspace(0.0, high * (1 - 1e-9), 50)) < 1.0
     assert radius(loop, delay=high * (1.0 + 1e-9)) > 1.0
+
+
+def test_sample_times_of_an_ideal_derivative_without_delay():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.PD(2.0, 0.6), delay=0.0, sample_time=0.1)
+    low, high = loop.stable_range("sample_time")
+    assert low == 0.0
+    for period in np.linspace(0.001, 0.999, 20) * high:
+        assert radius(loop, sample_time=period) < 1.0
+    assert radius(loop, sample_time=high * (1.0 + 1e-9)) > 1.0
+
+
+def test_corners_are_sought_up_to_where_the_loop_gain_is_below_one_for_all():
+    # A double integrator and Kv s alone: abs(L) = Kv/omega times the peak of the filter.
+    plant = dtm.RationalPlant([1.0], [1.0, 0.0, 0.0])
+    x, room = np.linspace(0.0, 3.0, 30001), []
+    for damping in (0.05, 0.5, 0.65, 0.8, 2.0):
+        controller = dtm.PV(1e-12, 3.0, dtm.DerivativeFilter(5.0, damping))
+        values = dtm.ControlLoop(plant, controller, delay=0.3).parameters
+        peak = (1.0 / np.hypot(1.0 - x**2, 2.0 * damping * x)).max()
+        room.append(_highest_crossing(plant, controller, values) / (3.0 * peak))
+    # A bound on roots leaves the same room for each.
+    assert room[0] >= 1.0
+    np.testing.assert_allclose(room, room[0], rtol=1e-6)
 
 
 def test_an_end_that_is_not_ruled_out_is_refused():

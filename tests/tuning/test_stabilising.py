@@ -42,6 +42,11 @@ def test_an_unstable_first_order_plant_is_stabilised_below_a_delay_of_its_time_c
         assert best.abscissa == pytest.approx(1.0 - 5.0, rel=1e-3)
 
 
+def test_without_delay_the_critical_gain_is_two_over_the_sample_time():
+    loop = dtm.ControlLoop(dtm.Integrator(), P1, delay=0.0, sample_time=0.065)
+    assert critical_gain(loop) == pytest.approx(2.0 / 0.065, rel=1e-9)
+
+
 def test_a_narrow_stable_interval_far_from_zero_is_found():
     # Between 1 and 1.0013 lies one cell of the map from 0.02 to 1.25 times the critical gain.
     best = dtm.design(unstable(0.99), controller=dtm.P)
