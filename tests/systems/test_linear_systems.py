@@ -268,6 +268,17 @@ def test_held_and_joined_inputs():
         G.simulate([0.0, 1.0], 0.0, input_before=2.0)
 
 
+@pytest.mark.parametrize("span", [0.02, 1.0, 500.0])
+def test_a_pulse_of_a_few_thousandths_of_the_run_is_not_missed(span):
+    width, start = 4e-3 * span, 0.618 * span
+
+    def pulse(t):
+        return np.where((t >= start) & (t < start + width), 1.0, 0.0)
+
+    found = dtm.TransferFunction([1.0], [1.0, 0.0]).simulate([0.0, span], pulse, vectorized=True)
+    assert found.outputs[-1] == pytest.approx(width, rel=1e-9)
+
+
 def test_a_stiff_lag_under_held_samples_is_a_row_of_exponentials():
     rng = np.random.default_rng(1)
     times = 0.05 * np.arange(61)
