@@ -391,6 +391,21 @@ def test_responses_decay_at_the_rate_of_the_certified_rightmost_root(key):
     assert rate == pytest.approx(alpha, rel=0.03, abs=1e-9)
 
 
+def test_a_recorded_step_is_measured_at_its_samples():
+    time = 0.01 * np.arange(801)
+    found = dtm.systems.Response(time, 1.0 - np.exp(-time), np.ones_like(time), [0.0]).info(
+        steady_state=1.0
+    )
+    assert found["rise_time"] == pytest.approx(math.log(9.0), abs=0.01)
+    assert found["settling_time"] == pytest.approx(math.log(50.0), abs=0.01)
+    assert found["overshoot"] == 0.0
+
+
+def test_a_rise_may_be_measured_from_the_first_output_on():
+    lag = dtm.TransferFunction([1.0], [1.0, 1.0]).step_response(np.linspace(0.0, 9.0, 31))
+    assert lag.info(rise=(0.0, 0.9))["rise_time"] == pytest.approx(math.log(10.0), abs=1e-6)
+
+
 def test_the_response_is_a_whole_object():
     system = dtm.DelaySystem({0.36: -2.0}, {0.36: 2.0})
     found = system.step_response()
