@@ -207,16 +207,6 @@ def test_the_response_of_a_plant_is_that_of_a_fine_simulation(plant, system):
     np.testing.assert_allclose(slopes.rate, quotient, rtol=0, atol=2e-2)
 
 
-@pytest.mark.parametrize(
-    ("plant", "steady"),
-    [(dtm.FirstOrder(2.0, 0.3), 1.0), (dtm.RationalPlant([3.0, 1.0], [1.0, 0.4, 4.0]), 0.25)],
-)
-def test_a_plant_rests_under_its_first_command(plant, steady):
-    path = path_of(plant, np.array([0.0, 0.5, 1.0]), np.array([2.0, 2.0, 0.0]))
-    found = path.value(np.array([-3.0, 0.0, 0.4, 1.0]), plant.parameters)
-    np.testing.assert_allclose(found, 2.0 * steady, rtol=1e-12)
-
-
 def test_the_delay_of_a_first_order_plant_from_its_command():
     rng = np.random.default_rng(1)
     time = np.arange(0.0, 12.0, 0.1)

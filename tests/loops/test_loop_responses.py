@@ -7,6 +7,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.loops._open_run import open_response
 from deadtime.loops._plants import realise, rest
 from loops import INTEGRATOR, TIMES
 from scipy.integrate import solve_ivp
@@ -244,3 +245,14 @@ def test_loops_without_an_impulse_response_say_so():
         loop.replace(limit=1.0).impulse_response()
     with pytest.raises(ValueError, match="delay of this loop is None"):
         dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0)).impulse_response()
+
+
+@pytest.mark.parametrize(
+    ("plant", "steady"),
+    [(dtm.FirstOrder(2.0, 0.3), 2.0), (dtm.RationalPlant([3.0, 1.0], [1.0, 0.4, 4.0]), 0.25)],
+)
+def test_a_plant_without_a_controller_rests_under_its_first_command(plant, steady):
+    when, command = np.array([0.0, 0.5, 1.0]), np.array([2.0, 2.0, 0.0])
+    times = np.array([-3.0, 0.0, 0.4, 1.0])
+    found = open_response(plant, plant.parameters, times, when, command)
+    np.testing.assert_allclose(found, 2.0 * steady, rtol=1e-12)

@@ -126,6 +126,16 @@ def test_roots_broadcast_and_keep_their_bits():
     assert (bits(alone) == bits(s[3, 4, 5])).all()
 
 
+@pytest.mark.parametrize("a1", [2.0, -2.0])
+def test_the_rightmost_branches_are_those_of_the_rightmost_roots(a1):
+    branches = dtm.roots.rightmost_branches(a1, 9)
+    found = dtm.dde_roots(-0.3, a1, 0.4, branches)
+    every = dtm.dde_roots(-0.3, a1, 0.4, np.arange(-20, 21))
+    assert len(set(branches.tolist())) == 9
+    assert (np.diff(found.real) <= 1e-12).all()
+    np.testing.assert_allclose(found.real, np.sort(every.real)[::-1][:9], rtol=1e-12)
+
+
 def test_the_rightmost_root_is_number_zero():
     generator = np.random.default_rng(2)
     a0, a1 = generator.uniform(-4, 4, (2, 500, 1))

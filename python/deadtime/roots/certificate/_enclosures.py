@@ -79,7 +79,7 @@ def exponential(n: int, q: int, bits: int) -> tuple[int, int, int]:
     r = t - ((k * ln2) >> 32)
     total = term = 1 << work
     count = 0
-    while term not in (0, -1):
+    while term:
         count += 1
         term = ((term * r) >> work) // count
         total += term
@@ -101,7 +101,7 @@ def cos_sin(n: int, q: int, bits: int) -> tuple[int, int]:
     sums = []
     for term, start in ((1 << work, 0), (r, 1)):
         total, k = term, start
-        while term not in (0, -1):
+        while term:
             term = -((term * square) >> work) // ((k + 1) * (k + 2))
             k += 2
             total += term
