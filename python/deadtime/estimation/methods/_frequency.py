@@ -55,9 +55,6 @@ Array = NDArray[np.float64]
 #: Longest delay of the search, as a share of the record or of the periods.
 LONGEST = 0.6
 
-#: Lags below this share of a sample count as zero.
-NO_LAG = 1e-9
-
 #: Largest relative deviation of the time between samples from its median.
 EVEN = 1e-3
 
@@ -248,9 +245,8 @@ class _PeriodicMisfit:
 
 
 def _path(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:
-    """Response to the commands for a gain of one; lags that would overflow count as zero."""
-    lag = values["lag"] if values["lag"] > NO_LAG * data.sample_time else 0.0
-    return response.at(data.time - values["delay"], lag).value
+    """Response to the commands for a gain of one."""
+    return response.at(data.time - values["delay"], values["lag"]).value
 
 
 def _residuals(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:
