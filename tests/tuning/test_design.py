@@ -8,10 +8,9 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.tuning import critical_gain
-from deadtime.tuning._margin_estimate import MarginEstimate
+from deadtime.tuning._margins import MarginEstimate
 from deadtime.tuning._objectives import dominant_damping
 from deadtime.tuning._problem import pose
-from deadtime.tuning._specification import DesignSpecification
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
 SAMPLED = dtm.ControlLoop(
@@ -169,21 +168,7 @@ def test_margins_that_nothing_meets_are_refused_with_the_best_there_is():
 
 @pytest.mark.parametrize("loop", [LOOP, LOOP.replace(sample_time=0.065), SAMPLED])
 def test_estimates_of_margins_are_close_to_the_exact_ones(loop):
-    asked = DesignSpecification(
-        controller=SMOOTH,
-        delay=None,
-        gain=None,
-        objective="abscissa",
-        fixed=None,
-        gain_margin=None,
-        phase_margin=None,
-        delay_margin=None,
-        ranges=None,
-        shape=None,
-        amplitude=1.0,
-        threads=None,
-    )
-    problem = pose(loop, asked)
+    problem = pose(loop, SMOOTH, None, None, fixed=None, ranges=None, amplitude=1.0, threads=None)
     estimate = MarginEstimate(problem)
     for gains in ([1.0, 0.1], [2.0, 0.2], [2.5, 0.4], [0.3, -0.02]):
         exact = problem.at(gains).margin()

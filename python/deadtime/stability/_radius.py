@@ -11,8 +11,8 @@ from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.ranges import Range
 from deadtime._base.validation import finite, positive
-from deadtime.roots._family import family_of
-from deadtime.stability._intervals import MOST_MOVING, System, Values
+from deadtime.roots._family import HasFamily, family_of
+from deadtime.stability._arguments import MOST_MOVING
 
 __all__ = ["StabilityRadius", "stability_radius"]
 
@@ -45,11 +45,11 @@ class StabilityRadius(ReadOnlyArrays):
 
 
 def stability_radius(
-    family: System,
+    family: HasFamily,
     point: Mapping[str, SupportsFloat],
     scales: Mapping[str, SupportsFloat] | None = None,
     *,
-    at: Values | None = None,
+    at: Mapping[str, SupportsFloat] | None = None,
     tol: float = 1e-3,
 ) -> StabilityRadius:
     """How far gains and delays may move away from a point, all at once, without loss of stability.

@@ -24,9 +24,8 @@ import numpy as np
 
 from deadtime.loops import ControlLoop, sweep
 from deadtime.loops._model import rest_of
-from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._problem import ObjectiveName, Problem, Scenario, Vector
 from deadtime.tuning._settling import BAND, proved_step
-from deadtime.tuning._specification import ObjectiveName
 
 __all__ = ["NEVER", "Objective", "dominant_damping", "objective_named"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from deadtime._base.ranges import Range, interval
 from deadtime._base.validation import finite, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.tuning._specification import DesignSpecification
 from deadtime.tuning._stabilising import candidate_ranges
 
 __all__ = [
+    "ObjectiveName",
     "Problem",
     "Scenario",
     "Vector",
@@ -27,6 +27,8 @@ __all__ = [
 ]
 
 Vector: TypeAlias = NDArray[np.float64]
+
+ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
 
 #: Values of the unknown numbers of a loop, by name.
 Scenario: TypeAlias = dict[str, float]
@@ -69,6 +71,11 @@ class Problem:
         """The loop with these gains, in one scenario or in the middle."""
         return self.loop.replace(**self.named(gains), **(scenario or {}))
 
+    def filtered(self, smooth: DerivativeFilter | None) -> Problem:
+        """The same problem with another filter of the derivative, or none."""
+        controller = with_filter(self.loop.controller, smooth)
+        return replace(self, loop=self.loop.replace(controller=controller))
+
     def scenarios(self, points: int) -> tuple[Scenario, ...]:
         """Every combination of `points` values of each unknown number."""
         values = [
@@ -97,15 +104,20 @@ class Problem:
         return (low, 0.5 * (low + high), high) if low < high else (low,)
 
 
-def pose(loop: object, specification: DesignSpecification) -> Problem:
-    """Check the arguments of a design, and state its problem."""
-    template = controller_template(specification.controller)
-    delay, gain, ranges = specification.delay, specification.gain, specification.ranges
+def pose(
+    loop: object,
+    template: Controller,
+    delay: float | Range | None,
+    gain: float | Range | None,
+    fixed: Mapping[str, float] | None,
+    ranges: Mapping[str, Range] | None,
+    amplitude: float,
+    threads: int | None,
+) -> Problem:
+    """Check these arguments of `design`, and state its problem."""
     if not isinstance(loop, ControlLoop):
         loop, delay = _around(loop, template, delay)
-    held = {
-        name: finite(name, value) for name, value in _mapping("fixed", specification.fixed).items()
-    }
+    held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
     unknown = [name for name in held if name not in template.gains]
     if unknown:
         raise ValueError(
@@ -142,10 +154,10 @@ def pose(loop: object, specification: DesignSpecification) -> Problem:
         if set(given) != set(free):
             raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
         spans = ({name: interval(f"the range of {name}", given[name]) for name in free},)
-    height = finite("amplitude", specification.amplitude)
+    height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
-    return Problem(whole, free, spans, intervals, height, specification.threads)
+    return Problem(whole, free, spans, intervals, height, threads)
 
 
 def _around(

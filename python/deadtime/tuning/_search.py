@@ -28,10 +28,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.tuning._margin_estimate import MarginEstimate
+from deadtime.tuning._margins import MarginEstimate, RequiredMargins
 from deadtime.tuning._objectives import NEVER, Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
-from deadtime.tuning._required_margins import RequiredMargins
 from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
 
 __all__ = ["Search"]
