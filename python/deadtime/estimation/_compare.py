@@ -12,11 +12,10 @@ import numpy as np
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.ranges import OpenRange
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import check_setpoint_active, independent_samples
-from deadtime.estimation.data._runs import paired_runs
+from deadtime.estimation.data._checks import check_setpoint_active, independent_samples
 from deadtime.estimation.methods._decay import Decay
 from deadtime.estimation.methods._decrement import Decrement
-from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._method import Method, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
 from deadtime.estimation.methods._waveform import Waveform

@@ -26,13 +26,16 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_decays, read_ringing
-from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
-from deadtime.estimation.data._input_output import InputOutput, read_input_output
-from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._input_output import (
+    FEEDBACK,
+    InputOutput,
+    feedback_p_value,
+    read_input_output,
+)
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
+from deadtime.estimation.data._step_reading import check_decays, read_ringing
+from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
+from deadtime.estimation.methods._method import Method, Run
 
 __all__ = ["ARXScan"]
 

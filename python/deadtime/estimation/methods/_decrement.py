@@ -25,19 +25,20 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import checked_names
-from deadtime.estimation.data._extremes import (
+from deadtime.estimation.data._checks import checked_names
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.data._step_reading import (
     Extreme,
+    StepReading,
     check_decays,
     read_extremes,
+    read_step,
+    stiffness_of,
     weighted_slope,
 )
-from deadtime.estimation.data._runs import Run
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import StepReading, read_step, stiffness_of
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._read_off import read_off_estimate
-from deadtime.estimation.models._held_transfer import held_transfer
+from deadtime.estimation.methods._conclusion import read_off_estimate
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.models._held import held_transfer
 from deadtime.loops import ControlLoop
 
 __all__ = ["Decrement", "loop_with_root"]

@@ -29,22 +29,23 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._commands import commands_over_samples
-from deadtime.estimation.data._evidence import (
+from deadtime.estimation.data._checks import (
+    ROUNDING,
     check_distinguishable,
+    check_gain,
+    check_moves,
     checked_names,
     embedded,
     standard_errors,
 )
-from deadtime.estimation.data._excitation import ROUNDING, check_gain, check_moves
 from deadtime.estimation.data._periodic import PeriodicSpectra, periodic_spectra
-from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.fit._line_fit import LineProfile, Lines, fit_lines
 from deadtime.estimation.fit._profile import Profile
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.models._held_response import HeldResponse
-from deadtime.estimation.models._held_transfer import held_transfer
+from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.models._held import HeldResponse, held_transfer
 from deadtime.loops import ControlLoop, Integrator
 from deadtime.recordings import Recording
 
@@ -135,23 +136,20 @@ class Frequency(Method):
         check_gain(values, errors)
         residuals = _residuals(data, response, found)
         whiteness = whiteness_of(residuals, len(names))
-        exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
-        adequate = exact or (p_value > SIGNIFICANCE if lines.known_noise else whiteness.white)
-        return DelayEstimate(
-            method="frequency",
-            loop=loop.replace(**values),
-            free=names,
-            stderr=errors,
-            cov=cov,
-            crb=None,
-            recording=data,
-            residuals=residuals,
-            whiteness=whiteness,
+        white = p_value > SIGNIFICANCE if lines.known_noise else whiteness.white
+        adequate = white or is_rounding(residuals, data)
+        return estimate_with_residuals(
+            "frequency",
+            loop,
+            data,
+            values,
+            cov,
+            residuals,
             adequate=adequate,
             message=_message(names, lines, source, adequate),
             uncalibrated=_why_uncalibrated(loop),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
-            _profile=Profile(
+            profile=Profile(
                 cost=LineProfile(lines, names, found),
                 best=power,
                 freedom=lines.freedom,

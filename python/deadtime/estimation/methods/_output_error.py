@@ -22,19 +22,16 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._commands import (
+from deadtime.estimation.data._checks import check_moves, checked_names
+from deadtime.estimation.data._simulated import (
     commands_over_samples,
     known_commands,
     moves_between_rows,
 )
-from deadtime.estimation.data._evidence import checked_names, excited
-from deadtime.estimation.data._excitation import check_moves
-from deadtime.estimation.data._runs import Run
-from deadtime.estimation.fit._joint import solve_jointly
-from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
+from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
-from deadtime.estimation.methods._method import Method, check_initial_output
-from deadtime.estimation.models._plant_path import Path, path_of
+from deadtime.estimation.methods._method import Method, Run, check_initial_output
+from deadtime.estimation.models._held import Path, path_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -123,26 +120,11 @@ def estimate_from_commands(
 
 @dataclass(frozen=True, eq=False)
 class _Model(ModelOfOne):
-    """Residuals of one recording; parameters are `names`, then the initial output if fitted."""
+    """Residuals of one recording."""
 
-    recording: Recording
     path: Path
-    names: tuple[str, ...]
     known: Mapping[str, float]
-    offset: float | None
     source: str
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        return (*self.names, *(["initial output"] if self.offset is None else []))
-
-    @cached_property
-    def size(self) -> float:
-        return excited(self.recording)
-
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        return (len(self.recording),)
 
     @cached_property
     def span(self) -> float:
@@ -161,17 +143,13 @@ class _Model(ModelOfOne):
             "initial output": Ends(-np.inf, np.inf, self.size),
         }.get(label, Ends(-np.inf, np.inf, size))
 
-    def _values(self, point: Array) -> dict[str, float]:
-        return {**self.known, **dict(zip(self.names, point.tolist(), strict=False))}
-
     def misfit(self, point: Array) -> Array:
-        values = self._values(point)
-        offset = float(point[-1]) if self.offset is None else self.offset
+        values = {**self.known, **self.values(point)}
         path = self.path.value(self.recording.time - values["delay"], values)
-        return values["gain"] * path + (offset - self.recording.output)
+        return values["gain"] * path + (self.start_of(point) - self.recording.output)
 
     def jacobian(self, point: Array) -> Array:
-        values = self._values(point)
+        values = {**self.known, **self.values(point)}
         times = self.recording.time - values["delay"]
         slopes = self.path.slopes(times, values, self.names)
         columns = {name: values["gain"] * slope for name, slope in slopes.by.items()}

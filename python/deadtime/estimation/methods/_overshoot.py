@@ -29,12 +29,17 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_decays, read_extremes
-from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
-from deadtime.estimation.methods._method import Method, check_choice
-from deadtime.estimation.methods._read_off import read_off_estimate
+from deadtime.estimation.data._step_reading import (
+    CLEARANCE,
+    StepReading,
+    check_decays,
+    read_extremes,
+    read_step,
+    stiffness_of,
+)
+from deadtime.estimation.methods._conclusion import read_off_estimate
+from deadtime.estimation.methods._method import Method, Run, check_choice
 from deadtime.recordings import Step
 
 __all__ = ["Overshoot", "OvershootMap", "damping_ratio"]

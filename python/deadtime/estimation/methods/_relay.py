@@ -27,11 +27,10 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._step_reading import noise_of_second_differences
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._read_off import check_delay_alone, estimate_with_residuals
-from deadtime.estimation.models._held_response import HeldResponse
+from deadtime.estimation.methods._conclusion import check_delay_alone, estimate_with_residuals
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.models._held import HeldResponse
 from deadtime.loops import Integrator
 from deadtime.recordings import Recording
 

@@ -13,7 +13,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress
 from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import method_of
-from deadtime.estimation.data._evidence import VEHICLE_PARAMETERS, checked_names
+from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
@@ -216,7 +216,7 @@ class Identifiability(ReadOnlyArrays):
         ValueError
             If `ax` holds another number of axes.
         """
-        from deadtime.estimation.planning._plots import plot_identifiability
+        from deadtime.estimation._plots import plot_identifiability
 
         return plot_identifiability(self, ax)
 
