@@ -30,16 +30,11 @@ COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s",
 #: Largest relative difference of two delays that agree.
 AGREEMENT = 0.03
 
+#: Names of the overshoot methods; the others are called by their own.
 LABELS = {
     "dominant": "paper's overshoot",
     "exact": "exact overshoot",
     "saturated": "overshoot with limit",
-    "decrement": "decrement",
-    "decay": "decay",
-    "waveform": "waveform",
-    "waveform with lag": "waveform with lag",
-    "output_error": "output error",
-    "output_error with lag": "output error with lag",
 }
 
 #: Names of the fits of all samples within a sentence.
@@ -94,7 +89,7 @@ class Comparison:
         """The estimates for one plot, by their labels in its legend."""
         names = ("dominant", self.trusted, f"{self.trusted} with lag")
         return {
-            f"{LABELS[name]}: {self.estimates[name].delay:.3f} s": self.estimates[name]
+            f"{_label(name)}: {self.estimates[name].delay:.3f} s": self.estimates[name]
             for name in names
             if name in self.estimates
         }
@@ -113,7 +108,7 @@ class Comparison:
                 total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
             rows.append(
                 [
-                    LABELS[name],
+                    _label(name),
                     f"{fit.delay:.3f}",
                     interval,
                     _number(fit.gain, "gain" in fit.free),
@@ -122,7 +117,7 @@ class Comparison:
                     "yes" if fit.adequate else "no",
                 ]
             )
-        rows += [[LABELS[name], f"refused: {why}"] for name, why in self.refusals.items()]
+        rows += [[_label(name), f"refused: {why}"] for name, why in self.refusals.items()]
         return rows
 
     def explanation(self) -> list[str]:
@@ -165,6 +160,10 @@ def truth_row(numbers: Mapping[str, float]) -> list[str]:
     ]
 
 
+def _label(name: str) -> str:
+    return LABELS.get(name, name.replace("_", " "))
+
+
 def _number(value: float | None, fitted: bool) -> str:
     if value is None:
         return "–"
@@ -187,13 +186,13 @@ def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: s
         return sentences
     low, high = plain.ci(0.95, "gain")
     if not low <= assumed <= high:
-        weaker = "weaker" if gain < assumed else "stronger"
-        less = "less" if gain < assumed else "more"
-        short = "too short" if gain < assumed else "too long"
+        weaker, less, short = (
+            ("weaker", "less", "short") if gain < assumed else ("stronger", "more", "long")
+        )
         sentences.append(
             f"The gain is not {assumed:g}, as the overshoot method assumes, but {gain:.3f} "
             f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the "
-            f"estimated delay is {short}. With this gain the same overshoot would mean "
+            f"estimated delay is too {short}. With this gain the same overshoot would mean "
             f"{dominant.delay * assumed / gain:.3f} s."
         )
     return sentences

@@ -58,22 +58,26 @@ IN_S = frozenset({"delay", "lag", "start"})
 NOT_NEGATIVE = frozenset({"delay", "lag"})
 
 
-def known_commands(recording: Recording, loop: ControlLoop) -> tuple[NDArray[np.float64], str]:
+def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]:
     """Commands within the limit, and their source in words.
 
     The command of a P controller depends on its sample alone, so it can be computed from the log;
     the command of other controllers depends on samples before the log.
     """
-    limit = math.inf if loop.limit is None else loop.limit
     if recording.command is not None:
-        return np.clip(recording.command, -limit, limit), "logged"
+        return _limited(recording.command, loop), "logged"
     if not isinstance(loop.controller, P):
         raise NotIdentifiableError(
             "the recording holds no command, and only that of a P controller can be computed from "
             "reference and output: log the command, or use method='waveform'"
         )
     command = loop.controller.Kp * (recording.reference - recording.output)
-    return np.clip(command, -limit, limit), "computed from reference and output"
+    return _limited(command, loop), "computed from reference and output"
+
+
+def _limited(command: Array, loop: ControlLoop) -> Array:
+    limit = math.inf if loop.limit is None else loop.limit
+    return np.clip(command, -limit, limit)
 
 
 def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
@@ -88,9 +92,7 @@ def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
     return float(np.std(computed - logged)) < ALIKE * float(np.std(logged))
 
 
-def commands_over_samples(
-    recording: Recording, loop: ControlLoop
-) -> tuple[NDArray[np.float64], str]:
+def commands_over_samples(recording: Recording, loop: ControlLoop) -> tuple[Array, str]:
     """Mean command from each sample to the next, and the source of the commands in words.
 
     A sampled loop holds its command. In a continuous loop the mean is that of a straight line
@@ -103,11 +105,9 @@ def commands_over_samples(
     before = command[1:].copy()
     jumps = np.flatnonzero(np.diff(recording.reference))
     if jumps.size and isinstance(loop.controller, P):
-        limit = math.inf if loop.limit is None else loop.limit
         Kp, output = loop.controller.Kp, recording.output[jumps + 1]
         old, new = (
-            np.clip(Kp * (recording.reference[rows] - output), -limit, limit)
-            for rows in (jumps, jumps + 1)
+            _limited(Kp * (recording.reference[rows] - output), loop) for rows in (jumps, jumps + 1)
         )
         before[jumps] -= new - old
     return np.append(0.5 * (command[:-1] + before), command[-1]), source
@@ -249,6 +249,4 @@ def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array
         return recording.command[:start]
     if not isinstance(loop.controller, P):
         return np.empty(0)
-    command = loop.controller.Kp * (recording.reference[:start] - recording.output[:start])
-    limit = np.inf if loop.limit is None else loop.limit
-    return np.clip(command, -limit, limit)
+    return known_commands(recording, loop)[0][:start]

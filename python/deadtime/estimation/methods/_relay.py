@@ -109,9 +109,10 @@ class Relay(Method):
                 f"a quarter of the period, {0.5 * half:.3g} s, is explained by lag and hold: the "
                 f"lag is shorter than the given {plant.lag:g} s, or there is no delay"
             )
-        path = _Path(data, switches, signs, delay, plant.lag)
-        first, last = data.time[path.rows[[0, -1]]]
-        slope = abs(plant.gain) * height if height is not None else path.slope
+        rows, path, output = _path(data, switches, delay, plant.lag)
+        first, last = data.time[rows[[0, -1]]]
+        fitted = float(path @ output) / float(path @ path)
+        slope = abs(plant.gain) * height if height is not None else abs(fitted)
         waits = float(np.mean(switches - crossings[:-1]))
         peaks = _peaks(data.time, error, crossings)
         return estimate_with_residuals(
@@ -120,7 +121,7 @@ class Relay(Method):
             data.window(float(first), float(last)),
             {"delay": delay},
             np.array([[stderr**2]]),
-            path.residuals(slope),
+            output - math.copysign(slope, fitted) * path,
             message=(
                 f"{cycles.size} cycles of {2.0 * half:.4g} s; "
                 + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
@@ -137,7 +138,7 @@ class Relay(Method):
                 "wait_of_hold": waits,
                 "amplitude": float(peaks.mean()),
                 "amplitude_expected": slope * (delay + waits),
-                "slope": path.slope,
+                "slope": abs(fitted),
             },
         )
 
@@ -277,40 +278,18 @@ def _delay_by_lag(lag: float, half: float) -> float:
     return float(brentq(output, 0.5 * half, half)) - 0.5 * half
 
 
-@dataclass(frozen=True)
-class _Path:
-    """The output caused by the switches, from the second of them on."""
+def _path(
+    data: Recording, switches: Array, delay: float, lag: float
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Rows from the second switch on; the unit path caused by the switches, and the output there.
 
-    data: Recording
-    switches: Array
-    signs: Array
-    delay: float
-    lag: float
-
-    @property
-    def rows(self) -> NDArray[np.intp]:
-        begin = self.switches[1] + self.delay
-        return np.flatnonzero(
-            (self.data.time >= begin) & (self.data.time <= self.switches[-1] + self.delay)
-        )
-
-    def fitted(self) -> tuple[Array, float, Array]:
-        """Unit path, slope and recorded output at `rows`, both about their means."""
-        first = -1.0 if self.data.output[self.rows[0]] > self.data.reference[self.rows[0]] else 1.0
-        values = np.full(self.switches.size, first)
-        values[::2] = -first
-        response = HeldResponse(self.switches, values)
-        path = response.at(self.data.time[self.rows] - self.delay, self.lag).value
-        output = self.data.output[self.rows]
-        path, output = path - path.mean(), output - output.mean()
-        return path, float(path @ output) / float(path @ path), output
-
-    @property
-    def slope(self) -> float:
-        """Slope of the best fit."""
-        return abs(self.fitted()[1])
-
-    def residuals(self, slope: float) -> Array:
-        """Recorded output minus the path of this slope."""
-        path, found, output = self.fitted()
-        return np.asarray(output - math.copysign(slope, found) * path)
+    Path and output are about their means.
+    """
+    begin, end = switches[1] + delay, switches[-1] + delay
+    rows = np.flatnonzero((data.time >= begin) & (data.time <= end))
+    first = -1.0 if data.output[rows[0]] > data.reference[rows[0]] else 1.0
+    values = np.full(switches.size, first)
+    values[::2] = -first
+    path = HeldResponse(switches, values).at(data.time[rows] - delay, lag).value
+    output = data.output[rows]
+    return rows, path - path.mean(), output - output.mean()

@@ -9,7 +9,7 @@ line and v - u_k decays as e^(-(t - t_k)/lag). dF/dt = v, and with p = dv/dlag, 
 recursion is the derivative of that of v, dF/dlag = -v - lag p.
 
 A path is F(t; lag or time constant) for a gain of one and no delay. An integrator has a closed
-form (`held_response`); any other plant is simulated, and its derivatives are central difference
+form (`HeldResponse`); any other plant is simulated, and its derivatives are central difference
 quotients with an error of about 1e-9 of the path.
 
 The unit step response of the plant gain/(s (lag s + 1)) is S(t) = t - lag (1 - e^(-t/lag)). A
@@ -92,6 +92,15 @@ class HeldResponse:
         p = np.where(before, 0.0, by_lag[row]) * decay + gap * decay * since / lag**2
         return Response(integral - lag * v, v, -v - lag * p)
 
+    def value(self, times: Array, values: Mapping[str, float]) -> Array:
+        """F at `times`, as the path of an integrator."""
+        return self.at(times, values["lag"]).value
+
+    def slopes(self, times: Array, values: Mapping[str, float], names: Sequence[str]) -> PathSlopes:
+        """Derivatives of that path."""
+        found = self.at(times, values["lag"])
+        return PathSlopes(found.rate, {"lag": found.by_lag} if "lag" in names else {})
+
     def _velocities(self, lag: float) -> tuple[Array, Array]:
         """The velocity v and dv/dlag at the start of each command; kept for the last lag."""
         if self._kept is None or self._kept[0] != lag:
@@ -162,20 +171,8 @@ class Path(Protocol):
 def path_of(plant: Plant, time: Array, command: Array) -> Path:
     """The path of `plant` under `command`, each value held from its time on."""
     if isinstance(plant, Integrator):
-        return _IntegratorPath(HeldResponse(time, command))
+        return HeldResponse(time, command)
     return _SteppedPath(plant, time, command)
-
-
-class _IntegratorPath:
-    def __init__(self, response: HeldResponse) -> None:
-        self._response = response
-
-    def value(self, times: Array, values: Mapping[str, float]) -> Array:
-        return self._response.at(times, values["lag"]).value
-
-    def slopes(self, times: Array, values: Mapping[str, float], names: Sequence[str]) -> PathSlopes:
-        found = self._response.at(times, values["lag"])
-        return PathSlopes(found.rate, {"lag": found.by_lag} if "lag" in names else {})
 
 
 class _SteppedPath:
