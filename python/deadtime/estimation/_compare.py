@@ -22,8 +22,6 @@ from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = ["Comparison", "compare_methods"]
-
 #: Headings of the columns of `Comparison.rows`.
 COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
 

@@ -21,8 +21,6 @@ from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._waveform import Waveform
 from deadtime.recordings import Recording
 
-__all__ = ["JOINT", "METHODS", "automatic_method", "estimate_delay", "method_of"]
-
 #: The methods by name.
 METHODS: Mapping[str, type[Method]] = {
     method.name: method

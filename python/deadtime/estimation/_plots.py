@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from deadtime.estimation.planning._identifiability import Identifiability
     from deadtime.estimation.planning._planned_bound import PlannedBound
 
-__all__ = ["estimate_axes", "plot_estimate", "plot_fits", "plot_identifiability", "shown_figure"]
-
 #: Half axis of the ellipse that holds 95 % of two Gaussian errors, in standard deviations.
 TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
 

@@ -20,8 +20,6 @@ from deadtime.recordings import Recording
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["CramerRaoBound", "DelayEstimate", "FittedRun"]
-
 Array = NDArray[np.float64]
 
 #: Quantities that are not times; a limit has the unit of the command.

@@ -33,8 +33,6 @@ from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
 from deadtime.recordings._recording import MINIMUM_SAMPLES
 
-__all__ = ["Experiment"]
-
 Array = NDArray[np.float64]
 
 #: A relay is simulated as a P controller with this gain (1/s, times the amplitude) and the

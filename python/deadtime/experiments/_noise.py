@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from deadtime._base.validation import non_negative
 
-__all__ = ["Noise", "NoiseModel", "Seed", "WhiteNoise", "noise_model"]
-
 Array = NDArray[np.float64]
 Seed: TypeAlias = int | np.random.SeedSequence
 

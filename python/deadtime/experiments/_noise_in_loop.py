@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from deadtime.loops import PV, ControlLoop, DerivativeFilter
 from deadtime.loops._derivative_filter import discretised
 
-__all__ = ["reference_shift"]
-
 Array = NDArray[np.float64]
 
 

@@ -14,8 +14,6 @@ from deadtime._base.errors import RecordingError
 from deadtime._base.ranges import OpenRange, open_interval
 from deadtime.recordings._recording import Recording
 
-__all__ = ["read_recording"]
-
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 

@@ -12,8 +12,6 @@ from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import unmasked
 
-__all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
-
 #: Largest absolute value. The squares of larger ones may overflow, and no physical quantity has
 #: them.
 LARGEST = 1e100

@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from deadtime import _deadtime
 from deadtime.special._ufunc import UfuncOptions, apply, branches
 
-__all__ = ["lambertw", "lambertw0", "lambertwm1"]
-
 
 def lambertw(
     z: ArrayLike,

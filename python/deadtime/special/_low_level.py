@@ -9,8 +9,6 @@ from deadtime import _deadtime
 if TYPE_CHECKING:
     import scipy
 
-__all__ = ["low_level_callable"]
-
 
 def low_level_callable(
     name: Literal["lambertw", "lambertw0", "lambertwm1"],

@@ -13,17 +13,6 @@ from numpy.typing import NDArray
 from deadtime._base.ranges import Range, interval, points_of
 from deadtime._base.validation import finite
 
-__all__ = [
-    "MOST_MOVING",
-    "Floats",
-    "Given",
-    "damping_demand",
-    "map_axes",
-    "ranges_of",
-    "side",
-    "sides",
-]
-
 Floats: TypeAlias = NDArray[np.float64]
 Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
 

@@ -11,8 +11,6 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.stability._arguments import Floats
 
-__all__ = ["Boundary", "boundaries_of"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Boundary(ReadOnlyArrays):

@@ -26,8 +26,6 @@ from deadtime.stability._arguments import Floats, Given, ranges_of, side
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ProvedBoxes", "largest_stable_box", "proved_boxes"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProvedBoxes(ReadOnlyArrays):

@@ -29,8 +29,6 @@ from deadtime.stability._boundaries import Boundary, boundaries_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["MapStatus", "StabilityMap", "stability_map"]
-
 
 class MapStatus(IntEnum):
     """What is known of a cell of a `StabilityMap`."""

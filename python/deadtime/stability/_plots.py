@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from deadtime.stability._map import StabilityMap
     from deadtime.stability._robust import RobustMap
 
-__all__ = ["plot_boxes", "plot_robust_map", "plot_stability_map"]
-
 #: Colours for one, two, ... unstable roots; more share the last one.
 _COUNTED = 8
 

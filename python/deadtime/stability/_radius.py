@@ -14,8 +14,6 @@ from deadtime._base.validation import finite, positive
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.stability._arguments import MOST_MOVING
 
-__all__ = ["StabilityRadius", "stability_radius"]
-
 #: Upper limit on the boxes of a search for a radius (bounds memory and time); what is proved until
 #: then is the result.
 _RADIUS_BOXES = 200_000

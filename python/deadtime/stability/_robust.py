@@ -22,8 +22,6 @@ from deadtime.stability._arguments import Floats, Given, map_axes, ranges_of, si
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["RobustMap", "robust_map"]
-
 #: Upper limit on the boxes of one cell of a robust map (bounds time); a cell that needs more is
 #: undecided.
 _CELL_BOXES = 1000

@@ -14,8 +14,6 @@ from deadtime.tuning._objectives import objective_named
 from deadtime.tuning._problem import ObjectiveName, controller_template, pose, with_filter
 from deadtime.tuning._result import Design
 
-__all__ = ["design"]
-
 
 def design(
     loop: object,

@@ -30,8 +30,6 @@ from deadtime.tuning._objectives import NEVER, Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
 from deadtime.tuning._search import Search
 
-__all__ = ["Found", "best_gains", "fine", "least_margins", "proved"]
-
 #: Most rounds of the exchange: two or three suffice where costs are continuous, and where steps are
 #: simulated, which jump, more do not help.
 _ROUNDS = 12

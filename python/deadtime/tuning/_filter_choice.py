@@ -35,8 +35,6 @@ from deadtime.tuning._result import Design, FilterChoice
 from deadtime.tuning._search import Search
 from deadtime.tuning._survey import Survey, surveyed
 
-__all__ = ["design_filter", "filter_choice", "noise_gain"]
-
 #: Number of corners tried, and the slowest and fastest in units of 1/(delay + lag + half a sample).
 #: Each corner costs a design.
 _CORNERS = 11

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from deadtime.loops._model import LoopModel, LoopRun
 
-__all__ = ["Fundamental", "states_at"]
-
 Vector = NDArray[np.float64]
 
 #: Least number of cells in a delay, cells in the fastest time constant, and most cells in a delay:

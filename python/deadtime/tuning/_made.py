@@ -17,8 +17,6 @@ from deadtime.tuning._search import Search
 from deadtime.tuning._settling import step_info
 from deadtime.tuning._survey import charts_at, surveyed
 
-__all__ = ["made"]
-
 #: A margin at most this factor above its requirement limits the design.
 _ACTIVE = 1.0 + 1e-3
 

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from deadtime._base.validation import finite, positive
 from deadtime.tuning._problem import Problem, Scenario, Vector
 
-__all__ = ["MARGINS", "UNITS", "MarginEstimate", "RequiredMargins", "exact_margins"]
-
 #: Names of the margins, in the order of every array of them, and their units.
 MARGINS = ("gain_margin", "phase_margin", "delay_margin")
 UNITS = {"gain_margin": "", "phase_margin": "°", "delay_margin": " s"}

@@ -27,8 +27,6 @@ from deadtime.loops._model import rest_of
 from deadtime.tuning._problem import ObjectiveName, Problem, Scenario, Vector
 from deadtime.tuning._settling import BAND, proved_step
 
-__all__ = ["NEVER", "Objective", "dominant_damping", "objective_named"]
-
 #: Cost of a loop that is unstable or does not settle: above every other cost.
 NEVER = 1e6
 

@@ -16,16 +16,6 @@ from deadtime._base.validation import finite, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._stabilising import candidate_ranges
 
-__all__ = [
-    "ObjectiveName",
-    "Problem",
-    "Scenario",
-    "Vector",
-    "controller_template",
-    "pose",
-    "with_filter",
-]
-
 Vector: TypeAlias = NDArray[np.float64]
 
 ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]

@@ -14,8 +14,6 @@ from deadtime.tuning._problem import ObjectiveName, Scenario, Vector
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Design", "FilterChoice", "LeastMargins", "Trade", "figure_in_words"]
-
 
 class LeastMargins(NamedTuple):
     """Margins at their least over all that is not known; each may have its own worst scenario."""

@@ -33,8 +33,6 @@ from deadtime.tuning._objectives import NEVER, Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
 from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
 
-__all__ = ["Search"]
-
 #: Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
 #: gain in the objective pays for a shortfall.
 _PENALTY = 50.0

@@ -9,8 +9,6 @@ import numpy as np
 from deadtime.loops import ControlLoop, sweep
 from deadtime.tuning._tail import tail_bound
 
-__all__ = ["BAND", "ProvedStep", "proved_step", "step_info"]
-
 #: Half width of the band, as a part of the step.
 BAND = 0.02
 

@@ -25,8 +25,6 @@ from deadtime.loops._model import LoopModel
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.tuning._fundamental import Fundamental, states_at
 
-__all__ = ["tail_bound"]
-
 Vector = NDArray[np.float64]
 
 #: Part of the deviation that may be left after a period; the period is doubled until it is, at most

@@ -13,26 +13,6 @@ from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 from deadtime.recordings._recording import MINIMUM_SAMPLES
 
-__all__ = [
-    "LOOP_PARAMETERS",
-    "ROUNDING",
-    "VEHICLE_PARAMETERS",
-    "check_distinguishable",
-    "check_ends",
-    "check_excitation",
-    "check_gain",
-    "check_moves",
-    "check_response",
-    "check_setpoint_active",
-    "checked_names",
-    "embedded",
-    "excited",
-    "independent_samples",
-    "lag_name",
-    "standard_errors",
-    "start_and_span",
-]
-
 Array = NDArray[np.float64]
 
 #: Ratio of singular values of the scaled Jacobian below which the data do not distinguish two

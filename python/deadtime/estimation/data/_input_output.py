@@ -26,8 +26,6 @@ from deadtime.estimation.data._simulated import SimulatedRecording, commands_ove
 from deadtime.loops import ControlLoop, FirstOrder, Integrator
 from deadtime.recordings import Recording
 
-__all__ = ["FEEDBACK", "InputOutput", "feedback_p_value", "read_input_output"]
-
 Array = NDArray[np.float64]
 
 #: Fewest samples for a delay by correlation or regression.

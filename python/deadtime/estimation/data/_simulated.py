@@ -24,14 +24,6 @@ from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
 from deadtime.systems import Response
 
-__all__ = [
-    "SimulatedRecording",
-    "commands_over_samples",
-    "known_commands",
-    "moves_between_rows",
-    "shortest_time",
-]
-
 #: A logged command is taken to be the P controller's where the two differ by less than this share
 #: of the command's standard deviation. Larger values accept more noise in the log, and more foreign
 #: commands.

@@ -22,19 +22,6 @@ from deadtime.estimation.data._checks import excited
 from deadtime.loops import ControlLoop, Integrator, P
 from deadtime.recordings import Recording, Step
 
-__all__ = [
-    "CLEARANCE",
-    "Extreme",
-    "StepReading",
-    "check_decays",
-    "noise_of_second_differences",
-    "read_extremes",
-    "read_ringing",
-    "read_step",
-    "stiffness_of",
-    "weighted_slope",
-]
-
 #: Smallest size of what is read from the response, in standard deviations of the noise.
 CLEARANCE = 3.0
 

@@ -27,18 +27,6 @@ from deadtime.estimation.data._checks import excited
 from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.recordings import Recording
 
-__all__ = [
-    "Ends",
-    "Fitted",
-    "JointModel",
-    "Minimum",
-    "Model",
-    "ModelOfOne",
-    "minimise",
-    "solve",
-    "solve_jointly",
-]
-
 Array = NDArray[np.float64]
 
 #: Starting points that are refined; the best minimum is taken.

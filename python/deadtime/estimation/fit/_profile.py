@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from deadtime.estimation.fit._least_squares import TO_COMPARE, Minimum, Model, minimise
 
-__all__ = ["Profile", "ProfileCost", "floor_of"]
-
 Array = NDArray[np.float64]
 
 #: Farthest end of an interval, in multiples of the Gaussian one.

@@ -37,8 +37,6 @@ from deadtime.estimation.data._step_reading import check_decays, read_ringing
 from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
 from deadtime.estimation.methods._method import Method, Run
 
-__all__ = ["ARXScan"]
-
 Array = NDArray[np.float64]
 
 #: Significance level of the F test that the command improves the model.

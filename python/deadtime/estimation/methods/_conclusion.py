@@ -35,15 +35,6 @@ from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = [
-    "check_delay_alone",
-    "concluded",
-    "estimate_with_residuals",
-    "is_rounding",
-    "read_off_estimate",
-    "without_vanishing",
-]
-
 Array = NDArray[np.float64]
 
 #: Samples for each fitted parameter below which intervals are those of the profile likelihood.

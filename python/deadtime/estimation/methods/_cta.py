@@ -44,8 +44,6 @@ from deadtime.estimation.methods._conclusion import read_off_estimate
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.loops import ControlLoop
 
-__all__ = ["CTA", "chebyshev_differentiation"]
-
 Array = NDArray[np.float64]
 
 #: Points of the initial grid over the delay, and its ends as shares of the window.

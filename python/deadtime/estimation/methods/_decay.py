@@ -40,8 +40,6 @@ from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import held_transfer
 from deadtime.loops import ControlLoop
 
-__all__ = ["Decay"]
-
 Array = NDArray[np.float64]
 
 #: Fewest samples of a tail, and the smallest share of the step that is not rounding.

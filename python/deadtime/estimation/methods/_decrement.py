@@ -41,8 +41,6 @@ from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import held_transfer
 from deadtime.loops import ControlLoop
 
-__all__ = ["Decrement", "loop_with_root"]
-
 Array = NDArray[np.float64]
 
 #: Contribution of the other modes to the first extreme as a share, and the factor by which it falls

@@ -49,8 +49,6 @@ from deadtime.estimation.models._held import HeldResponse, held_transfer
 from deadtime.loops import ControlLoop, Integrator
 from deadtime.recordings import Recording
 
-__all__ = ["Frequency"]
-
 Array = NDArray[np.float64]
 
 #: Longest delay of the search, as a share of the record or of the periods.

@@ -36,8 +36,6 @@ from deadtime.estimation.data._step_reading import check_decays, read_ringing
 from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
 from deadtime.estimation.methods._method import Method, Run, check_choice
 
-__all__ = ["GCC", "Weighting"]
-
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
 Array = NDArray[np.float64]
 

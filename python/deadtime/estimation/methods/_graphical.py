@@ -40,8 +40,6 @@ from deadtime.estimation.data._step_reading import (
 from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
 from deadtime.estimation.methods._method import Method, Run, check_choice
 
-__all__ = ["Construction", "Graphical"]
-
 Construction = Literal["tangent", "two_point", "first_movement"]
 Array = NDArray[np.float64]
 

@@ -43,8 +43,6 @@ from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.methods._waveform import SimulatedModel
 
-__all__ = ["Grid"]
-
 Array = NDArray[np.float64]
 
 #: Points of the grid besides zero, and its ends as shares of the window.

@@ -13,17 +13,6 @@ from deadtime.estimation._result import DelayEstimate
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = [
-    "Loops",
-    "Method",
-    "Recordings",
-    "Run",
-    "Windows",
-    "check_choice",
-    "check_initial_output",
-    "paired_runs",
-]
-
 #: One recording, or several of the same vehicle.
 Recordings: TypeAlias = Recording | Sequence[Recording]
 

@@ -35,8 +35,6 @@ from deadtime.estimation.models._held import Path, path_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
-__all__ = ["OutputError", "estimate_from_commands"]
-
 Array = NDArray[np.float64]
 
 #: Longest delay of the search, as a share of the window.

@@ -41,8 +41,6 @@ from deadtime.estimation.data._step_reading import (
 from deadtime.estimation.methods._conclusion import read_off_estimate
 from deadtime.estimation.methods._method import Method, Run, check_choice
 
-__all__ = ["Overshoot", "OvershootMap", "damping_ratio"]
-
 OvershootMap = Literal["dominant", "exact", "saturated"]
 
 #: Below x = 1/e the rightmost root is real and the response does not overshoot.

@@ -34,8 +34,6 @@ from deadtime.estimation.models._held import HeldResponse
 from deadtime.loops import Integrator
 from deadtime.recordings import Recording
 
-__all__ = ["Relay"]
-
 Array = NDArray[np.float64]
 
 #: Crossings at the beginning that are left out: from rest, where noise alone switches the relay,

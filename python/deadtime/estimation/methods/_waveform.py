@@ -44,8 +44,6 @@ from deadtime.estimation.methods._conclusion import concluded, without_vanishing
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.estimation.methods._output_error import estimate_from_commands
 
-__all__ = ["NoisePath", "SimulatedModel", "Waveform"]
-
 Array = NDArray[np.float64]
 
 #: Where sensor noise goes: into the recording alone, or through the controller as well.

@@ -33,8 +33,6 @@ from numpy.typing import NDArray
 from deadtime.loops import Integrator, Plant
 from deadtime.loops._open_run import open_response
 
-__all__ = ["HeldResponse", "Path", "PathSlopes", "Response", "held_transfer", "path_of"]
-
 Array = NDArray[np.float64]
 
 #: Largest relative range of the time between commands that counts as rounding of even times.

@@ -34,8 +34,6 @@ from deadtime.recordings import Recording
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Identifiability", "identifiability"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identifiability(ReadOnlyArrays):

@@ -23,8 +23,6 @@ from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
 from deadtime.recordings import Recording
 
-__all__ = ["SLOW", "MonteCarlo", "run_many_times"]
-
 Array = NDArray[np.float64]
 
 #: Parameters whose effect is similar to that of a delay.

@@ -31,8 +31,6 @@ from deadtime.recordings import Recording
 from deadtime.roots import delay, s
 from deadtime.systems import TransferFunction
 
-__all__ = ["PlannedBound", "bound_of", "from_the_command", "from_the_reference"]
-
 Array = NDArray[np.float64]
 
 #: Where a delay is a whole number of samples, the derivative is one-sided, towards a longer delay:
