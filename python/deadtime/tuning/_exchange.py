@@ -67,18 +67,15 @@ class Found:
     checked: int
 
 
-def best_gains(search: Search, required: RequiredMargins, start: Vector | None = None) -> Found:
+def best_gains(search: Search, start: Vector | None = None) -> Found:
     """The best gains in the worst scenario of all, from the map or from around a start."""
-    problem, objective = search.problem, search.objective
+    problem, objective, required = search.problem, search.objective, search.required
     scenarios = list(problem.corners)
-    aimed = required.scaled(1.0 + _ABOVE)
-    if start is None:
-        gains = search.globally(scenarios, aimed)
-    else:
-        gains = search.locally(start, scenarios, aimed)
+    search = replace(search, required=required.scaled(1.0 + _ABOVE), scenarios=tuple(scenarios))
+    gains = search.globally() if start is None else search.locally(start)
     best: Found | None = None
     for _ in range(_ROUNDS_SIMULATED if objective.simulated else _ROUNDS):
-        if required.named and search.short(gains, scenarios, aimed) > _HOPELESS:
+        if required.named and search.short(gains) > _HOPELESS:
             break
         everywhere = [*fine(problem), *scenarios[len(problem.corners) :]]
         cost, worst = worst_scenario(problem, objective, gains, everywhere)
@@ -98,8 +95,9 @@ def best_gains(search: Search, required: RequiredMargins, start: Vector | None =
         if not missing.any() and (stalled or not added):
             break
         scenarios += [one for i, one in enumerate(added) if one not in added[:i]]
-        aimed = aimed.raised(missing)
-        gains = search.locally(gains, scenarios, aimed)
+        aimed = search.required.raised(missing)
+        search = replace(search, required=aimed, scenarios=tuple(scenarios))
+        gains = search.locally(gains)
     if best is None:
         raise _unmet(search, required, gains)
     if best.cost >= NEVER:

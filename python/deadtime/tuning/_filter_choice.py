@@ -232,8 +232,9 @@ class _Task:
             # A map over one gain costs next to nothing.
             shape = self.survey.abscissa.shape
             survey = surveyed(problem, shape) if alone else self.survey
-            search = Search(problem, self.objective, survey, MarginEstimate(problem))
-            found = best_gains(search, self.required, None if alone else start)
+            estimate = MarginEstimate(problem)
+            search = Search(problem, self.objective, survey, estimate, self.required)
+            found = best_gains(search, None if alone else start)
         except ValueError:
             return _Tried(math.nan, math.nan, start)
         value = self.objective.value(problem, found.gains, [*fine(problem), found.worst])

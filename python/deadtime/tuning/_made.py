@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from deadtime.tuning._exchange import Found, best_gains, fine, least_margins, proved
 from deadtime.tuning._margins import UNITS, MarginEstimate, RequiredMargins, exact_margins
@@ -36,8 +37,8 @@ def made(
 ) -> Design:
     """Find the gains of a problem."""
     survey = surveyed(problem, shape)
-    search = Search(problem, objective, survey, MarginEstimate(problem))
-    found = best_gains(search, required)
+    search = Search(problem, objective, survey, MarginEstimate(problem), required)
+    found = best_gains(search)
     judged = [*fine(problem), found.worst]
     loops = [problem.at(found.gains, one) for one in judged]
     value = objective.proved(problem, found.gains, judged)
@@ -60,20 +61,18 @@ def made(
         worst=found.worst,
         checked=found.checked,
         proved=proved(problem, found.gains, required),
-        traded=_trades(search, required, found, margins, value),
+        traded=_trades(search, found, margins, value),
         charts=charts_at(problem, survey, found.gains),
     )
 
 
-def _trades(
-    search: Search, required: RequiredMargins, found: Found, margins: LeastMargins, value: float
-) -> tuple[Trade, ...]:
+def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -> tuple[Trade, ...]:
     """The price of each margin, of all of them, and of the intervals."""
-    objective, problem = search.objective, search.problem
+    objective, problem, required = search.objective, search.problem, search.required
     made = []
 
     def best_without(rest: RequiredMargins, scenarios: tuple[dict[str, float], ...]) -> float:
-        gains = search.globally(scenarios, rest)
+        gains = replace(search, scenarios=scenarios, required=rest).globally()
         return objective.value(problem, gains, scenarios)
 
     for name, least in required.named.items():

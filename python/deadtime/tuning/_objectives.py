@@ -127,7 +127,8 @@ class _Damping(Objective):
         return super().lost(-value, -reference)
 
 
-class _ByStep(Objective):
+class _SettlingTime(Objective):
+    name: ObjectiveName = "settling_time"
     simulated = True
     tolerance = 1e-3
 
@@ -159,16 +160,6 @@ class _ByStep(Objective):
             worst = max(worst, self._figure(*np.array(step)))
         return worst
 
-    @abstractmethod
-    def _cost(self, settling: Vector, overshoot: Vector) -> Vector: ...
-
-    @abstractmethod
-    def _figure(self, settling: Vector, overshoot: Vector) -> float: ...
-
-
-class _SettlingTime(_ByStep):
-    name: ObjectiveName = "settling_time"
-
     def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
         return settling
 
@@ -176,7 +167,7 @@ class _SettlingTime(_ByStep):
         return float(settling.max())
 
 
-class _Overshoot(_ByStep):
+class _Overshoot(_SettlingTime):
     name: ObjectiveName = "overshoot"
 
     def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
