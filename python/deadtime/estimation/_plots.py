@@ -26,8 +26,7 @@ def plot_fits(
     ax: Axes, recording: Recording, fits: Mapping[str, DelayEstimate], unit: str = "m"
 ) -> Axes:
     """Draw the recorded output with the fitted ones over it."""
-    ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
-    ax.plot(recording.time, recording.output, label="recorded", **DATA)
+    _draw_recorded(ax, recording)
     for colour, (label, fit) in zip(COLOURS, fits.items(), strict=False):
         window = fit.recording
         ax.plot(window.time, window.output - fit.residuals, color=colour, lw=1.6, label=label)
@@ -79,14 +78,18 @@ def shown_figure(width: float, height: float) -> Figure:
     return pyplot.figure(figsize=(width, height), layout="constrained")
 
 
+def _draw_recorded(ax: Axes, recording: Recording) -> None:
+    ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
+    ax.plot(recording.time, recording.output, label="recorded", **DATA)
+
+
 def _has_profile(fit: DelayEstimate) -> bool:
     return fit.has_profile and "delay" in fit.stderr
 
 
 def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
     recording = run.recording
-    upper.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
-    upper.plot(recording.time, recording.output, label="recorded", **DATA)
+    _draw_recorded(upper, recording)
     fitted = recording.output - run.residuals
     upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
     lower.plot(recording.time, run.residuals, **DATA)
@@ -187,12 +190,9 @@ def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
     ax.plot(*(1e3 * centre), "k+")
     name = slow.replace("_", " ")
     ax.set(xlabel="delay (ms)", ylabel=f"{name} (ms)")
+    error = 1e3 * plan.bound.stderr[f"delay+{slow}"]
     ax.set_title(
-        f"95 % of the estimates\ndelay + {name} ± {_sum_error(plan.bound, slow):.2g} ms",
+        f"95 % of the estimates\ndelay + {name} ± {error:.2g} ms",
         fontsize="medium",
     )
     ax.legend(fontsize="small")
-
-
-def _sum_error(bound: PlannedBound, slow: str) -> float:
-    return 1e3 * bound.stderr[f"delay+{slow}"]

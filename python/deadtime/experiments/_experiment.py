@@ -18,8 +18,7 @@ from deadtime._base.validation import (
     positive,
     whole_number,
 )
-from deadtime.experiments._noise import Noise, Seed, noise_model
-from deadtime.experiments._noise_in_loop import reference_shift
+from deadtime.experiments._noise import Noise, Seed, noise_model, reference_shift
 from deadtime.experiments._waves import (
     ON_A_SAMPLE,
     binary_sequence,

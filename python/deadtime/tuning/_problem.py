@@ -157,7 +157,7 @@ def _around(
     loop = ControlLoop(plant, template)
     if delay is None or loop.delay is None:
         return loop, delay
-    more = _interval("delay", delay)
+    more = _times(delay)
     return loop, (loop.delay + more[0], loop.delay + more[1])
 
 
@@ -198,16 +198,16 @@ def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
         if loop.delay is None:
             raise ValueError("the delay of the loop is not known: give delay=, or estimate it")
         return loop.delay, loop.delay
-    return _interval("delay", delay)
+    return _times(delay)
 
 
-def _interval(name: str, given: float | Range) -> Range:
-    """One time or an interval of times, s."""
-    if not isinstance(given, (tuple, list, np.ndarray)):
-        return non_negative(name, given), float(given)
-    low, high = interval(name, given, may_be_point=True)
+def _times(delay: float | Range) -> Range:
+    """One delay or an interval of delays, s."""
+    if not isinstance(delay, (tuple, list, np.ndarray)):
+        return non_negative("delay", delay), float(delay)
+    low, high = interval("delay", delay, may_be_point=True)
     if low < 0.0:
-        raise ValueError(f"{name}={given!r} is not an interval (low, high) of times >= 0")
+        raise ValueError(f"delay={delay!r} is not an interval (low, high) of times >= 0")
     return low, high
 
 

@@ -143,16 +143,12 @@ def embedded(cov: Array, loose: list[int], size: int) -> Array:
     return full
 
 
-def lag_name(names: Sequence[str]) -> str:
-    """The parameter that acts like a delay: ``time_constant`` where it is fitted, else ``lag``."""
-    return "time_constant" if "time_constant" in names else "lag"
-
-
 def standard_errors(names: tuple[str, ...], cov: Array) -> dict[str, float]:
     """Standard errors of `names`, and of ``delay+lag`` where the delay is among them."""
     errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
     if "delay" in names:
-        slow = lag_name(names)
+        # What acts like a delay.
+        slow = "time_constant" if "time_constant" in names else "lag"
         total = np.array([1.0 if name in ("delay", slow) else 0.0 for name in names])
         count = len(names)
         errors[f"delay+{slow}"] = float(np.sqrt(total @ cov[:count, :count] @ total))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.data._checks import check_moves
 from deadtime.estimation.data._simulated import SimulatedRecording, commands_over_samples
-from deadtime.loops import ControlLoop, FirstOrder, Integrator
+from deadtime.loops import FirstOrder, Integrator
 from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
@@ -58,8 +58,6 @@ class InputOutput:
         s.
     late : float
         Delay of the response besides the delay itself, s: what was not inverted of plant and hold.
-    source : str
-        Source of the commands.
     remark : str
         What else is part of the delay, in words; empty if nothing.
     """
@@ -68,7 +66,6 @@ class InputOutput:
     response: Array
     sample_time: float
     late: float
-    source: str
     remark: str
 
     @property
@@ -77,11 +74,12 @@ class InputOutput:
         return int(LONGEST * self.command.size)
 
 
-def read_input_output(
-    recording: Recording, loop: ControlLoop, simulated: SimulatedRecording, method: str
-) -> InputOutput:
-    """Input and output over the window of `simulated`; refuses constant ones."""
-    data = simulated.recording
+def read_input_output(simulated: SimulatedRecording, method: str) -> InputOutput:
+    """Input and output over its window, as far as the plant can be inverted.
+
+    Refuses a constant input or output.
+    """
+    data, loop = simulated.recording, simulated.loop
     steps = np.diff(data.time)
     h = data.sample_time
     if float(np.max(np.abs(steps - h))) > EVEN * h:
@@ -89,32 +87,25 @@ def read_input_output(
             f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: the "
             f"{method} method needs even ones; use method='output_error' or 'waveform'"
         )
-    command, source = commands_over_samples(data, loop)
+    command, _ = commands_over_samples(data, loop)
     if len(data) < FEWEST:
         raise NotIdentifiableError(
             f"{len(data)} samples are too few for the {method} method, {FEWEST} are needed: widen "
             "the window"
         )
     check_moves(data.output, command)
-    return _inverted(command, data.output, loop, h, source)
-
-
-def _inverted(
-    command: Array, output: Array, loop: ControlLoop, h: float, source: str
-) -> InputOutput:
-    """Command and response without the plant, as far as it can be inverted."""
-    plant = loop.plant
+    plant, output = loop.plant, data.output
     moved = output - float(output[0])
     if isinstance(plant, Integrator):
-        return InputOutput(command[:-1], np.diff(moved) / h, h, plant.lag, source, "")
+        return InputOutput(command[:-1], np.diff(moved) / h, h, plant.lag, "")
     if isinstance(plant, FirstOrder):
         kept = math.exp(-h / plant.time_constant)
         response = (moved[1:] - kept * moved[:-1]) / (1.0 - kept)
         resting = float(output[0]) / plant.gain
-        return InputOutput(command[:-1] - resting, response, h, 0.0, source, "")
+        return InputOutput(command[:-1] - resting, response, h, 0.0, "")
     remark = "; the plant was not inverted, so its lag is part of the delay"
     centred = output - float(output.mean())
-    return InputOutput(command - float(command.mean()), centred, h, 0.5 * h, source, remark)
+    return InputOutput(command - float(command.mean()), centred, h, 0.5 * h, remark)
 
 
 def feedback_p_value(recording: Recording) -> float:

@@ -79,7 +79,7 @@ class GCC(Method):
         check_delay_alone("gcc", free)
         simulated = SimulatedRecording(recording, loop, window)
         data = simulated.recording
-        read = read_input_output(recording, loop, simulated, "gcc")
+        read = read_input_output(simulated, "gcc")
         if int(np.count_nonzero(np.diff(read.command))) < 2:
             raise NotIdentifiableError(
                 "the command changes at most once in the window, as when it is at its limit: its "

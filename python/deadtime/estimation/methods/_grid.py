@@ -104,12 +104,8 @@ class Grid(Method):
 
         misfit, jacobian = problem.misfit(point), problem.jacobian(point)
         residuals = -misfit
-        held = [
-            i
-            for i, name in enumerate(problem.labels)
-            if name == "lag" and problem.at_least(point, i)
-        ]
-        loose = [i for i in range(len(problem.labels)) if i not in held]
+        at_zero = point <= problem.low * (1.0 + 1e-6) + 1e-9
+        loose = [i for i, name in enumerate(problem.labels) if name != "lag" or not at_zero[i]]
         check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
         whiteness = whiteness_of(residuals, len(names))
         adequate = whiteness.white or is_rounding(residuals, data)
@@ -302,10 +298,6 @@ class _Problem(SimulatedModel):
             max_nfev=60,
         )
         return at(np.asarray(found.x))
-
-    def at_least(self, point: Array, place: int) -> bool:
-        """Whether a delay or lag is at the lower bound of the search."""
-        return bool(point[place] <= self.low[place] * (1.0 + 1e-6) + 1e-9)
 
 
 def _message(names: tuple[str, ...], grid: Array, adequate: bool) -> str:

@@ -52,7 +52,9 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
             raise TypeError(f"recording[{index}] must be a Recording, got {type(one).__name__}")
         if not isinstance(its_loop, ControlLoop):
             raise TypeError(f"loop[{index}] must be a ControlLoop, got {type(its_loop).__name__}")
-        runs.append(Run(one, its_loop, _checked(ends)))
+        open_interval("window", ends)
+        low, high = (None, None) if ends is None else ends
+        runs.append(Run(one, its_loop, (low, high)))
     plants = {type(run.loop.plant).__name__ for run in runs}
     if len(plants) > 1:
         raise ValueError(
@@ -60,12 +62,6 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
             "fitted together must be of one vehicle"
         )
     return runs
-
-
-def _checked(window: OpenRange | None) -> OpenRange:
-    open_interval("window", window)
-    low, high = (None, None) if window is None else window
-    return low, high
 
 
 @dataclass(frozen=True)

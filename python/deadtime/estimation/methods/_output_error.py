@@ -94,7 +94,10 @@ def estimate_from_commands(
     longest = min(LONGEST * one.span for one in models)
     delay = dict(zip(names, found.point.tolist(), strict=False)).get("delay", 0.0)
     if delay >= longest * (1.0 - 1e-3):
-        _refuse_longest(longest)
+        raise NotIdentifiableError(
+            f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is "
+            "no response to this command; check columns and units, or choose a longer window"
+        )
     sources = {one.source for one in models}
     message = f"least squares over {', '.join(names)} on the response to the command"
     if computed:
@@ -214,13 +217,6 @@ class _Model(ModelOfOne):
             gains = np.full(delays.size, values["gain"])
         left = target - gains[:, None] * moved
         return np.einsum("ij,ij->i", left, left), gains, level - gains * centres
-
-
-def _refuse_longest(longest: float) -> None:
-    raise NotIdentifiableError(
-        f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is no "
-        "response to this command; check columns and units, or choose a longer window"
-    )
 
 
 def _model(

@@ -98,7 +98,8 @@ class Relay(Method):
         switches = _switches(data.time, signs, crossings, loop.is_sampled)
         half = float(np.mean(np.diff(crossings)))
         readings = 0.5 * (crossings[1:] + crossings[:-1]) - switches
-        cycles = _paired(readings)
+        # Means of pairs of successive half cycles.
+        cycles = readings[readings.size % 2 :].reshape(-1, 2).mean(axis=1)
         late = _delay_by_lag(plant.lag, half)
         delay = float(cycles.mean()) - late
         stderr = _error_of_mean(cycles)
@@ -236,12 +237,6 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
             )
         found.append(float(np.sum(own[::2]) - np.sum(own[1::2])))
     return np.array(found)
-
-
-def _paired(readings: Array) -> Array:
-    """Means of pairs of successive half cycles."""
-    even = readings[readings.size % 2 :]
-    return np.asarray(even.reshape(-1, 2).mean(axis=1))
 
 
 def _error_of_mean(cycles: Array) -> float:

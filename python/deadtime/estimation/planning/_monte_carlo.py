@@ -175,7 +175,9 @@ def _summed_up(
     method: str, everything: Mapping[str, float], level: float, outcomes: list[_Outcome]
 ) -> MonteCarlo:
     answered = [outcome for outcome in outcomes if not outcome.refusal]
-    reasons = Counter(_without_numbers(outcome.refusal) for outcome in outcomes if outcome.refusal)
+    # Numbers are left out, so that equal reasons are counted together.
+    refusals = [outcome.refusal for outcome in outcomes if outcome.refusal]
+    reasons = Counter(re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", one) for one in refusals)
     if not answered:
         raise NotIdentifiableError(
             f"all {len(outcomes)} runs were refused, most of them because "
@@ -201,8 +203,3 @@ def _summed_up(
         },
         failures=dict(reasons.most_common()),
     )
-
-
-def _without_numbers(reason: str) -> str:
-    """The reason with its numbers left out, so that equal reasons are counted together."""
-    return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", reason)
