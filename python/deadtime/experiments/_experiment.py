@@ -107,12 +107,11 @@ class Experiment(ReadOnlyArrays):
         if not np.isfinite(reference).all():
             wrong = reference[~np.isfinite(reference)][0]
             raise ValueError(f"reference holds {wrong}: give finite values")
-        object.__setattr__(self, "time", read_only(time))
-        object.__setattr__(self, "reference", read_only(reference))
-        for label, value in (("relay_amplitude", relay_amplitude), ("period", period)):
-            checked = None if value is None else positive(label, value)
-            object.__setattr__(self, label, checked)
-        object.__setattr__(self, "name", name)
+        held = {"time": read_only(time), "reference": read_only(reference), "name": name}
+        for label, number in (("relay_amplitude", relay_amplitude), ("period", period)):
+            held[label] = None if number is None else positive(label, number)
+        for label, value in held.items():
+            object.__setattr__(self, label, value)
 
     def __len__(self) -> int:
         return int(self.time.size)

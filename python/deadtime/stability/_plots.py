@@ -38,29 +38,24 @@ def plot_stability_map(
     """Shade the cells, draw the boundaries with their frequencies, mark the chosen point."""
     across, up = chart.names
     x, y = chart.axes[across], chart.axes[up]
-    if show == "abscissa":
-        _shade_abscissa(ax, chart, x, y)
-    else:
-        _shade_counts(ax, chart, x, y)
-    _draw_boundaries(ax, chart, x, y)
+    (_shade_abscissa if show == "abscissa" else _shade_counts)(ax, chart)
+    _draw_boundaries(ax, chart)
     if chosen:
         ax.plot(chosen[across], chosen[up], "*", color=COLOURS[1], ms=14, mec="w", zorder=4)
     ax.set(xlabel=across, ylabel=up, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
 
 
-def _shade_abscissa(
-    ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> None:
+def _shade_abscissa(ax: Axes, chart: StabilityMap) -> None:
     """Spectral abscissa where the loop is stable."""
     shading = np.where(chart.stable, chart.abscissa, np.nan).T
     if np.any(np.isfinite(shading)):
-        drawn = ax.pcolormesh(x, y, shading, cmap="viridis_r", shading="auto", rasterized=True)
+        drawn = ax.pcolormesh(
+            *chart.axes.values(), shading, cmap="viridis_r", shading="auto", rasterized=True
+        )
         ax.figure.colorbar(drawn, ax=ax, label="spectral abscissa / (1/s)")
 
 
-def _shade_counts(
-    ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> None:
+def _shade_counts(ax: Axes, chart: StabilityMap) -> None:
     """Number of unstable roots: green for none, grey for infinitely many."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -72,6 +67,7 @@ def _shade_counts(
     steps = colormaps["Blues"](np.linspace(0.15, 0.95, _COUNTED))
     colours = ListedColormap([(0.86, 0.95, 0.86, 1.0), *steps, (0.45, 0.45, 0.45, 1.0)])
     norm = BoundaryNorm(np.arange(-0.5, _COUNTED + 2.0), colours.N)
+    x, y = chart.axes.values()
     drawn = ax.pcolormesh(
         x, y, counts.T, cmap=colours, norm=norm, shading="nearest", rasterized=True
     )
@@ -79,9 +75,7 @@ def _shade_counts(
     bar.ax.set_yticklabels([*map(str, range(_COUNTED)), f"{_COUNTED}+", "no end"])
 
 
-def _draw_boundaries(
-    ax: Axes, chart: StabilityMap, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> None:
+def _draw_boundaries(ax: Axes, chart: StabilityMap) -> None:
     """Crossing curves where they are known, else the edge of the stable cells."""
     try:
         curves = chart.boundaries
@@ -89,6 +83,7 @@ def _draw_boundaries(
         curves = ()
     for curve in curves:
         ax.plot(*(curve.values[name] for name in chart.names), color="k", lw=1.0, zorder=3)
+    x, y = chart.axes.values()
     least = _LABELLED * min(len(x), len(y))
     for curve in [curve for curve in curves if len(curve) >= least][:_MOST_LABELS]:
         _label(ax, chart, curve)

@@ -10,7 +10,7 @@ is repeated with the requirement on the estimate raised by what is missing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +39,7 @@ _TURNS = 8.0
 _VALUES = 2_000_000
 
 
-@dataclass(frozen=True)
-class RequiredMargins:
+class RequiredMargins(NamedTuple):
     """Least gain margin (a factor), phase margin in degrees and delay margin in s; 0 for none."""
 
     gain_margin: float = 0.0
@@ -69,17 +68,15 @@ class RequiredMargins:
     @property
     def named(self) -> dict[str, float]:
         """The margins that are required, by name."""
-        return {
-            name: value for name, value in zip(MARGINS, astuple(self), strict=True) if value > 0.0
-        }
+        return {name: value for name, value in self._asdict().items() if value > 0.0}
 
     @property
     def vector(self) -> Vector:
-        return np.array(astuple(self))
+        return np.array(self)
 
     def without(self, name: str) -> RequiredMargins:
         """The other requirements."""
-        return replace(self, **{name: 0.0})
+        return self._replace(**{name: 0.0})
 
     def scaled(self, factor: float) -> RequiredMargins:
         """All requirements multiplied by a factor."""

@@ -15,7 +15,7 @@ is incomplete and its error grows with the motion: the weight is then the invers
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
@@ -200,27 +200,28 @@ class JointModel:
             after += own
         return places
 
-    def _joined(self, ends: Sequence[Array], common: Array) -> Array:
+    def _joined(self, what: str, common: Callable[[list[Array]], Array]) -> Array:
+        """The common values of a bound or scale, then those of each recording."""
         count = len(self.names)
-        return np.concatenate([common, *(end[count:] for end in ends)])
+        ends = [getattr(part, what) for part in self.parts]
+        return np.concatenate(
+            [common([end[:count] for end in ends]), *(end[count:] for end in ends)]
+        )
 
     @cached_property
     def low(self) -> Array:
         """Lower bounds: the largest over the recordings."""
-        ends = [part.low for part in self.parts]
-        return self._joined(ends, np.max([end[: len(self.names)] for end in ends], axis=0))
+        return self._joined("low", lambda ends: np.max(ends, axis=0))
 
     @cached_property
     def high(self) -> Array:
         """Upper bounds: the smallest over the recordings."""
-        ends = [part.high for part in self.parts]
-        return self._joined(ends, np.min([end[: len(self.names)] for end in ends], axis=0))
+        return self._joined("high", lambda ends: np.min(ends, axis=0))
 
     @cached_property
     def scale(self) -> Array:
         """Scales of the parameters."""
-        ends = [part.scale for part in self.parts]
-        return self._joined(ends, ends[0][: len(self.names)])
+        return self._joined("scale", lambda ends: ends[0])
 
     def misfit(self, point: Array) -> Array:
         """Weighted residuals, one recording after the other."""
@@ -243,10 +244,10 @@ class JointModel:
     def starts(self) -> list[Array]:
         """Starting points of every recording, completed by the best ones of the others."""
         starts = [part.starts() for part in self.parts]
-        own = [points[0] for points in starts]
         count = len(self.names)
+        own = [points[0][count:] for points in starts]
         candidates = [
-            np.clip(self._joined(own, point[:count]), self.low, self.high)
+            np.clip(np.concatenate([point[:count], *own]), self.low, self.high)
             for points in starts
             for point in points[:3]
         ]

@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -182,7 +183,7 @@ def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest
     if nyquist:
         weight[-1] = math.sqrt(1.0 / size)
 
-    misfit = _RecordMisfit(data, response, weight, kept)
+    misfit = partial(_record_misfit, data, response, weight, kept)
     describe = f"{int(kept.sum())} of one record"
     span = float(data.time[-1] - data.time[0])
     return Lines(misfit, False, real - numbers, 1.0, LONGEST * span, data.sample_time, describe)
@@ -200,47 +201,39 @@ def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) 
     widening = spectra.freedom / (spectra.freedom - 1.0)
     describe = f"{spectra.lines.size} of {spectra.periods} periods"
     longest = min(LONGEST * spectra.periods, 1.0) * spectra.samples * sample_time
-    misfit = _PeriodicMisfit(spectra, sample_time)
+    misfit = partial(_periodic_misfit, spectra, sample_time)
     return Lines(misfit, True, freedom, widening, longest, sample_time, describe)
 
 
-@dataclass(frozen=True, eq=False)
-class _RecordMisfit:
+def _record_misfit(
+    data: Recording,
+    response: HeldResponse,
+    weight: Array,
+    kept: NDArray[np.bool_],
+    values: dict[str, float],
+) -> Array:
     """Misfit at the `kept` lines of one record, times a weight."""
-
-    data: Recording
-    response: HeldResponse
-    weight: Array
-    kept: NDArray[np.bool_]
-
-    def __call__(self, values: dict[str, float]) -> Array:
-        path = _path(self.data, self.response, values)
-        spectrum = np.fft.rfft(self.data.output - values["gain"] * path)
-        lines = self.weight * spectrum[self.kept]
-        return np.concatenate([lines.real, lines.imag])
+    spectrum = np.fft.rfft(data.output - values["gain"] * _path(data, response, values))
+    lines = weight * spectrum[kept]
+    return np.concatenate([lines.real, lines.imag])
 
 
-@dataclass(frozen=True, eq=False)
-class _PeriodicMisfit:
+def _periodic_misfit(
+    spectra: PeriodicSpectra, sample_time: float, values: dict[str, float]
+) -> Array:
     """Misfit at the excited lines over their standard deviation between periods."""
-
-    spectra: PeriodicSpectra
-    sample_time: float
-
-    def __call__(self, values: dict[str, float]) -> Array:
-        spectra = self.spectra
-        z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
-        floor = ROUNDING * float(np.max(np.abs(spectra.output)))
-        g = values["gain"] * held_transfer(z, values["delay"], values["lag"], self.sample_time)
-        variance = (
-            spectra.output_variance
-            + np.abs(g) ** 2 * spectra.input_variance
-            - 2.0 * (spectra.covariance * np.conj(g)).real
-        )
-        # Per real part; the sum of squares of all parts is then a chi-square.
-        spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
-        lines = (spectra.output - g * spectra.input) / spread
-        return np.concatenate([lines.real, lines.imag])
+    z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
+    floor = ROUNDING * float(np.max(np.abs(spectra.output)))
+    g = values["gain"] * held_transfer(z, values["delay"], values["lag"], sample_time)
+    variance = (
+        spectra.output_variance
+        + np.abs(g) ** 2 * spectra.input_variance
+        - 2.0 * (spectra.covariance * np.conj(g)).real
+    )
+    # Per real part; the sum of squares of all parts is then a chi-square.
+    spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
+    lines = (spectra.output - g * spectra.input) / spread
+    return np.concatenate([lines.real, lines.imag])
 
 
 def _path(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Protocol, overload
+from typing import NamedTuple, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,35 +156,22 @@ class PathSlopes(NamedTuple):
     by: dict[str, Array]
 
 
-class Path(Protocol):
-    """Output of a plant of unit gain under one record of commands."""
+class SteppedPath:
+    """The simulated output of any other plant."""
 
-    def value(self, times: Array, values: Mapping[str, float]) -> Array:
-        """F at `times`, of any shape, for these parameters of the plant."""
-
-    def slopes(self, times: Array, values: Mapping[str, float], names: Sequence[str]) -> PathSlopes:
-        """Derivatives of F at `times`, by those of `names` that the plant has."""
-
-
-def path_of(plant: Plant, time: Array, command: Array) -> Path:
-    """The path of `plant` under `command`, each value held from its time on."""
-    if isinstance(plant, Integrator):
-        return HeldResponse(time, command)
-    return _SteppedPath(plant, time, command)
-
-
-class _SteppedPath:
     def __init__(self, plant: Plant, time: Array, command: Array) -> None:
         self._plant, self._time, self._command = plant, time, command
         self._change = STEP * float(np.median(np.diff(time)))
 
     def value(self, times: Array, values: Mapping[str, float]) -> Array:
+        """F at `times`, of any shape, for these parameters of the plant."""
         distinct, place = np.unique(times, return_inverse=True)
         numbers = {**self._plant.parameters, **values, "gain": 1.0}
         path = open_response(self._plant, numbers, distinct, self._time, self._command)
         return path[place].reshape(times.shape)
 
     def slopes(self, times: Array, values: Mapping[str, float], names: Sequence[str]) -> PathSlopes:
+        """Derivatives of F at `times`, by those of `names` that the plant has."""
         change = self._change
         rate = (self.value(times + change, values) - self.value(times - change, values)) / (
             2.0 * change
@@ -199,3 +186,14 @@ class _SteppedPath:
                 )
                 by[name] = (higher - lower) / (2.0 * step)
         return PathSlopes(rate, by)
+
+
+#: Output of a plant of unit gain under one record of commands.
+Path: TypeAlias = HeldResponse | SteppedPath
+
+
+def path_of(plant: Plant, time: Array, command: Array) -> Path:
+    """The path of `plant` under `command`, each value held from its time on."""
+    if isinstance(plant, Integrator):
+        return HeldResponse(time, command)
+    return SteppedPath(plant, time, command)
