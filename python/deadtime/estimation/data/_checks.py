@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.loops import ControlLoop
+from deadtime.loops import ControlLoop, Integrator
 from deadtime.recordings import Recording
 from deadtime.recordings._recording import MINIMUM_SAMPLES
 
@@ -65,6 +65,22 @@ def checked_names(
     if "delay" not in free and loop.delay is None:
         raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
     return tuple(name for name in known if name in free)
+
+
+def integrator_of(loop: ControlLoop, method: str) -> Integrator:
+    """The plant of the loop, which has to be an integrator."""
+    if not isinstance(loop.plant, Integrator):
+        raise ValueError(
+            f"the {method} method is for an Integrator, the loop has a "
+            f"{type(loop.plant).__name__}: use method='waveform'"
+        )
+    return loop.plant
+
+
+def check_delay_free(names: Sequence[str], method: str) -> None:
+    """Refuse a known delay, for a method that searches it."""
+    if "delay" not in names:
+        raise ValueError(f"the {method} method estimates the delay: keep it among `free`")
 
 
 def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:

@@ -176,6 +176,14 @@ class Extreme(NamedTuple):
     height_error: float
 
 
+def read_decaying_step(recording: Recording, method: str) -> tuple[StepReading, list[Extreme]]:
+    """The one step and its extremes, for a method of linear theory; refuses what does not decay."""
+    reading = read_step(recording)
+    extremes = read_extremes(reading)
+    check_decays(extremes, method)
+    return reading, extremes
+
+
 def read_extremes(reading: StepReading) -> list[Extreme]:
     """Peaks and valleys above the noise, from the first peak on."""
     return _extremes(reading.since, reading.travelled - 1.0, reading.noise)

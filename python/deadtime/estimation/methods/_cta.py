@@ -29,6 +29,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import (
+    check_delay_free,
     check_distinguishable,
     check_excitation,
     check_gain,
@@ -86,8 +87,7 @@ class CTA(Method):
         """Fit `free` to the one recording."""
         ((recording, loop, window),) = runs
         names = checked_names(free, loop)
-        if "delay" not in names:
-            raise ValueError("the cta method estimates the delay: keep it among `free`")
+        check_delay_free(names, "cta")
         stiffness_of(loop, "cta")
         if loop.is_sampled or loop.limit is not None:
             what = "a hold" if loop.is_sampled else "a limit"

@@ -29,9 +29,7 @@ from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     CLEARANCE,
     StepReading,
-    check_decays,
-    read_extremes,
-    read_step,
+    read_decaying_step,
     stiffness_of,
 )
 from deadtime.estimation.fit._residuals import robust_covariance
@@ -78,9 +76,7 @@ class Decay(Method):
         check_delay_alone("decay", free)
         stiffness = stiffness_of(loop, "decay")
         simulated = SimulatedRecording(recording, loop, window)
-        reading = read_step(simulated.recording)
-        extremes = read_extremes(reading)
-        check_decays(extremes, "decay")
+        reading, extremes = read_decaying_step(simulated.recording, "decay")
         if extremes:
             raise NotIdentifiableError(
                 "the output overshoots, so the rightmost roots are complex and the tail is no "

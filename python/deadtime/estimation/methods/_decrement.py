@@ -25,14 +25,12 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import checked_names
+from deadtime.estimation.data._checks import check_delay_free, checked_names
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     Extreme,
     StepReading,
-    check_decays,
-    read_extremes,
-    read_step,
+    read_decaying_step,
     stiffness_of,
     weighted_slope,
 )
@@ -64,13 +62,10 @@ class Decrement(Method):
                 "the decrement method has two numbers, damping and frequency, for delay and gain: "
                 "fix the lag, or use method='waveform'"
             )
-        if "delay" not in names:
-            raise ValueError("the decrement method estimates the delay: keep it among `free`")
+        check_delay_free(names, "decrement")
         stiffness = stiffness_of(loop, "decrement")
         simulated = SimulatedRecording(recording, loop, window)
-        reading = read_step(simulated.recording)
-        extremes = read_extremes(reading)
-        check_decays(extremes, "decrement")
+        reading, extremes = read_decaying_step(simulated.recording, "decrement")
         extremes = _linear(extremes, reading, loop)
         pair, pair_cov = _ringing(extremes)
         lag = loop.parameters["lag"]

@@ -37,6 +37,7 @@ from deadtime.estimation.data._checks import (
     check_moves,
     checked_names,
     embedded,
+    integrator_of,
     standard_errors,
 )
 from deadtime.estimation.data._periodic import PeriodicSpectra, periodic_spectra
@@ -47,7 +48,7 @@ from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
 from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import HeldResponse, held_transfer
-from deadtime.loops import ControlLoop, Integrator
+from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
@@ -100,11 +101,7 @@ class Frequency(Method):
 
         ((recording, loop, window),) = runs
         names = checked_names(free, loop)
-        if not isinstance(loop.plant, Integrator):
-            raise ValueError(
-                f"the frequency method is for an Integrator, the loop has a "
-                f"{type(loop.plant).__name__}: use method='waveform'"
-            )
+        integrator_of(loop, "frequency")
         data = recording.window(*window)
         rows = recording.rows(*window)
         _check_even(data)

@@ -32,9 +32,7 @@ from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     CLEARANCE,
     StepReading,
-    check_decays,
-    read_extremes,
-    read_step,
+    read_decaying_step,
     stiffness_of,
 )
 from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
@@ -85,8 +83,7 @@ class Graphical(Method):
         ((recording, loop, window),) = runs
         check_delay_alone("graphical", free)
         simulated = SimulatedRecording(recording, loop, window)
-        reading = read_step(simulated.recording)
-        check_decays(read_extremes(reading), "graphical")
+        reading, _ = read_decaying_step(simulated.recording, "graphical")
         moved = _first_movement(reading)
         delay, stderr = float(reading.since[moved]), math.nan
         if self.construction != "first_movement":

@@ -27,6 +27,7 @@ from deadtime._base.validation import increasing
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate
 from deadtime.estimation.data._checks import (
     ROUNDING,
+    check_delay_free,
     check_distinguishable,
     check_ends,
     check_excitation,
@@ -91,8 +92,7 @@ class Grid(Method):
         """Fit `free` to the one recording."""
         ((recording, loop, window),) = runs
         names = checked_names(free, loop)
-        if "delay" not in names:
-            raise ValueError("the grid method searches the delay: keep it among `free`")
+        check_delay_free(names, "grid")
         simulated = SimulatedRecording(recording, loop, window)
         data = simulated.recording
         check_excitation(data, len(names))

@@ -27,11 +27,11 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._checks import integrator_of
 from deadtime.estimation.data._step_reading import noise_of_second_differences
 from deadtime.estimation.methods._conclusion import check_delay_alone, estimate_with_residuals
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import HeldResponse
-from deadtime.loops import Integrator
 from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
@@ -84,12 +84,7 @@ class Relay(Method):
         """Fit `free` to the one recording."""
         ((recording, loop, window),) = runs
         check_delay_alone("relay", free)
-        plant = loop.plant
-        if not isinstance(plant, Integrator):
-            raise ValueError(
-                f"the relay method is for an Integrator, the loop has a {type(plant).__name__}: "
-                "use method='waveform'"
-            )
+        plant = integrator_of(loop, "relay")
         data = recording.window(*window)
         signs, height = _relay(data, self.amplitude)
         error = data.output - data.reference
