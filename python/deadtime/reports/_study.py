@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from deadtime._base.progress import Stages, stage_report
-from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import OpenRange
 from deadtime.estimation import Comparison, DelayEstimate, compare_methods
 from deadtime.experiments import Experiment, Noise
 from deadtime.loops import PV, Controller, ControlLoop, Integrator, P, kit_plant

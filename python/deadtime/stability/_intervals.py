@@ -8,7 +8,7 @@ from typing import SupportsFloat, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.ranges import Range, interval
+from deadtime._base.validation import Range, interval
 from deadtime.roots._family import HasFamily
 
 __all__ = [

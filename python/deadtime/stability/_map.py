@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -15,8 +16,7 @@ from numpy.typing import NDArray
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, Report, reported
-from deadtime._base.ranges import Points, numbers_at
-from deadtime._base.validation import finite, thread_number
+from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop
 from deadtime.loops._family import numbers_of
 from deadtime.loops._stability import sampled_grid
@@ -378,7 +378,7 @@ def stability_map(
         raise ValueError(
             f"damping={question.damping}: a sampled loop is judged by a circle; ask for decay="
         )
-    with reported(progress, cells) as report:
+    with nullcontext() if progress is False else reported(progress, cells) as report:
         if isinstance(family, ControlLoop) and sampled:
             numbers = numbers_of(family.parameters, (*names, *fixed)) | fixed
             found = _map_sampled(family, numbers, names, axes, question.decay, threads, report)

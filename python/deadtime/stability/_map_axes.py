@@ -10,8 +10,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.ranges import points_of
-from deadtime._base.validation import finite
+from deadtime._base.validation import finite, points_of
 
 __all__ = ["damping_demand", "map_axes"]
 

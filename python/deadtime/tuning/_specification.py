@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from deadtime._base.ranges import Range
+from deadtime._base.validation import Range
 from deadtime.loops import Controller
 
 __all__ = ["DesignSpecification", "FilterSpecification", "ObjectiveName"]

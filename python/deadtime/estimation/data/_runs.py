@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from deadtime._base.ranges import OpenRange, is_range, open_interval
+from deadtime._base.validation import OpenRange, is_range, open_interval
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
