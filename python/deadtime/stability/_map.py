@@ -18,7 +18,7 @@ from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop
-from deadtime.loops._family import numbers_of
+from deadtime.loops._characteristic import numbers_of
 from deadtime.loops._stability import sampled_grid
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.roots._family import HasFamily, family_of
