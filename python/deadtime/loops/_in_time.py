@@ -20,19 +20,11 @@ from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_w
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
-from deadtime.systems._run import first_duration
+from deadtime.systems._response import until_settled
 
 __all__ = ["LoopInTime"]
 
 Vector = NDArray[np.float64]
-
-#: Output times of a step response by default.
-_POINTS = 501
-#: Its duration is doubled, at most this many times, until the last quarter stays within _SETTLED of
-#: the goal or the response is _LOST times as far away from it.
-_DOUBLINGS = 10
-_SETTLED = 0.005
-_LOST = 20.0
 
 
 class LoopInTime:
@@ -157,9 +149,13 @@ class LoopInTime:
         """
         if time is not None:
             return self.simulate(time, amplitude)
-        rational = self.specification.plant.is_rational
-        run = _settled_step if rational else settled_step_with_delays
-        return run(self.specification, finite("amplitude", amplitude))
+        loop, amplitude = self.specification, finite("amplitude", amplitude)
+        if not loop.plant.is_rational:
+            return settled_step_with_delays(loop, amplitude)
+        longest = loop.known_delay + (loop.sample_time or 0.0)
+        return until_settled(
+            lambda times: _simulated(loop, times, amplitude), loop.model.A, longest
+        )
 
     def impulse_response(self, time: ArrayLike | None = None) -> Response:
         """Response to an impulse of the reference of unit area, from rest at zero.
@@ -267,20 +263,6 @@ def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -
     if loop.sample_time is None:
         return since
     return on_samples(since, start, loop.sample_time, phase)
-
-
-def _settled_step(loop: LoopSpecification, amplitude: float) -> Response:
-    """Step response up to where it has settled, found by doubling the time."""
-    delay = loop.known_delay
-    span = first_duration(loop.model.A, delay + (loop.sample_time or 0.0))
-    for _ in range(_DOUBLINGS):
-        response = _simulated(loop, np.linspace(0.0, span, _POINTS), amplitude)
-        goal = response.outputs[-1] if response.steady_state is None else response.steady_state
-        away = np.abs(response.outputs - goal)
-        if away[-_POINTS // 4 :].max() <= _SETTLED * abs(goal) or away.max() > _LOST * abs(goal):
-            break
-        span *= 2.0
-    return response
 
 
 class _Again:

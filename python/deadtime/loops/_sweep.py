@@ -32,7 +32,7 @@ from deadtime._deadtime import sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
-from deadtime.systems._run import first_duration
+from deadtime.systems._response import first_duration
 
 __all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
 
