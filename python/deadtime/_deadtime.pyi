@@ -1,93 +1,10 @@
 """Signatures of the native part."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, TypeAlias, final
+from typing import Any, Final, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
-
-__all__ = [
-    "AtCommand",
-    "Certificate",
-    "CharacteristicMatrix",
-    "Contour",
-    "Crossings",
-    "DelayPieces",
-    "DelayRun",
-    "Expansion",
-    "Family",
-    "FixedStepResponse",
-    "LegendreTables",
-    "LinearLoop",
-    "LinearSystem",
-    "LinearSystemResponse",
-    "LoopPacket",
-    "LoopResponse",
-    "LoopSensitivities",
-    "MapBoundary",
-    "MapCells",
-    "Margins",
-    "Monotone",
-    "Navdata",
-    "NavdataLayout",
-    "NavdataOption",
-    "ProvedBoxes",
-    "QuasiPolynomial",
-    "RootSet",
-    "SampledCells",
-    "Segment",
-    "Sensitivity",
-    "Signal",
-    "StabilityRadius",
-    "SweepMetrics",
-    "SweepResponses",
-    "at_read",
-    "at_write",
-    "configuration_read",
-    "configuration_write",
-    "corner_range",
-    "crossings",
-    "damping_range",
-    "dde_root_number",
-    "dde_roots",
-    "delay_margin",
-    "delay_range",
-    "doubles_read",
-    "doubles_write",
-    "end_of_gain",
-    "fixed_step_run",
-    "gain_range",
-    "lambertw",
-    "lambertw0",
-    "lambertw0_number",
-    "lambertw_derivative",
-    "lambertw_log",
-    "lambertw_number",
-    "lambertw_offset",
-    "lambertwm1",
-    "lambertwm1_number",
-    "largest_stable_box",
-    "legendre_tables",
-    "limit_threads",
-    "loop_margins",
-    "loop_packet_read",
-    "loop_packet_write",
-    "loop_sensitivities",
-    "navdata_full",
-    "navdata_layouts",
-    "navdata_read",
-    "navdata_write",
-    "on_samples",
-    "proved_boxes",
-    "ratio",
-    "robust_map",
-    "sampled_abscissa_grid",
-    "solve_dde",
-    "stability_radius",
-    "sweep_metrics",
-    "sweep_responses",
-    "wrightomega",
-]
 
 _Pair: TypeAlias = tuple[float, float]
 _Progress: TypeAlias = Callable[[int], object] | None
@@ -98,100 +15,62 @@ _Region: TypeAlias = tuple[_Pair, _Pair]
 
 @final
 class RootSet:
-    @property
-    def roots(self) -> NDArray[np.complex128]: ...
-    @property
-    def multiplicities(self) -> NDArray[np.int64]: ...
-    @property
-    def radii(self) -> NDArray[np.float64]: ...
-    @property
-    def resolved(self) -> NDArray[np.bool_]: ...
-    @property
-    def counted(self) -> int: ...
-    @property
-    def region(self) -> _Region: ...
+    roots: Final[NDArray[np.complex128]]
+    multiplicities: Final[NDArray[np.int64]]
+    radii: Final[NDArray[np.float64]]
+    resolved: Final[NDArray[np.bool_]]
+    counted: Final[int]
+    region: Final[_Region]
 
 @final
 class Sensitivity:
-    @property
-    def root(self) -> complex: ...
-    @property
-    def coefficients(self) -> NDArray[np.complex128]: ...
+    root: Final[complex]
+    coefficients: Final[NDArray[np.complex128]]
 
 @final
 class Segment:
-    @property
-    def start(self) -> complex: ...
-    @property
-    def end(self) -> complex: ...
-    @property
-    def middle(self) -> complex: ...
-    @property
-    def reference(self) -> int: ...
-    @property
-    def value(self) -> complex: ...
-    @property
-    def error(self) -> float: ...
-    @property
-    def slope(self) -> float: ...
+    start: Final[complex]
+    end: Final[complex]
+    middle: Final[complex]
+    reference: Final[int]
+    value: Final[complex]
+    error: Final[float]
+    slope: Final[float]
 
 @final
 class Monotone:
-    @property
-    def start(self) -> float: ...
-    @property
-    def end(self) -> float: ...
-    @property
-    def middle(self) -> float: ...
-    @property
-    def reference(self) -> int: ...
-    @property
-    def slope(self) -> float: ...
-    @property
-    def error(self) -> float: ...
-    @property
-    def bend(self) -> float: ...
+    start: Final[float]
+    end: Final[float]
+    middle: Final[float]
+    reference: Final[int]
+    slope: Final[float]
+    error: Final[float]
+    bend: Final[float]
 
 @final
 class Contour:
-    @property
-    def re(self) -> _Pair: ...
-    @property
-    def im(self) -> _Pair: ...
-    @property
-    def symmetric(self) -> bool: ...
-    @property
-    def count(self) -> int: ...
-    @property
-    def segments(self) -> list[Segment]: ...
+    re: Final[_Pair]
+    im: Final[_Pair]
+    symmetric: Final[bool]
+    count: Final[int]
+    segments: Final[list[Segment]]
 
 @final
 class Certificate:
-    @property
-    def region(self) -> _Region: ...
-    @property
-    def count(self) -> int: ...
-    @property
-    def scale(self) -> int: ...
-    @property
-    def zeros(self) -> int: ...
-    @property
-    def beyond(self) -> tuple[int, float] | None: ...
-    @property
-    def closed(self) -> _Region: ...
-    @property
-    def contours(self) -> list[Contour]: ...
-    @property
-    def real(self) -> list[Segment | Monotone]: ...
+    region: Final[_Region]
+    count: Final[int]
+    scale: Final[int]
+    zeros: Final[int]
+    beyond: Final[tuple[int, float] | None]
+    closed: Final[_Region]
+    contours: Final[list[Contour]]
+    real: Final[list[Segment | Monotone]]
 
 @final
 class Expansion:
-    @property
-    def coefficients(self) -> NDArray[np.complex128]: ...
-    @property
-    def errors(self) -> NDArray[np.float64]: ...
-    @property
-    def delay(self) -> float: ...
+    coefficients: Final[NDArray[np.complex128]]
+    errors: Final[NDArray[np.float64]]
+    delay: Final[float]
 
 @final
 class CharacteristicMatrix:
@@ -246,36 +125,21 @@ class QuasiPolynomial:
 
 @final
 class Margins:
-    @property
-    def stable(self) -> bool: ...
-    @property
-    def gain_margin(self) -> float: ...
-    @property
-    def gain_reduction(self) -> float: ...
-    @property
-    def phase_margin(self) -> float: ...
-    @property
-    def delay_margin(self) -> float: ...
-    @property
-    def gain_margin_omega(self) -> float: ...
-    @property
-    def gain_reduction_omega(self) -> float: ...
-    @property
-    def phase_margin_omega(self) -> float: ...
-    @property
-    def delay_margin_omega(self) -> float: ...
-    @property
-    def gain_crossovers(self) -> NDArray[np.float64]: ...
-    @property
-    def phase_margins(self) -> NDArray[np.float64]: ...
-    @property
-    def delay_margins(self) -> NDArray[np.float64]: ...
-    @property
-    def phase_crossovers(self) -> NDArray[np.float64]: ...
-    @property
-    def gain_margins(self) -> NDArray[np.float64]: ...
-    @property
-    def searched(self) -> _Pair: ...
+    stable: Final[bool]
+    gain_margin: Final[float]
+    gain_reduction: Final[float]
+    phase_margin: Final[float]
+    delay_margin: Final[float]
+    gain_margin_omega: Final[float]
+    gain_reduction_omega: Final[float]
+    phase_margin_omega: Final[float]
+    delay_margin_omega: Final[float]
+    gain_crossovers: Final[NDArray[np.float64]]
+    phase_margins: Final[NDArray[np.float64]]
+    delay_margins: Final[NDArray[np.float64]]
+    phase_crossovers: Final[NDArray[np.float64]]
+    gain_margins: Final[NDArray[np.float64]]
+    searched: Final[_Pair]
 
 def loop_margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins: ...
 def end_of_gain(n: QuasiPolynomial, d: QuasiPolynomial, level: float) -> float: ...
@@ -285,14 +149,10 @@ def ratio(
 
 @final
 class Crossings:
-    @property
-    def values(self) -> NDArray[np.float64]: ...
-    @property
-    def omega(self) -> NDArray[np.float64]: ...
-    @property
-    def direction(self) -> NDArray[np.int32]: ...
-    @property
-    def unlisted(self) -> list[_Pair]: ...
+    values: Final[NDArray[np.float64]]
+    omega: Final[NDArray[np.float64]]
+    direction: Final[NDArray[np.int32]]
+    unlisted: Final[list[_Pair]]
 
 def crossings(family: Family, ends: _Pair) -> Crossings: ...
 def delay_margin(family: Family, start: float) -> float: ...
@@ -346,25 +206,17 @@ class _MapQuestion(Protocol):
 
 @final
 class MapCells:
-    @property
-    def unstable(self) -> NDArray[np.int32]: ...
-    @property
-    def abscissa(self) -> NDArray[np.float64] | None: ...
-    @property
-    def status(self) -> NDArray[np.uint8]: ...
+    unstable: Final[NDArray[np.int32]]
+    abscissa: Final[NDArray[np.float64] | None]
+    status: Final[NDArray[np.uint8]]
 
 @final
 class MapBoundary:
-    @property
-    def gain(self) -> NDArray[np.float64]: ...
-    @property
-    def row(self) -> NDArray[np.int64]: ...
-    @property
-    def omega(self) -> NDArray[np.float64]: ...
-    @property
-    def crossing(self) -> NDArray[np.int32]: ...
-    @property
-    def along(self) -> str: ...
+    gain: Final[NDArray[np.float64]]
+    row: Final[NDArray[np.int64]]
+    omega: Final[NDArray[np.float64]]
+    crossing: Final[NDArray[np.int32]]
+    along: Final[str]
 
 @final
 class Family:
@@ -385,29 +237,19 @@ class Family:
 
 @final
 class ProvedBoxes:
-    @property
-    def low(self) -> NDArray[np.float64]: ...
-    @property
-    def high(self) -> NDArray[np.float64]: ...
-    @property
-    def unstable(self) -> NDArray[np.int32]: ...
-    @property
-    def undecided(self) -> float: ...
-    @property
-    def parameter(self) -> NDArray[np.int8]: ...
-    @property
-    def at(self) -> NDArray[np.float64]: ...
-    @property
-    def link(self) -> NDArray[np.int64]: ...
+    low: Final[NDArray[np.float64]]
+    high: Final[NDArray[np.float64]]
+    unstable: Final[NDArray[np.int32]]
+    undecided: Final[float]
+    parameter: Final[NDArray[np.int8]]
+    at: Final[NDArray[np.float64]]
+    link: Final[NDArray[np.int64]]
 
 @final
 class StabilityRadius:
-    @property
-    def radius(self) -> float: ...
-    @property
-    def upper(self) -> float: ...
-    @property
-    def witness(self) -> dict[str, float] | None: ...
+    radius: Final[float]
+    upper: Final[float]
+    witness: Final[dict[str, float] | None]
 
 def proved_boxes(
     family: Family,
@@ -497,14 +339,10 @@ class _LoopRun(Protocol):
 
 @final
 class LoopResponse:
-    @property
-    def outputs(self) -> NDArray[np.float64]: ...
-    @property
-    def inputs(self) -> NDArray[np.float64]: ...
-    @property
-    def breaks(self) -> NDArray[np.float64]: ...
-    @property
-    def reference(self) -> NDArray[np.float64]: ...
+    outputs: Final[NDArray[np.float64]]
+    inputs: Final[NDArray[np.float64]]
+    breaks: Final[NDArray[np.float64]]
+    reference: Final[NDArray[np.float64]]
 
 @final
 class LinearLoop:
@@ -549,12 +387,9 @@ class _SampledLoops(Protocol):
 
 @final
 class SampledCells:
-    @property
-    def abscissa(self) -> NDArray[np.float64]: ...
-    @property
-    def unstable(self) -> NDArray[np.int32]: ...
-    @property
-    def status(self) -> NDArray[np.uint8]: ...
+    abscissa: Final[NDArray[np.float64]]
+    unstable: Final[NDArray[np.int32]]
+    status: Final[NDArray[np.uint8]]
 
 def sampled_abscissa_grid(
     loops: _SampledLoops,
@@ -612,10 +447,8 @@ class _FixedStepSettings(Protocol):
 
 @final
 class FixedStepResponse:
-    @property
-    def outputs(self) -> NDArray[np.float64]: ...
-    @property
-    def inputs(self) -> NDArray[np.float64]: ...
+    outputs: Final[NDArray[np.float64]]
+    inputs: Final[NDArray[np.float64]]
 
 def fixed_step_run(
     plant: _StateSpace,
@@ -638,10 +471,8 @@ class _LoopSlopes(Protocol):
 
 @final
 class LoopSensitivities:
-    @property
-    def outputs(self) -> NDArray[np.float64]: ...
-    @property
-    def inputs(self) -> NDArray[np.float64]: ...
+    outputs: Final[NDArray[np.float64]]
+    inputs: Final[NDArray[np.float64]]
 
 def loop_sensitivities(
     slopes: _LoopSlopes,
@@ -662,17 +493,13 @@ class _LoopSets(Protocol):
 
 @final
 class SweepMetrics:
-    @property
-    def metrics(self) -> dict[str, NDArray[np.float64]]: ...
-    @property
-    def status(self) -> NDArray[np.uint8]: ...
+    metrics: Final[dict[str, NDArray[np.float64]]]
+    status: Final[NDArray[np.uint8]]
 
 @final
 class SweepResponses:
-    @property
-    def outputs(self) -> NDArray[np.float64]: ...
-    @property
-    def status(self) -> NDArray[np.uint8]: ...
+    outputs: Final[NDArray[np.float64]]
+    status: Final[NDArray[np.uint8]]
 
 def sweep_metrics(
     sets: _LoopSets,
@@ -696,10 +523,8 @@ def sweep_responses(
 
 @final
 class LegendreTables:
-    @property
-    def nodes(self) -> NDArray[np.float64]: ...
-    @property
-    def transform(self) -> NDArray[np.float64]: ...
+    nodes: Final[NDArray[np.float64]]
+    transform: Final[NDArray[np.float64]]
 
 def legendre_tables() -> LegendreTables: ...
 
@@ -731,14 +556,10 @@ class _SystemMatrices(Protocol):
 
 @final
 class LinearSystemResponse:
-    @property
-    def outputs(self) -> NDArray[np.float64]: ...
-    @property
-    def states(self) -> NDArray[np.float64]: ...
-    @property
-    def inputs(self) -> NDArray[np.float64]: ...
-    @property
-    def breaks(self) -> NDArray[np.float64]: ...
+    outputs: Final[NDArray[np.float64]]
+    states: Final[NDArray[np.float64]]
+    inputs: Final[NDArray[np.float64]]
+    breaks: Final[NDArray[np.float64]]
 
 @final
 class LinearSystem:
@@ -766,10 +587,8 @@ class DelayPieces:
         coefficients: NDArray[np.float64],
     ) -> DelayPieces: ...
     def __reduce__(self) -> tuple[type[DelayPieces], tuple[Any, ...]]: ...
-    @property
-    def span(self) -> tuple[float, float]: ...
-    @property
-    def count(self) -> int: ...
+    span: Final[tuple[float, float]]
+    count: Final[int]
     def evaluate(self, times: NDArray[np.float64], nu: int) -> NDArray[np.float64]: ...
 
 class _DelayEvent(Protocol):
@@ -828,30 +647,18 @@ class _DelayProblem(Protocol):
 
 @final
 class DelayRun:
-    @property
-    def t(self) -> NDArray[np.float64]: ...
-    @property
-    def y(self) -> NDArray[np.float64]: ...
-    @property
-    def t_events(self) -> list[NDArray[np.float64]]: ...
-    @property
-    def y_events(self) -> list[NDArray[np.float64]]: ...
-    @property
-    def breaks(self) -> NDArray[np.float64]: ...
-    @property
-    def nfev(self) -> int: ...
-    @property
-    def n_nodes(self) -> int: ...
-    @property
-    def n_elements(self) -> int: ...
-    @property
-    def n_rejected(self) -> int: ...
-    @property
-    def outcome(self) -> str: ...
-    @property
-    def end(self) -> float: ...
-    @property
-    def pieces(self) -> DelayPieces: ...
+    t: Final[NDArray[np.float64]]
+    y: Final[NDArray[np.float64]]
+    t_events: Final[list[NDArray[np.float64]]]
+    y_events: Final[list[NDArray[np.float64]]]
+    breaks: Final[NDArray[np.float64]]
+    nfev: Final[int]
+    n_nodes: Final[int]
+    n_elements: Final[int]
+    n_rejected: Final[int]
+    outcome: Final[str]
+    end: Final[float]
+    pieces: Final[DelayPieces]
 
 def solve_dde(problem: _DelayProblem) -> DelayRun: ...
 
@@ -859,50 +666,34 @@ def solve_dde(problem: _DelayProblem) -> DelayRun: ...
 
 @final
 class AtCommand:
-    @property
-    def sequence(self) -> int: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def arguments(self) -> tuple[Any, ...]: ...
+    sequence: Final[int]
+    name: Final[str]
+    arguments: Final[tuple[Any, ...]]
 
 def at_write(commands: Sequence[tuple[str, tuple[Any, ...]]], first: int) -> bytes: ...
 def at_read(datagram: bytes) -> list[AtCommand]: ...
 
 @final
 class NavdataOption:
-    @property
-    def tag(self) -> int: ...
-    @property
-    def body(self) -> bytes: ...
-    @property
-    def values(self) -> tuple[float, ...] | None: ...
+    tag: Final[int]
+    body: Final[bytes]
+    values: Final[tuple[float, ...] | None]
 
 @final
 class Navdata:
-    @property
-    def header(self) -> int: ...
-    @property
-    def state(self) -> int: ...
-    @property
-    def sequence(self) -> int: ...
-    @property
-    def vision(self) -> int: ...
-    @property
-    def options(self) -> list[NavdataOption]: ...
-    @property
-    def checksum_matches(self) -> bool: ...
+    header: Final[int]
+    state: Final[int]
+    sequence: Final[int]
+    vision: Final[int]
+    options: Final[list[NavdataOption]]
+    checksum_matches: Final[bool]
 
 @final
 class NavdataLayout:
-    @property
-    def tag(self) -> int: ...
-    @property
-    def length(self) -> int: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def fields(self) -> list[str]: ...
+    tag: Final[int]
+    length: Final[int]
+    name: Final[str]
+    fields: Final[list[str]]
 
 def navdata_read(packet: bytes, verify: bool) -> Navdata: ...
 def navdata_write(
@@ -920,22 +711,14 @@ def configuration_write(settings: Sequence[tuple[str, str]]) -> bytes: ...
 
 @final
 class LoopPacket:
-    @property
-    def sequence(self) -> int: ...
-    @property
-    def sent(self) -> float: ...
-    @property
-    def echo_sequence(self) -> int: ...
-    @property
-    def echo_sent(self) -> float: ...
-    @property
-    def held(self) -> float: ...
-    @property
-    def value(self) -> float: ...
-    @property
-    def reference(self) -> float: ...
-    @property
-    def flags(self) -> int: ...
+    sequence: Final[int]
+    sent: Final[float]
+    echo_sequence: Final[int]
+    echo_sent: Final[float]
+    held: Final[float]
+    value: Final[float]
+    reference: Final[float]
+    flags: Final[int]
 
 def loop_packet_read(packet: bytes) -> LoopPacket: ...
 def loop_packet_write(
