@@ -23,9 +23,9 @@ from deadtime.links.ardrone2.emulator.motion import PlantName
 from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
 from deadtime.links.parent_watch import parent_ended
 
-__all__ = ["emulators", "tell"]
+__all__ = ["command", "print_address"]
 
-emulators = typer.Typer(
+command = typer.Typer(
     help="Stand in for a vehicle, on its own ports and in its own protocol.",
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -39,12 +39,12 @@ COLUMNS = ("time_s", "height_m", "climb_m_s", "setpoint_m_s", "battery_percent",
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="This port; 0: a free one.")]
 
 
-@emulators.callback()
+@command.callback()
 def _group() -> None:
     """Stand in for a vehicle, on its own ports and in its own protocol."""
 
 
-@emulators.command()
+@command.command()
 def ardrone2(
     plant: Annotated[
         PlantName, typer.Option(help="How height answers the commanded climb.")
@@ -135,7 +135,7 @@ async def _emulate(
     with ExitStack() as stack:
         journal = None if record is None else stack.enter_context(Journal(record, COLUMNS))
         async with Emulator(options) as emulator:
-            tell(emulator, as_json)
+            print_address(emulator, as_json)
             live = None
             if not as_json and console.is_terminal:
                 live = stack.enter_context(Live(console=console, auto_refresh=False))
@@ -156,7 +156,7 @@ async def _emulate(
                     task.cancel()
 
 
-def tell(emulator: Emulator, as_json: bool) -> None:
+def print_address(emulator: Emulator, as_json: bool) -> None:
     """Print the addresses and ports of the drone once it listens."""
     options = emulator.options
     warning = (
@@ -166,13 +166,10 @@ def tell(emulator: Emulator, as_json: bool) -> None:
     if not options.only_here:
         print(f"deadtime: {warning}", file=sys.stderr)
     if as_json:
+        names = ("navdata_port", "command_port", "control_port", "ftp_port", "video_port")
         found = {
             "host": emulator.host,
-            "navdata_port": emulator.navdata_port,
-            "command_port": emulator.command_port,
-            "control_port": emulator.control_port,
-            "ftp_port": emulator.ftp_port,
-            "video_port": emulator.video_port,
+            **{name: getattr(emulator, name) for name in names},
             "plant": options.plant,
             "delay": options.transport_delay,
             "worst_case": options.worst_case,

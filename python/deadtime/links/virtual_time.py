@@ -17,12 +17,11 @@ from contextvars import Context
 from typing import Any, TypeVar, cast
 
 from deadtime._base.errors import LinkError
+from deadtime.links.addresses import Address
 
 __all__ = ["VirtualTimeLoop", "run"]
 
 T = TypeVar("T")
-
-Address = tuple[str, int]
 
 #: Ports for endpoints that ask for a free one.
 FREE_PORTS = range(49152, 65536)
@@ -49,36 +48,21 @@ def run(main: Coroutine[Any, Any, T]) -> T:
         return runner.run(main)
 
 
-class _Jump(selectors.BaseSelector):
+class _Jump(selectors.DefaultSelector):
     """Advances the clock where a selector would wait; only the waker of the loop is registered."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.time = 0.0
-        self._real = selectors.DefaultSelector()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        ready = self._real.select(0)  # a signal, such as Ctrl-C
+        ready = super().select(0)  # a signal, such as Ctrl-C
         if ready:
             return ready
         if timeout is None:
             raise LinkError("all tasks wait and no event is scheduled: the program would never end")
         self.time += max(timeout, 0.0)
         return []
-
-    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
-        return self._real.register(fileobj, events, data)
-
-    def unregister(self, fileobj: Any) -> selectors.SelectorKey:
-        return self._real.unregister(fileobj)
-
-    def modify(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
-        return self._real.modify(fileobj, events, data)
-
-    def get_map(self) -> Any:
-        return self._real.get_map()
-
-    def close(self) -> None:
-        self._real.close()
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):

@@ -26,19 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["PARTS", "TITLES", "Reproduction", "reproduce"]
 
 #: The parts, in the order of the paper.
-PARTS: Mapping[str, Callable[[], Part]] = {
-    "table1": table1,
-    "figure2": figure2,
-    "figure3": figure3,
-    "table2": table2,
-    "figure6": figure6,
-    "figure7": figure7,
-    "gap": gap,
-    "figure8": figure8,
-    "figure9": figure9,
-    "figure10": figure10,
-    "figure11": figure11,
-}
+_IN_ORDER: tuple[Callable[[], Part], ...] = (
+    *(table1, figure2, figure3, table2, figure6, figure7),
+    *(gap, figure8, figure9, figure10, figure11),
+)
+PARTS: Mapping[str, Callable[[], Part]] = {part.__name__: part for part in _IN_ORDER}
 
 TITLES: Mapping[str, str] = {
     "table1": "Table 1: delays of the Internet loop from its overshoots",

@@ -6,7 +6,6 @@ import asyncio
 import math
 import warnings
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Self
 
 from deadtime._base.errors import FlightAbortedError, LinkError
@@ -433,12 +432,7 @@ class ARDrone2:
         await self.connect()
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             await self.close()
         except LinkError as problem:

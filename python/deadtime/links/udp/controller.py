@@ -114,10 +114,8 @@ class ControllerReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON; without the recording."""
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        plain = {**vars(self), "link": self.link.to_dict(), "period": vars(self.period)}
         del plain["recording"]
-        plain["link"] = self.link.to_dict()
-        plain["period"] = vars(self.period)
         return plain
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import asdict, fields
-from typing import Any
 
 from deadtime.links.udp.controller import ControllerOptions
 from deadtime.links.udp.delays import Constant, Delays, LogNormal, Normal, ShiftedGamma
@@ -20,7 +18,6 @@ __all__ = [
     "arguments_of",
     "network_from",
     "network_of",
-    "plain",
     "policy_of",
 ]
 
@@ -114,17 +111,6 @@ def policy_of(name: str, number: float | None = None) -> Policy:
             raise ValueError(f"the policy 'hold' needs a whole number of samples, not {number:g}")
         return HoldThenZero(int(number))
     return (DropLate if name == "drop-late" else JitterBuffer)(number)
-
-
-def plain(value: Any) -> Any:
-    """The value with None in place of numbers that JSON cannot represent."""
-    if isinstance(value, dict):
-        return {key: plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def network_text(network: Network) -> str:

@@ -64,7 +64,8 @@ MOTORS = {
     for what, version in (("soft", "1.43"), ("hard", "6.0"), ("supplier", "1.1"))
 }
 
-GENERAL = {
+#: All keys. The ranges are those of the developer guide; those it does not give are wide.
+ENTRIES: dict[str, Entry] = {
     "general:num_version_config": Entry("1"),
     "general:num_version_mb": Entry("34"),
     "general:num_version_soft": Entry("2.4.8"),
@@ -85,9 +86,6 @@ GENERAL = {
     "general:battery_type": _whole(0),
     "general:gps_soft": Entry("0"),
     "general:gps_hard": Entry("0"),
-}
-
-CONTROL = {
     "control:accs_offset": _vector(-2048.0, 2048.0, 2048.0),
     "control:accs_gains": _vector(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0),
     "control:gyros_offset": _vector(0.0, 0.0, 0.0),
@@ -124,23 +122,14 @@ CONTROL = {
     "control:flight_anim": _text("0,0"),
     "control:flying_camera_enable": _truth("FALSE"),
     "control:flying_camera_mode": _text("0,0,0,0,0,0,0,0,0,0"),
-}
-
-NETWORK = {
     "network:ssid_single_player": _text("ardrone2_emulated"),
     "network:ssid_multi_player": _text("ardrone2_emulated"),
     "network:wifi_mode": _whole(0, 0, 2),
     "network:wifi_rate": _whole(0),
     "network:owner_mac": _text("00:00:00:00:00:00"),
-}
-
-PIC = {
     "pic:ultrasound_freq": _whole(8),
     "pic:ultrasound_watchdog": _whole(3),
     "pic:pic_version": Entry("262192"),
-}
-
-VIDEO = {
     "video:camif_fps": Entry("30"),
     "video:codec_fps": _whole(30, 15, 30),
     "video:camif_buffers": Entry("2"),
@@ -159,9 +148,6 @@ VIDEO = {
     "video:exposure_mode": _text("0"),
     "video:saturation_mode": _text("0"),
     "video:whitebalance_mode": _text("0"),
-}
-
-OTHERS = {
     "leds:leds_anim": _text("0,0,0"),
     "detect:enemy_colors": _whole(1),
     "detect:groundstripe_colors": _whole(16),
@@ -178,24 +164,10 @@ OTHERS = {
     "gps:latitude": _text("5.0000000000000000e+02"),
     "gps:longitude": _text("5.0000000000000000e+02"),
     "gps:altitude": _text("0.0000000000000000e+00"),
-}
-
-CUSTOM = {
     "custom:application_id": Entry(NO_ID, "id"),
     "custom:application_desc": _text("Default application configuration"),
     "custom:profile_id": Entry(NO_ID, "id"),
     "custom:profile_desc": _text("Default profile configuration"),
     "custom:session_id": Entry(NO_ID, "id"),
     "custom:session_desc": _text("Default session configuration"),
-}
-
-#: All keys. The ranges are those of the developer guide; those it does not give are wide.
-ENTRIES: dict[str, Entry] = {
-    **GENERAL,
-    **CONTROL,
-    **NETWORK,
-    **PIC,
-    **VIDEO,
-    **OTHERS,
-    **CUSTOM,
 }

@@ -20,19 +20,16 @@ from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, seconds
 from deadtime.links.ardrone2.emulator.flight import LOW_BATTERY, TICK, Phase
 from deadtime.links.ardrone2.emulator.motion import GRAVITY
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
-from deadtime.links.ardrone2.navdata import (
-    FULL_OPTIONS,
+from deadtime.links.ardrone2.navdata import FULL_OPTIONS, TAGS, Navdata, State, build_navdata
+from deadtime.links.ardrone2.navdata_options import (
     AltitudeOption,
     Demo,
     KalmanPressure,
-    Navdata,
     PhysicalMeasures,
     Pressure,
     Pwm,
     RawMeasures,
-    State,
     VideoStream,
-    build_navdata,
 )
 
 __all__ = ["Reading", "Sensors"]
@@ -65,19 +62,6 @@ WORKING = (
     | State.ACQUISITION_THREAD
 )
 
-#: Tags of the options that are filled in, by their names in `Navdata`; the others are zero.
-TAGS = {
-    "demo": Demo.tag,
-    "clock": 1,
-    "raw_measures": RawMeasures.tag,
-    "physical_measures": PhysicalMeasures.tag,
-    "pwm": Pwm.tag,
-    "altitude": AltitudeOption.tag,
-    "video_stream": VideoStream.tag,
-    "pressure": Pressure.tag,
-    "kalman_pressure": KalmanPressure.tag,
-}
-
 #: Control states: the upper half of the word in navdata.
 DEFAULT, LANDED, FLYING, HOVERING, TAKING_OFF, GOING_UP, LANDING = 0, 2, 3, 4, 6, 7, 8
 
@@ -108,7 +92,7 @@ class Reading:
     bootstrap: bool
     #: The options of short navdata, one bit a tag; None for the long ones.
     options: int | None
-    deaf: bool
+    no_echo: bool
 
 
 class _Noise:
@@ -190,7 +174,7 @@ class Sensors:
             (State.BOOTSTRAP, reading.bootstrap),
             (State.COMMUNICATION_LOST, reading.link_lost),
             (State.BATTERY_LOW, reading.charge < LOW_BATTERY),
-            (State.ULTRASOUND_DEAF, reading.deaf or reading.pose.height > HEARS_UP_TO),
+            (State.ULTRASOUND_DEAF, reading.no_echo or reading.pose.height > HEARS_UP_TO),
             (State.COM_WATCHDOG, reading.link_late),
             (State.EMERGENCY, reading.emergency),
         ):

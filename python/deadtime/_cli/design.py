@@ -8,12 +8,12 @@ import typer
 
 from deadtime._base.validation import finite
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, print_json, save_figure, stages
+from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime.tuning import Design
 from deadtime.tuning import design as find_design
 
-__all__ = ["design_gains"]
+__all__ = ["command"]
 
 Ends = tuple[float, float]
 Objective = Literal["abscissa", "damping", "settling_time", "overshoot"]
@@ -22,7 +22,7 @@ Kind = Literal["P", "PV", "PD", "PI", "PID"]
 CONTROLLERS: dict[str, type[Controller]] = {"P": P, "PV": PV, "PD": PD, "PI": PI, "PID": PID}
 
 
-def design_gains(
+def command(
     delay: opt.Delay,
     delay_to: Annotated[
         float | None, typer.Option(help="Upper end of the delay, if it is an interval, s.")
@@ -88,9 +88,9 @@ def design_gains(
         choice = found.filter_choice
         save_figure(found.plot() if choice is None else choice.plot(), plot)
     if as_json:
-        print_json(_told(found))
+        print_json(_as_dict(found))
         return
-    console.print(found.summary(), highlight=False, markup=False, soft_wrap=True)
+    print_text(found.summary(), wrapped=False)
 
 
 def _gain(text: str) -> tuple[str, float]:
@@ -105,7 +105,7 @@ def _gain(text: str) -> tuple[str, float]:
     return name.strip(), finite(name.strip(), value)
 
 
-def _told(found: Design) -> dict[str, object]:
+def _as_dict(found: Design) -> dict[str, object]:
     choice = found.filter_choice
     return {
         "gains": found.gains,
