@@ -58,7 +58,10 @@ def command(
     """Find the gains that are best in the worst case, within margins."""
     if choose_filter and filter is not None:
         raise ValueError("--filter gives the corner and --choose-filter asks for it: take one")
-    loop = opt.pv_loop(delay, gain, lag, sample_time, limit, filter, plant)
+    # The gains are varied: any that are not zero will do.
+    loop = opt.described_loop(
+        1.0, 0.1, delay, gain, lag, sample_time=sample_time, limit=limit, corner=filter, plant=plant
+    )
     low = loop.specification.known_delay
     in_plant = low - delay
     high = low if delay_to is None else delay_to + in_plant

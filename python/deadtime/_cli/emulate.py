@@ -36,6 +36,8 @@ SHOWN_EVERY, RECORDED_EVERY = 0.2, 0.02
 
 COLUMNS = ("time_s", "height_m", "climb_m_s", "setpoint_m_s", "battery_percent", "landed")
 
+PORTS = ("navdata_port", "command_port", "control_port", "ftp_port", "video_port")
+
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="This port; 0: a free one.")]
 
 
@@ -99,14 +101,10 @@ def ardrone2(
 ) -> None:
     """Emulate an AR.Drone 2.0 until Ctrl-C: navdata, commands and configuration, in real time."""
     ports = ports_from(port_base)
-    chosen = {
-        "navdata_port": navdata_port,
-        "command_port": command_port,
-        "control_port": control_port,
-        "ftp_port": ftp_port,
-        "video_port": video_port,
-    }
-    ports |= {name: port for name, port in chosen.items() if port is not None}
+    chosen = zip(
+        PORTS, (navdata_port, command_port, control_port, ftp_port, video_port), strict=True
+    )
+    ports |= {name: port for name, port in chosen if port is not None}
     if duration is not None:
         positive("--duration", duration)
     options = EmulatorOptions(
@@ -166,10 +164,9 @@ def print_address(emulator: Emulator, as_json: bool) -> None:
     if not options.only_here:
         print(f"deadtime: {warning}", file=sys.stderr)
     if as_json:
-        names = ("navdata_port", "command_port", "control_port", "ftp_port", "video_port")
         found = {
             "host": emulator.host,
-            **{name: getattr(emulator, name) for name in names},
+            **{name: getattr(emulator, name) for name in PORTS},
             "plant": options.plant,
             "delay": options.transport_delay,
             "worst_case": options.worst_case,

@@ -139,7 +139,7 @@ def command(
 
 
 def _print_note(sentence: str) -> None:
-    ERRORS.print(f"deadtime: {sentence}", highlight=False, markup=False, soft_wrap=True)
+    print_text(f"deadtime: {sentence}", wrapped=False, on=ERRORS)
 
 
 def _numbers(gains: str) -> tuple[float, ...]:
@@ -158,9 +158,9 @@ def _free_folder() -> Path:
 
 
 def _print_plan(plan: FlightPlan, vehicle: str) -> None:
-    ERRORS.print(f"About to fly {vehicle}:", highlight=False, markup=False)
+    print_text(f"About to fly {vehicle}:", on=ERRORS)
     for line in plan.lines():
-        ERRORS.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
+        print_text(f"  {line}", wrapped=False, on=ERRORS)
 
 
 def _ask_for_consent(host: str, plan: FlightPlan, consent: bool, virtual_time: bool) -> None:
@@ -229,11 +229,7 @@ def emulated_drone(plant: PlantName, seed: int, limits: Limits) -> Connect:
 def _print_kept_recordings(folder: Path) -> None:
     kept = sorted(folder.glob("flight-*.csv"))
     if kept:
-        ERRORS.print(
-            f"kept in {folder}: {', '.join(path.name for path in kept)}",
-            highlight=False,
-            markup=False,
-        )
+        print_text(f"kept in {folder}: {', '.join(path.name for path in kept)}", on=ERRORS)
 
 
 def _print_study(study: FlightStudy, page: Path) -> None:

@@ -71,7 +71,10 @@ def command(
     as_json: opt.As_json = False,
 ) -> None:
     """Map which gains of a PV controller are stable, with the boundary and the best of them."""
-    loop = opt.pv_loop(delay, gain, lag, sample_time, None, filter, plant)
+    # The gains are varied: any that are not zero will do.
+    loop = opt.described_loop(
+        1.0, 0.1, delay, gain, lag, sample_time=sample_time, corner=filter, plant=plant
+    )
     with counted("mapping", shape[0] * shape[1], quiet=as_json) as progress:
         chart = stability_map(
             loop,

@@ -43,7 +43,6 @@ __all__ = [
     "Window",
     "check_duration",
     "described_loop",
-    "pv_loop",
 ]
 
 
@@ -102,10 +101,10 @@ SHORT_TIMES = ("delay", "lag", "sample_time")
 def described_loop(
     kp: float,
     kv: float = 0.0,
-    *,
     delay: float | None = None,
     gain: float = 1.0,
     lag: float = 0.0,
+    *,
     sample_time: float | None = None,
     limit: float | None = None,
     corner: float | None = None,
@@ -150,26 +149,3 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
                 f"{name} is {length:g} s, less than a millionth of the {duration:g} s to simulate: "
                 "that takes too long; leave such a time out, or shorten the simulation"
             )
-
-
-def pv_loop(
-    delay: float | None,
-    gain: float,
-    lag: float,
-    sample_time: float | None,
-    limit: float | None,
-    corner: float | None,
-    plant: str | None = None,
-) -> ControlLoop:
-    """The loop of a PV controller with any gains: they are to be varied."""
-    return described_loop(
-        1.0,
-        0.1,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        limit=limit,
-        corner=corner,
-        plant=plant,
-    )

@@ -7,9 +7,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Timer
 
 from deadtime._base.errors import LinkError
+from deadtime.links.parent_watch import first_line
 
 __all__ = ["own_emulator"]
 
@@ -49,13 +49,7 @@ def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
 
 
 def _ports(process: subprocess.Popen[str]) -> tuple[int, int, int]:
-    assert process.stdout is not None
-    late = Timer(STARTING, process.kill)
-    late.start()
-    try:
-        line = process.stdout.readline()
-    finally:
-        late.cancel()
+    line = first_line(process, STARTING)
     try:
         ports = json.loads(line)
         return int(ports["navdata_port"]), int(ports["command_port"]), int(ports["control_port"])

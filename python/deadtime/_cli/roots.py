@@ -45,14 +45,7 @@ def command(
 ) -> None:
     """Characteristic roots of a loop: the rightmost ones, or all in a region."""
     loop = opt.described_loop(
-        kp,
-        kv,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        corner=filter,
-        plant=plant,
+        kp, kv, delay, gain, lag, sample_time=sample_time, corner=filter, plant=plant
     )
     if (re is None) != (im is None):
         raise ValueError("a region needs both --re and --im")

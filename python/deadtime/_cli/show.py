@@ -64,9 +64,11 @@ def results_table(
     return table
 
 
-def print_text(text: str, style: str | None = None, wrapped: bool = True) -> None:
+def print_text(
+    text: str, style: str | None = None, wrapped: bool = True, on: Console = console
+) -> None:
     """Print a text as it is: nothing in it is markup or highlighted."""
-    console.print(text, style=style, highlight=False, markup=False, soft_wrap=not wrapped)
+    on.print(text, style=style, highlight=False, markup=False, soft_wrap=not wrapped)
 
 
 def print_points(sentences: Iterable[str]) -> None:

@@ -42,15 +42,7 @@ def command(
 ) -> None:
     """Simulate the step response of a loop, exactly."""
     loop = opt.described_loop(
-        kp,
-        kv,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        limit=limit,
-        corner=filter,
-        plant=plant,
+        kp, kv, delay, gain, lag, sample_time=sample_time, limit=limit, corner=filter, plant=plant
     )
     opt.check_duration(loop, duration)
     time = np.linspace(0.0, duration, points)

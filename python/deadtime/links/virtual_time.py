@@ -14,7 +14,7 @@ import math
 import selectors
 from collections.abc import Callable, Coroutine
 from contextvars import Context
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from deadtime._base.errors import LinkError
 from deadtime.links.addresses import Address
@@ -203,7 +203,7 @@ class _Stream(asyncio.Transport):
     peer: _Stream | None = None
 
     def __init__(
-        self, loop: VirtualTimeLoop, protocol: asyncio.BaseProtocol, local: Address, remote: Address
+        self, loop: VirtualTimeLoop, protocol: asyncio.Protocol, local: Address, remote: Address
     ) -> None:
         super().__init__({"sockname": local, "peername": remote})
         self._loop, self._protocol = loop, protocol
@@ -215,21 +215,18 @@ class _Stream(asyncio.Transport):
 
     def _receive(self, data: bytes) -> None:
         if not self._closing:
-            cast(asyncio.Protocol, self._protocol).data_received(data)
+            self._protocol.data_received(data)
 
     def _end(self) -> None:
         """The other end sends no more data."""
         if self._closing:
             return
-        if not cast(asyncio.Protocol, self._protocol).eof_received():
+        if not self._protocol.eof_received():
             self.close()
 
     def write_eof(self) -> None:
         if self.peer is not None:
             self._loop.call_soon(self.peer._end)
-
-    def can_write_eof(self) -> bool:
-        return True
 
     def close(self) -> None:
         if not self._closing:
@@ -251,12 +248,6 @@ class _Stream(asyncio.Transport):
 
     def get_write_buffer_size(self) -> int:
         return 0
-
-    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
-        self._protocol = protocol
-
-    def get_protocol(self) -> asyncio.BaseProtocol:
-        return self._protocol
 
 
 class _Listening:

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 
 from deadtime._base.errors import LinkError
 from deadtime.links.addresses import Address
+from deadtime.links.parent_watch import first_line
 from deadtime.links.udp.described import arguments_of
 from deadtime.links.udp.trial import ENDS, Trial
 
@@ -41,14 +41,7 @@ class Part:
 
     def address(self) -> Address:
         """Its address, once it is ready."""
-        assert self.process.stdout is not None
-        # A process that prints nothing is killed, which ends the read.
-        timer = threading.Timer(TIMEOUT, self.process.kill)
-        timer.start()
-        try:
-            line = self.process.stdout.readline()
-        finally:
-            timer.cancel()
+        line = first_line(self.process, TIMEOUT)
         if not line:
             _, said = self.process.communicate()
             raise LinkError(f"the {self.name} did not start: {_last_line(said)}")

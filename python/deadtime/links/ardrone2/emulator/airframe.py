@@ -117,10 +117,6 @@ class Airframe:
         self._fall.drop(time, height, climb)
         self._vertical, self.setpoint = self._fall, 0.0
 
-    def height_at(self, time: Micros) -> float:
-        """Height, m."""
-        return self._vertical.at(time)[0]
-
     def vertical_at(self, time: Micros) -> tuple[float, float]:
         """Height and climb, m and m/s."""
         return self._vertical.at(time)

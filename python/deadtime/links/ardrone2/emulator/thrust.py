@@ -149,11 +149,6 @@ class ThrustMotion(Motion):
         height, climb, _ = self._step(self._state, time - self._time)
         return height, climb
 
-    @property
-    def rotor_speed(self) -> float:
-        """Speed of a rotor at the last evaluation, rad/s."""
-        return self._state[2]
-
     def _go_to(self, time: Micros) -> None:
         while self._time < time:
             until = min(time, self._time - self._time % STEP + STEP)
