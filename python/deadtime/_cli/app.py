@@ -13,8 +13,6 @@ from typer.main import get_command
 
 from deadtime._base.errors import DeadtimeError
 
-__all__ = ["COMMANDS", "app", "run"]
-
 #: Errors that end a command with one line; any other is a defect and prints its traceback.
 FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 

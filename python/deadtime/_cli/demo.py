@@ -18,8 +18,6 @@ from deadtime.recordings import Recording
 from deadtime.reports import demo_recording, study
 from deadtime.reports._page import write_report
 
-__all__ = ["command"]
-
 Ends = tuple[float, float]
 
 

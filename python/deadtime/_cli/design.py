@@ -13,8 +13,6 @@ from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime.tuning import Design
 from deadtime.tuning import design as find_design
 
-__all__ = ["command"]
-
 Ends = tuple[float, float]
 Objective = Literal["abscissa", "damping", "settling_time", "overshoot"]
 Kind = Literal["P", "PV", "PD", "PI", "PID"]

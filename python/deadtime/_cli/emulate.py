@@ -23,8 +23,6 @@ from deadtime.links.ardrone2.emulator.motion import PlantName
 from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
 from deadtime.links.parent_watch import parent_ended
 
-__all__ = ["command", "print_address"]
-
 command = typer.Typer(
     help="Stand in for a vehicle, on its own ports and in its own protocol.",
     no_args_is_help=True,

@@ -19,8 +19,6 @@ from deadtime.estimation.methods._overshoot import OvershootMap
 from deadtime.estimation.methods._waveform import NoisePath
 from deadtime.recordings import read_recording
 
-__all__ = ["command"]
-
 CHOICES = ("all", "auto", *METHODS)
 
 

@@ -35,8 +35,6 @@ from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
 from deadtime.links.ardrone2.emulator.motion import PlantName
 
-__all__ = ["command", "emulated_drone"]
-
 #: Largest commanded climb in m/s: on an emulator, as in the paper, and on a drone, which can hurt.
 EMULATED_CLIMB, REAL_CLIMB = 1.0, 0.5
 

@@ -25,8 +25,6 @@ from deadtime.internet._result import InternetRun, Spread
 from deadtime.links.udp import Trial, network_of, policy_of
 from deadtime.paper import PRINTED_OVERSHOOTS, delay_by_dominant_root
 
-__all__ = ["command"]
-
 Kind = Literal["normal", "gamma", "lognormal"]
 Late = Literal["newest", "drop-late", "hold", "jitter-buffer"]
 

@@ -23,8 +23,6 @@ from deadtime.loops import ControlLoop
 from deadtime.roots import Crossings, crossings, delay_margin
 from deadtime.stability import stability_map
 
-__all__ = ["command"]
-
 Ends = tuple[float, float]
 Proof = Literal["curves", "cells"]
 Gains = Literal["Kp", "Kv"]

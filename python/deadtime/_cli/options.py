@@ -22,29 +22,6 @@ from deadtime.loops import (
     RationalPlant,
 )
 
-__all__ = [
-    "As_json",
-    "Command",
-    "Delay",
-    "File",
-    "Files",
-    "Filter",
-    "Gain",
-    "Kp",
-    "Kv",
-    "Lag",
-    "Limit",
-    "Output",
-    "Plant",
-    "Plot",
-    "Reference",
-    "Sample_time",
-    "Time",
-    "Window",
-    "check_duration",
-    "described_loop",
-]
-
 
 def _drawn_later(path: Path | None) -> Path | None:
     """Refuse a picture that cannot be written before the work for it begins."""

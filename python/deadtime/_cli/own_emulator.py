@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from deadtime._base.errors import LinkError
 from deadtime.links.parent_watch import first_line
 
-__all__ = ["own_emulator"]
-
 #: Longest time to start, and to end after a request, s.
 STARTING, ENDING = 30.0, 3.0
 

@@ -14,8 +14,6 @@ from deadtime.recordings import read_recording
 from deadtime.reports import study
 from deadtime.reports._page import write_report
 
-__all__ = ["command"]
-
 
 def command(
     file: opt.File,

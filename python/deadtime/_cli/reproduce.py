@@ -21,8 +21,6 @@ from deadtime._cli.show import (
 from deadtime.paper import PARTS, TITLES, Part, Verdict, reproduce
 from deadtime.paper._page import HEADS, write_reproduction
 
-__all__ = ["command"]
-
 STYLES = {
     Verdict.EXACT: "green",
     Verdict.CONFIRMED: "green",

@@ -15,8 +15,6 @@ from deadtime._cli.verdicts import listed, verdict
 from deadtime.roots._plots import plot_root_set
 from deadtime.roots.certificate._plots import plot_certificate
 
-__all__ = ["command"]
-
 Ends = tuple[float, float]
 
 HEADS = ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius")

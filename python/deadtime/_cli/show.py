@@ -20,19 +20,6 @@ from deadtime._cli.readable import shows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "check_picture",
-    "console",
-    "counted",
-    "print_json",
-    "print_points",
-    "print_table",
-    "print_text",
-    "results_table",
-    "save_figure",
-    "stages",
-]
-
 console = Console()
 PICTURES = (".png", ".svg", ".pdf")
 

@@ -15,8 +15,6 @@ from deadtime._cli.show import print_json, print_text, save_figure
 from deadtime._cli.verdicts import verdict
 from deadtime.systems._plots import plot_responses
 
-__all__ = ["command"]
-
 #: Metrics that a step response has also without a steady state.
 PEAK = ("peak", "peak_time")
 

@@ -29,8 +29,6 @@ from deadtime.loops import PV, P
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.recordings import read_recording
 
-__all__ = ["Connect", "FlightPlan", "PassesMessages", "fly_all", "fly_experiment"]
-
 Connect: TypeAlias = Callable[[], AbstractAsyncContextManager[Vehicle]]
 
 #: Columns of a file with every message of the vehicle after its time, and their `VehicleState`.

@@ -4,8 +4,6 @@ from typing import Any, Final
 
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, delay, parameters, s
 
-__all__ = ["ENTRIES"]
-
 a, g, kappa1, Kd, Kp, Kv, T, tau, Td, w = parameters("a g kappa1 Kd Kp Kv T tau Td w")
 
 _EIGHT_DELAYS = QuasiPolynomial(

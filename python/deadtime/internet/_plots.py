@@ -11,8 +11,6 @@ from deadtime.internet._result import InternetLoop
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["LABELS", "plot_internet_loop"]
-
 #: Name, marker and colour of each method.
 LABELS = {
     "dominant": ("paper's overshoot", "o", COLOURS[1]),

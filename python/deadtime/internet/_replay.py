@@ -21,8 +21,6 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.methods._overshoot import dominant_x, exact_x
 from deadtime.links.udp import HeldIntegrator, Trial
 
-__all__ = ["MAPS", "age_error", "answer_times", "interval_of_mean", "replayed_errors"]
-
 Array = NDArray[np.float64]
 
 #: Functions from the overshoot to K·Td, by the names of the replayed methods.

@@ -13,8 +13,6 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Self
 
-__all__ = ["Journal"]
-
 
 class Journal:
     """A CSV file of numbers whose rows are written by a background thread.

@@ -12,8 +12,6 @@ import sys
 import threading
 from contextlib import suppress
 
-__all__ = ["first_line", "parent_ended"]
-
 
 def parent_ended() -> asyncio.Event:
     """An event of the running loop that is set when standard input ends.

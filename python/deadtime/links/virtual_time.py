@@ -19,8 +19,6 @@ from typing import Any, TypeVar
 from deadtime._base.errors import LinkError
 from deadtime.links.addresses import Address
 
-__all__ = ["VirtualTimeLoop", "run"]
-
 T = TypeVar("T")
 
 #: Ports for endpoints that ask for a free one.

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from deadtime.systems import Response
 
-__all__ = ["draw"]
-
 THIN: dict[str, Any] = {"lw": 1.3}
 PRINTED: dict[str, Any] = {"color": "0.25", "marker": "o", "ms": 5, "ls": "", "mfc": "none"}
 

@@ -13,8 +13,6 @@ from decimal import ROUND_HALF_UP, Decimal
 from enum import Enum
 from typing import Any
 
-__all__ = ["Comparison", "Verdict", "agreeing_digits", "printed_digits"]
-
 #: Fewest agreeing digits that count as agreement.
 LEAST_DIGITS = 2
 

@@ -20,8 +20,6 @@ from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid, Part
 
-__all__ = ["Curve", "Figure10", "figure10", "velocity_loop"]
-
 #: Proportional gain of the design, 1/s.
 GAIN = 2.0
 

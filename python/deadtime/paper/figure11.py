@@ -19,8 +19,6 @@ from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid, Part
 from deadtime.systems import Response
 
-__all__ = ["Figure11", "SettlingTimes", "figure11"]
-
 #: Velocity gain and settling time of the flight as printed, s.
 PRINTED = {0.3: "1.86", 0.7: "2.47"}
 

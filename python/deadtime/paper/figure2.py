@@ -19,8 +19,6 @@ from deadtime.paper.table1 import PRINTED_OVERSHOOTS
 from deadtime.paper.time_scales import Explanation, Stretch, explain, stretch, time_scale
 from deadtime.systems import Response
 
-__all__ = ["Figure2", "Scenario", "Trial", "figure2"]
-
 #: Round trip of the simulated loops, s: that of Figure 3.
 DELAY = 0.1
 

@@ -17,8 +17,6 @@ from deadtime.paper.comparison import Comparison
 from deadtime.paper.part import Grid, Part
 from deadtime.systems import Response
 
-__all__ = ["Figure3", "coarse_limit", "figure3"]
-
 DELAY = 0.1
 
 #: Lengths of step of a coarse simulation, s.

@@ -17,8 +17,6 @@ from deadtime.paper.part import Grid, Part
 from deadtime.paper.table2 import PRINTED, SAMPLE_TIME, altitude_loop, simulink
 from deadtime.systems import Response
 
-__all__ = ["Figure6", "Figure7", "Flight", "figure6", "figure7"]
-
 #: Delay that the paper uses further on, s.
 DELAY = 0.36
 

@@ -17,8 +17,6 @@ from deadtime.paper.part import Grid, Part
 from deadtime.paper.table2 import SAMPLE_TIME, altitude_loop
 from deadtime.systems import Response
 
-__all__ = ["Figure8", "Figure9", "figure8", "figure9"]
-
 GAINS = (4.0, 5.0)
 
 #: Branches of W of which roots are shown.

@@ -15,8 +15,6 @@ from deadtime.paper.inversion import delay_by_dominant_root, delay_by_simulation
 from deadtime.paper.part import Grid, Part
 from deadtime.paper.table2 import SAMPLE_TIME, altitude_loop
 
-__all__ = ["Gap", "gap"]
-
 #: Overshoot of the flights (%), gain, and the delay in samples that the paper chooses.
 OVERSHOOT, GAIN, SAMPLES = "2.30", 1.31, 5.6646
 

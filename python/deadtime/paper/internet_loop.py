@@ -16,8 +16,6 @@ import numpy as np
 
 import deadtime as dtm
 
-__all__ = ["internet_loop"]
-
 #: Rest before the step, s, from which the estimators read the initial output.
 REST = 1.0
 

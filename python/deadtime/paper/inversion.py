@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import deadtime as dtm
 
-__all__ = ["damping_of", "delay_by_dominant_root", "delay_by_simulation", "overshoot"]
-
 #: Longest delay of the search, in units of 1/(gain Kp): the limit of stability is pi/2.
 LONGEST = 1.55
 

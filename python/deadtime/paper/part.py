@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 
 from deadtime.paper.comparison import Comparison
 
-__all__ = ["Grid", "Part"]
-
 
 @dataclass(frozen=True)
 class Grid:

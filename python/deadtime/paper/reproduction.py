@@ -23,8 +23,6 @@ from deadtime.paper.table2 import table2
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["PARTS", "TITLES", "Reproduction", "reproduce"]
-
 #: The parts, in the order of the paper.
 _IN_ORDER: tuple[Callable[[], Part], ...] = (
     *(table1, figure2, figure3, table2, figure6, figure7),

@@ -18,8 +18,6 @@ from deadtime.paper.inversion import (
 )
 from deadtime.paper.part import Grid, Part
 
-__all__ = ["PRINTED_OVERSHOOTS", "Table1", "Table1Row", "table1"]
-
 #: Gain: overshoot (%), damping ratio, delay (s), root, as printed.
 PRINTED = {
     5: ("1.7", "0.7898", "0.09", ("-9.2", "7.2")),

@@ -15,8 +15,6 @@ from deadtime.paper.inversion import overshoot
 from deadtime.paper.part import Grid, Part
 from deadtime.systems import Response
 
-__all__ = ["SAMPLE_TIME", "Table2", "Table2Row", "altitude_loop", "simulink", "table2"]
-
 #: Sample time of the loop over the wireless network, s.
 SAMPLE_TIME = 0.065
 

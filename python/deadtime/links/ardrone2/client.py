@@ -24,8 +24,6 @@ from deadtime.links.ardrone2.reader import (
 from deadtime.links.safety import Limits, UnitCommand
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["ARDrone2"]
-
 #: Longest wait for the first navdata, and for the end of bootstrap, s.
 FIRST_NEWS = 5.0
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 from deadtime._deadtime import configuration_read, configuration_write
 
-__all__ = ["parse_configuration", "write_configuration"]
-
 
 def parse_configuration(dump: bytes) -> dict[str, str]:
     r"""Read the settings, keys with their section.

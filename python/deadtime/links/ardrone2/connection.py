@@ -15,8 +15,6 @@ from deadtime.links.clock import now
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["LOST", "Connection"]
-
 #: Silence after which the link counts as lost, s.
 LOST = 1.0
 

@@ -27,16 +27,6 @@ from deadtime.links.ardrone2.navdata_options import (
     Wifi,
 )
 
-__all__ = [
-    "DEMO_OPTIONS",
-    "FULL_OPTIONS",
-    "TAGS",
-    "Navdata",
-    "State",
-    "build_navdata",
-    "parse_navdata",
-]
-
 Options: TypeAlias = tuple[tuple[int, bytes], ...]
 
 HEADER = 0x55667788

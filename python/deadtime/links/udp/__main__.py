@@ -29,8 +29,6 @@ from deadtime.links.udp.plant import Plant
 from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.relay import Relay, RelayOptions
 
-__all__ = ["main"]
-
 T = TypeVar("T", ControllerOptions, PlantOptions)
 
 

@@ -23,8 +23,6 @@ from deadtime.links.udp.statistics import LinkReport, Percentiles
 from deadtime.links.udp.wires import SAFE, wire_of
 from deadtime.recordings import Recording
 
-__all__ = ["Controller", "ControllerOptions", "ControllerReport"]
-
 #: Columns of the controller's recording.
 COLUMNS = ("time_s", "reference", "output", "command", "measured_s")
 

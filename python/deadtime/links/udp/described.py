@@ -12,15 +12,6 @@ from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.policies import DropLate, HoldThenZero, JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.relay import RelayOptions
 
-__all__ = [
-    "DELAYS",
-    "POLICIES",
-    "arguments_of",
-    "network_from",
-    "network_of",
-    "policy_of",
-]
-
 #: Names of delays and policies in options.
 DELAYS = ("normal", "gamma", "lognormal")
 POLICIES = ("newest", "drop-late", "hold", "jitter-buffer")

@@ -14,8 +14,6 @@ from deadtime.links.udp.statistics import KEPT
 from deadtime.recordings import Recording
 from deadtime.recordings._recording import MINIMUM_SAMPLES
 
-__all__ = ["LoopEnd"]
-
 
 class LoopEnd:
     """One end of the loop, with the rows of its recording: time, reference, output, command, ...

@@ -8,8 +8,6 @@ from typing import Self
 
 from deadtime._deadtime import doubles_read, doubles_write, loop_packet_read, loop_packet_write
 
-__all__ = ["LoopPacket", "decode_doubles", "encode_doubles"]
-
 
 @dataclass(frozen=True)
 class LoopPacket:

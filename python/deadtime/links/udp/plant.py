@@ -21,8 +21,6 @@ from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.statistics import KEPT, Percentiles
 from deadtime.links.udp.wires import SAFE, wire_of
 
-__all__ = ["Plant", "run_plant"]
-
 #: Columns of the plant's recording.
 COLUMNS = ("time_s", "reference", "output", "command", "age_s")
 

@@ -12,8 +12,6 @@ from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.statistics import LinkReport, Percentiles
 from deadtime.recordings import Recording
 
-__all__ = ["PlantOptions", "PlantReport"]
-
 
 @dataclass(frozen=True)
 class PlantOptions:

@@ -12,8 +12,6 @@ from typing import ClassVar
 
 from deadtime._base.validation import positive, whole_number
 
-__all__ = ["DropLate", "HoldThenZero", "JitterBuffer", "NewestWins", "Policy"]
-
 
 class Policy:
     """Treatment of a command by the age of the measurement that it answers."""

@@ -17,8 +17,6 @@ from deadtime.links.parent_watch import first_line
 from deadtime.links.udp.described import arguments_of
 from deadtime.links.udp.trial import ENDS, Trial
 
-__all__ = ["part", "run_processes"]
-
 #: Longest time until a process is ready, and until it has ended, s.
 TIMEOUT = 30.0
 

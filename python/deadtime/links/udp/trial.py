@@ -15,8 +15,6 @@ from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.relay import Relay, RelayOptions
 
-__all__ = ["Trial", "TrialReport", "run_trial"]
-
 UNUSED_ADDRESS = ("127.0.0.1", 0)
 
 

@@ -13,8 +13,6 @@ from typing import ClassVar, TypeAlias
 from deadtime._base.validation import whole_number
 from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_doubles
 
-__all__ = ["SAFE", "Doubles", "Stamped", "Wire", "wire_of"]
-
 #: Flag of a packet with the safe command of the controller, which is no answer.
 SAFE = 1
 

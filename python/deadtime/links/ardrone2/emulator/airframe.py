@@ -19,8 +19,6 @@ from deadtime.links.ardrone2.emulator.motion import (
 from deadtime.links.ardrone2.emulator.thrust import Thruster, ThrustMotion
 from deadtime.loops import FirstOrder, Integrator, RationalPlant
 
-__all__ = ["Airframe", "Pose"]
-
 #: Time constants of roll, pitch and turning speed, s.
 ATTITUDE_LAG = 0.15
 

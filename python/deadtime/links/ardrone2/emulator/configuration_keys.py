@@ -11,8 +11,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["ENTRIES", "LONGEST", "NAVDATA_OPTIONS", "NO_ID", "Entry", "Kind"]
-
 #: DEMO and VISION_DETECT.
 NAVDATA_OPTIONS = 65537
 

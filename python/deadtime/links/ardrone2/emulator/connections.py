@@ -12,8 +12,6 @@ from collections.abc import Callable
 
 from deadtime.links.addresses import canonical
 
-__all__ = ["Connection", "PortConnections"]
-
 #: Most connections to a port at a time, and most unread bytes of one.
 MOST_CONNECTIONS = 4
 MOST_UNREAD = 65536

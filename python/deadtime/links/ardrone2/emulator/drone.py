@@ -32,8 +32,6 @@ from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.sensors import Reading, Sensors
 from deadtime.links.ardrone2.emulator.settings import IDS, Settings
 
-__all__ = ["Drone", "Truth"]
-
 #: Time after the last motion command at which a drone hovers, except in the worst case.
 HOVER_AFTER: Micros = SECOND // 4
 

@@ -14,8 +14,6 @@ from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, seconds
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.settings import Settings
 
-__all__ = ["TICK", "Flight", "Phase", "Setpoints"]
-
 #: Time between two steps of the autopilot.
 TICK: Micros = SECOND // 200
 

@@ -11,8 +11,6 @@ from __future__ import annotations
 from deadtime.links.addresses import Address
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
 
-__all__ = ["LINK_LOST_AFTER", "Listener", "Order"]
-
 #: Time without commands after which the drone warns in its navdata (state bit 30).
 COM_WATCHDOG: Micros = 50_000
 

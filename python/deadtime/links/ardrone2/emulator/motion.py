@@ -20,16 +20,6 @@ from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
 from deadtime.loops import Integrator, Plant, kit_plant
 from deadtime.loops._plants import rest
 
-__all__ = [
-    "DELAYS",
-    "GRAVITY",
-    "FreeFall",
-    "LinearMotion",
-    "Motion",
-    "PlantName",
-    "linear_plant",
-]
-
 PlantName: TypeAlias = Literal["kit", "paper", "real", "thrust"]
 
 #: Transport delay of each plant, s.

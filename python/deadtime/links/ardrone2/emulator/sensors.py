@@ -32,8 +32,6 @@ from deadtime.links.ardrone2.navdata_options import (
     VideoStream,
 )
 
-__all__ = ["Reading", "Sensors"]
-
 #: Period of the ultrasound, and its largest height, m.
 ECHO_EVERY: Micros = SECOND // 25
 HEARS_UP_TO = 6.0

@@ -21,8 +21,6 @@ from deadtime.links.ardrone2.emulator.connections import Connection, PortConnect
 from deadtime.links.ardrone2.emulator.drone import Drone, Truth
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 
-__all__ = ["Emulator"]
-
 #: Age beyond which navdata that could not be sent in time are dropped, s.
 STALE = 0.25
 

@@ -25,8 +25,6 @@ from deadtime._base.validation import positive
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
 from deadtime.links.ardrone2.emulator.motion import GRAVITY, Motion
 
-__all__ = ["ThrustMotion", "Thruster"]
-
 #: Largest step of the integration: a shorter one is more accurate and slower.
 STEP: Micros = 1000
 
