@@ -18,8 +18,6 @@ from deadtime.recordings import Recording
 from deadtime.reports import demo_recording, study
 from deadtime.reports._page import write_report
 
-Ends = tuple[float, float]
-
 
 def command(
     folder: Annotated[Path, typer.Option(help="Where to write.")] = Path("demo"),
@@ -70,7 +68,7 @@ def _write_flight(recording: Recording, path: Path) -> None:
             rows.writerow([f"{time:.3f}", f"{reference:.3f}", f"{output:.5f}"])
 
 
-def _next_commands(loop: ControlLoop, window: Ends, file: Path, fit: object) -> list[str]:
+def _next_commands(loop: ControlLoop, window: opt.Ends, file: Path, fit: object) -> list[str]:
     columns = (
         f"{shlex.quote(str(file))} --time t_s --reference ref_m --output height_m "
         f"--kp {loop.controller.gains['Kp']:g} --sample-time {loop.sample_time:g} "

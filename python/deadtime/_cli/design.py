@@ -13,7 +13,6 @@ from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime.tuning import Design
 from deadtime.tuning import design as find_design
 
-Ends = tuple[float, float]
 Objective = Literal["abscissa", "damping", "settling_time", "overshoot"]
 Kind = Literal["P", "PV", "PD", "PI", "PID"]
 
@@ -26,10 +25,10 @@ def command(
         float | None, typer.Option(help="Upper end of the delay, if it is an interval, s.")
     ] = None,
     controller: Annotated[Kind, typer.Option(help="Kind of controller.")] = "PV",
-    kp: Annotated[Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
-    kv: Annotated[Ends | None, typer.Option(help="Range of the velocity gain.")] = None,
-    ki: Annotated[Ends | None, typer.Option(help="Range of the integral gain.")] = None,
-    kd: Annotated[Ends | None, typer.Option(help="Range of the derivative gain.")] = None,
+    kp: Annotated[opt.Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
+    kv: Annotated[opt.Ends | None, typer.Option(help="Range of the velocity gain.")] = None,
+    ki: Annotated[opt.Ends | None, typer.Option(help="Range of the integral gain.")] = None,
+    kd: Annotated[opt.Ends | None, typer.Option(help="Range of the derivative gain.")] = None,
     fix: Annotated[
         list[str] | None, typer.Option(help="A gain that is given, such as Kp=2; repeatable.")
     ] = None,

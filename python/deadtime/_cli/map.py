@@ -23,7 +23,6 @@ from deadtime.loops import ControlLoop
 from deadtime.roots import Crossings, crossings, delay_margin
 from deadtime.stability import stability_map
 
-Ends = tuple[float, float]
 Proof = Literal["curves", "cells"]
 Gains = Literal["Kp", "Kv"]
 
@@ -36,8 +35,8 @@ SHOWN_CURVES = 4
 
 def command(
     delay: opt.Delay,
-    kp: Annotated[Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
-    kv: Annotated[Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
+    kp: Annotated[opt.Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
+    kv: Annotated[opt.Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
     plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     lag: opt.Lag = 0.0,
@@ -51,7 +50,7 @@ def command(
         float, typer.Option(help="Stable: every root decays at least so fast, 1/s.")
     ] = 0.0,
     damping: Annotated[
-        Ends | None,
+        opt.Ends | None,
         typer.Option(
             help="And: least damping ratio, of roots that decay slower than this rate, 1/s."
         ),

@@ -30,6 +30,9 @@ def _drawn_later(path: Path | None) -> Path | None:
     return path
 
 
+#: The ends of a range.
+Ends = tuple[float, float]
+
 File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
 Files = Annotated[
     list[Path],
@@ -39,9 +42,7 @@ Time = Annotated[str, typer.Option(help="Column of the time stamps, s.")]
 Reference = Annotated[str, typer.Option(help="Column of the reference.")]
 Output = Annotated[str, typer.Option(help="Column of the measured output.")]
 Command = Annotated[str | None, typer.Option(help="Column of the command, if it was logged.")]
-Window = Annotated[
-    tuple[float, float] | None, typer.Option(help="Use the samples between these times, s.")
-]
+Window = Annotated[Ends | None, typer.Option(help="Use the samples between these times, s.")]
 Kp = Annotated[float, typer.Option(help="Proportional gain.", show_default=False)]
 Kv = Annotated[float, typer.Option(help="Velocity gain.")]
 Delay = Annotated[float, typer.Option(help="Delay of the loop, s.", show_default=False)]

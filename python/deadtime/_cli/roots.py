@@ -15,8 +15,6 @@ from deadtime._cli.verdicts import listed, verdict
 from deadtime.roots._plots import plot_root_set
 from deadtime.roots.certificate._plots import plot_certificate
 
-Ends = tuple[float, float]
-
 HEADS = ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius")
 
 
@@ -29,8 +27,8 @@ def command(
     lag: opt.Lag = 0.0,
     sample_time: opt.Sample_time = None,
     filter: opt.Filter = None,  # noqa: A002
-    re: Annotated[Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
-    im: Annotated[Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
+    re: Annotated[opt.Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
+    im: Annotated[opt.Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
     rightmost: Annotated[
         int, typer.Option(min=1, help="At most how many of those with Im s >= 0, without a region.")
     ] = 3,

@@ -14,6 +14,7 @@ import math
 import selectors
 from collections.abc import Callable, Coroutine
 from contextvars import Context
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 from deadtime._base.errors import LinkError
@@ -248,16 +249,6 @@ class _Stream(asyncio.Transport):
         return 0
 
 
-class _Listening:
-    """The socket of a server, for its address."""
-
-    def __init__(self, local: Address) -> None:
-        self._local = local
-
-    def getsockname(self) -> Address:
-        return self._local
-
-
 class _Server(asyncio.AbstractServer):
     """A listener at one address."""
 
@@ -268,7 +259,7 @@ class _Server(asyncio.AbstractServer):
         local: Address,
     ) -> None:
         self._loop, self.protocol_factory, self._local = loop, protocol_factory, local
-        self.sockets = (_Listening(local),)
+        self.sockets = (SimpleNamespace(getsockname=lambda: local),)
 
     def close(self) -> None:
         self._loop._servers.pop(self._local, None)

@@ -55,9 +55,7 @@ def _responses(
 
 def _step_axes(ax: Axes, title: str, unit: str = "") -> None:
     ax.axhline(1.0, **REFERENCE)
-    ax.set(xlabel="time / s", ylabel=f"output{unit}", title=title)
-    ax.title.set_fontsize("medium")
-    ax.legend(frameon=False, fontsize="small")
+    _legend(ax, title, xlabel="time / s", ylabel=f"output{unit}")
 
 
 def _legend(ax: Axes, title: str, **labels: str) -> None:

@@ -21,6 +21,7 @@ from deadtime.links.ardrone2.reader import (
     on_ground,
     phase_of,
 )
+from deadtime.links.clock import now
 from deadtime.links.safety import Limits, UnitCommand
 from deadtime.links.vehicle import VehicleState
 
@@ -199,28 +200,28 @@ class ARDrone2:
                 f"vertical speed of {speed:g} m/s: give a smaller one"
             )
         self._link.send(FlatTrim())
-        asked = self._link.now
+        asked = now()
         await asyncio.sleep(TRIMMING)
-        late = self._link.now - asked - TRIMMING
+        late = now() - asked - TRIMMING
         if late > self.limits.command_age:
             raise LinkError(
                 f"this program was paused for {late:.2f} s just before the take-off of "
                 f"{self.host}, so its last known state is old: take off again"
             )
-        self._asked_up = self._link.now
+        self._asked_up = now()
         self._sender.fly()
         try:
             await self._rise()
         except BaseException:
             self._sender.land()
             raise
-        self._sender.guard(self._link.now)
+        self._sender.guard(now())
 
     async def _rise(self) -> None:
-        deadline = self._link.now + TAKING_OFF
+        deadline = now() + TAKING_OFF
         while not await self._link.until(_is_up, LOOKING):
             self._check_link()
-            if self._link.now > deadline:
+            if now() > deadline:
                 raise LinkError(f"{self.host} is not up {TAKING_OFF:g} s after the take-off")
         navdata = self._link.reader.navdata
         if navdata is None or navdata.emergency:
@@ -292,7 +293,7 @@ class ARDrone2:
         self._check_wish()
         most = min(self.limits.max_climb, self.vz_max)
         share = UnitCommand.saturated(max(-most, min(most, requested)) / self.vz_max)
-        sent = self._sender.climb(share, self._link.now)
+        sent = self._sender.climb(share, now())
         self._link.send()
         return float(sent) * self.vz_max
 
@@ -305,7 +306,7 @@ class ARDrone2:
             If the flight has ended without `land`, as of `command`.
         """
         self._check_wish()
-        self._sender.hover(self._link.now)
+        self._sender.hover(now())
         self._link.send()
 
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
@@ -330,7 +331,7 @@ class ARDrone2:
         if not self._link.is_open or self._reader.newest is None:
             return
         self._link.send()
-        deadline = self._link.now + LANDING
+        deadline = now() + LANDING
         while not await self._link.until(self._is_down, LOOKING):
             silent = self._link.silent
             if silent > SILENT_LANDING:
@@ -338,7 +339,7 @@ class ARDrone2:
                     f"nothing received from {self.host} for {silent:.1f} s while landing: its own "
                     "watchdog lands it 2 s after the last command it received"
                 )
-            if self._link.now > deadline:
+            if now() > deadline:
                 raise LinkError(f"{self.host} has not landed within {LANDING:g} s")
 
     def _is_down(self, navdata: Navdata) -> bool:
@@ -412,13 +413,13 @@ class ARDrone2:
         the old state.
         """
         link = self._link
-        deadline = link.now + TOGGLING
+        deadline = now() + TOGGLING
         while not await link.until(requested, 0.0):
             self._sender.cut = True
             link.send(copies=COPIES)
-            toggled = link.now
+            toggled = now()
             while not await link.until(requested, LOOKING):
-                if link.now > deadline:
+                if now() > deadline:
                     return False
                 # Packets that waited in the socket during a pause of this program are old too.
                 since = max(toggled, self._sender.resumed)

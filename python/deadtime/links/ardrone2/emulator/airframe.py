@@ -10,11 +10,11 @@ import numpy as np
 from deadtime.links.ardrone2.emulator.clock import Micros
 from deadtime.links.ardrone2.emulator.motion import (
     GRAVITY,
+    LINEAR_PLANTS,
     FreeFall,
     LinearMotion,
     Motion,
     PlantName,
-    linear_plant,
 )
 from deadtime.links.ardrone2.emulator.thrust import Thruster, ThrustMotion
 from deadtime.loops import FirstOrder, Integrator, RationalPlant
@@ -63,7 +63,7 @@ class Airframe:
 
     def __init__(self, plant: PlantName) -> None:
         self._hover: Motion = (
-            ThrustMotion(Thruster()) if plant == "thrust" else LinearMotion(linear_plant(plant))
+            ThrustMotion(Thruster()) if plant == "thrust" else LinearMotion(LINEAR_PLANTS[plant])
         )
         self._fall = FreeFall()
         self._vertical: Motion = self._hover

@@ -236,10 +236,10 @@ def _chosen(bits: int) -> tuple[tuple[int, bytes], ...]:
 
 
 def _control_state(reading: Reading) -> int:
-    if reading.phase is Phase.LANDED:
-        return LANDED
-    if reading.phase is Phase.TAKING_OFF:
-        return GOING_UP if reading.lifted else TAKING_OFF
-    if reading.phase is Phase.FLYING:
-        return HOVERING if reading.hovering else FLYING
-    return LANDING if reading.phase is Phase.LANDING else DEFAULT
+    return {
+        Phase.LANDED: LANDED,
+        Phase.TAKING_OFF: GOING_UP if reading.lifted else TAKING_OFF,
+        Phase.FLYING: HOVERING if reading.hovering else FLYING,
+        Phase.LANDING: LANDING,
+        Phase.FALLING: DEFAULT,
+    }[reading.phase]
