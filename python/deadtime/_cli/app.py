@@ -112,14 +112,16 @@ def run() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except FAILURES as error:
-        told = str(error)
+        message = str(error)
         if isinstance(error, OSError) and error.filename is not None:
-            told = f"{error.filename}: {error.strerror}"
+            message = f"{error.filename}: {error.strerror}"
         elif isinstance(error, ArithmeticError):
-            told = f"a number leaves the range of double precision ({told}): choose other units"
+            message = (
+                f"a number leaves the range of double precision ({message}): choose other units"
+            )
         elif isinstance(error, MemoryError):
-            told = f"out of memory: {told or 'ask for less at once'}"
-        print(f"deadtime: {' '.join(told.split())}", file=sys.stderr)
+            message = f"out of memory: {message or 'ask for less at once'}"
+        print(f"deadtime: {' '.join(message.split())}", file=sys.stderr)
         raise SystemExit(1) from None
     except Exception as error:
         import traceback

@@ -51,10 +51,10 @@ def delay_by_dominant_root(gain: float, part: float) -> float:
     """
     from scipy.optimize import brentq
 
-    wanted = dtm.damping_ratio(part)
+    requested = dtm.damping_ratio(part)
 
     def excess(delay: float) -> float:
-        return damping_of(complex(dtm.dde_roots(0.0, -gain, delay))) - wanted
+        return damping_of(complex(dtm.dde_roots(0.0, -gain, delay))) - requested
 
     # The root is real, and its damping ratio 1, up to gain * delay = 1/e.
     return float(brentq(excess, 0.3679 / gain, LONGEST / gain, xtol=1e-15))

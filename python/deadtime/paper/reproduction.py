@@ -81,12 +81,12 @@ class Reproduction:
         """
         counts = self.counts()
         numbers = (Verdict.EXACT, Verdict.PARTLY, Verdict.DIFFERENT)
-        said = (Verdict.CONFIRMED, Verdict.CONTRADICTED)
+        statements = (Verdict.CONFIRMED, Verdict.CONTRADICTED)
         return (
             f"{sum(counts[one] for one in numbers)} printed numbers: "
             f"{counts[Verdict.EXACT]} reproduced to every digit, {counts[Verdict.PARTLY]} to fewer "
             f"digits, {counts[Verdict.DIFFERENT]} not. "
-            f"{sum(counts[one] for one in said)} statements: {counts[Verdict.CONFIRMED]} "
+            f"{sum(counts[one] for one in statements)} statements: {counts[Verdict.CONFIRMED]} "
             f"confirmed, {counts[Verdict.CONTRADICTED]} not supported. "
             f"{counts[Verdict.MEASURED]} measurements, which are not compared."
         )

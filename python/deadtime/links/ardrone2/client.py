@@ -26,16 +26,16 @@ from deadtime.links.safety import Limits, UnitCommand
 from deadtime.links.vehicle import VehicleState
 
 #: Longest wait for the first navdata, and for the end of bootstrap, s.
-FIRST_NEWS = 5.0
+FIRST_NAVDATA = 5.0
 
 #: Longest duration of a take-off until the drone holds its height, and of a landing, s.
-TAKING_OFF, LANDING = 15.0, 20.0
+LONGEST_TAKE_OFF, LONGEST_LANDING = 15.0, 20.0
 
 #: Time between two checks of the link while nothing else is waited for, s.
-LOOKING = 0.1
+CHECK_EVERY = 0.1
 
 #: Time for the drone to calibrate its level, s.
-TRIMMING = 0.3
+TRIM_TIME = 0.3
 
 #: Longest silence while landing, s: the watchdog of the drone lands it within this time.
 SILENT_LANDING = 3.0
@@ -106,7 +106,7 @@ class ARDrone2:
         self._restarts = 0
         self._vz_max: float | None = None
         self._settings = LimitSettings(host)
-        self._asked_up = -math.inf
+        self._take_off_sent = -math.inf
         self._link = self._new_link()
 
     def _new_link(self) -> Connection:
@@ -160,14 +160,14 @@ class ARDrone2:
 
     async def _configure(self) -> None:
         link, host = self._link, self.host
-        heard = await link.until(lambda navdata: True, FIRST_NEWS)
+        heard = await link.until(lambda navdata: True, FIRST_NAVDATA)
         if not heard:
             raise LinkError(
-                f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NEWS:g} s: "
-                "is the drone on, this computer in its network, and no other client connected?"
+                f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NAVDATA:g} "
+                "s: is the drone on, this computer in its network, and no other client connected?"
             )
         await self._settings.set(link, self.control_port, self.limits, self.full)
-        if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
+        if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NAVDATA):
             raise LinkError(f"{host} sends navdata without height and battery: restart it")
         self._vz_max = self._settings.vz_max
         self._restarts = self._reader.restarts
@@ -201,14 +201,14 @@ class ARDrone2:
             )
         self._link.send(FlatTrim())
         asked = now()
-        await asyncio.sleep(TRIMMING)
-        late = now() - asked - TRIMMING
+        await asyncio.sleep(TRIM_TIME)
+        late = now() - asked - TRIM_TIME
         if late > self.limits.command_age:
             raise LinkError(
                 f"this program was paused for {late:.2f} s just before the take-off of "
                 f"{self.host}, so its last known state is old: take off again"
             )
-        self._asked_up = now()
+        self._take_off_sent = now()
         self._sender.fly()
         try:
             await self._rise()
@@ -218,11 +218,11 @@ class ARDrone2:
         self._sender.guard(now())
 
     async def _rise(self) -> None:
-        deadline = now() + TAKING_OFF
-        while not await self._link.until(_is_up, LOOKING):
+        deadline = now() + LONGEST_TAKE_OFF
+        while not await self._link.until(_is_up, CHECK_EVERY):
             self._check_link()
             if now() > deadline:
-                raise LinkError(f"{self.host} is not up {TAKING_OFF:g} s after the take-off")
+                raise LinkError(f"{self.host} is not up {LONGEST_TAKE_OFF:g} s after the take-off")
         navdata = self._link.reader.navdata
         if navdata is None or navdata.emergency:
             raise FlightAbortedError(f"{self.host} went into emergency while taking off")
@@ -238,8 +238,8 @@ class ARDrone2:
         """
         if not self._link.is_open:
             raise LinkError(f"{self.host} is not connected")
-        if self._reader.newest is None and not await self._link.until(_tells_state, FIRST_NEWS):
-            raise LinkError(f"no state from {self.host} within {FIRST_NEWS:g} s")
+        if self._reader.newest is None and not await self._link.until(_has_state, FIRST_NAVDATA):
+            raise LinkError(f"no state from {self.host} within {FIRST_NAVDATA:g} s")
         self._check_link()
         state = self._reader.newest
         assert state is not None
@@ -250,7 +250,7 @@ class ARDrone2:
             raise LinkError(
                 f"the listener of {self.host} has failed: {self._link.failure}"
             ) from self._link.failure
-        self._check_wish()
+        self._check_flight()
         if self._sender.rival is not None:
             raise LinkError(self._sender.rival)
         if self._link.silent > LOST:
@@ -258,7 +258,7 @@ class ARDrone2:
         if self._vz_max is not None and self._reader.restarts > self._restarts:
             raise LinkError(self._link.forgotten)
 
-    def _check_wish(self) -> None:
+    def _check_flight(self) -> None:
         """Raise if the flight has ended without `land`."""
         self._link.age()
         if self._sender.expired is not None:
@@ -290,7 +290,7 @@ class ARDrone2:
         requested = finite("climb", climb)
         if self._sender.expired is None and not self._sender.guarded:
             raise LinkError(f"{self.host} is not in the air: take off before commanding it")
-        self._check_wish()
+        self._check_flight()
         most = min(self.limits.max_climb, self.vz_max)
         share = UnitCommand.saturated(max(-most, min(most, requested)) / self.vz_max)
         sent = self._sender.climb(share, now())
@@ -305,7 +305,7 @@ class ARDrone2:
         LinkError
             If the flight has ended without `land`, as of `command`.
         """
-        self._check_wish()
+        self._check_flight()
         self._sender.hover(now())
         self._link.send()
 
@@ -331,8 +331,8 @@ class ARDrone2:
         if not self._link.is_open or self._reader.newest is None:
             return
         self._link.send()
-        deadline = now() + LANDING
-        while not await self._link.until(self._is_down, LOOKING):
+        deadline = now() + LONGEST_LANDING
+        while not await self._link.until(self._is_down, CHECK_EVERY):
             silent = self._link.silent
             if silent > SILENT_LANDING:
                 raise LinkError(
@@ -340,12 +340,12 @@ class ARDrone2:
                     "watchdog lands it 2 s after the last command it received"
                 )
             if now() > deadline:
-                raise LinkError(f"{self.host} has not landed within {LANDING:g} s")
+                raise LinkError(f"{self.host} has not landed within {LONGEST_LANDING:g} s")
 
     def _is_down(self, navdata: Navdata) -> bool:
         """Whether a drone is down, by navdata new enough to show the beginning of a take-off."""
-        sent = self._link.news_sent
-        return on_ground(navdata) and sent is not None and sent >= self._asked_up + ANSWERED
+        sent = self._link.newest_sent
+        return on_ground(navdata) and sent is not None and sent >= self._take_off_sent + ANSWERED
 
     async def close(self) -> None:
         """Land if in the air, restore the settings of the drone, and close the link.
@@ -418,12 +418,12 @@ class ARDrone2:
             self._sender.cut = True
             link.send(copies=COPIES)
             toggled = now()
-            while not await link.until(requested, LOOKING):
+            while not await link.until(requested, CHECK_EVERY):
                 if now() > deadline:
                     return False
                 # Packets that waited in the socket during a pause of this program are old too.
                 since = max(toggled, self._sender.resumed)
-                if link.news_sent is not None and link.news_sent >= since + ANSWERED:
+                if link.newest_sent is not None and link.newest_sent >= since + ANSWERED:
                     break
         return True
 
@@ -440,17 +440,17 @@ class ARDrone2:
             _note(error, str(problem), *getattr(problem, "__notes__", ()))
 
 
-def _note(error: BaseException, *said: str | None) -> None:
-    for one in said:
-        if one is not None:
-            error.add_note(one)
+def _note(error: BaseException, *notes: str | None) -> None:
+    for note in notes:
+        if note is not None:
+            error.add_note(note)
 
 
 def _is_up(navdata: Navdata) -> bool:
     return navdata.emergency or (navdata.flying and phase_of(navdata) in (FLYING, HOVERING))
 
 
-def _tells_state(navdata: Navdata) -> bool:
+def _has_state(navdata: Navdata) -> bool:
     return navdata.demo is not None
 
 

@@ -87,7 +87,7 @@ class Connection:
         )
 
     @property
-    def news_sent(self) -> float | None:
+    def newest_sent(self) -> float | None:
         """When the newest navdata were sent, s; when they arrived, if the drone sends no clock."""
         return self.reader.heard if self.reader.sent is None else self.reader.sent
 

@@ -57,12 +57,12 @@ async def _until_stopped(work: Coroutine[Any, Any, None], until_input_ends: bool
         await task
 
 
-def _say(**what: Any) -> None:
+def _print_line(**what: Any) -> None:
     print(json.dumps(plain(what), allow_nan=False), flush=True)
 
 
 def _ready(part: str, address: Address) -> None:
-    _say(ready=part, host=address[0], port=address[1])
+    _print_line(ready=part, host=address[0], port=address[1])
 
 
 def _options(kind: type[T], given: argparse.Namespace) -> T:
@@ -76,7 +76,7 @@ async def _run_controller(given: argparse.Namespace) -> None:
         try:
             await controller.running(given.duration)
         finally:
-            _say(report=controller.report().to_dict())
+            _print_line(report=controller.report().to_dict())
 
 
 async def _run_relay(given: argparse.Namespace) -> None:
@@ -92,7 +92,7 @@ async def _run_relay(given: argparse.Namespace) -> None:
         finally:
             paths = {name: getattr(relay, name) for name in PATHS}
             counts = {name: path.counts() for name, path in paths.items()}
-            _say(report={**counts, "overflowed": relay.overflowed})
+            _print_line(report={**counts, "overflowed": relay.overflowed})
 
 
 async def _run_plant(given: argparse.Namespace) -> None:
@@ -105,7 +105,7 @@ async def _run_plant(given: argparse.Namespace) -> None:
         try:
             await plant.running()
         finally:
-            _say(report=plant.report().to_dict())
+            _print_line(report=plant.report().to_dict())
 
 
 #: From the plant to the controller, and from the controller to the plant.

@@ -211,19 +211,19 @@ class Plant(LoopEnd):
             self._hold.cancel()
         if self.options.policy.holds is not None:
             held = self.options.policy.holds * self.options.sample_time
-            self._hold = self._loop.call_later(held, self._let_go)
+            self._hold = self._loop.call_later(held, self._end_hold)
 
     def _arm_watchdog(self) -> None:
         if self._watchdog is not None:
             self._watchdog.cancel()
-        self._watchdog = self._loop.call_later(self.options.watchdog, self._bite)
+        self._watchdog = self._loop.call_later(self.options.watchdog, self._watchdog_trips)
 
-    def _let_go(self) -> None:
+    def _end_hold(self) -> None:
         """End the hold of the last command."""
         self._pass_time(self._loop.time())
         self._command, self._stamp = 0.0, math.nan
 
-    def _bite(self) -> None:
+    def _watchdog_trips(self) -> None:
         """Apply the safe command, and accept a restarted controller."""
         self._endpoint.forget_peer()
         self._make_safe()
