@@ -16,8 +16,6 @@ from deadtime.recordings import Recording
 from deadtime.systems import Response
 from deadtime.tuning import Design, critical_gain, design
 
-__all__ = ["DemoRecording", "Study", "demo_recording", "study"]
-
 #: Largest safe gain as a share of the stability limit: the usual gain margin of 2.
 SAFE_SHARE = 0.5
 
