@@ -10,7 +10,7 @@ from typing import get_args
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import OpenRange
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import check_setpoint_active, independent_samples
 from deadtime.estimation.methods._decay import Decay

@@ -100,8 +100,6 @@ class PlantWithDelays(Plant):
 
 def plant_and_delay(given: object) -> tuple[Plant, float]:
     """Return a plant, and the delay in s that was in series with it."""
-    if isinstance(given, Plant):
-        return given, 0.0
     G = transfer_function_of(given)
     if G is None:
         raise TypeError(

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from deadtime._base.errors import RecordingError
-from deadtime._base.ranges import OpenRange, open_interval
+from deadtime._base.validation import OpenRange, open_interval
 from deadtime.recordings._recording import Recording
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")

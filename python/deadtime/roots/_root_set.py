@@ -149,7 +149,7 @@ def root_set(found: _deadtime.RootSet) -> RootSet:
     """The roots that the native part found."""
     return RootSet(
         roots=found.roots,
-        multiplicities=found.multiplicities,
+        multiplicities=found.multiplicities.astype(np.int64),
         radii=found.radii,
         resolved=found.resolved,
         counted=found.counted,

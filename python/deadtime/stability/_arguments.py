@@ -10,8 +10,7 @@ from typing import Any, SupportsFloat, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.ranges import Range, interval, points_of
-from deadtime._base.validation import finite
+from deadtime._base.validation import Range, finite, interval, points_of
 
 Floats: TypeAlias = NDArray[np.float64]
 Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]

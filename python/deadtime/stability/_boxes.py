@@ -8,6 +8,7 @@ infinity; both are excluded for all members of a box at once, and the roots of o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, SupportsFloat
@@ -18,8 +19,14 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress, reported
-from deadtime._base.ranges import Range
-from deadtime._base.validation import finite, positive, real_array, thread_number, whole_number
+from deadtime._base.validation import (
+    Range,
+    finite,
+    positive,
+    real_array,
+    thread_number,
+    whole_number,
+)
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.stability._arguments import Floats, Given, ranges_of, side
 
@@ -235,7 +242,7 @@ def proved_boxes(
     share = finite("tol", tol)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
-    with reported(progress) as report:
+    with nullcontext() if progress is False else reported(progress) as report:
         found = _deadtime.proved_boxes(
             family_of(family, tuple(ends), at)._family,
             ends,
@@ -307,7 +314,7 @@ def largest_stable_box(
     """
     ends = ranges_of(ranges)
     step = positive("tol", tol)
-    with reported(progress) as report:
+    with nullcontext() if progress is False else reported(progress) as report:
         found = _deadtime.largest_stable_box(
             family_of(family, tuple(ends), at)._family,
             ends,

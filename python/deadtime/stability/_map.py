@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -16,10 +17,9 @@ from numpy.typing import NDArray
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, Report, reported
-from deadtime._base.ranges import Points, numbers_at
-from deadtime._base.validation import finite, thread_number
+from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop
-from deadtime.loops._family import numbers_of
+from deadtime.loops._characteristic import numbers_of
 from deadtime.loops._stability import SampledCells, sampled_grid
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.roots._family import HasFamily, family_of
@@ -371,7 +371,7 @@ def stability_map(
     size = len(axes[first]), len(axes[second])
     judged: ParametricQuasiPolynomial | None = None
     alpha: Floats
-    with reported(progress, math.prod(size)) as report:
+    with nullcontext() if progress is False else reported(progress, math.prod(size)) as report:
         if isinstance(family, ControlLoop) and family.is_sampled:
             if question.damping is not None:
                 raise ValueError(

@@ -9,8 +9,7 @@ from typing import SupportsFloat
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.ranges import Range
-from deadtime._base.validation import finite, positive
+from deadtime._base.validation import Range, finite, positive
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.stability._arguments import MOST_MOVING
 

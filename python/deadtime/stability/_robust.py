@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, SupportsFloat
@@ -14,8 +15,7 @@ from numpy.typing import NDArray
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress, reported
-from deadtime._base.ranges import Points, Range
-from deadtime._base.validation import thread_number
+from deadtime._base.validation import Points, Range, thread_number
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.stability._arguments import Floats, Given, map_axes, ranges_of, side, sides
 
@@ -144,7 +144,7 @@ def robust_map(
         raise ValueError(f"{twice[0]} is an axis and has an interval: give it one of the two")
     known = family_of(family, (first, second, *held), at)
     cells = math.prod(len(points) for points in axes.values())
-    with reported(progress, cells) as report:
+    with nullcontext() if progress is False else reported(progress, cells) as report:
         unstable = _deadtime.robust_map(
             known._family,
             axes,

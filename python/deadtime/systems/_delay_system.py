@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import OpenRange
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, RootSet
 from deadtime.roots._crossings import margin_of_family
 from deadtime.roots._determinant import NotExpandedError, expanded

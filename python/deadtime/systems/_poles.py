@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from typing import SupportsFloat
 
-from deadtime._base.ranges import OpenRange, Range
+from deadtime._base.validation import OpenRange, Range
 from deadtime.roots import (
     Certificate,
     Crossings,

@@ -11,8 +11,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.ranges import Range, interval
-from deadtime._base.validation import finite, non_negative
+from deadtime._base.validation import Range, finite, interval, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._stabilising import candidate_ranges
 

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
-from deadtime._base.ranges import OpenRange, is_range, open_interval
-from deadtime._base.validation import finite
+from deadtime._base.validation import OpenRange, finite, is_range, open_interval
 from deadtime.estimation._result import DelayEstimate
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
