@@ -30,3 +30,5 @@ pub use value::Scaled;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::make;
