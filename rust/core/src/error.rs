@@ -4,6 +4,22 @@ use num_complex::Complex64;
 
 use crate::memory::readable_size;
 
+/// Return [`Error::Argument`] with a formatted message.
+macro_rules! refuse {
+    ($($message:tt)+) => {
+        return Err($crate::Error::Argument(format!($($message)+)))
+    };
+}
+
+/// Return [`Error::Argument`] with a formatted message if the condition holds.
+macro_rules! refuse_if {
+    ($condition:expr, $($message:tt)+) => {
+        if $condition {
+            refuse!($($message)+);
+        }
+    };
+}
+
 /// Every error of the kernel. The message states what was wrong and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {

@@ -56,8 +56,6 @@ fn two_product(a: f64, b: f64) -> DoubleDouble {
 }
 
 impl DoubleDouble {
-    /// Zero.
-    pub const ZERO: Self = Self::new(0.0, 0.0);
     /// One.
     pub const ONE: Self = Self::new(1.0, 0.0);
 

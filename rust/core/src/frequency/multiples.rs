@@ -120,12 +120,12 @@ fn common(slopes: &[f64], name: &str) -> Result<(f64, Vec<usize>), Error> {
         .skip(1)
         .map(|slope| format!("{slope} {name}"))
         .collect();
-    Err(Error::argument(format!(
+    refuse!(
         "{name} enters as several delays ({}): its crossings are known where these are whole \
          multiples of one, up to {MOST} of it; a map over {name} and a second parameter shows its \
          counts",
         shown.join(", ")
-    )))
+    )
 }
 
 fn schur_cohn(p: &[TwoSided]) -> Vec<Vec<TwoSided>> {
@@ -185,10 +185,10 @@ fn highest(parts: &[QuasiPolynomial], name: &str) -> Result<f64, Error> {
     if radius.is_finite() {
         return Ok(radius);
     }
-    Err(Error::argument(format!(
+    refuse!(
         "the terms with {name} outweigh the leading one at high frequencies: there is no end to the \
          frequencies at which roots may cross"
-    )))
+    )
 }
 
 fn roots_near_circle(parts: &[Part], omega: f64, order: usize) -> Vec<Complex64> {

@@ -126,16 +126,6 @@ impl Breaks {
         }
         order.map(|order| BreakingPoint { time, order })
     }
-
-    /// Number of points stored.
-    pub fn len(&self) -> usize {
-        self.ahead.len()
-    }
-
-    /// Is no point stored?
-    pub fn is_empty(&self) -> bool {
-        self.ahead.is_empty()
-    }
 }
 
 /// The largest K with C(m + K, m) ≤ DESCENDANTS for m delays, at least 3.
@@ -226,7 +216,7 @@ mod tests {
             let point = breaks.next().unwrap();
             let point = breaks.reach(point.time).unwrap();
             breaks.follow(point);
-            assert!(breaks.len() <= MOST);
+            assert!(breaks.ahead.len() <= MOST);
         }
     }
 }

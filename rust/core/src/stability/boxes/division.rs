@@ -113,20 +113,18 @@ pub fn proved_boxes(
 
 /// The indices of the parameters that vary, after a check of the ranges.
 pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>, Error> {
-    if ranges.len() != family.names().len() {
-        return Err(Error::argument(format!(
-            "{} ranges for {} parameters ({}): give one range for each parameter",
-            ranges.len(),
-            family.names().len(),
-            family.names().join(", ")
-        )));
-    }
+    refuse_if!(
+        ranges.len() != family.names().len(),
+        "{} ranges for {} parameters ({}): give one range for each parameter",
+        ranges.len(),
+        family.names().len(),
+        family.names().join(", ")
+    );
     for (name, (low, high)) in family.names().iter().zip(ranges) {
-        if !(low.is_finite() && high.is_finite() && (high - low).is_finite() && low <= high) {
-            return Err(Error::argument(format!(
-                "{name} from {low} to {high}: the ends of a range must be finite and in order"
-            )));
-        }
+        refuse_if!(
+            !(low.is_finite() && high.is_finite() && (high - low).is_finite() && low <= high),
+            "{name} from {low} to {high}: the ends of a range must be finite and in order"
+        );
     }
     family.check_delays(ranges)?;
     let varying: Vec<usize> = ranges
@@ -135,13 +133,12 @@ pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>
         .filter(|(_, (low, high))| low < high)
         .map(|(index, _)| index)
         .collect();
-    if varying.len() > MOST_PARAMETERS {
-        return Err(Error::argument(format!(
-            "{} parameters vary ({}): boxes have up to {MOST_PARAMETERS}, give the others values",
-            varying.len(),
-            family.names().join(", ")
-        )));
-    }
+    refuse_if!(
+        varying.len() > MOST_PARAMETERS,
+        "{} parameters vary ({}): boxes have up to {MOST_PARAMETERS}, give the others values",
+        varying.len(),
+        family.names().join(", ")
+    );
     Ok(varying)
 }
 
