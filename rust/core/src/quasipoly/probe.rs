@@ -30,6 +30,10 @@ const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 /// turn.
 const OPPOSITE: f64 = 5.0 / f64::EPSILON;
 
+/// Factor on a computed bound: larger than the rounding errors of its sums and powers with
+/// millions of operations, and too small to weaken the bound.
+pub(super) const ENLARGED: f64 = 1.0 + 1e-9;
+
 /// Number of evaluations that one in double-double arithmetic counts for.
 const DOUBLE_DOUBLE_COST: u64 = 20;
 
@@ -266,7 +270,7 @@ impl<'a> Probe<'a> {
         }
         // Exponents are below 746 in modulus, or the weight is 0 or infinite; their error is at
         // most 2e-13. This, the rounding of the sums and of `modulus` together are far below 1e-9.
-        (total + FLOOR) * (1.0 + 1e-9)
+        (total + FLOOR) * ENLARGED
     }
 
     fn terms(&self) -> impl Iterator<Item = ((&Vec<f64>, &f64), &f64)> {
@@ -313,8 +317,8 @@ impl<'a> Probe<'a> {
         }
         (small && other).then_some(DominatedTerms {
             slope,
-            bend: bend * (1.0 + 1e-9),
-            perturbation: (perturbation + FLOOR) * (1.0 + 1e-9),
+            bend: bend * ENLARGED,
+            perturbation: (perturbation + FLOOR) * ENLARGED,
         })
     }
 }
