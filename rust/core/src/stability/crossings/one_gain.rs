@@ -27,22 +27,6 @@ const ROOM: f64 = 1e-9;
 /// Relative error of four roundings.
 const SLACK: f64 = 2.0 * f64::EPSILON;
 
-/// A value of the gain at which roots cross the imaginary axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxisCrossing {
-    /// The gain.
-    pub gain: f64,
-    /// An interval that holds it.
-    pub low: f64,
-    /// Its other end.
-    pub high: f64,
-    /// Imaginary part of the root, zero or positive, 1/s.
-    pub omega: f64,
-    /// Roots that move to the right as the gain grows minus those that move to the left; `None`
-    /// where it is not known whether any cross at all.
-    pub jump: Option<i32>,
-}
-
 /// All values in `range` of the parameter with index `parameter` at which the member of `family`
 /// has a root on the imaginary axis, by increasing frequency. `values` holds the other parameters.
 ///
@@ -73,7 +57,7 @@ pub fn crossings_along(
     parameter: usize,
     range: (f64, f64),
     task: &Task,
-) -> Result<Vec<AxisCrossing>, Error> {
+) -> Result<Vec<Crossing>, Error> {
     let name = family.names().get(parameter).map_or("", String::as_str);
     let mut ranges: Vec<(f64, f64)> = values.iter().map(|value| (*value, *value)).collect();
     if let Some(place) = ranges.get_mut(parameter) {
@@ -114,17 +98,7 @@ pub fn crossings_along(
              imaginary axis whatever {name} is, or coefficients differ by too many decades"
         );
     };
-    Ok(found.iter().map(axis_crossing).collect())
-}
-
-fn axis_crossing(crossing: &Crossing) -> AxisCrossing {
-    AxisCrossing {
-        gain: crossing.gain,
-        low: crossing.low,
-        high: crossing.high,
-        omega: crossing.omega,
-        jump: crossing.jump,
-    }
+    Ok(found)
 }
 
 /// h(0).
