@@ -131,6 +131,11 @@ impl Error {
         Self::Argument(message.into())
     }
 
+    /// Shorthand for [`Error::Contour`].
+    pub(crate) const fn contour(place: Complex64, distance: f64) -> Self {
+        Self::Contour { place, distance }
+    }
+
     /// Does the error end the whole computation? True when the caller asked to stop, or memory is
     /// exhausted; no part of the work may then interpret the error as a result.
     pub const fn ends_all(&self) -> bool {

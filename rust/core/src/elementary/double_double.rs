@@ -35,10 +35,7 @@ fn two_sum(a: f64, b: f64) -> DoubleDouble {
 #[inline(always)]
 fn ordered_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
-    DoubleDouble {
-        high,
-        low: b - (high - a),
-    }
+    DoubleDouble::new(high, b - (high - a))
 }
 
 /// a b without error, up to 2⁹⁹⁵.

@@ -17,7 +17,8 @@ const MAX_ORDER: u32 = 10_000;
 /// Relative difference of delays of a product below which they are merged.
 const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
 
-fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
+/// The coefficients of a product of polynomials.
+pub(crate) fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
     for (shift, x) in a.iter().enumerate() {
         for (total, y) in product.iter_mut().skip(shift).zip(b) {

@@ -245,3 +245,16 @@ impl<S: Simd> Not for Mask<S> {
         Self::new(self.simd, [self.simd.not_m64s(a), self.simd.not_m64s(b)])
     }
 }
+
+#[cfg(test)]
+impl Real<pulp::Scalar128b> {
+    /// The same number in every lane.
+    pub(crate) fn lane(value: f64) -> Self {
+        Self::splat(pulp::Scalar128b, value)
+    }
+
+    /// The number in the first lane.
+    pub(crate) fn first(self) -> f64 {
+        self.numbers().first().copied().unwrap_or(f64::NAN)
+    }
+}

@@ -13,6 +13,7 @@
 
 use crate::Error;
 use crate::dde::limits::finite;
+use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
 
 /// The matrices of the loop, row-major; n is the length of `b`.
@@ -53,6 +54,11 @@ impl<S: Scalar> Equations<S> {
     /// y.
     pub(crate) fn output(&self, x: &[S], w: S) -> S {
         dot(&self.c, x) + self.d * w
+    }
+
+    /// The change of the states over a time `h` with constant w and r.
+    pub(crate) fn over(&self, h: S) -> Propagator<S> {
+        Propagator::new(&self.a, &[&self.b, &self.e], h)
     }
 }
 

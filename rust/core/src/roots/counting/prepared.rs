@@ -76,10 +76,7 @@ impl Prepared {
             return Ok(0);
         }
         if re.0 == 0.0 || re.1 == 0.0 {
-            return Err(Error::Contour {
-                place: Complex64::ZERO,
-                distance: f64::MIN_POSITIVE,
-            });
+            return Err(Error::contour(Complex64::ZERO, f64::MIN_POSITIVE));
         }
         Ok(self.zeros)
     }

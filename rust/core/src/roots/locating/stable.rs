@@ -62,6 +62,11 @@ pub fn is_stable(h: &QuasiPolynomial, strong: bool, task: &Task) -> Result<bool,
             Err(error) => Err(error),
         }
     };
+    is_none(number)
+}
+
+/// Does the closed right half plane hold none of the roots counted in it? One on its edge is one.
+pub(crate) fn is_none(number: Result<u64, Error>) -> Result<bool, Error> {
     match number {
         Ok(number) => Ok(number == 0),
         Err(Error::Contour { .. }) => Ok(false),

@@ -9,7 +9,7 @@ use super::walker::{MAX_EVALUATIONS, MatrixWalker};
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::counting::{Cell, Closed, EDGE_MARGIN};
 use crate::roots::locating::{
-    Effort, Spectrum, all_discs, balances, first, half_plane_discs, leading, leads_right,
+    Effort, Spectrum, all_discs, balances, first, half_plane_discs, is_none, leading, leads_right,
     rightmost_first,
 };
 use crate::roots::region::Region;
@@ -299,11 +299,7 @@ pub fn is_stable(system: &CharacteristicMatrix, task: &Task) -> Result<bool, Err
             count_right_of(system, 0.0, task)
         }
     };
-    match number {
-        Ok(number) => Ok(number == 0),
-        Err(Error::Contour { .. }) => Ok(false),
-        Err(error) => Err(error),
-    }
+    is_none(number)
 }
 
 /// A function whose coefficients are the norms of the matrices. Its roots have about the size of

@@ -93,11 +93,7 @@ pub(super) fn run<S: Scalar>(
                 }
             }
             let v = (dot(&closed.k, &x) + closed.m * S::from(r)).value();
-            mode = match limit.map(S::value) {
-                Some(limit) if v > limit => Mode::High,
-                Some(limit) if v < -limit => Mode::Low,
-                _ => Mode::Free,
-            };
+            mode = limit.map_or(Mode::Free, |limit| Mode::of(v, limit.value()));
         }
         let held = match mode {
             Mode::Free => None,

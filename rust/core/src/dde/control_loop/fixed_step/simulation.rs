@@ -130,21 +130,22 @@ pub fn run(
         inputs.push(u);
         for (i, (node, row)) in formula.nodes.iter().zip(formula.rows).enumerate() {
             stage.copy_from_slice(&x);
-            for (weight, slope) in row.iter().zip(slopes.chunks_exact(n.max(1))) {
-                for (value, k) in stage.iter_mut().zip(slope) {
-                    *value += h * weight * k;
-                }
-            }
+            advance(&mut stage, h, row, &slopes);
             let slope = &mut slopes[i * n..(i + 1) * n];
             simulation.slope(&stage, k, *node, slope);
         }
-        for (weight, slope) in formula.weights.iter().zip(slopes.chunks_exact(n.max(1))) {
-            for (value, k) in x.iter_mut().zip(slope) {
-                *value += h * weight * k;
-            }
-        }
+        advance(&mut x, h, formula.weights, &slopes);
     }
     Ok((outputs, inputs))
+}
+
+/// Add the weighted slopes over a step of length h.
+fn advance(x: &mut [f64], h: f64, weights: &[f64], slopes: &[f64]) {
+    for (weight, slope) in weights.iter().zip(slopes.chunks_exact(x.len().max(1))) {
+        for (value, k) in x.iter_mut().zip(slope) {
+            *value += h * weight * k;
+        }
+    }
 }
 
 /// The signals at one instant.
