@@ -15,28 +15,6 @@ from typing import Any, SupportsFloat, SupportsIndex, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "OpenRange",
-    "Points",
-    "Range",
-    "finite",
-    "given_points",
-    "increasing",
-    "interval",
-    "is_range",
-    "non_negative",
-    "non_zero",
-    "numbers_at",
-    "one_dimensional",
-    "open_interval",
-    "points_of",
-    "positive",
-    "real_array",
-    "thread_number",
-    "unmasked",
-    "whole_number",
-]
-
 #: A range between two numbers.
 Range: TypeAlias = tuple[float, float]
 

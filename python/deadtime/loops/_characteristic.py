@@ -14,15 +14,6 @@ from deadtime.loops._plants import Plant, in_s
 from deadtime.roots import Parameter, ParametricQuasiPolynomial, delay
 from deadtime.systems import TransferFunction
 
-__all__ = [
-    "characteristic",
-    "closed_loop",
-    "family_of_loop",
-    "numbers_of",
-    "open_loop",
-    "reference_to_command",
-]
-
 
 def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
     """Build a g + b f e^(-s delay) from numbers or symbols in `values`."""

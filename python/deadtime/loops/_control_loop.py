@@ -14,8 +14,6 @@ from deadtime.loops._plants import Plant
 from deadtime.loops._poles import LoopPoles
 from deadtime.loops._specification import LoopSpecification
 
-__all__ = ["ControlLoop"]
-
 
 @dataclass(frozen=True, init=False)
 class ControlLoop(LoopInTime, LoopPoles, LoopGain):

@@ -26,8 +26,6 @@ from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, 
 from deadtime.loops._given_plants import transfer_function_of
 from deadtime.systems import TransferFunction
 
-__all__ = ["PD", "PI", "PID", "PV", "Controller", "DerivativeFilter", "P"]
-
 Vector = NDArray[np.float64]
 
 #: Descending coefficients: numbers, arrays of numbers or symbols.

@@ -15,8 +15,6 @@ from deadtime.loops._model import LoopRun, reference_jumps, refuse_discretised
 from deadtime.loops._plants import realise
 from deadtime.systems import Response
 
-__all__ = ["simulate_fixed_step"]
-
 Vector = NDArray[np.float64]
 
 #: A time counts as a whole number of steps if it differs by less than this, in steps: rounding of

@@ -15,8 +15,6 @@ from deadtime.loops._plants import NO_GAIN, Plant, RationalPlant
 from deadtime.roots import QuasiPolynomial
 from deadtime.systems import DelaySystem, TransferFunction
 
-__all__ = ["PlantWithDelays", "plant_and_delay", "transfer_function_of"]
-
 
 @dataclass(frozen=True)
 class PlantWithDelays(Plant):

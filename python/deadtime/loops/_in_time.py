@@ -22,8 +22,6 @@ from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
 from deadtime.systems._response import until_settled
 
-__all__ = ["LoopInTime"]
-
 Vector = NDArray[np.float64]
 
 

@@ -20,15 +20,6 @@ from deadtime.loops._batched_matrices import column, number, vector, zeros
 from deadtime.loops._controllers import Controller, FilterUpdate
 from deadtime.loops._plants import Plant, StateSpace, realise, rest
 
-__all__ = [
-    "LoopModel",
-    "LoopRun",
-    "ReferenceJumps",
-    "reference_jumps",
-    "rest_of",
-    "state_at_rest",
-]
-
 Vector = NDArray[np.float64]
 
 

@@ -24,8 +24,6 @@ from deadtime.loops._batched_matrices import matrix, number, vector
 from deadtime.roots import s
 from deadtime.systems import TransferFunction
 
-__all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
-
 
 class StateSpace(NamedTuple):
     """x' = A x + B w, y = C x + D w with one input and one output.

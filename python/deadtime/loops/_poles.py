@@ -29,8 +29,6 @@ from deadtime.roots import (
 )
 from deadtime.roots.certificate import Certificate
 
-__all__ = ["LoopPoles"]
-
 
 class LoopPoles:
     """The poles of a `ControlLoop`; its limit is left out throughout."""

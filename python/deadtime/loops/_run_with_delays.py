@@ -18,8 +18,6 @@ from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, TransferFunction
 from deadtime.systems._run import respond, step_response
 
-__all__ = ["settled_step_with_delays", "simulate_with_delays"]
-
 Vector = NDArray[np.float64]
 
 #: Relative error to which an initial output must be the one at rest.

@@ -10,8 +10,6 @@ from deadtime._base.validation import OpenRange, open_interval
 from deadtime.loops._stability import sampled_roots
 from deadtime.roots import RootSet
 
-__all__ = ["sampled_poles_in"]
-
 
 def sampled_poles_in(
     matrix: NDArray[np.float64], sample_time: float, re: OpenRange | None, im: OpenRange | None

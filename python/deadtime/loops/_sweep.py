@@ -34,8 +34,6 @@ from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
 from deadtime.systems._response import first_duration
 
-__all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
-
 Vector = NDArray[np.float64]
 
 #: Number of sets that are built and simulated together: more take more memory, fewer more calls.

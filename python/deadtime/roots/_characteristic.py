@@ -17,8 +17,6 @@ from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots.certificate._certificate import Certificate
 from deadtime.roots.certificate._proof import proved
 
-__all__ = ["Characteristic", "Edge"]
-
 #: What becomes of roots on the edge of a region.
 Edge: TypeAlias = Literal["error", "inside", "outside"]
 

@@ -19,8 +19,6 @@ from deadtime.roots._family import HasFamily, family_of
 from deadtime.roots._parametric import ParametricQuasiPolynomial
 from deadtime.roots._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Crossings", "crossings", "delay_margin", "margin_of_family"]
-
 _Floats: TypeAlias = NDArray[np.float64]
 
 

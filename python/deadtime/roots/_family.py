@@ -8,8 +8,6 @@ from typing import Protocol, SupportsFloat
 from deadtime._base.validation import numbers_at
 from deadtime.roots._parametric import ParametricQuasiPolynomial
 
-__all__ = ["HasFamily", "family_of"]
-
 
 class HasFamily(Protocol):
     """A system whose numbers can become parameters of its characteristic function."""

@@ -19,8 +19,6 @@ from deadtime._base.validation import OpenRange, open_interval
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots.certificate._certificate import Certificate
 
-__all__ = ["MatrixDeterminant"]
-
 _NOT_EXACT = (
     "with its delays taken as exact, a neutral system is judged by its expanded determinant, which "
     "this one does not have"

@@ -24,8 +24,6 @@ from deadtime._deadtime import Family
 from deadtime.roots._quasipolynomial import QuasiPolynomial, is_number
 from deadtime.roots._text import Delay, Monomial, Powers, Terms, family_text, latex
 
-__all__ = ["Parameter", "ParametricQuasiPolynomial", "parameters"]
-
 #: Most terms of a product: bounds memory and time.
 _MAX_TERMS = 100_000
 

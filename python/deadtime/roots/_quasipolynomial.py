@@ -31,7 +31,6 @@ from deadtime.roots._text import joined, latex, row_text
 if TYPE_CHECKING:
     from deadtime.systems import Margins, TransferFunction
 
-__all__ = ["QuasiPolynomial", "delay", "s"]
 
 Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "advanced"]
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from deadtime import _deadtime
     from deadtime.roots._chains import Chain
 
-__all__ = ["RootSet", "root_set"]
 
 _SHOWN = 12
 

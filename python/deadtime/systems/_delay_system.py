@@ -33,8 +33,6 @@ from deadtime.systems._responses import HasResponses
 from deadtime.systems._scaled_delays import scaled_family, smallest_delay
 from deadtime.systems._transfer import TransferFunction
 
-__all__ = ["DelaySystem"]
-
 
 class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     """A linear system with delays: any order, any number of inputs and outputs. Immutable.

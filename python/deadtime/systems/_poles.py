@@ -18,8 +18,6 @@ from deadtime.roots import (
 from deadtime.roots._characteristic import Edge
 from deadtime.roots._matrix_roots import MatrixDeterminant
 
-__all__ = ["HasPoles"]
-
 
 class HasPoles(ABC):
     """Base of systems; the poles are the roots of `_determinant`, hidden ones included."""

@@ -18,7 +18,6 @@ from deadtime.systems._step_metrics import OneSignal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Response", "first_duration", "until_settled"]
 
 Vector = NDArray[np.float64]
 

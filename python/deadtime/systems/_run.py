@@ -19,8 +19,6 @@ from deadtime._deadtime import Signal
 from deadtime.systems._realisation import Differentiable, Realisable, Realisation
 from deadtime.systems._response import Response, until_settled
 
-__all__ = ["Given", "impulse_response", "respond", "step_response"]
-
 Vector = NDArray[np.float64]
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
 

@@ -36,8 +36,6 @@ from deadtime.systems._responses import HasResponses
 if TYPE_CHECKING:
     pass
 
-__all__ = ["TransferFunction", "feedback"]
-
 
 class TransferFunction(FrequencyDomain, HasPoles, HasResponses, Writable):
     """A transfer function num(s)/den(s) of two quasi-polynomials.
