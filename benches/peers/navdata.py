@@ -16,13 +16,11 @@ from deadtime.links.ardrone2 import commands
 from deadtime.links.ardrone2.navdata import (
     DEMO_OPTIONS,
     FULL_OPTIONS,
-    Demo,
-    KalmanPressure,
     Navdata,
-    Pwm,
     build_navdata,
     parse_navdata,
 )
+from deadtime.links.ardrone2.navdata_options import Demo, KalmanPressure, Pwm
 
 try:
     with warnings.catch_warnings():

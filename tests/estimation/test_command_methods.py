@@ -4,11 +4,11 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import GCC, ARXScan
-from deadtime.estimation.data._commands import commands_over_samples
-from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
+from deadtime.estimation.data._input_output import FEEDBACK, feedback_p_value
+from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.methods._arx_scan import F_TEST_LEVEL, _check_response
 from deadtime.estimation.methods._gcc import _whitener
-from deadtime.estimation.models._held_response import HeldResponse
+from deadtime.estimation.models._held import HeldResponse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest

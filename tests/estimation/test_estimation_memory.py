@@ -57,7 +57,7 @@ def test_the_losses_of_an_arx_scan_are_those_of_least_squares_at_every_delay():
     command = random.normal(size=400)
     output = np.cumsum(np.concatenate([np.zeros(7), command])[:401]) * 0.1
     output += random.normal(0.0, 0.2, output.size)
-    read = InputOutput(command, np.diff(output), 0.1, 0.0, "", "")
+    read = InputOutput(command, np.diff(output), 0.1, 0.0, "")
     losses, best, none = arx_scan._scan(output, read, 2, 2, 0)
     assert losses.size == read.longest > 200
     late = arx_scan._Delayed(command, output.size)

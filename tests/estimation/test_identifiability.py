@@ -11,7 +11,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Overshoot
-from deadtime.estimation.models._held_response import HeldResponse
+from deadtime.estimation.models._held import HeldResponse
 from deadtime.estimation.planning._planned_bound import from_the_command, from_the_reference
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import step_recordings
 from deadtime.estimation import OutputError
-from deadtime.estimation.models._held_response import HeldResponse
+from deadtime.estimation.models._held import HeldResponse
 from flights import flight_path
 from hypothesis import given, settings
 from hypothesis import strategies as st

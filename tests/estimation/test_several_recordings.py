@@ -4,7 +4,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 import step_recordings
-from deadtime.estimation.fit._joint import JointModel
+from deadtime.estimation.fit._least_squares import JointModel
 from flights import flight_path
 
 TS = 0.065
@@ -72,7 +72,7 @@ def test_coloured_misfit_is_weighted_by_the_size_of_the_step():
 
 
 def test_the_joint_model_consists_of_the_models_of_its_recordings():
-    from deadtime.estimation.data._runs import paired_runs
+    from deadtime.estimation.methods._method import paired_runs
     from deadtime.estimation.methods._waveform import _model
 
     pairs = [record_step(Kp, 0.01, 3) for Kp in (0.8, 2.0)]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import Decay, Graphical, Overshoot
 from deadtime.estimation.methods._decrement import loop_with_root
-from deadtime.estimation.models._held_transfer import held_transfer
+from deadtime.estimation.models._held import held_transfer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from step_recordings import (

@@ -4,7 +4,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Waveform
-from deadtime.estimation.models._plant_path import path_of
+from deadtime.estimation.models._held import path_of
 from scipy.signal import lsim
 
 TS = 0.065

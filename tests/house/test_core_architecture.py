@@ -229,9 +229,10 @@ def test_the_core_knows_nothing_of_python():
 
 
 def test_the_wire_formats_stand_alone():
-    # The crate that reads bytes from a network has no unsafe code and no panics.
+    # The crate that reads bytes from a network has no unsafe code and no panics. thiserror writes the
+    # texts of its errors while it is compiled, and is no part of what runs.
     manifest = tomllib.loads((WIRE_FORMATS / "Cargo.toml").read_text(encoding="utf-8"))
-    assert manifest["dependencies"] == {}
+    assert manifest["dependencies"].keys() <= {"thiserror"}
     table_of_contents = (WIRE_FORMATS / "src" / "lib.rs").read_text(encoding="utf-8")
     assert "#![forbid(unsafe_code)]" in table_of_contents
     assert "#![deny(clippy::indexing_slicing)]" in table_of_contents

@@ -4,7 +4,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import delay, s
-from deadtime._base.ranges import given_points, interval, is_range, open_interval
+from deadtime._base.validation import given_points, interval, is_range, open_interval
 
 Kp, Kv, T = dtm.parameters("Kp Kv T")
 VELOCITY = s + (Kp + Kv * s) * delay(T)

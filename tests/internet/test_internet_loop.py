@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from deadtime import estimate_delay, read_recording
 from deadtime._base.errors import LinkError
+from deadtime._base.plain import plain
 from deadtime._cli.app import app
 from deadtime.internet._loop import GAINS, run_internet_loop
 from deadtime.internet._replay import _overshoot, answer_times
@@ -30,7 +31,7 @@ from deadtime.links.udp import (
 )
 from deadtime.links.udp.__main__ import main
 from deadtime.links.udp.controller import ControllerOptions
-from deadtime.links.udp.described import arguments_of, plain, policy_of
+from deadtime.links.udp.described import arguments_of, policy_of
 from deadtime.links.udp.processes import part
 from deadtime.paper import internet_loop
 from typer.testing import CliRunner

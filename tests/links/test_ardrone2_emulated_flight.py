@@ -17,7 +17,7 @@ from deadtime.links.ardrone2.emulator import (
     Thruster,
     ThrustMotion,
 )
-from deadtime.links.ardrone2.emulator.motion import GRAVITY, LinearMotion, linear_plant
+from deadtime.links.ardrone2.emulator.motion import GRAVITY, LINEAR_PLANTS, LinearMotion
 from deadtime.links.ardrone2.navdata import parse_navdata
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -181,7 +181,7 @@ def test_jitter_delays_packets_and_never_reorders_them():
 
 @pytest.mark.parametrize("name", ["kit", "paper", "real"])
 def test_a_linear_plant_is_stepped_exactly(name):
-    plant = linear_plant(name)
+    plant = LINEAR_PLANTS[name]
     times = np.arange(1, 60) * 0.137
     motion = LinearMotion(plant)
     motion.settle(0, 0.0)
@@ -209,7 +209,7 @@ def test_a_loop_around_the_emulated_drone_equals_the_control_loop(name, delay, g
         error = gain * (begun + step - height)
         pilot.send(UP, Move(gaz=max(-1.0, min(1.0, error))))
     loop = dtm.ControlLoop(
-        linear_plant(name), dtm.P(gain), delay=delay, sample_time=sample, limit=1.0
+        LINEAR_PLANTS[name], dtm.P(gain), delay=delay, sample_time=sample, limit=1.0
     )
     exact = loop.simulate(np.arange(150) * sample, step).outputs
     # Commands travel as single-precision numbers.

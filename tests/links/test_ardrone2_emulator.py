@@ -317,7 +317,7 @@ def test_a_low_battery_is_reported_prevents_take_off_and_ends_a_flight():
 
 def test_a_failed_ultrasonic_sensor_is_reported():
     pilot = Pilot().connect(demo=False)
-    pilot.drone.deaf = True
+    pilot.drone.no_echo = True
     pilot.wait(0.1, Watchdog())
     assert pilot.last.ultrasound_deaf
 

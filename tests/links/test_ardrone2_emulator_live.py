@@ -14,7 +14,7 @@ import pytest
 from deadtime import DeadtimeError
 from deadtime import links as dtl
 from deadtime._base.errors import LinkError
-from deadtime._cli.emulate import tell
+from deadtime._cli.emulate import print_address
 from deadtime.links.ardrone2.commands import Config, Control, Move, Ref, Watchdog, encode
 from deadtime.links.ardrone2.configuration import parse_configuration
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase
@@ -414,9 +414,9 @@ def test_ctrl_c_ends_the_command(listens_to_ctrl_c):
 def test_an_address_that_other_machines_reach_causes_a_warning(capsys):
     # The port is not opened, because tests stay on this machine.
     emulator = Emulator(EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)))
-    tell(emulator, as_json=True)
+    print_address(emulator, as_json=True)
     out, errors = capsys.readouterr()
     assert "nothing authenticates" in errors
     assert json.loads(out)["host"] == "0.0.0.0"
-    tell(Emulator(EmulatorOptions()), as_json=True)
+    print_address(Emulator(EmulatorOptions()), as_json=True)
     assert capsys.readouterr().err == ""

@@ -8,6 +8,7 @@ import socket
 import struct
 
 import pytest
+from deadtime._base.plain import plain
 from deadtime.links import virtual_time
 from deadtime.links.addresses import canonical
 from deadtime.links.udp import (
@@ -19,7 +20,6 @@ from deadtime.links.udp import (
     RelayOptions,
     run_plant,
 )
-from deadtime.links.udp.described import plain
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

@@ -7,20 +7,17 @@ from itertools import pairwise
 
 import pytest
 from deadtime._base.errors import LinkError, PacketError
-from deadtime.links._wire import navdata_layouts
+from deadtime._deadtime import navdata_layouts
 from deadtime.links.ardrone2 import navdata as room
 from deadtime.links.ardrone2.navdata import (
     DEMO_OPTIONS,
     FULL_OPTIONS,
-    AltitudeOption,
-    Demo,
-    KalmanPressure,
     Navdata,
-    Pwm,
     State,
     build_navdata,
     parse_navdata,
 )
+from deadtime.links.ardrone2.navdata_options import AltitudeOption, Demo, KalmanPressure, Pwm
 from hypothesis import given
 from hypothesis import strategies as st
 from navdata_packets import BOOTSTRAP, demo_packet, full_packets, older_packet

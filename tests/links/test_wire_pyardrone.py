@@ -16,16 +16,18 @@ from deadtime.links.ardrone2 import commands
 from deadtime.links.ardrone2.navdata import (
     DEMO_OPTIONS,
     FULL_OPTIONS,
+    Navdata,
+    build_navdata,
+    parse_navdata,
+)
+from deadtime.links.ardrone2.navdata_options import (
     AltitudeOption,
     Demo,
     KalmanPressure,
-    Navdata,
     Pressure,
     RawMeasures,
     References,
     VideoStream,
-    build_navdata,
-    parse_navdata,
 )
 
 with warnings.catch_warnings():

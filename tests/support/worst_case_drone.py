@@ -12,7 +12,8 @@ from contextlib import asynccontextmanager
 from deadtime.links import Limits
 from deadtime.links.ardrone2 import ARDrone2, Navdata, build_navdata, write_configuration
 from deadtime.links.ardrone2.commands import Config, Control, Move, Ref, decode
-from deadtime.links.ardrone2.navdata import Demo, State, VideoStream
+from deadtime.links.ardrone2.navdata import State
+from deadtime.links.ardrone2.navdata_options import Demo, VideoStream
 
 WATCHDOG, WARNING_TIME = 2.0, 0.05
 RISE_TIME, LANDING_TIME = 0.3, 0.4

@@ -8,10 +8,9 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.tuning import critical_gain
-from deadtime.tuning._margin_estimate import MarginEstimate
+from deadtime.tuning._margins import MarginEstimate
 from deadtime.tuning._objectives import _rounded, dominant_damping
 from deadtime.tuning._problem import pose
-from deadtime.tuning._specification import DesignSpecification
 from deadtime.tuning._survey import Survey
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
@@ -192,21 +191,7 @@ def test_a_gain_margin_at_half_the_sampling_rate_is_estimated(share):
 
 
 def posed(loop, controller):
-    asked = DesignSpecification(
-        controller=controller,
-        delay=None,
-        gain=None,
-        objective="abscissa",
-        fixed=None,
-        gain_margin=None,
-        phase_margin=None,
-        delay_margin=None,
-        ranges=None,
-        shape=None,
-        amplitude=1.0,
-        threads=None,
-    )
-    return pose(loop, asked)
+    return pose(loop, controller, None, None, fixed=None, ranges=None, amplitude=1.0, threads=None)
 
 
 # What is not known

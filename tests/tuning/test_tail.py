@@ -5,8 +5,7 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 from deadtime.loops._model import LoopRun
-from deadtime.tuning._fundamental import Fundamental
-from deadtime.tuning._tail import tail_bound
+from deadtime.tuning._tail import Fundamental, tail_bound
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from loops import loops

@@ -16,15 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "as_svg",
-    "bare_axes",
-    "check_matplotlib",
-    "empty_figure",
-    "new_figure",
-    "shown_axes",
-    "shown_rows",
-]
 
 DATA: dict[str, Any] = {"color": "0.35", "lw": 0.9, "marker": ".", "ms": 3}
 REFERENCE: dict[str, Any] = {"color": "0.6", "lw": 1.0, "ls": "--"}

@@ -8,21 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = [
-    "CertificateError",
-    "ContourError",
-    "ConvergenceError",
-    "CountMismatchError",
-    "DeadtimeError",
-    "FlightAbortedError",
-    "LinkError",
-    "MissingExtraError",
-    "NotIdentifiableError",
-    "PacketError",
-    "RecordingError",
-    "WorkerError",
-]
-
 
 class DeadtimeError(Exception):
     """Base of every error that `deadtime` raises for other reasons than a bad argument."""

@@ -8,8 +8,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-__all__ = ["FrozenDict", "ReadOnlyArrays", "equal", "read_only"]
-
 
 class FrozenDict(dict[Any, Any]):
     """A dict that does not change; ``dict(found)`` makes one that does."""

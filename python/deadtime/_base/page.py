@@ -12,7 +12,6 @@ from deadtime._base.drawing import as_svg
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["escaped", "page", "picture", "table", "table_row", "write_page"]
 
 STYLE = """
 :root { color-scheme: light; }

@@ -15,8 +15,6 @@ from deadtime._base.errors import WorkerError
 from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.validation import whole_number
 
-__all__ = ["shared_out"]
-
 T = TypeVar("T")
 
 #: Number of items below which starting other processes takes longer than the work.

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-__all__ = ["Progress", "Report", "Stages", "reported", "stage_report"]
-
 #: Called now and then with the number of items that are done.
 Report: TypeAlias = Callable[[int], object]
 

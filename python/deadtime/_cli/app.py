@@ -5,15 +5,13 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
 from deadtime._base.errors import DeadtimeError
-
-__all__ = ["COMMANDS", "app", "run"]
 
 #: Errors that end a command with one line; any other is a defect and prints its traceback.
 FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
@@ -25,68 +23,20 @@ DEFECT = 70
 INTERRUPTED = 130
 
 
-class Command(NamedTuple):
-    """Where a command is, and the first line of its help."""
-
-    file: str
-    function: str
-    help: str
-
-
+#: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
-    "estimate": Command(
-        "estimates",
-        "estimate_delays",
-        "Estimate the delay of a loop from a recording of it, or from several together.",
-    ),
-    "roots": Command(
-        "roots",
-        "list_roots",
-        "Characteristic roots of a loop: the rightmost ones, or all in a region.",
-    ),
-    "map": Command(
-        "maps",
-        "map_gains",
-        "Map which gains of a PV controller are stable, with the boundary and the best of them.",
-    ),
-    "design": Command(
-        "designs",
-        "design_gains",
-        "Find the gains that are best in the worst case, within margins.",
-    ),
-    "reproduce": Command(
-        "reproduce",
-        "reproduce_paper",
-        "Reproduce the paper on delays in quadrotor control: each printed number beside ours.",
-    ),
-    "fly": Command(
-        "fly",
-        "fly_drone",
-        "Fly steps under P control, learn the delay, design PV for it, fly that; land.",
-    ),
-    "internet-loop": Command(
-        "internet_loop",
-        "run_loop",
-        "Control an integrator over UDP, estimate the loop's delay, and measure it.",
-    ),
-    "simulate": Command(
-        "simulate", "simulate_step", "Simulate the step response of a loop, exactly."
-    ),
-    "report": Command(
-        "report",
-        "report_recording",
-        "Write one page about a recording: delay, map of gains, a controller to try.",
-    ),
-    "demo": Command(
-        "demo",
-        "show_demo",
-        "Fly a simulated loop with known truth and find its delay and its gains; no hardware.",
-    ),
-    "emulate": Command(
-        "emulate",
-        "emulators",
-        "Stand in for a vehicle, on its own ports and in its own protocol.",
-    ),
+    "estimate": "Estimate the delay of a loop from a recording of it, or from several together.",
+    "roots": "Characteristic roots of a loop: the rightmost ones, or all in a region.",
+    "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
+    "design": "Find the gains that are best in the worst case, within margins.",
+    "reproduce": "Reproduce the paper on delays in quadrotor control: each printed number beside "
+    "ours.",
+    "fly": "Fly steps under P control, learn the delay, design PV for it, fly that; land.",
+    "internet-loop": "Control an integrator over UDP, estimate the loop's delay, and measure it.",
+    "simulate": "Simulate the step response of a loop, exactly.",
+    "report": "Write one page about a recording: delay, map of gains, a controller to try.",
+    "demo": "Fly a simulated loop with known truth and find its delay and its gains; no hardware.",
+    "emulate": "Stand in for a vehicle, on its own ports and in its own protocol.",
 }
 
 
@@ -101,8 +51,7 @@ class _Commands(TyperGroup):
 
 def _loaded(name: str) -> Any:
     """Import a command."""
-    place = COMMANDS[name]
-    found = getattr(importlib.import_module(f"deadtime._cli.{place.file}"), place.function)
+    found = importlib.import_module(f"deadtime._cli.{name.replace('-', '_')}").command
     if isinstance(found, typer.Typer):
         return get_command(found)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
@@ -144,8 +93,8 @@ def _not_loaded() -> None:
     """Stands for a command that was not called."""
 
 
-for _name, _command in COMMANDS.items():
-    app.command(_name, help=_command.help)(_not_loaded)
+for _name, _help in COMMANDS.items():
+    app.command(_name, help=_help)(_not_loaded)
 
 
 def run() -> None:
@@ -163,14 +112,16 @@ def run() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except FAILURES as error:
-        told = str(error)
+        message = str(error)
         if isinstance(error, OSError) and error.filename is not None:
-            told = f"{error.filename}: {error.strerror}"
+            message = f"{error.filename}: {error.strerror}"
         elif isinstance(error, ArithmeticError):
-            told = f"a number leaves the range of double precision ({told}): choose other units"
+            message = (
+                f"a number leaves the range of double precision ({message}): choose other units"
+            )
         elif isinstance(error, MemoryError):
-            told = f"out of memory: {told or 'ask for less at once'}"
-        print(f"deadtime: {' '.join(told.split())}", file=sys.stderr)
+            message = f"out of memory: {message or 'ask for less at once'}"
+        print(f"deadtime: {' '.join(message.split())}", file=sys.stderr)
         raise SystemExit(1) from None
     except Exception as error:
         import traceback

@@ -10,8 +10,6 @@ from rich.table import Table
 from deadtime.estimation import Comparison
 from deadtime.estimation._compare import COLUMNS, truth_row
 
-__all__ = ["estimates_table"]
-
 
 def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = None) -> Table:
     """The delay by every method, with the truth beside it where it is known."""

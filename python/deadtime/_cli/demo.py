@@ -12,18 +12,14 @@ import typer
 from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
 from deadtime._cli.comparisons import estimates_table
-from deadtime._cli.show import console, print_json, print_table, stages
+from deadtime._cli.show import print_json, print_points, print_table, print_text, stages
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 from deadtime.reports import demo_recording, study
 from deadtime.reports._page import write_report
 
-__all__ = ["show_demo"]
 
-Ends = tuple[float, float]
-
-
-def show_demo(
+def command(
     folder: Annotated[Path, typer.Option(help="Where to write.")] = Path("demo"),
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")] = 1,
     as_json: opt.As_json = False,
@@ -55,11 +51,9 @@ def show_demo(
         )
         return
     print_table(estimates_table(found.comparison, flight.numbers))
-    for sentence in found.comparison.explanation():
-        console.print(f"• {sentence}", highlight=False, markup=False)
-    console.print()
-    console.print(found.verdict(), highlight=False, markup=False, style="bold")
-    console.print(f"\nThe flight is in {file}, the report in {page}. To go on:", highlight=False)
+    print_points(found.comparison.explanation())
+    print_text(f"\n{found.verdict()}", "bold")
+    print_text(f"\nThe flight is in {file}, the report in {page}. To go on:")
     for line in _next_commands(found.known, flight.window, file, found.fit):
         print(f"  {line}")
 
@@ -74,7 +68,7 @@ def _write_flight(recording: Recording, path: Path) -> None:
             rows.writerow([f"{time:.3f}", f"{reference:.3f}", f"{output:.5f}"])
 
 
-def _next_commands(loop: ControlLoop, window: Ends, file: Path, fit: object) -> list[str]:
+def _next_commands(loop: ControlLoop, window: opt.Ends, file: Path, fit: object) -> list[str]:
     columns = (
         f"{shlex.quote(str(file))} --time t_s --reference ref_m --output height_m "
         f"--kp {loop.controller.gains['Kp']:g} --sample-time {loop.sample_time:g} "

@@ -23,9 +23,7 @@ from deadtime.links.ardrone2.emulator.motion import PlantName
 from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
 from deadtime.links.parent_watch import parent_ended
 
-__all__ = ["emulators", "tell"]
-
-emulators = typer.Typer(
+command = typer.Typer(
     help="Stand in for a vehicle, on its own ports and in its own protocol.",
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -36,15 +34,17 @@ SHOWN_EVERY, RECORDED_EVERY = 0.2, 0.02
 
 COLUMNS = ("time_s", "height_m", "climb_m_s", "setpoint_m_s", "battery_percent", "landed")
 
+PORTS = ("navdata_port", "command_port", "control_port", "ftp_port", "video_port")
+
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="This port; 0: a free one.")]
 
 
-@emulators.callback()
+@command.callback()
 def _group() -> None:
     """Stand in for a vehicle, on its own ports and in its own protocol."""
 
 
-@emulators.command()
+@command.command()
 def ardrone2(
     plant: Annotated[
         PlantName, typer.Option(help="How height answers the commanded climb.")
@@ -99,14 +99,10 @@ def ardrone2(
 ) -> None:
     """Emulate an AR.Drone 2.0 until Ctrl-C: navdata, commands and configuration, in real time."""
     ports = ports_from(port_base)
-    chosen = {
-        "navdata_port": navdata_port,
-        "command_port": command_port,
-        "control_port": control_port,
-        "ftp_port": ftp_port,
-        "video_port": video_port,
-    }
-    ports |= {name: port for name, port in chosen.items() if port is not None}
+    chosen = zip(
+        PORTS, (navdata_port, command_port, control_port, ftp_port, video_port), strict=True
+    )
+    ports |= {name: port for name, port in chosen if port is not None}
     if duration is not None:
         positive("--duration", duration)
     options = EmulatorOptions(
@@ -135,7 +131,7 @@ async def _emulate(
     with ExitStack() as stack:
         journal = None if record is None else stack.enter_context(Journal(record, COLUMNS))
         async with Emulator(options) as emulator:
-            tell(emulator, as_json)
+            print_address(emulator, as_json)
             live = None
             if not as_json and console.is_terminal:
                 live = stack.enter_context(Live(console=console, auto_refresh=False))
@@ -156,7 +152,7 @@ async def _emulate(
                     task.cancel()
 
 
-def tell(emulator: Emulator, as_json: bool) -> None:
+def print_address(emulator: Emulator, as_json: bool) -> None:
     """Print the addresses and ports of the drone once it listens."""
     options = emulator.options
     warning = (
@@ -168,11 +164,7 @@ def tell(emulator: Emulator, as_json: bool) -> None:
     if as_json:
         found = {
             "host": emulator.host,
-            "navdata_port": emulator.navdata_port,
-            "command_port": emulator.command_port,
-            "control_port": emulator.control_port,
-            "ftp_port": emulator.ftp_port,
-            "video_port": emulator.video_port,
+            **{name: getattr(emulator, name) for name in PORTS},
             "plant": options.plant,
             "delay": options.transport_delay,
             "worst_case": options.worst_case,

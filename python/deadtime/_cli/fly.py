@@ -8,17 +8,23 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
-from rich import box
-from rich.table import Table
 
 from deadtime._base.drawing import check_matplotlib
+from deadtime._base.plain import plain
 from deadtime._cli import options as opt
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
-from deadtime._cli.show import ERRORS, console, plain, print_json, print_table, stages
+from deadtime._cli.show import (
+    ERRORS,
+    print_json,
+    print_table,
+    print_text,
+    results_table,
+    stages,
+)
 from deadtime.flights import FlightPlan, FlightStudy, FlownSteps, fly_experiment
 from deadtime.flights._fly import Connect
 from deadtime.flights._learn import COLUMNS
@@ -27,10 +33,7 @@ from deadtime.links import Limits, Vehicle
 from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
-
-__all__ = ["emulated_drone", "fly_drone"]
-
-Plant = Literal["kit", "paper", "real", "thrust"]
+from deadtime.links.ardrone2.emulator.motion import PlantName
 
 #: Largest commanded climb in m/s: on an emulator, as in the paper, and on a drone, which can hurt.
 EMULATED_CLIMB, REAL_CLIMB = 1.0, 0.5
@@ -46,7 +49,7 @@ SEED_STEP = 1_000_003
 FOLDER = "flight"
 
 
-def fly_drone(
+def command(
     host: Annotated[
         str | None,
         typer.Option(
@@ -59,7 +62,7 @@ def fly_drone(
             "--i-have-a-safe-area", help="Needed with --host: a drone is about to take off there."
         ),
     ] = False,
-    plant: Annotated[Plant, typer.Option(help="What the emulator flies like.")] = "kit",
+    plant: Annotated[PlantName, typer.Option(help="What the emulator flies like.")] = "kit",
     gains: Annotated[str, typer.Option(help="Proportional gains to learn from.")] = "1.2,2.4",
     step: Annotated[float, typer.Option(help="Size of the steps, m.")] = 0.25,
     base: Annotated[float, typer.Option(help="Height the steps go up from, m.")] = 1.0,
@@ -134,7 +137,7 @@ def fly_drone(
 
 
 def _print_note(sentence: str) -> None:
-    ERRORS.print(f"deadtime: {sentence}", highlight=False, markup=False, soft_wrap=True)
+    print_text(f"deadtime: {sentence}", wrapped=False, on=ERRORS)
 
 
 def _numbers(gains: str) -> tuple[float, ...]:
@@ -153,9 +156,9 @@ def _free_folder() -> Path:
 
 
 def _print_plan(plan: FlightPlan, vehicle: str) -> None:
-    ERRORS.print(f"About to fly {vehicle}:", highlight=False, markup=False)
+    print_text(f"About to fly {vehicle}:", on=ERRORS)
     for line in plan.lines():
-        ERRORS.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
+        print_text(f"  {line}", wrapped=False, on=ERRORS)
 
 
 def _ask_for_consent(host: str, plan: FlightPlan, consent: bool, virtual_time: bool) -> None:
@@ -181,7 +184,7 @@ class _Vehicle:
 @contextmanager
 def _vehicle(
     host: str | None,
-    plant: Plant,
+    plant: PlantName,
     seed: int,
     virtual_time: bool,
     plan: FlightPlan,
@@ -204,7 +207,7 @@ def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
     return ARDrone2(host, limits, navdata_port=navdata, command_port=command, control_port=control)
 
 
-def emulated_drone(plant: Plant, seed: int, limits: Limits) -> Connect:
+def emulated_drone(plant: PlantName, seed: int, limits: Limits) -> Connect:
     """Connect to an emulator in the same event loop; each link has a different noise seed."""
     seeds = itertools.count(seed, SEED_STEP)
 
@@ -224,26 +227,11 @@ def emulated_drone(plant: Plant, seed: int, limits: Limits) -> Connect:
 def _print_kept_recordings(folder: Path) -> None:
     kept = sorted(folder.glob("flight-*.csv"))
     if kept:
-        ERRORS.print(
-            f"kept in {folder}: {', '.join(path.name for path in kept)}",
-            highlight=False,
-            markup=False,
-        )
+        print_text(f"kept in {folder}: {', '.join(path.name for path in kept)}", on=ERRORS)
 
 
 def _print_study(study: FlightStudy, page: Path) -> None:
-    print_table(_table("Flights", COLUMNS, study.rows()))
-    print_table(_table("The delay", PARTS, study.parts()))
-    console.print(study.verdict(), highlight=False, markup=False, style="bold")
-    console.print(
-        f"\nRecordings and report are in {page.parent}: {page.name}", highlight=False, markup=False
-    )
-
-
-def _table(title: str, heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> Table:
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    for number, head in enumerate(heads):
-        table.add_column(head, justify="left" if number == 0 else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*row)
-    return table
+    print_table(results_table(COLUMNS, study.rows(), "Flights", COLUMNS[:1]))
+    print_table(results_table(PARTS, study.parts(), "The delay", PARTS[:1]))
+    print_text(study.verdict(), "bold")
+    print_text(f"\nRecordings and report are in {page.parent}: {page.name}")

@@ -7,25 +7,23 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich import box
-from rich.table import Table
 
 from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
-    console,
     print_json,
+    print_points,
     print_table,
+    print_text,
+    results_table,
     save_figure,
     stages,
 )
 from deadtime.internet._loop import GAINS, run_internet_loop
-from deadtime.internet._plots import plot_internet_loop
-from deadtime.internet._result import InternetLoop, InternetRun, Spread
+from deadtime.internet._plots import LABELS, plot_internet_loop
+from deadtime.internet._result import InternetRun, Spread
 from deadtime.links.udp import Trial, network_of, policy_of
 from deadtime.paper import PRINTED_OVERSHOOTS, delay_by_dominant_root
-
-__all__ = ["run_loop"]
 
 Kind = Literal["normal", "gamma", "lognormal"]
 Late = Literal["newest", "drop-late", "hold", "jitter-buffer"]
@@ -45,10 +43,8 @@ HEADS = (
     "Td",
 )
 
-METHODS = ("dominant", "exact", "waveform", "output_error")
 
-
-def run_loop(
+def command(
     gain: Annotated[
         list[float] | None,
         typer.Option(help="Gain K of a run; again for the next. Without: 5 to 10.", min=0.0),
@@ -131,36 +127,19 @@ def run_loop(
     if as_json:
         print_json({**found.to_dict(), "table_1": printed})
         return
-    print_table(_table(found, printed))
-    console.print("means, 95 % intervals, and what was measured, in ms", style="dim")
-    for name, text in _spreads(found).items():
-        console.print(f"{name:<20}{text}", highlight=False, markup=False)
-    for sentence in found.explanation():
-        console.print(f"• {sentence}", highlight=False, markup=False)
-    for run in found.runs:
-        for method, why in run.refusals.items():
-            console.print(
-                f"• K = {run.trial.gain:g}, {LABELS[method]}: {why}", highlight=False, markup=False
-            )
+    rows = [_row(run, printed) for run in found.runs]
+    print_table(results_table(HEADS, rows, "Times in ms"))
+    print_text("means, 95 % intervals, and what was measured, in ms", "dim")
+    for method, (label, *_) in LABELS.items():
+        print_text(f"{label:<20}{_spread_text(found.spread(method), found.expected(method))}")
+    print_points(found.explanation())
+    print_points(
+        f"K = {run.trial.gain:g}, {LABELS[method][0]}: {why}"
+        for run in found.runs
+        for method, why in run.refusals.items()
+    )
     if folder is not None:
-        console.print(f"recordings: {folder}", highlight=False, markup=False)
-
-
-LABELS = {
-    "dominant": "paper's overshoot",
-    "exact": "exact overshoot",
-    "waveform": "waveform",
-    "output_error": "output error",
-}
-
-
-def _table(found: InternetLoop, printed: dict[float, float]) -> Table:
-    table = Table(title="Times in ms", title_justify="left", box=box.SIMPLE_HEAD)
-    for head in HEADS:
-        table.add_column(head, justify="right")
-    for run in found.runs:
-        table.add_row(*_row(run, printed))
-    return table
+        print_text(f"recordings: {folder}")
 
 
 def _row(run: InternetRun, printed: dict[float, float]) -> list[str]:
@@ -175,7 +154,7 @@ def _row(run: InternetRun, printed: dict[float, float]) -> list[str]:
         f"{link['late']}/{link['received']}",
         _ms(run.age),
         f"{100 * run.overshoot:.1f} %" if math.isfinite(run.overshoot) else "–",
-        *(_estimate(run, method) for method in METHODS),
+        *(_estimate(run, method) for method in LABELS),
         *(table_1 or ["–", "–"]),
     ]
 
@@ -189,15 +168,8 @@ def _ms(value: float | None) -> str:
     return "–" if value is None or not math.isfinite(value) else f"{1e3 * value:.1f}"
 
 
-def _spreads(found: InternetLoop) -> dict[str, str]:
-    """For each method the mean over the runs, its interval, and the measured delay."""
-    return {
-        LABELS[method]: _spread_text(found.spread(method), found.expected(method))
-        for method in METHODS
-    }
-
-
 def _spread_text(spread: Spread, expected: float) -> str:
+    """The mean of a method over the runs, its interval, and the measured delay."""
     interval = ""
     if math.isfinite(spread.low):
         how = "corrected by replaying" if spread.replayed else "by the spread of the runs"

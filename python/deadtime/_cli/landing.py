@@ -10,8 +10,6 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, TypeAlias, TypeVar
 
-__all__ = ["run_landing", "terminated_like_interrupted"]
-
 T = TypeVar("T")
 
 Stop: TypeAlias = Callable[[], None]

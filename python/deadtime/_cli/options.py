@@ -22,30 +22,6 @@ from deadtime.loops import (
     RationalPlant,
 )
 
-__all__ = [
-    "As_json",
-    "Command",
-    "Delay",
-    "File",
-    "Files",
-    "Filter",
-    "Gain",
-    "Kp",
-    "Kv",
-    "Lag",
-    "Limit",
-    "Output",
-    "Plant",
-    "Plot",
-    "Reference",
-    "Sample_time",
-    "Time",
-    "Window",
-    "check_duration",
-    "described_loop",
-    "pv_loop",
-]
-
 
 def _drawn_later(path: Path | None) -> Path | None:
     """Refuse a picture that cannot be written before the work for it begins."""
@@ -53,6 +29,9 @@ def _drawn_later(path: Path | None) -> Path | None:
         check_picture(path)
     return path
 
+
+#: The ends of a range.
+Ends = tuple[float, float]
 
 File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
 Files = Annotated[
@@ -63,9 +42,7 @@ Time = Annotated[str, typer.Option(help="Column of the time stamps, s.")]
 Reference = Annotated[str, typer.Option(help="Column of the reference.")]
 Output = Annotated[str, typer.Option(help="Column of the measured output.")]
 Command = Annotated[str | None, typer.Option(help="Column of the command, if it was logged.")]
-Window = Annotated[
-    tuple[float, float] | None, typer.Option(help="Use the samples between these times, s.")
-]
+Window = Annotated[Ends | None, typer.Option(help="Use the samples between these times, s.")]
 Kp = Annotated[float, typer.Option(help="Proportional gain.", show_default=False)]
 Kv = Annotated[float, typer.Option(help="Velocity gain.")]
 Delay = Annotated[float, typer.Option(help="Delay of the loop, s.", show_default=False)]
@@ -102,10 +79,10 @@ SHORT_TIMES = ("delay", "lag", "sample_time")
 def described_loop(
     kp: float,
     kv: float = 0.0,
-    *,
     delay: float | None = None,
     gain: float = 1.0,
     lag: float = 0.0,
+    *,
     sample_time: float | None = None,
     limit: float | None = None,
     corner: float | None = None,
@@ -150,26 +127,3 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
                 f"{name} is {length:g} s, less than a millionth of the {duration:g} s to simulate: "
                 "that takes too long; leave such a time out, or shorten the simulation"
             )
-
-
-def pv_loop(
-    delay: float | None,
-    gain: float,
-    lag: float,
-    sample_time: float | None,
-    limit: float | None,
-    corner: float | None,
-    plant: str | None = None,
-) -> ControlLoop:
-    """The loop of a PV controller with any gains: they are to be varied."""
-    return described_loop(
-        1.0,
-        0.1,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        limit=limit,
-        corner=corner,
-        plant=plant,
-    )

@@ -7,11 +7,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Timer
 
 from deadtime._base.errors import LinkError
-
-__all__ = ["own_emulator"]
+from deadtime.links.parent_watch import first_line
 
 #: Longest time to start, and to end after a request, s.
 STARTING, ENDING = 30.0, 3.0
@@ -49,13 +47,7 @@ def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
 
 
 def _ports(process: subprocess.Popen[str]) -> tuple[int, int, int]:
-    assert process.stdout is not None
-    late = Timer(STARTING, process.kill)
-    late.start()
-    try:
-        line = process.stdout.readline()
-    finally:
-        late.cancel()
+    line = first_line(process, STARTING)
     try:
         ports = json.loads(line)
         return int(ports["navdata_port"]), int(ports["command_port"]), int(ports["control_port"])

@@ -15,8 +15,6 @@ from typing import Any
 from deadtime.roots import QuasiPolynomial, delay, s
 from deadtime.systems import TransferFunction
 
-__all__ = ["plant_from"]
-
 #: Longest text, and highest power of an expression with s in it: they bound time and memory.
 _LONGEST = 500
 _HIGHEST = 30

@@ -7,8 +7,6 @@ import io
 import sys
 import unicodedata
 
-__all__ = ["make_readable", "shows"]
-
 #: Replacements of characters for which `_spelled` has no rule, or a longer one.
 INSTEAD = {
     "−": "-", "–": "-", "—": "-", "×": "x", "·": "*", "•": "*", "≤": "<=", "≥": ">=", "≈": "~",

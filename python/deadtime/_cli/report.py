@@ -9,15 +9,13 @@ import typer
 
 from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, print_json, stages
+from deadtime._cli.show import print_json, print_text, stages
 from deadtime.recordings import read_recording
 from deadtime.reports import study
 from deadtime.reports._page import write_report
 
-__all__ = ["report_recording"]
 
-
-def report_recording(
+def command(
     file: opt.File,
     kp: opt.Kp,
     time: opt.Time = "time",
@@ -42,5 +40,5 @@ def report_recording(
     if as_json:
         print_json({"verdict": found.verdict(), "report": out, "gains": found.designed.gains})
         return
-    console.print(found.verdict(), highlight=False, markup=False)
-    console.print(f"report: {out}", highlight=False, markup=False)
+    print_text(found.verdict())
+    print_text(f"report: {out}")

@@ -6,16 +6,20 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich import box
-from rich.table import Table
 
 from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, print_json, print_table, save_figure, stages
-from deadtime.paper import PARTS, TITLES, Grid, Part, Verdict, reproduce
-from deadtime.paper._page import write_reproduction
-
-__all__ = ["reproduce_paper"]
+from deadtime._cli.show import (
+    print_json,
+    print_points,
+    print_table,
+    print_text,
+    results_table,
+    save_figure,
+    stages,
+)
+from deadtime.paper import PARTS, TITLES, Part, Verdict, reproduce
+from deadtime.paper._page import HEADS, write_reproduction
 
 STYLES = {
     Verdict.EXACT: "green",
@@ -30,7 +34,7 @@ STYLES = {
 SETTLED = (Verdict.EXACT, Verdict.MEASURED)
 
 
-def reproduce_paper(
+def command(
     out: Annotated[Path, typer.Option(help="Folder for the figures and the page.")] = Path(
         "reproduction"
     ),
@@ -63,34 +67,27 @@ def reproduce_paper(
         return
     for name, part in found.parts.items():
         _show(TITLES[name], part)
-    console.print(found.summary(), highlight=False, markup=False, style="bold")
-    console.print(f"figures: {out}, page: {written}", highlight=False, markup=False)
+    print_text(found.summary(), "bold")
+    print_text(f"figures: {out}, page: {written}")
 
 
 def _show(title: str, part: Part) -> None:
-    console.print(title, highlight=False, markup=False, style="bold")
+    print_text(title, "bold")
     if part.comparisons:
-        table = Table(box=box.SIMPLE_HEAD)
-        for head in ("where", "what", "printed", "ours", "verdict"):
-            table.add_column(head, justify="right" if head in ("printed", "ours") else "left")
-        for one in part.comparisons:
-            verdict = f"[{STYLES[one.verdict]}]{one.outcome}[/]"
-            table.add_row(one.where, one.quantity, one.printed, one.shown, verdict)
-        print_table(table)
+        rows = [
+            (
+                one.where,
+                one.quantity,
+                one.printed,
+                one.shown,
+                f"[{STYLES[one.verdict]}]{one.outcome}[/]",
+            )
+            for one in part.comparisons
+        ]
+        print_table(results_table(HEADS[:5], rows, left=("where", "what", "verdict")))
     for grid in part.grids():
-        print_table(_table(grid))
+        print_table(results_table(grid.heads, grid.rows, grid.title, grid.heads[:1]))
     unsettled = [one for one in part.comparisons if one.note and one.verdict not in SETTLED]
-    for one in unsettled:
-        console.print(f"• {one.quantity}: {one.note}", highlight=False, markup=False)
-    for sentence in part.findings():
-        console.print(f"• {sentence}", highlight=False, markup=False)
-    console.print()
-
-
-def _table(grid: Grid) -> Table:
-    table = Table(title=grid.title, title_justify="left", box=box.SIMPLE_HEAD)
-    for index, head in enumerate(grid.heads):
-        table.add_column(head, justify="right" if index else "left")
-    for row in grid.rows:
-        table.add_row(*row)
-    return table
+    print_points(f"{one.quantity}: {one.note}" for one in unsettled)
+    print_points(part.findings())
+    print_text("")

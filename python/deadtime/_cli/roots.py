@@ -7,23 +7,18 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich import box
-from rich.table import Table
 
 from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, print_json, print_table, save_figure
+from deadtime._cli.show import print_json, print_table, print_text, results_table, save_figure
 from deadtime._cli.verdicts import listed, verdict
-from deadtime.roots import RootSet
 from deadtime.roots._plots import plot_root_set
 from deadtime.roots.certificate._plots import plot_certificate
 
-__all__ = ["list_roots"]
-
-Ends = tuple[float, float]
+HEADS = ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius")
 
 
-def list_roots(
+def command(
     kp: opt.Kp,
     delay: opt.Delay,
     kv: opt.Kv = 0.0,
@@ -32,8 +27,8 @@ def list_roots(
     lag: opt.Lag = 0.0,
     sample_time: opt.Sample_time = None,
     filter: opt.Filter = None,  # noqa: A002
-    re: Annotated[Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
-    im: Annotated[Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
+    re: Annotated[opt.Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
+    im: Annotated[opt.Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
     rightmost: Annotated[
         int, typer.Option(min=1, help="At most how many of those with Im s >= 0, without a region.")
     ] = 3,
@@ -46,14 +41,7 @@ def list_roots(
 ) -> None:
     """Characteristic roots of a loop: the rightmost ones, or all in a region."""
     loop = opt.described_loop(
-        kp,
-        kv,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        corner=filter,
-        plant=plant,
+        kp, kv, delay, gain, lag, sample_time=sample_time, corner=filter, plant=plant
     )
     if (re is None) != (im is None):
         raise ValueError("a region needs both --re and --im")
@@ -86,19 +74,14 @@ def list_roots(
             }
         )
         return
-    print_table(_roots_table(found))
-    console.print(listed(found, rightmost if re is None else None, chain), highlight=False)
+    rows = [
+        (f"{root.real:.10g}", f"{root.imag:.10g}", str(multiplicity), f"{radius:.1e}")
+        for root, multiplicity, radius in zip(
+            found.roots, found.multiplicities, found.radii, strict=True
+        )
+    ]
+    print_table(results_table(HEADS, rows))
+    print_text(listed(found, rightmost if re is None else None, chain))
     if np.isfinite(chain):
-        console.print(f"neutral: a chain of roots approaches Re s = {chain:.6g}", highlight=False)
-    console.print(verdict(loop), highlight=False)
-
-
-def _roots_table(found: RootSet) -> Table:
-    table = Table(box=box.SIMPLE_HEAD)
-    for head in ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius"):
-        table.add_column(head, justify="right")
-    for root, multiplicity, radius in zip(
-        found.roots, found.multiplicities, found.radii, strict=True
-    ):
-        table.add_row(f"{root.real:.10g}", f"{root.imag:.10g}", str(multiplicity), f"{radius:.1e}")
-    return table
+        print_text(f"neutral: a chain of roots approaches Re s = {chain:.6g}")
+    print_text(verdict(loop))

@@ -3,33 +3,22 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from deadtime._base.drawing import check_matplotlib
+from deadtime._base.plain import plain
 from deadtime._cli.readable import shows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = [
-    "check_picture",
-    "console",
-    "counted",
-    "plain",
-    "print_json",
-    "print_table",
-    "save_figure",
-    "stages",
-]
 
 console = Console()
 PICTURES = (".png", ".svg", ".pdf")
@@ -41,29 +30,38 @@ def print_json(found: Mapping[str, Any]) -> None:
     print(text if shows(text) else json.dumps(json.loads(text), indent=2))
 
 
-def plain(value: Any) -> Any:
-    """Convert to types of JSON; numbers that are not finite become None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
-    if isinstance(value, complex):
-        return {"re": plain(value.real), "im": plain(value.imag)}
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Path):
-        return str(value)
-    return value
-
-
 def print_table(table: Table) -> None:
     """Print a table in its full width, so that a narrow terminal does not cut digits off."""
     needed = Console(width=1000).measure(table).maximum
     Console(width=max(console.width, needed)).print(table, soft_wrap=True)
+
+
+def results_table(
+    heads: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    title: str | None = None,
+    left: Sequence[str] = (),
+) -> Table:
+    """A table of text; the columns of `left` are adjusted to the left, the others to the right."""
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for head in heads:
+        table.add_column(head, justify="left" if head in left else "right")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def print_text(
+    text: str, style: str | None = None, wrapped: bool = True, on: Console = console
+) -> None:
+    """Print a text as it is: nothing in it is markup or highlighted."""
+    on.print(text, style=style, highlight=False, markup=False, soft_wrap=not wrapped)
+
+
+def print_points(sentences: Iterable[str]) -> None:
+    """Print sentences as a list."""
+    for sentence in sentences:
+        print_text(f"• {sentence}")
 
 
 def check_picture(path: Path) -> None:

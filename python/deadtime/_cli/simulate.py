@@ -11,17 +11,15 @@ import typer
 
 from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, print_json, save_figure
+from deadtime._cli.show import print_json, print_text, save_figure
 from deadtime._cli.verdicts import verdict
 from deadtime.systems._plots import plot_responses
-
-__all__ = ["simulate_step"]
 
 #: Metrics that a step response has also without a steady state.
 PEAK = ("peak", "peak_time")
 
 
-def simulate_step(
+def command(
     kp: opt.Kp,
     delay: opt.Delay,
     kv: opt.Kv = 0.0,
@@ -42,15 +40,7 @@ def simulate_step(
 ) -> None:
     """Simulate the step response of a loop, exactly."""
     loop = opt.described_loop(
-        kp,
-        kv,
-        delay=delay,
-        gain=gain,
-        lag=lag,
-        sample_time=sample_time,
-        limit=limit,
-        corner=filter,
-        plant=plant,
+        kp, kv, delay, gain, lag, sample_time=sample_time, limit=limit, corner=filter, plant=plant
     )
     opt.check_duration(loop, duration)
     time = np.linspace(0.0, duration, points)
@@ -89,8 +79,8 @@ def simulate_step(
         )
         return
     limited = " (without the limit on its command)" if limit is not None else ""
-    console.print(f"the loop{limited} is {verdict(loop)}", highlight=False)
+    print_text(f"the loop{limited} is {verdict(loop)}")
     for name, value in figures.items():
         if stable or name in PEAK:
             shown = f"{value:.6g}" if np.isfinite(value) else "not within the time simulated"
-            console.print(f"{name.replace('_', ' '):<20}{shown}", highlight=False)
+            print_text(f"{name.replace('_', ' '):<20}{shown}")

@@ -7,8 +7,6 @@ import math
 from deadtime.loops import ControlLoop
 from deadtime.roots import RootSet
 
-__all__ = ["listed", "verdict"]
-
 
 def verdict(loop: ControlLoop) -> str:
     """Stable; unstable, with the root or chain of roots that proves it; or neither is proved."""

@@ -6,8 +6,6 @@ import ctypes
 from _ctypes import CFuncPtr
 from typing import Any
 
-__all__ = ["addresses"]
-
 _SIGNATURE = "void (double, double *, double *, double *, double *, void *)"
 _NUMBERS = 4  # pointers to doubles between the time and the user data
 

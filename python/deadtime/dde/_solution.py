@@ -12,8 +12,6 @@ from deadtime._base.frozen import ReadOnlyArrays, equal
 from deadtime._base.validation import real_array
 from deadtime._deadtime import DelayPieces
 
-__all__ = ["DelayResult", "DelaySolution"]
-
 Array = NDArray[np.float64]
 
 

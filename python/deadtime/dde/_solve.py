@@ -14,8 +14,6 @@ from deadtime._base.validation import finite, positive, real_array, whole_number
 from deadtime.dde._compiled import addresses
 from deadtime.dde._solution import DelayResult, DelaySolution
 
-__all__ = ["solve_dde"]
-
 Array = NDArray[np.float64]
 
 _METHODS = ("auto", "spectral")

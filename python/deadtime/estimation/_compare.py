@@ -10,20 +10,17 @@ from typing import get_args
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import OpenRange
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import check_setpoint_active, independent_samples
-from deadtime.estimation.data._runs import paired_runs
+from deadtime.estimation.data._checks import check_setpoint_active, independent_samples
 from deadtime.estimation.methods._decay import Decay
 from deadtime.estimation.methods._decrement import Decrement
-from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._method import Method, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
 from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-__all__ = ["Comparison", "compare_methods"]
 
 #: Headings of the columns of `Comparison.rows`.
 COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
@@ -31,16 +28,11 @@ COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s",
 #: Largest relative difference of two delays that agree.
 AGREEMENT = 0.03
 
+#: Names of the overshoot methods; the others are called by their own.
 LABELS = {
     "dominant": "paper's overshoot",
     "exact": "exact overshoot",
     "saturated": "overshoot with limit",
-    "decrement": "decrement",
-    "decay": "decay",
-    "waveform": "waveform",
-    "waveform with lag": "waveform with lag",
-    "output_error": "output error",
-    "output_error with lag": "output error with lag",
 }
 
 #: Names of the fits of all samples within a sentence.
@@ -95,7 +87,7 @@ class Comparison:
         """The estimates for one plot, by their labels in its legend."""
         names = ("dominant", self.trusted, f"{self.trusted} with lag")
         return {
-            f"{LABELS[name]}: {self.estimates[name].delay:.3f} s": self.estimates[name]
+            f"{_label(name)}: {self.estimates[name].delay:.3f} s": self.estimates[name]
             for name in names
             if name in self.estimates
         }
@@ -114,7 +106,7 @@ class Comparison:
                 total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
             rows.append(
                 [
-                    LABELS[name],
+                    _label(name),
                     f"{fit.delay:.3f}",
                     interval,
                     _number(fit.gain, "gain" in fit.free),
@@ -123,7 +115,7 @@ class Comparison:
                     "yes" if fit.adequate else "no",
                 ]
             )
-        rows += [[LABELS[name], f"refused: {why}"] for name, why in self.refusals.items()]
+        rows += [[_label(name), f"refused: {why}"] for name, why in self.refusals.items()]
         return rows
 
     def explanation(self) -> list[str]:
@@ -166,6 +158,10 @@ def truth_row(numbers: Mapping[str, float]) -> list[str]:
     ]
 
 
+def _label(name: str) -> str:
+    return LABELS.get(name, name.replace("_", " "))
+
+
 def _number(value: float | None, fitted: bool) -> str:
     if value is None:
         return "–"
@@ -188,13 +184,13 @@ def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: s
         return sentences
     low, high = plain.ci(0.95, "gain")
     if not low <= assumed <= high:
-        weaker = "weaker" if gain < assumed else "stronger"
-        less = "less" if gain < assumed else "more"
-        short = "too short" if gain < assumed else "too long"
+        weaker, less, short = (
+            ("weaker", "less", "short") if gain < assumed else ("stronger", "more", "long")
+        )
         sentences.append(
             f"The gain is not {assumed:g}, as the overshoot method assumes, but {gain:.3f} "
             f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the "
-            f"estimated delay is {short}. With this gain the same overshoot would mean "
+            f"estimated delay is too {short}. With this gain the same overshoot would mean "
             f"{dominant.delay * assumed / gain:.3f} s."
         )
     return sentences

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import check_setpoint_active
-from deadtime.estimation.data._runs import Loops, Recordings, Windows, paired_runs
+from deadtime.estimation.data._checks import check_setpoint_active
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay
@@ -15,14 +14,12 @@ from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._gcc import GCC
 from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._grid import Grid
-from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._method import Loops, Method, Recordings, Windows, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot
 from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._waveform import Waveform
 from deadtime.recordings import Recording
-
-__all__ = ["JOINT", "METHODS", "automatic_method", "estimate_delay", "method_of"]
 
 #: The methods by name.
 METHODS: Mapping[str, type[Method]] = {

@@ -1,9 +1,11 @@
-"""Plots of fits. Matplotlib is imported when something is drawn."""
+"""Plots of fits and of planned experiments. Matplotlib is imported when something is drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from deadtime._base.drawing import COLOURS, DATA, REFERENCE, bare_axes, check_matplotlib
 from deadtime.estimation._result import DelayEstimate, FittedRun
@@ -13,16 +15,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from deadtime.estimation.planning._identifiability import Identifiability
+    from deadtime.estimation.planning._planned_bound import PlannedBound
 
-__all__ = ["estimate_axes", "plot_estimate", "plot_fits", "shown_figure"]
+#: Half axis of the ellipse that holds 95 % of two Gaussian errors, in standard deviations.
+TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
 
 
 def plot_fits(
     ax: Axes, recording: Recording, fits: Mapping[str, DelayEstimate], unit: str = "m"
 ) -> Axes:
     """Draw the recorded output with the fitted ones over it."""
-    ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
-    ax.plot(recording.time, recording.output, label="recorded", **DATA)
+    _draw_recorded(ax, recording)
     for colour, (label, fit) in zip(COLOURS, fits.items(), strict=False):
         window = fit.recording
         ax.plot(window.time, window.output - fit.residuals, color=colour, lw=1.6, label=label)
@@ -74,14 +78,18 @@ def shown_figure(width: float, height: float) -> Figure:
     return pyplot.figure(figsize=(width, height), layout="constrained")
 
 
+def _draw_recorded(ax: Axes, recording: Recording) -> None:
+    ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
+    ax.plot(recording.time, recording.output, label="recorded", **DATA)
+
+
 def _has_profile(fit: DelayEstimate) -> bool:
     return fit.has_profile and "delay" in fit.stderr
 
 
 def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
     recording = run.recording
-    upper.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
-    upper.plot(recording.time, recording.output, label="recorded", **DATA)
+    _draw_recorded(upper, recording)
     fitted = recording.output - run.residuals
     upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
     lower.plot(recording.time, run.residuals, **DATA)
@@ -99,3 +107,92 @@ def _plot_profile(ax: Axes, fit: DelayEstimate) -> None:
     ax.axhline(1.96, color="0.6", lw=0.8, ls=":")
     ax.set(xlabel="delay / s", ylabel="t", ylim=(0.0, None), title="profile, and 95 % interval")
     ax.title.set_fontsize("small")
+
+
+def plot_identifiability(plan: Identifiability, axes: Sequence[Axes] | None = None) -> list[Axes]:
+    """The expected recording, its sensitivities; delay against lag where both are free."""
+    both = plan.correlation is not None
+    axes = _new_axes(both) if axes is None else list(axes)
+    if len(axes) != 2 + both:
+        raise ValueError(f"ax holds {len(axes)} axes: give {2 + both}")
+    for one in axes:
+        bare_axes(one)
+    _draw_recording(axes[0], plan)
+    _draw_slopes(axes[1], plan)
+    if both:
+        _draw_ellipse(axes[2], plan)
+    return axes
+
+
+def _new_axes(both: bool) -> list[Axes]:
+    figure = shown_figure(10.0 if both else 7.0, 5.0)
+    grid = figure.add_gridspec(2, 1 + both, width_ratios=[3.0, 2.0][: 1 + both])
+    upper = figure.add_subplot(grid[0, 0])
+    axes = [upper, figure.add_subplot(grid[1, 0], sharex=upper)]
+    return [*axes, figure.add_subplot(grid[:, 1])] if both else axes
+
+
+def _draw_recording(ax: Axes, plan: Identifiability) -> None:
+    recording = plan.recording
+    assert recording.command is not None
+    ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
+    ax.plot(recording.time, recording.output, color="0.15", lw=1.4, label="output")
+    held: Literal["post", "mid"] = "post" if plan.loop.is_sampled else "mid"
+    ax.step(recording.time, recording.command, where=held, color="0.6", lw=0.8, label="command")
+    _legend_above(ax, f"{plan.experiment.name}, noise {plan.noise:g}:")
+    ax.tick_params(labelbottom=False)
+
+
+def _draw_slopes(ax: Axes, plan: Identifiability) -> None:
+    """Effect of an error as large as the bound; similar curves are hard to tell apart."""
+    bound = plan.bound
+    for name, colour in zip(plan.free, COLOURS, strict=False):
+        moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise
+        ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
+    ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the noise")
+    _legend_above(ax, "for one standard error of")
+
+
+def _legend_above(ax: Axes, title: str) -> None:
+    ax.legend(
+        title=title,
+        ncols=3,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        frameon=False,
+        fontsize="small",
+    )
+
+
+def _with_error(bound: PlannedBound, name: str) -> str:
+    error = bound.stderr[name]
+    return f"{name} ({error:.2g})" if name == "gain" else f"{name} ({1e3 * error:.2g} ms)"
+
+
+def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
+    """Region of 95 % of the estimates of an efficient method; neither can be below zero."""
+    slow = next(name for name in plan.free if name not in ("delay", "gain"))
+    centre = np.array([plan.loop.parameters["delay"], plan.loop.parameters[slow]])
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    bounds = (("command logged", plan.command_logged), ("reference only", plan.reference_only))
+    for (label, bound), colour in zip(bounds, COLOURS, strict=False):
+        if bound is None:
+            continue
+        places = [bound.free.index("delay"), bound.free.index(slow)]
+        root = np.linalg.cholesky(bound.cov[np.ix_(places, places)])
+        x, y = 1e3 * (centre[:, None] + TWO_DIMENSIONS * root @ circle)
+        ax.plot(x, y, color=colour, lw=1.3, label=label)
+    low, high = ax.get_ylim()
+    if low < 0.0:
+        ax.axhspan(low, 0.0, color="0.9", zorder=0)
+        ax.set_ylim(low, high)
+    ax.plot(*(1e3 * centre), "k+")
+    name = slow.replace("_", " ")
+    ax.set(xlabel="delay (ms)", ylabel=f"{name} (ms)")
+    error = 1e3 * plan.bound.stderr[f"delay+{slow}"]
+    ax.set_title(
+        f"95 % of the estimates\ndelay + {name} ± {error:.2g} ms",
+        fontsize="medium",
+    )
+    ax.legend(fontsize="small")

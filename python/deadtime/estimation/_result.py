@@ -20,8 +20,6 @@ from deadtime.recordings import Recording
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["CramerRaoBound", "DelayEstimate", "FittedRun"]
-
 Array = NDArray[np.float64]
 
 #: Quantities that are not times; a limit has the unit of the command.
@@ -259,7 +257,9 @@ class DelayEstimate(ReadOnlyArrays):
             "lag": self.lag,
             "delay_plus_lag": self.delay_plus_lag,
             "free": list(self.free),
-            "stderr": {name: _plain(value) for name, value in self.stderr.items()},
+            "stderr": {
+                name: value if math.isfinite(value) else None for name, value in self.stderr.items()
+            },
             "interval_95": (
                 {name: list(self.ci(0.95, name)) for name in self.stderr}
                 if self.calibrated
@@ -334,7 +334,3 @@ class DelayEstimate(ReadOnlyArrays):
             f"<DelayEstimate {self.method}: delay {self.delay:.4g}{spread} s, "
             f"adequate: {self.adequate}>"
         )
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None

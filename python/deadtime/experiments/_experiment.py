@@ -18,8 +18,7 @@ from deadtime._base.validation import (
     positive,
     whole_number,
 )
-from deadtime.experiments._noise import Noise, Seed, noise_model
-from deadtime.experiments._noise_in_loop import reference_shift
+from deadtime.experiments._noise import Noise, Seed, noise_model, reference_shift
 from deadtime.experiments._waves import (
     ON_A_SAMPLE,
     binary_sequence,
@@ -32,8 +31,6 @@ from deadtime.experiments._waves import (
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
 from deadtime.recordings._recording import MINIMUM_SAMPLES
-
-__all__ = ["Experiment"]
 
 Array = NDArray[np.float64]
 
@@ -110,12 +107,11 @@ class Experiment(ReadOnlyArrays):
         if not np.isfinite(reference).all():
             wrong = reference[~np.isfinite(reference)][0]
             raise ValueError(f"reference holds {wrong}: give finite values")
-        object.__setattr__(self, "time", read_only(time))
-        object.__setattr__(self, "reference", read_only(reference))
-        for label, value in (("relay_amplitude", relay_amplitude), ("period", period)):
-            checked = None if value is None else positive(label, value)
-            object.__setattr__(self, label, checked)
-        object.__setattr__(self, "name", name)
+        held = {"time": read_only(time), "reference": read_only(reference), "name": name}
+        for label, number in (("relay_amplitude", relay_amplitude), ("period", period)):
+            held[label] = None if number is None else positive(label, number)
+        for label, value in held.items():
+            object.__setattr__(self, label, value)
 
     def __len__(self) -> int:
         return int(self.time.size)

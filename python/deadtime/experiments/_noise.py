@@ -1,4 +1,10 @@
-"""Measurement noise of a simulated run: white by a number, or a model."""
+"""Measurement noise of a simulated run: white by a number, or a model; its effect in the loop.
+
+Where a controller acts on the error r - y alone, noise on the output is noise on the reference
+with the other sign, limit and hold included. Where it differentiates the output alone, as PV
+does, the noise goes through the filter of the derivative as well: u = Kp (r - y - n) - Kv H (y + n)
+is what it makes of y under the reference r - n - (Kv/Kp) H n, computed exactly on the samples.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import non_negative
-
-__all__ = ["Noise", "NoiseModel", "Seed", "WhiteNoise", "noise_model"]
+from deadtime.loops import PV, ControlLoop, DerivativeFilter
+from deadtime.loops._derivative_filter import discretised
 
 Array = NDArray[np.float64]
 Seed: TypeAlias = int | np.random.SeedSequence
@@ -61,3 +67,50 @@ Noise: TypeAlias = float | NoiseModel
 def noise_model(noise: Noise) -> NoiseModel:
     """The model itself; white noise for a number."""
     return noise if isinstance(noise, NoiseModel) else WhiteNoise(non_negative("noise", noise))
+
+
+def reference_shift(error: Array, loop: ControlLoop) -> Array:
+    """What the reference has to be lowered by to have the effect of noise on the output."""
+    controller = loop.controller
+    gains, smooth = controller.gains, controller._filter
+    slope = gains.get("Kd", gains.get("Kv", 0.0))
+    if slope == 0.0:
+        return error
+    if smooth is None:
+        raise ValueError(
+            "noise has no ideal derivative: give the controller a DerivativeFilter, or keep the "
+            "noise out of the loop (noise_in_loop=False)"
+        )
+    if not isinstance(controller, PV):
+        return error
+    if loop.sample_time is None:
+        raise ValueError(
+            "noise through the filter of a PV controller is computed on samples: give the loop a "
+            "sample_time, or keep the noise out of the loop (noise_in_loop=False)"
+        )
+    if controller.Kp == 0.0:
+        raise ValueError(
+            "Kp=0: the reference does not enter, so noise cannot be added to it; give a Kp other "
+            "than zero, or keep the noise out of the loop (noise_in_loop=False)"
+        )
+    return error + slope / controller.Kp * _derivative(error, smooth, loop.sample_time)
+
+
+def _derivative(error: Array, smooth: DerivativeFilter, sample_time: float) -> Array:
+    """The filtered derivative of noise at the samples.
+
+    The noise is held from sample to sample, for which the hold discretisation of a continuous
+    filter is exact.
+    """
+    from scipy import signal
+
+    omega, damping = smooth.omega, smooth.damping
+    found = discretised(
+        np.array([[0.0, omega], [-omega, -2.0 * damping * omega]]),
+        np.array([0.0, omega]),
+        np.array([0.0, omega]),
+        sample_time,
+        smooth.discretisation or "hold",
+    )
+    num, den = signal.ss2tf(found.F, found.G[:, None], found.C[None, :], np.array([[found.D]]))
+    return np.asarray(signal.lfilter(num[0], den, error), dtype=np.float64)

@@ -16,16 +16,6 @@ from numpy.typing import NDArray
 from deadtime._base.validation import positive, whole_number
 from deadtime.recordings._recording import MINIMUM_SAMPLES
 
-__all__ = [
-    "ON_A_SAMPLE",
-    "binary_sequence",
-    "excited_lines",
-    "hold_numbers",
-    "multisine",
-    "sample_times",
-    "whole_period",
-]
-
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 

@@ -29,19 +29,16 @@ from deadtime.loops import PV, P
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.recordings import read_recording
 
-__all__ = ["Connect", "FlightPlan", "PassesMessages", "fly_all", "fly_experiment"]
-
 Connect: TypeAlias = Callable[[], AbstractAsyncContextManager[Vehicle]]
 
-#: Columns of a file with every message of the vehicle.
-MESSAGE = (
-    "time_s",
-    "vehicle_time_s",
-    "sequence",
-    "height_m",
-    "climb_m_s",
-    "climb_setpoint_m_s",
-)
+#: Columns of a file with every message of the vehicle after its time, and their `VehicleState`.
+MESSAGE = {
+    "vehicle_time_s": "vehicle_time",
+    "sequence": "sequence",
+    "height_m": "height",
+    "climb_m_s": "climb",
+    "climb_setpoint_m_s": "climb_setpoint",
+}
 
 
 #: Smallest step, m: several times the noise of the height.
@@ -279,7 +276,9 @@ async def _fly_one(
     messages = None
     if isinstance(vehicle, PassesMessages):
         messages = path.with_suffix(".messages.csv")
-        _keep_messages(vehicle, journals.enter_context(Journal(messages, MESSAGE)), begin)
+        _keep_messages(
+            vehicle, journals.enter_context(Journal(messages, ("time_s", *MESSAGE))), begin
+        )
     try:
         await fly_steps(vehicle, control, plan.programme(hold), plan.limits, journal, begin)
     finally:
@@ -293,15 +292,7 @@ def _keep_messages(vehicle: PassesMessages, journal: Journal, begin: float) -> N
     """Save every further message."""
 
     def save(state: VehicleState) -> None:
-        journal.write(
-            (
-                state.time - begin,
-                state.vehicle_time,
-                state.sequence,
-                state.height,
-                state.climb,
-                state.climb_setpoint,
-            )
-        )
+        reported = (getattr(state, name) for name in MESSAGE.values())
+        journal.write((state.time - begin, *reported))
 
     vehicle.listen(save)

@@ -7,8 +7,6 @@ import numpy as np
 from deadtime.loops import PV, DerivativeFilter, P
 from deadtime.loops._derivative_filter import PAPER_FILTER, discretised
 
-__all__ = ["HeightControl", "Velocity"]
-
 
 class Velocity:
     """Vertical speed from samples of the height: the filtered derivative by the trapezoidal rule.

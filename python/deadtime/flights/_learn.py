@@ -16,8 +16,6 @@ from deadtime.loops import PV, ControlLoop, Integrator, P
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.tuning import Design, design
 
-__all__ = ["COLUMNS", "FlightStudy", "Learned", "learn"]
-
 #: Headings of the columns of `FlightStudy.rows`.
 COLUMNS = (
     "flight",

@@ -10,8 +10,6 @@ from deadtime.flights._learn import COLUMNS, FlightStudy
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
 
-__all__ = ["write_flight_page"]
-
 PARTS = ("what", "s", "95 % interval")
 
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from deadtime.estimation import DelayEstimate
 
-__all__ = ["plot_checked", "plot_learned", "plot_telemetry"]
-
 #: Plotted time before and after a step, s.
 BEFORE, AFTER = 0.5, 4.5
 

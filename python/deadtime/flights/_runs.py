@@ -14,16 +14,6 @@ from numpy.typing import NDArray
 from deadtime.loops import PV, P
 from deadtime.recordings import Recording, Step
 
-__all__ = [
-    "FlownSteps",
-    "LoopTiming",
-    "StepMeasures",
-    "Telemetry",
-    "named",
-    "read_telemetry",
-    "telemetry_of",
-]
-
 Array = NDArray[np.float64]
 
 #: Half width of the settling band of a flown step, as a share of the step, and its least width as a

@@ -24,8 +24,6 @@ from deadtime.flights._runs import Telemetry
 from deadtime.loops import ControlLoop, FirstOrder, Integrator, P
 from deadtime.recordings import Recording
 
-__all__ = ["DelaySplit", "split_delay"]
-
 Array = NDArray[np.float64]
 
 #: Time between used messages, s, while the setpoint is constant: more of them hold no more

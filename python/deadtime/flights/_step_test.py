@@ -16,8 +16,6 @@ from deadtime.links.journal import Journal
 from deadtime.links.safety import Limits, Watch, largest_gain
 from deadtime.links.vehicle import Vehicle
 
-__all__ = ["ROW", "StepProgramme", "check_gain", "fly_steps"]
-
 #: Columns of a recording.
 ROW = (
     "time_s",

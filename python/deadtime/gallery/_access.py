@@ -10,8 +10,6 @@ from types import MappingProxyType
 from deadtime.gallery._entries import ENTRIES
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial
 
-__all__ = ["Problem", "names", "problem", "problems"]
-
 
 @dataclass(frozen=True)
 class Problem:

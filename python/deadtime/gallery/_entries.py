@@ -4,8 +4,6 @@ from typing import Any, Final
 
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, delay, parameters, s
 
-__all__ = ["ENTRIES"]
-
 a, g, kappa1, Kd, Kp, Kv, T, tau, Td, w = parameters("a g kappa1 Kd Kp Kv T tau Td w")
 
 _EIGHT_DELAYS = QuasiPolynomial(
@@ -48,52 +46,25 @@ _ROUTER = QuasiPolynomial(
     ],
     [0.0, 0.246],
 )
-_CAR_RING = QuasiPolynomial(
-    [
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0, 5.0, 0.0],
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 6.400000000000001, 16.0, 10.0, 0.0, 0.0],
-        [
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            5.120000000000001,
-            19.200000000000003,
-            24.000000000000004,
-            10.0,
-            0.0,
-            0.0,
-            0.0,
-        ],
-        [
-            0.0,
-            0.0,
-            2.0480000000000005,
-            10.240000000000002,
-            19.200000000000003,
-            16.0,
-            5.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ],
-        [
-            0.0,
-            2.0480000000000005,
-            5.120000000000001,
-            6.400000000000001,
-            4.0,
-            1.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ],
-    ],
-    [0.0, 0.4, 0.8, 1.2, 1.6, 2.0],
+_CAR_RING = (
+    s**10
+    + (4.0 * s**8 + 5.0 * s**9) * delay(0.4)
+    + (6.400000000000001 * s**6 + 16.0 * s**7 + 10.0 * s**8) * delay(0.8)
+    + s**4
+    * (5.120000000000001 + 19.200000000000003 * s + 24.000000000000004 * s**2 + 10.0 * s**3)
+    * delay(1.2)
+    + s**2
+    * (
+        2.0480000000000005
+        + 10.240000000000002 * s
+        + 19.200000000000003 * s**2
+        + 16.0 * s**3
+        + 5.0 * s**4
+    )
+    * delay(1.6)
+    + s
+    * (2.0480000000000005 + 5.120000000000001 * s + 6.400000000000001 * s**2 + 4.0 * s**3 + s**4)
+    * delay(2.0)
 )
 _SIXFOLD = QuasiPolynomial(
     [
@@ -115,6 +86,20 @@ _TWO_STATES = QuasiPolynomial(
     [[11.0, 6.0, 1.0], [-3.7859999999999987, -1.3299999999999998, 0.0], [0.10041, 0.0, 0.0]],
     [0.0, 1.0, 2.0],
 )
+_QPMR = (
+    'T. Vyhlidal and P. Zitek, "QPmR - Quasi-polynomial root-finder: algorithm update and '
+    'examples", in Delay Systems: From Theory to Numerics and Applications, Springer '
+    "(2014), example "
+)
+_QUADROTOR = (
+    'S. Armah and S. Yi, "Analysis of time delays in quadrotor systems and design of '
+    'control", in Time Delay Systems: Theory, Numerics, Applications, and Experiments, '
+    "Springer (2017)"
+)
+_TDS_CONTROL = (
+    'P. Appeltans and W. Michiels, "Analysis and controller-design of time-delay systems '
+    'using TDS-CONTROL: a tutorial and manual" (2023), example '
+)
 
 
 def _member(family: ParametricQuasiPolynomial | QuasiPolynomial, **values: float) -> dict[str, Any]:
@@ -126,11 +111,7 @@ def _member(family: ParametricQuasiPolynomial | QuasiPolynomial, **values: float
 ENTRIES: Final[dict[str, dict[str, Any]]] = {
     "vyhlidal2014-1": {
         "title": "Integrator with dead time",
-        "reference": (
-            'T. Vyhlidal and P. Zitek, "QPmR - Quasi-polynomial root-finder: algorithm '
-            'update and examples", in Delay Systems: From Theory to Numerics and '
-            "Applications, Springer (2014), example 1"
-        ),
+        "reference": _QPMR + "1",
         "h": s + delay(1.0),
         "base_delay": 1.0,
         "rightmost": complex(-0.31813150520476413, 1.3372357014306895),
@@ -152,11 +133,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
     },
     "vyhlidal2014-3": {
         "title": "Neutral, four delays, degree 4",
-        "reference": (
-            'T. Vyhlidal and P. Zitek, "QPmR - Quasi-polynomial root-finder: algorithm '
-            'update and examples", in Delay Systems: From Theory to Numerics and '
-            "Applications, Springer (2014), example 3"
-        ),
+        "reference": _QPMR + "3",
         "h": _FOUR_DELAYS,
         "base_delay": 0.1,
         "rightmost": complex(0.9100066128666843, 1.5566934977882543),
@@ -165,11 +142,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
     },
     "armah2017": {
         "title": "Height of a quadrotor under proportional control",
-        "reference": (
-            'S. Armah and S. Yi, "Analysis of time delays in quadrotor systems and design '
-            'of control", in Time Delay Systems: Theory, Numerics, Applications, and '
-            "Experiments, Springer (2017)"
-        ),
+        "reference": _QUADROTOR,
         **_member(s + Kp * delay(Td), Kp=2.0, Td=0.36),
         "base_delay": 0.36,
         "rightmost": complex(-1.515361660344816, 3.100547959071834),
@@ -179,11 +152,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
     },
     "armah2017-pv": {
         "title": "Height of a quadrotor under proportional-velocity control",
-        "reference": (
-            'S. Armah and S. Yi, "Analysis of time delays in quadrotor systems and design '
-            'of control", in Time Delay Systems: Theory, Numerics, Applications, and '
-            "Experiments, Springer (2017)"
-        ),
+        "reference": _QUADROTOR,
         **_member(s + (Kp + Kv * s) * delay(Td), Kp=2.0, Kv=0.3, Td=0.36),
         "base_delay": 0.36,
         "rightmost": (-3.3167803221473853 + 0j),
@@ -193,10 +162,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
     },
     "appeltans2023-2.6": {
         "title": "Neutral, stable for its delays but not strongly",
-        "reference": (
-            'P. Appeltans and W. Michiels, "Analysis and controller-design of time-delay '
-            'systems using TDS-CONTROL: a tutorial and manual" (2023), example 2.6'
-        ),
+        "reference": _TDS_CONTROL + "2.6",
         **_member(-0.25 + s + (1 / 3 - 0.75 * s) * delay(1.0) + 0.5 * s * delay(T), T=2.0),
         "base_delay": 1.0,
         "rightmost": None,
@@ -208,10 +174,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
     },
     "appeltans2023-2.9": {
         "title": "Neutral closed loop, three commensurate delays",
-        "reference": (
-            'P. Appeltans and W. Michiels, "Analysis and controller-design of time-delay '
-            'systems using TDS-CONTROL: a tutorial and manual" (2023), example 2.9'
-        ),
+        "reference": _TDS_CONTROL + "2.9",
         "h": _CLOSED_LOOP,
         "base_delay": 1.0,
         "rightmost": complex(-0.28448043673259954, 0.21784497571362862),
@@ -221,10 +184,7 @@ ENTRIES: Final[dict[str, dict[str, Any]]] = {
     },
     "appeltans2023-2.12": {
         "title": "Smith predictor with a wrong delay",
-        "reference": (
-            'P. Appeltans and W. Michiels, "Analysis and controller-design of time-delay '
-            'systems using TDS-CONTROL: a tutorial and manual" (2023), example 2.12'
-        ),
+        "reference": _TDS_CONTROL + "2.12",
         "h": 3.0 + 1.5 * s + (2.0 + 0.5 * s) * delay(1.0) - (2.0 + 0.5 * s) * delay(1.5),
         "base_delay": 0.5,
         "rightmost": complex(-0.31399773579383705, 3.5322397083324475),

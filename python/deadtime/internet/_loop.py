@@ -31,8 +31,6 @@ from deadtime.links.udp import ENDS, Trial, run_processes, run_trial
 from deadtime.loops import ControlLoop, Integrator, P
 from deadtime.recordings import Recording, read_recording
 
-__all__ = ["GAINS", "run_internet_loop"]
-
 #: The gains of the paper's Table 1 whose step responses overshoot, 1/s.
 GAINS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0)
 

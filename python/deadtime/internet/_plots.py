@@ -11,8 +11,7 @@ from deadtime.internet._result import InternetLoop
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_internet_loop"]
-
+#: Name, marker and colour of each method.
 LABELS = {
     "dominant": ("paper's overshoot", "o", COLOURS[1]),
     "exact": ("exact overshoot", "s", COLOURS[3]),

@@ -21,8 +21,6 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.methods._overshoot import dominant_x, exact_x
 from deadtime.links.udp import HeldIntegrator, Trial
 
-__all__ = ["MAPS", "age_error", "answer_times", "interval_of_mean", "replayed_errors"]
-
 Array = NDArray[np.float64]
 
 #: Functions from the overshoot to K·Td, by the names of the replayed methods.
@@ -134,7 +132,7 @@ def _overshoot(trial: Trial, times: Array) -> float:
     hold, then = trial.watchdog, trial.safe
     if holds is not None and holds * trial.sample_time < hold:
         hold, then = holds * trial.sample_time, 0.0
-    under_way: list[tuple[float, int, float]] = []
+    in_transit: list[tuple[float, int, float]] = []
     command, newest, clock, peak = 0.0, -1, 0.0, 0.0
     released = math.inf
     delays = np.resize(times, samples).tolist()
@@ -149,8 +147,8 @@ def _overshoot(trial: Trial, times: Array) -> float:
 
     for number, delay in enumerate(delays):
         now = number * trial.sample_time
-        while under_way and under_way[0][0] <= now:
-            arrival, answered, value = heapq.heappop(under_way)
+        while in_transit and in_transit[0][0] <= now:
+            arrival, answered, value = heapq.heappop(in_transit)
             until(arrival)
             if answered > newest:
                 command, newest, released = value, answered, arrival + hold
@@ -159,5 +157,5 @@ def _overshoot(trial: Trial, times: Array) -> float:
         if math.isfinite(delay):
             requested = trial.gain * (1.0 - plant.output)
             value = max(-trial.limit, min(trial.limit, requested))
-            heapq.heappush(under_way, (now + delay, number, value))
+            heapq.heappush(in_transit, (now + delay, number, value))
     return peak - 1.0

@@ -30,8 +30,6 @@ from deadtime.internet._replay import MAPS, interval_of_mean
 from deadtime.links.udp import Trial
 from deadtime.recordings import Recording
 
-__all__ = ["METHODS", "InternetLoop", "InternetRun", "Spread"]
-
 #: The methods, and whether their delay includes the hold.
 METHODS = {
     "dominant": True,

@@ -7,8 +7,6 @@ import socket
 from contextlib import suppress
 from typing import Any, TypeAlias
 
-__all__ = ["Address", "canonical", "for_socket", "is_loopback"]
-
 Address: TypeAlias = tuple[str, int]
 
 

@@ -11,8 +11,6 @@ import time
 
 from deadtime.links.virtual_time import VirtualTimeLoop
 
-__all__ = ["now"]
-
 
 def _counted() -> float:
     """Time since the machine was started, s, with its sleep where the system counts that."""

@@ -11,10 +11,7 @@ from errno import EEXIST
 from io import FileIO
 from pathlib import Path
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Self
-
-__all__ = ["Journal"]
 
 
 class Journal:
@@ -123,12 +120,7 @@ class Journal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             self.close()
         except OSError as full:

@@ -1,4 +1,4 @@
-"""Notice when the parent process ends: it holds the other end of standard input.
+"""Between a process and the one that started it, which holds the other end of its standard input.
 
 The system closes that end when its holder ends, in whatever way, by ``kill -9`` as well.
 """
@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import asyncio
 import os
+import subprocess
 import sys
 import threading
 from contextlib import suppress
-
-__all__ = ["parent_ended"]
 
 
 def parent_ended() -> asyncio.Event:
@@ -36,3 +35,14 @@ def parent_ended() -> asyncio.Event:
     # A daemon thread, because the input may never end.
     threading.Thread(target=read, daemon=True).start()
     return ended
+
+
+def first_line(process: subprocess.Popen[str], within: float) -> str:
+    """The first line that a process prints; without one within so many seconds it is killed."""
+    assert process.stdout is not None
+    timer = threading.Timer(within, process.kill)  # which ends the read
+    timer.start()
+    try:
+        return process.stdout.readline()
+    finally:
+        timer.cancel()

@@ -16,8 +16,6 @@ from deadtime._base.errors import FlightAbortedError
 from deadtime._base.validation import finite, positive
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["Limits", "UnitCommand", "Watch", "largest_gain"]
-
 
 class UnitCommand(float):
     """A finite number in [-1, 1]: a share of the largest motion of the vehicle.

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
 
-__all__ = ["Vehicle", "VehicleState"]
-
 
 @dataclass(frozen=True)
 class VehicleState:

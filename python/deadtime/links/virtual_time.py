@@ -14,15 +14,13 @@ import math
 import selectors
 from collections.abc import Callable, Coroutine
 from contextvars import Context
-from typing import Any, TypeVar, cast
+from types import SimpleNamespace
+from typing import Any, TypeVar
 
 from deadtime._base.errors import LinkError
-
-__all__ = ["VirtualTimeLoop", "run"]
+from deadtime.links.addresses import Address
 
 T = TypeVar("T")
-
-Address = tuple[str, int]
 
 #: Ports for endpoints that ask for a free one.
 FREE_PORTS = range(49152, 65536)
@@ -49,36 +47,21 @@ def run(main: Coroutine[Any, Any, T]) -> T:
         return runner.run(main)
 
 
-class _Jump(selectors.BaseSelector):
+class _Jump(selectors.DefaultSelector):
     """Advances the clock where a selector would wait; only the waker of the loop is registered."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.time = 0.0
-        self._real = selectors.DefaultSelector()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        ready = self._real.select(0)  # a signal, such as Ctrl-C
+        ready = super().select(0)  # a signal, such as Ctrl-C
         if ready:
             return ready
         if timeout is None:
             raise LinkError("all tasks wait and no event is scheduled: the program would never end")
         self.time += max(timeout, 0.0)
         return []
-
-    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
-        return self._real.register(fileobj, events, data)
-
-    def unregister(self, fileobj: Any) -> selectors.SelectorKey:
-        return self._real.unregister(fileobj)
-
-    def modify(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
-        return self._real.modify(fileobj, events, data)
-
-    def get_map(self) -> Any:
-        return self._real.get_map()
-
-    def close(self) -> None:
-        self._real.close()
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
@@ -219,7 +202,7 @@ class _Stream(asyncio.Transport):
     peer: _Stream | None = None
 
     def __init__(
-        self, loop: VirtualTimeLoop, protocol: asyncio.BaseProtocol, local: Address, remote: Address
+        self, loop: VirtualTimeLoop, protocol: asyncio.Protocol, local: Address, remote: Address
     ) -> None:
         super().__init__({"sockname": local, "peername": remote})
         self._loop, self._protocol = loop, protocol
@@ -231,21 +214,18 @@ class _Stream(asyncio.Transport):
 
     def _receive(self, data: bytes) -> None:
         if not self._closing:
-            cast(asyncio.Protocol, self._protocol).data_received(data)
+            self._protocol.data_received(data)
 
     def _end(self) -> None:
         """The other end sends no more data."""
         if self._closing:
             return
-        if not cast(asyncio.Protocol, self._protocol).eof_received():
+        if not self._protocol.eof_received():
             self.close()
 
     def write_eof(self) -> None:
         if self.peer is not None:
             self._loop.call_soon(self.peer._end)
-
-    def can_write_eof(self) -> bool:
-        return True
 
     def close(self) -> None:
         if not self._closing:
@@ -268,22 +248,6 @@ class _Stream(asyncio.Transport):
     def get_write_buffer_size(self) -> int:
         return 0
 
-    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
-        self._protocol = protocol
-
-    def get_protocol(self) -> asyncio.BaseProtocol:
-        return self._protocol
-
-
-class _Listening:
-    """The socket of a server, for its address."""
-
-    def __init__(self, local: Address) -> None:
-        self._local = local
-
-    def getsockname(self) -> Address:
-        return self._local
-
 
 class _Server(asyncio.AbstractServer):
     """A listener at one address."""
@@ -295,7 +259,7 @@ class _Server(asyncio.AbstractServer):
         local: Address,
     ) -> None:
         self._loop, self.protocol_factory, self._local = loop, protocol_factory, local
-        self.sockets = (_Listening(local),)
+        self.sockets = (SimpleNamespace(getsockname=lambda: local),)
 
     def close(self) -> None:
         self._loop._servers.pop(self._local, None)

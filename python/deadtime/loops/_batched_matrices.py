@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["column", "matrix", "number", "vector", "zeros"]
-
 
 def vector(entries: Sequence[Any]) -> NDArray[Any]:
     """Array of shape (..., n) from n entries that broadcast against one another."""

@@ -1,4 +1,4 @@
-"""Transfer functions of a continuous loop, its limit left out.
+"""Characteristic function and transfer functions of a continuous loop, its limit left out.
 
 With the plant b/a, the feedback F = f/g and the reference path R = r/g of the controller, the loop
 has the characteristic function a g + b f e^(-s delay).
@@ -6,16 +6,13 @@ has the characteristic function a g + b f e^(-s delay).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from deadtime.loops._controllers import Controller
-from deadtime.loops._plants import Plant
-from deadtime.loops._polynomials import in_s
-from deadtime.roots import delay
+from deadtime.loops._plants import Plant, in_s
+from deadtime.roots import Parameter, ParametricQuasiPolynomial, delay
 from deadtime.systems import TransferFunction
-
-__all__ = ["characteristic", "closed_loop", "open_loop", "reference_to_command"]
 
 
 def characteristic(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> Any:
@@ -52,3 +49,35 @@ def reference_to_command(
     _, a = plant._fraction(values)
     num = a * in_s(controller._reference(values)[0])
     return TransferFunction(num, characteristic(plant, controller, values))
+
+
+def family_of_loop(
+    characteristic: Callable[[Mapping[str, Any]], Any],
+    parameters: Mapping[str, float | None],
+    names: Collection[str],
+) -> ParametricQuasiPolynomial:
+    """Return `characteristic` with the parameters `names`; the others keep their values."""
+    values = numbers_of(parameters, names)
+    values |= {name: Parameter(name) for name in names}
+    family = characteristic(values)
+    # Stability need not depend on every number of the loop.
+    idle = tuple(name for name in names if name not in family.names)
+    return ParametricQuasiPolynomial._of((*family.names, *idle), family._terms)
+
+
+def numbers_of(parameters: Mapping[str, float | None], names: Collection[str]) -> dict[str, Any]:
+    """Return the numbers of a loop that stability depends on; `names` must be among them."""
+    values: dict[str, Any] = {**parameters}
+    values.pop("limit", None)
+    unknown = [name for name in names if name not in values and name != "delay"]
+    if unknown:
+        raise ValueError(
+            f"ranges for {', '.join(unknown)}: stability depends on no such number of this loop, "
+            f"but on {', '.join(dict.fromkeys([*values, 'delay']))}"
+        )
+    if "delay" not in values and "delay" not in names:
+        raise ValueError(
+            "the delay of this loop is None: give it a range, or set it with "
+            "loop.replace(delay=...)"
+        )
+    return values

@@ -14,8 +14,6 @@ from deadtime.loops._plants import Plant
 from deadtime.loops._poles import LoopPoles
 from deadtime.loops._specification import LoopSpecification
 
-__all__ = ["ControlLoop"]
-
 
 @dataclass(frozen=True, init=False)
 class ControlLoop(LoopInTime, LoopPoles, LoopGain):
@@ -87,7 +85,7 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain):
         limit: float | None = None,
         delay_path: Literal["command", "measurement"] = "command",
     ) -> None:
-        own, in_series = plant_and_delay(plant)
+        own, in_series = (plant, 0.0) if isinstance(plant, Plant) else plant_and_delay(plant)
         if in_series > 0.0:
             if delay_path == "measurement":
                 raise ValueError(

@@ -15,7 +15,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,12 @@ from deadtime._base.validation import finite
 from deadtime.loops._batched_matrices import matrix, vector
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
 from deadtime.loops._given_plants import transfer_function_of
-from deadtime.loops._polynomials import Polynomial, multiplied, scaled, summed
 from deadtime.systems import TransferFunction
 
-__all__ = ["PD", "PI", "PID", "PV", "Controller", "DerivativeFilter", "P"]
-
 Vector = NDArray[np.float64]
+
+#: Descending coefficients: numbers, arrays of numbers or symbols.
+Polynomial: TypeAlias = list[Any]
 
 
 class ControllerEquations(NamedTuple):
@@ -178,12 +178,12 @@ class Controller(ABC):
             omega, damping = values["omega"], values["damping"]
             rolled_off = [1.0, 2.0 * (damping * omega), omega * omega]
             slope = [omega * omega * d, 0.0]
-        num = scaled(p, multiplied(integral, rolled_off))
+        num = _scaled(p, _multiplied(integral, rolled_off))
         if terms.differentiates:
-            num = summed(num, multiplied(integral, slope))
+            num = _summed(num, _multiplied(integral, slope))
         if terms.integrates:
-            num = summed(num, scaled(i, rolled_off))
-        return num, multiplied(integral, rolled_off)
+            num = _summed(num, _scaled(i, rolled_off))
+        return num, _multiplied(integral, rolled_off)
 
     def _equations(self, values: Mapping[str, Any]) -> ControllerEquations:
         """Equations of the states: integral of the error first, filter after it."""
@@ -446,3 +446,25 @@ class PID(Controller):
             differentiates=True,
             derivative_of_error=True,
         )
+
+
+def _multiplied(p: Polynomial, q: Polynomial) -> Polynomial:
+    """Product of two polynomials."""
+    out: Polynomial = [0.0] * (len(p) + len(q) - 1)
+    for i, a in enumerate(p):
+        for j, b in enumerate(q):
+            out[i + j] = out[i + j] + a * b
+    return out
+
+
+def _summed(p: Polynomial, q: Polynomial) -> Polynomial:
+    """Sum of two polynomials."""
+    if len(p) < len(q):
+        p, q = q, p
+    head = len(p) - len(q)
+    return p[:head] + [a + b for a, b in zip(p[head:], q, strict=True)]
+
+
+def _scaled(factor: Any, p: Polynomial) -> Polynomial:
+    """A polynomial times a number or symbol."""
+    return [factor * a for a in p]

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from deadtime._base.validation import positive
 
-__all__ = ["PAPER_FILTER", "DerivativeFilter", "Discretisation", "SampledFilter", "discretised"]
-
 Vector = NDArray[np.float64]
 
 Discretisation: TypeAlias = Literal["hold", "tustin", "backward"]

@@ -11,12 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.validation import finite, positive
 from deadtime._deadtime import fixed_step_run
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._model import LoopRun, refuse_discretised
+from deadtime.loops._model import LoopRun, reference_jumps, refuse_discretised
 from deadtime.loops._plants import realise
-from deadtime.loops._run import reference_jumps
 from deadtime.systems import Response
-
-__all__ = ["simulate_fixed_step"]
 
 Vector = NDArray[np.float64]
 

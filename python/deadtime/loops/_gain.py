@@ -21,8 +21,6 @@ from deadtime.systems import Margins, TransferFunction
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["LoopGain"]
-
 
 class LoopGain:
     """The loop gain of a `ControlLoop`, which is cut at the command."""

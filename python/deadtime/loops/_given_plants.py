@@ -15,8 +15,6 @@ from deadtime.loops._plants import NO_GAIN, Plant, RationalPlant
 from deadtime.roots import QuasiPolynomial
 from deadtime.systems import DelaySystem, TransferFunction
 
-__all__ = ["PlantWithDelays", "plant_and_delay", "transfer_function_of"]
-
 
 @dataclass(frozen=True)
 class PlantWithDelays(Plant):
@@ -100,8 +98,6 @@ class PlantWithDelays(Plant):
 
 def plant_and_delay(given: object) -> tuple[Plant, float]:
     """Return a plant, and the delay in s that was in series with it."""
-    if isinstance(given, Plant):
-        return given, 0.0
     G = transfer_function_of(given)
     if G is None:
         raise TypeError(

@@ -1,4 +1,8 @@
-"""What a control loop does in time: simulations, step and impulse responses."""
+"""What a control loop does in time: simulations, step and impulse responses.
+
+With the delay in the measurement the true output runs ahead of what the stepper calls y by the
+delay, so outputs are asked for that much later and their breaks are moved back.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from deadtime._base.validation import finite
+from deadtime._base.validation import finite, one_dimensional
+from deadtime._deadtime import on_samples
 from deadtime.loops._characteristic import closed_loop
-from deadtime.loops._run import settled_step, simulate_loop
+from deadtime.loops._model import LoopRun, reference_jumps
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
+from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
+from deadtime.systems._response import until_settled
 
-__all__ = ["LoopInTime"]
+Vector = NDArray[np.float64]
 
 
 class LoopInTime:
@@ -103,7 +110,7 @@ class LoopInTime:
         >>> print(response.sensitivities["delay"])       # before 2 delays: y = Kp (t - delay)
         [ 0.         -1.31       -0.348984]
         """
-        run = simulate_loop if self.specification.plant.is_rational else simulate_with_delays
+        run = _simulated if self.specification.plant.is_rational else simulate_with_delays
         return run(
             self.specification,
             time,
@@ -140,9 +147,13 @@ class LoopInTime:
         """
         if time is not None:
             return self.simulate(time, amplitude)
-        rational = self.specification.plant.is_rational
-        run = settled_step if rational else settled_step_with_delays
-        return run(self.specification, finite("amplitude", amplitude))
+        loop, amplitude = self.specification, finite("amplitude", amplitude)
+        if not loop.plant.is_rational:
+            return settled_step_with_delays(loop, amplitude)
+        longest = loop.known_delay + (loop.sample_time or 0.0)
+        return until_settled(
+            lambda times: _simulated(loop, times, amplitude), loop.model.A, longest
+        )
 
     def impulse_response(self, time: ArrayLike | None = None) -> Response:
         """Response to an impulse of the reference of unit area, from rest at zero.
@@ -185,3 +196,81 @@ class LoopInTime:
         closed = closed_loop(loop.plant, loop.controller, loop.parameters, loop.delay_path)
         found = closed.impulse_response(time)
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
+
+
+def _simulated(
+    loop: LoopSpecification,
+    time: ArrayLike,
+    reference: ArrayLike,
+    *,
+    initial_output: float = 0.0,
+    reference_before: float | None = None,
+    reference_time: ArrayLike | None = None,
+    command_history: ArrayLike = (),
+    sample_phase: float = 0.0,
+    sensitivities: Sequence[str] = (),
+) -> Response:
+    """Check the arguments of `ControlLoop.simulate` and run it."""
+    times = one_dimensional("time", time)
+    if times.size == 0:
+        raise ValueError("time is empty: give at least one output time")
+    initial = finite("initial_output", initial_output)
+    before = initial if reference_before is None else finite("reference_before", reference_before)
+    held: float | Vector
+    past, held_from = before, None
+    if type(reference) is float and reference_time is None:
+        held = last = finite("reference", reference)
+    else:
+        jumps = reference_jumps(times, reference, reference_time, before)
+        held, held_from, last = jumps.values, jumps.times, float(jumps.values[-1])
+        if jumps.times[0] < times[0]:
+            past = jumps.just_before(float(times[0]))
+    history = None
+    if not isinstance(command_history, tuple) or command_history:
+        history = one_dimensional("command_history", command_history)
+    phase = finite("sample_phase", sample_phase)
+    run = LoopRun(*loop.rest_at(initial, past), before, held, held_from, history, phase)
+    # The array belongs to the caller; the response must not change with it.
+    kept = times.copy()
+    found = loop.native.respond(kept, run, loop.output_lead)
+    start = float(kept[0])
+    again = _Again(loop, start, run)
+    response = Response._of_fresh(kept, found, loop.steady_state(last), again)
+    if not sensitivities:
+        return response
+    names = slope_names(loop, sensitivities)
+    slopes, input_slopes = output_and_input_slopes(
+        loop,
+        names,
+        (initial, past),
+        _moved(loop, kept - start, start, phase),
+        _since_start(loop, start, run),
+    )
+    return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
+
+
+def _since_start(loop: LoopSpecification, start: float, run: LoopRun) -> LoopRun:
+    """The run in the clock of the stepper, which is zero at the start."""
+    times = np.array([start]) if run.reference_time is None else run.reference_time
+    since = _moved(loop, times - start, start, run.sample_phase)
+    return run._replace(reference=np.atleast_1d(run.reference), reference_time=since)
+
+
+def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -> Vector:
+    """Times since the start, moved onto the samples they miss by rounding only."""
+    if loop.sample_time is None:
+        return since
+    return on_samples(since, start, loop.sample_time, phase)
+
+
+class _Again:
+    """Output of a run at other times: the run is repeated for them."""
+
+    __slots__ = ("loop", "run", "start")
+
+    def __init__(self, loop: LoopSpecification, start: float, run: LoopRun) -> None:
+        self.loop, self.start, self.run = loop, start, run
+
+    def __call__(self, times: Vector) -> Vector:
+        run = _since_start(self.loop, self.start, self.run)
+        return self.loop.native.outputs(times - self.start + self.loop.output_lead, run)

@@ -12,14 +12,13 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.validation import increasing, real_array
 from deadtime._deadtime import LinearLoop
 from deadtime.loops._batched_matrices import column, number, vector, zeros
 from deadtime.loops._controllers import Controller, FilterUpdate
 from deadtime.loops._plants import Plant, StateSpace, realise, rest
-
-__all__ = ["LoopModel", "LoopRun", "rest_of", "state_at_rest"]
 
 Vector = NDArray[np.float64]
 
@@ -45,6 +44,22 @@ class LoopRun(NamedTuple):
     #: Commands at the samples before the start, the latest one last.
     command_history: Vector | None = None
     sample_phase: float = 0.0
+
+
+class ReferenceJumps(NamedTuple):
+    """A reference that holds `values` from `times` on, and `before` until the first of them."""
+
+    times: Vector
+    values: Vector
+    before: float
+
+    def at(self, times: Vector) -> Vector:
+        place = np.searchsorted(self.times, times, side="right")
+        return np.concatenate([[self.before], self.values])[place]
+
+    def just_before(self, time: float) -> float:
+        """The value from which it jumps, if it does, at `time`."""
+        return float(self.at(np.array([np.nextafter(time, -np.inf)]))[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,3 +219,24 @@ def state_at_rest(
     """
     state, command = rest(*plant._polynomials(values), output, space)
     return np.concatenate([state, controller._rest(values, output, reference, command)]), command
+
+
+def reference_jumps(
+    times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
+) -> ReferenceJumps:
+    """The reference as jumps: one number steps at the first of `times`."""
+    values = real_array("reference", reference)
+    if values.ndim == 0:
+        if reference_time is not None:
+            raise ValueError(
+                f"reference={values} is one number, so reference_time has no meaning: give an "
+                "array of as many values as there are times"
+            )
+        return ReferenceJumps(times[:1], values.reshape(1), before)
+    where = times if reference_time is None else increasing("reference_time", reference_time)
+    if values.shape != where.shape or values.size == 0:
+        raise ValueError(
+            f"reference has shape {values.shape} and its times {where.shape}: give one value for "
+            "each element of reference_time (or of time, without reference_time), at least one"
+        )
+    return ReferenceJumps(where, values, before)

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from deadtime.loops._model import LoopModel, LoopRun
 from deadtime.loops._plants import Plant, realise, rest
 
-__all__ = ["open_response"]
-
 Vector = NDArray[np.float64]
 
 

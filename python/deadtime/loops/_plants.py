@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 
 from deadtime._base.validation import finite, non_negative, non_zero, unmasked
 from deadtime.loops._batched_matrices import matrix, number, vector
-from deadtime.loops._polynomials import in_s
+from deadtime.roots import s
 from deadtime.systems import TransferFunction
-
-__all__ = ["FirstOrder", "Integrator", "Plant", "RationalPlant", "StateSpace", "kit_plant"]
 
 
 class StateSpace(NamedTuple):
@@ -348,3 +346,12 @@ def _coefficients(name: str, given: Sequence[SupportsFloat]) -> tuple[float, ...
     if numbers.size == 0 or not numbers.any():
         raise ValueError(f"{name}={listed}: give at least one coefficient other than zero")
     return tuple(float(c) for c in _trimmed(numbers.tolist()))
+
+
+def in_s(coefficients: Sequence[Any]) -> Any:
+    """The quasi-polynomial, with symbols the family, of these descending coefficients."""
+    total: Any = 0.0 * s
+    for power, c in enumerate(reversed(coefficients)):
+        if not (isinstance(c, float) and c == 0.0):
+            total = total + c * s**power
+    return total

@@ -9,8 +9,8 @@ from typing import SupportsFloat, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.ranges import OpenRange
-from deadtime.loops._family import family_of_loop
+from deadtime._base.validation import OpenRange
+from deadtime.loops._characteristic import family_of_loop
 from deadtime.loops._sampled_regions import sampled_poles_in
 from deadtime.loops._specification import LoopSpecification
 from deadtime.loops._stability import (
@@ -28,8 +28,6 @@ from deadtime.roots import (
     crossings,
 )
 from deadtime.roots.certificate import Certificate
-
-__all__ = ["LoopPoles"]
 
 
 class LoopPoles:

@@ -13,12 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import finite, one_dimensional
 from deadtime.loops._characteristic import closed_loop, reference_to_command
-from deadtime.loops._run import reference_jumps
+from deadtime.loops._model import reference_jumps
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, TransferFunction
 from deadtime.systems._run import respond, step_response
-
-__all__ = ["settled_step_with_delays", "simulate_with_delays"]
 
 Vector = NDArray[np.float64]
 

@@ -26,8 +26,6 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.validation import real_array
 from deadtime.loops._model import LoopModel
 
-__all__ = ["SampledLoopGain"]
-
 Vector = NDArray[np.float64]
 
 #: A pole this close to z = 1 counts as an integrator: the error of a computed double pole is about

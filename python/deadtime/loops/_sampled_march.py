@@ -26,8 +26,6 @@ from numpy.typing import NDArray
 
 from deadtime.loops._sampled_gain import SampledLoopGain
 
-__all__ = ["Loss", "first_loss"]
-
 Vector = NDArray[np.float64]
 Gains = Callable[[float], SampledLoopGain]
 

@@ -25,8 +25,6 @@ from numpy.typing import NDArray
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.systems import Margins
 
-__all__ = ["sampled_margins"]
-
 Vector = NDArray[np.float64]
 
 #: Relative tolerance of the angle of an extremum between two angles: a smaller one finds closer

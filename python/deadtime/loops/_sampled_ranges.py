@@ -17,8 +17,6 @@ from deadtime.loops._model import LoopModel
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.loops._sampled_march import Loss, first_loss
 
-__all__ = ["SampledNumber", "further_delay"]
-
 #: First step of a march, relative to the value: a larger one starts faster, but is refused sooner.
 _FIRST_STEP = 1.0 / 16.0
 

@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import ContourError
-from deadtime._base.ranges import OpenRange, open_interval
+from deadtime._base.validation import OpenRange, open_interval
 from deadtime.loops._stability import sampled_roots
 from deadtime.roots import RootSet
-
-__all__ = ["sampled_poles_in"]
 
 
 def sampled_poles_in(

@@ -18,8 +18,6 @@ from deadtime._deadtime import loop_sensitivities
 from deadtime.loops._model import LoopRun, refuse_discretised, state_at_rest
 from deadtime.loops._specification import LoopSpecification
 
-__all__ = ["output_and_input_slopes", "slope_names"]
-
 Vector = NDArray[np.float64]
 Slopes = dict[str, Vector]
 

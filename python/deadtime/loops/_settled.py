@@ -20,8 +20,6 @@ from deadtime._base.errors import DeadtimeError
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._stability import sampled_grid
 
-__all__ = ["TIME_CONSTANTS", "abscissae", "slowest_times"]
-
 Vector = NDArray[np.float64]
 
 #: Time for which a response must have been in its band to count as settled, in slowest time

@@ -23,7 +23,6 @@ from deadtime.loops._plants import Plant
 if TYPE_CHECKING:
     from deadtime._deadtime import LinearLoop
 
-__all__ = ["DELAY_PATHS", "LoopSpecification"]
 
 #: Where the delay of a loop can sit.
 DELAY_PATHS = ("command", "measurement")

@@ -21,15 +21,6 @@ from deadtime.loops._plants import Plant
 from deadtime.loops._sampled_ranges import SampledNumber, further_delay
 from deadtime.roots import Parameter, QuasiPolynomial, RootSet
 
-__all__ = [
-    "continuous_range",
-    "sampled_abscissa",
-    "sampled_grid",
-    "sampled_is_stable",
-    "sampled_range",
-    "sampled_roots",
-]
-
 #: Numbers of a loop that cannot be negative.
 _NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"})
 #: Numbers that keep their sign, since the loop has no meaning at zero.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -18,15 +19,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress, Report, reported
-from deadtime._base.ranges import given_points, is_range
-from deadtime._base.validation import finite, increasing, positive, real_array, thread_number
+from deadtime._base.validation import (
+    finite,
+    given_points,
+    increasing,
+    is_range,
+    positive,
+    real_array,
+    thread_number,
+)
 from deadtime._deadtime import sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
-from deadtime.systems._run import first_duration
-
-__all__ = ["Sweep", "SweepStatus", "require_loop", "sweep"]
+from deadtime.systems._response import first_duration
 
 Vector = NDArray[np.float64]
 
@@ -269,7 +275,7 @@ def sweep(
     refuse_discretised(common.controller, sampled, "a sweep")
     sets = _Sets(common, arrays, shape, height, band, parts, thread_number(threads))
     times = None if time is None and not responses else _times(time, responses)
-    with reported(progress, math.prod(shape)) as report:
+    with nullcontext() if progress is False else reported(progress, math.prod(shape)) as report:
         if times is None:
             return sets.until_settled(report)
         return sets.outputs(times, report) if responses else sets.decided(times, report)

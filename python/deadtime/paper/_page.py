@@ -12,8 +12,6 @@ from deadtime.paper import TITLES, Comparison, Grid, Part, Reproduction, Verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["render_reproduction", "write_reproduction"]
-
 STYLE = """
 body { max-width: 66rem; }
 td { vertical-align: top; }

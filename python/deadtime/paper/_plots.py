@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from deadtime.systems import Response
 
-__all__ = ["draw"]
-
 THIN: dict[str, Any] = {"lw": 1.3}
 PRINTED: dict[str, Any] = {"color": "0.25", "marker": "o", "ms": 5, "ls": "", "mfc": "none"}
 
@@ -57,9 +55,7 @@ def _responses(
 
 def _step_axes(ax: Axes, title: str, unit: str = "") -> None:
     ax.axhline(1.0, **REFERENCE)
-    ax.set(xlabel="time / s", ylabel=f"output{unit}", title=title)
-    ax.title.set_fontsize("medium")
-    ax.legend(frameon=False, fontsize="small")
+    _legend(ax, title, xlabel="time / s", ylabel=f"output{unit}")
 
 
 def _legend(ax: Axes, title: str, **labels: str) -> None:

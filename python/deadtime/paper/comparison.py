@@ -13,8 +13,6 @@ from decimal import ROUND_HALF_UP, Decimal
 from enum import Enum
 from typing import Any
 
-__all__ = ["Comparison", "Verdict", "agreeing_digits", "printed_digits"]
-
 #: Fewest agreeing digits that count as agreement.
 LEAST_DIGITS = 2
 
@@ -189,18 +187,8 @@ class Comparison:
     ) -> Comparison:
         """Compare a number digit by digit."""
         digits = agreeing_digits(printed, computed), printed_digits(printed)
-        return cls(
-            where,
-            quantity,
-            printed,
-            float(computed),
-            _shown(printed, computed),
-            model,
-            _verdict(*digits),
-            digits,
-            note,
-            details,
-        )
+        shown, verdict, ours = _shown(printed, computed), _verdict(*digits), float(computed)
+        return cls(where, quantity, printed, ours, shown, model, verdict, digits, note, details)
 
     @classmethod
     def of_root(
@@ -217,20 +205,9 @@ class Comparison:
         root = complex(computed.real, abs(computed.imag))
         parts = list(zip(printed, (root.real, root.imag), strict=True))
         digits = min((agreeing_digits(*part), printed_digits(part[0])) for part in parts)
-        shown = " ± ".join(_shown(*part) for part in parts)
-        shown_printed = " ± ".join(printed)
-        return cls(
-            where,
-            quantity,
-            f"{shown_printed}i",
-            root,
-            f"{shown}i",
-            model,
-            _verdict(*digits),
-            digits,
-            note,
-            details,
-        )
+        shown = " ± ".join(_shown(*part) for part in parts) + "i"
+        pair, verdict = " ± ".join(printed) + "i", _verdict(*digits)
+        return cls(where, quantity, pair, root, shown, model, verdict, digits, note, details)
 
     @classmethod
     def of_limits(
@@ -246,20 +223,9 @@ class Comparison:
     ) -> Comparison:
         """Compare a number with an interval of the paper."""
         holds = limits[0] <= computed <= limits[1]
-        shown = f"{computed:.3f}"
+        shown, ours = f"{computed:.3f}", float(computed)
         verdict = Verdict.CONFIRMED if holds else Verdict.DIFFERENT
-        return cls(
-            where,
-            quantity,
-            printed,
-            float(computed),
-            shown,
-            model,
-            verdict,
-            None,
-            note,
-            details,
-        )
+        return cls(where, quantity, printed, ours, shown, model, verdict, None, note, details)
 
     @classmethod
     def of_statement(
@@ -296,18 +262,8 @@ class Comparison:
             if computed is not None:
                 off = 100.0 * (computed / float(printed) - 1.0)
                 shown = f"{_shown(printed, computed)} ({off:+.0f} %)"
-        return cls(
-            where,
-            quantity,
-            printed,
-            computed,
-            shown,
-            model,
-            Verdict.MEASURED,
-            None,
-            note,
-            details,
-        )
+        verdict = Verdict.MEASURED
+        return cls(where, quantity, printed, computed, shown, model, verdict, None, note, details)
 
 
 def _verdict(agreeing: int, printed: int) -> Verdict:

@@ -18,9 +18,7 @@ import deadtime as dtm
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
-from deadtime.paper.part import Grid
-
-__all__ = ["Curve", "Figure10", "figure10", "velocity_loop"]
+from deadtime.paper.part import Grid, Part
 
 #: Proportional gain of the design, 1/s.
 GAIN = 2.0
@@ -83,7 +81,7 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure10:
+class Figure10(Part):
     """Figure 10, reproduced, and with the filter.
 
     Attributes
@@ -102,7 +100,6 @@ class Figure10:
     filtered: Curve
     delay: float
     turns_complex: float
-    comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
         """Rightmost roots and best gains, without and with the filter."""
@@ -152,9 +149,8 @@ def figure10() -> Figure10:
     """
     ideal, filtered = (_curve(velocity_loop(0.3, one)) for one in (False, True))
     complex_above = _turns_complex()
-    return Figure10(
-        ideal, filtered, DELAY, complex_above, _compared(ideal, filtered, complex_above)
-    )
+    comparisons = _compared(ideal, filtered, complex_above)
+    return Figure10(ideal, filtered, DELAY, complex_above, comparisons=comparisons)
 
 
 def _curve(loop: dtm.ControlLoop) -> Curve:

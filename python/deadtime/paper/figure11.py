@@ -16,10 +16,8 @@ from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figure10 import velocity_loop
 from deadtime.paper.figures6and7 import DELAY
-from deadtime.paper.part import Grid
+from deadtime.paper.part import Grid, Part
 from deadtime.systems import Response
-
-__all__ = ["Figure11", "SettlingTimes", "figure11"]
 
 #: Velocity gain and settling time of the flight as printed, s.
 PRINTED = {0.3: "1.86", 0.7: "2.47"}
@@ -60,7 +58,7 @@ class SettlingTimes:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure11:
+class Figure11(Part):
     """Figure 11, from the model.
 
     Attributes
@@ -81,7 +79,6 @@ class Figure11:
     settling: tuple[SettlingTimes, ...]
     unlimited: Response
     cutoffs: dict[str, float]
-    comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
         """Settling times of the model, and cutoffs of the filter."""
@@ -137,9 +134,8 @@ def figure11() -> Figure11:
     unlimited = velocity_loop(0.3).simulate(time)
     settling = tuple(_settling(gain, response) for gain, response in responses.items())
     cutoffs = _cutoffs()
-    return Figure11(
-        responses, settling, unlimited, cutoffs, _compared(settling, unlimited, cutoffs)
-    )
+    comparisons = _compared(settling, unlimited, cutoffs)
+    return Figure11(responses, settling, unlimited, cutoffs, comparisons=comparisons)
 
 
 def _settling(gain: float, response: Response) -> SettlingTimes:

@@ -13,14 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 import deadtime as dtm
-from deadtime.paper.comparison import Comparison
 from deadtime.paper.internet_loop import internet_loop
-from deadtime.paper.part import Grid
+from deadtime.paper.part import Grid, Part
 from deadtime.paper.table1 import PRINTED_OVERSHOOTS
 from deadtime.paper.time_scales import Explanation, Stretch, explain, stretch, time_scale
 from deadtime.systems import Response
-
-__all__ = ["Figure2", "Scenario", "Trial", "figure2"]
 
 #: Round trip of the simulated loops, s: that of Figure 3.
 DELAY = 0.1
@@ -79,7 +76,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure2:
+class Figure2(Part):
     """Figure 2, in virtual time, and the answer to its question.
 
     Attributes
@@ -104,7 +101,6 @@ class Figure2:
     stretches: tuple[Stretch, ...]
     explanations: tuple[Explanation, ...]
     fitted: tuple[Stretch, ...]
-    comparisons: tuple[Comparison, ...] = ()
 
     def grids(self) -> tuple[Grid, ...]:
         """Estimates over the network, time scales, and what explains Table 1."""

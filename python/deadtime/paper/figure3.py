@@ -14,10 +14,8 @@ import numpy as np
 
 import deadtime as dtm
 from deadtime.paper.comparison import Comparison
-from deadtime.paper.part import Grid
+from deadtime.paper.part import Grid, Part
 from deadtime.systems import Response
-
-__all__ = ["Figure3", "coarse_limit", "figure3"]
 
 DELAY = 0.1
 
@@ -35,7 +33,7 @@ DECAYED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Figure3:
+class Figure3(Part):
     """Figure 3, reproduced.
 
     Attributes
@@ -59,7 +57,6 @@ class Figure3:
     limit: float
     held_limit: float
     coarse_limits: dict[float, float]
-    comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
         """Limits of coarse simulations, and roots."""

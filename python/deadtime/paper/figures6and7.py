@@ -13,11 +13,9 @@ import numpy as np
 
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.inversion import delay_by_dominant_root, delay_by_simulation
-from deadtime.paper.part import Grid
+from deadtime.paper.part import Grid, Part
 from deadtime.paper.table2 import PRINTED, SAMPLE_TIME, altitude_loop, simulink
 from deadtime.systems import Response
-
-__all__ = ["Figure6", "Figure7", "Flight", "figure6", "figure7"]
 
 #: Delay that the paper uses further on, s.
 DELAY = 0.36
@@ -27,7 +25,7 @@ FLIGHTS = ("2.3", "2.3", "2.29", "2.27", "0.6")
 
 
 @dataclass(frozen=True, eq=False)
-class Figure6:
+class Figure6(Part):
     """Figure 6, reproduced.
 
     Attributes
@@ -40,11 +38,6 @@ class Figure6:
 
     exact: dict[float, Response]
     coarse: dict[float, Response]
-    comparisons: tuple[Comparison, ...]
-
-    def grids(self) -> tuple[Grid, ...]:
-        """None: its numbers are those of Table 2."""
-        return ()
 
     def findings(self) -> tuple[str, ...]:
         """What the figure shows."""
@@ -106,7 +99,7 @@ class Flight:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure7:
+class Figure7(Part):
     """Figure 7: the delays from the measured overshoots.
 
     Attributes
@@ -121,7 +114,6 @@ class Figure7:
 
     flights: tuple[Flight, ...]
     response: Response
-    comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
         """Delay of each flight, in three ways."""
@@ -193,4 +185,4 @@ def figure7() -> Figure7:
             )
         )
     response = loop.replace(delay=flights[0].saturated).simulate(np.linspace(0.0, 8.0, 801))
-    return Figure7(tuple(flights), response, tuple(compared))
+    return Figure7(tuple(flights), response, comparisons=tuple(compared))

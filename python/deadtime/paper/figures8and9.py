@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 import deadtime as dtm
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
-from deadtime.paper.part import Grid
+from deadtime.paper.part import Grid, Part
 from deadtime.paper.table2 import SAMPLE_TIME, altitude_loop
 from deadtime.systems import Response
-
-__all__ = ["Figure8", "Figure9", "figure8", "figure9"]
 
 GAINS = (4.0, 5.0)
 
@@ -26,7 +24,7 @@ BRANCHES = np.arange(-5, 5)
 
 
 @dataclass(frozen=True, eq=False)
-class Figure8:
+class Figure8(Part):
     """Figure 8: responses at the measured delay.
 
     Attributes
@@ -44,7 +42,6 @@ class Figure8:
     responses: dict[float, Response]
     limit: float
     held_limit: float
-    comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
         """Both limits."""
@@ -104,7 +101,7 @@ def figure8() -> Figure8:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure9:
+class Figure9(Part):
     """Figure 9: roots at the measured delay.
 
     Attributes
@@ -116,15 +113,6 @@ class Figure9:
     """
 
     roots: dict[float, NDArray[np.complex128]]
-    comparisons: tuple[Comparison, ...]
-
-    def grids(self) -> tuple[Grid, ...]:
-        """None: the rightmost roots are among the comparisons."""
-        return ()
-
-    def findings(self) -> tuple[str, ...]:
-        """None beyond the comparisons."""
-        return ()
 
 
 def figure9() -> Figure9:
@@ -157,5 +145,5 @@ def figure9() -> Figure9:
         )
     return Figure9(
         {gain: np.asarray(dtm.dde_roots(0.0, -gain, DELAY, BRANCHES)) for gain in GAINS},
-        tuple(compared),
+        comparisons=tuple(compared),
     )

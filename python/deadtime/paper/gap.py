@@ -7,22 +7,20 @@ response, the limit of the speed, and the coarse steps of the simulation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import deadtime as dtm
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.inversion import delay_by_dominant_root, delay_by_simulation
-from deadtime.paper.part import Grid
+from deadtime.paper.part import Grid, Part
 from deadtime.paper.table2 import SAMPLE_TIME, altitude_loop
-
-__all__ = ["Gap", "gap"]
 
 #: Overshoot of the flights (%), gain, and the delay in samples that the paper chooses.
 OVERSHOOT, GAIN, SAMPLES = "2.30", 1.31, 5.6646
 
 
 @dataclass(frozen=True)
-class Gap:
+class Gap(Part):
     """The delays that the same overshoot gives, in s.
 
     Attributes
@@ -43,7 +41,6 @@ class Gap:
     saturated: float
     linear: float
     dominant: float
-    comparisons: tuple[Comparison, ...]
 
     @property
     def parts(self) -> dict[str, float]:
@@ -110,11 +107,8 @@ def gap() -> Gap:
         saturated=delay_by_simulation(loop, part),
         linear=delay_by_simulation(loop.replace(limit=None), part),
         dominant=delay_by_dominant_root(GAIN, part),
-        comparisons=(),
     )
-    return Gap(
-        found.simulation, found.saturated, found.linear, found.dominant, _compared(found, part)
-    )
+    return replace(found, comparisons=_compared(found, part))
 
 
 def _compared(found: Gap, part: float) -> tuple[Comparison, ...]:

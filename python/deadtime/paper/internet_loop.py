@@ -16,8 +16,6 @@ import numpy as np
 
 import deadtime as dtm
 
-__all__ = ["internet_loop"]
-
 #: Rest before the step, s, from which the estimators read the initial output.
 REST = 1.0
 
@@ -89,11 +87,11 @@ def internet_loop(
     trips = _round_trips(time.size, delay, jitter, loss, seed)
     output, command = np.zeros(time.size), np.zeros(time.size)
     # Answers in transit: arrival, number of the answered packet, command.
-    under_way: list[tuple[float, int, float]] = []
+    in_transit: list[tuple[float, int, float]] = []
     state, held, latest, clock = 0.0, 0.0, -1, float(time[0])
     for packet, now in enumerate(time.tolist()):
-        while under_way and under_way[0][0] <= now:
-            arrival, number, answer = heapq.heappop(under_way)
+        while in_transit and in_transit[0][0] <= now:
+            arrival, number, answer = heapq.heappop(in_transit)
             state += held * (arrival - clock)
             clock = arrival
             if number > latest:
@@ -103,7 +101,7 @@ def internet_loop(
         output[packet] = state
         command[packet] = gain * (reference[packet] - state)
         if math.isfinite(trips[packet]):
-            heapq.heappush(under_way, (now + trips[packet], packet, float(command[packet])))
+            heapq.heappush(in_transit, (now + trips[packet], packet, float(command[packet])))
     return dtm.Recording(
         time, reference, output, command, source=f"the Internet loop with K = {gain:g}"
     )

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import deadtime as dtm
 
-__all__ = ["damping_of", "delay_by_dominant_root", "delay_by_simulation", "overshoot"]
-
 #: Longest delay of the search, in units of 1/(gain Kp): the limit of stability is pi/2.
 LONGEST = 1.55
 
@@ -53,10 +51,10 @@ def delay_by_dominant_root(gain: float, part: float) -> float:
     """
     from scipy.optimize import brentq
 
-    wanted = dtm.damping_ratio(part)
+    requested = dtm.damping_ratio(part)
 
     def excess(delay: float) -> float:
-        return damping_of(complex(dtm.dde_roots(0.0, -gain, delay))) - wanted
+        return damping_of(complex(dtm.dde_roots(0.0, -gain, delay))) - requested
 
     # The root is real, and its damping ratio 1, up to gain * delay = 1/e.
     return float(brentq(excess, 0.3679 / gain, LONGEST / gain, xtol=1e-15))

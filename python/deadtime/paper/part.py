@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
 
 from deadtime.paper.comparison import Comparison
-
-__all__ = ["Grid", "Part"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +26,8 @@ class Grid:
     rows: tuple[tuple[str, ...], ...]
 
 
-class Part(Protocol):
+@dataclass(frozen=True, eq=False)
+class Part:
     """A table or a figure of the paper, reproduced.
 
     Attributes
@@ -38,15 +36,12 @@ class Part(Protocol):
         The printed numbers beside the computed ones.
     """
 
-    @property
-    def comparisons(self) -> tuple[Comparison, ...]:
-        """The printed numbers beside the computed ones."""
-        ...
+    comparisons: tuple[Comparison, ...] = field(default=(), kw_only=True)
 
     def grids(self) -> tuple[Grid, ...]:
         """Further tables."""
-        ...
+        return ()
 
     def findings(self) -> tuple[str, ...]:
         """The findings, in sentences."""
-        ...
+        return ()

@@ -23,22 +23,12 @@ from deadtime.paper.table2 import table2
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["PARTS", "TITLES", "Reproduction", "reproduce"]
-
 #: The parts, in the order of the paper.
-PARTS: Mapping[str, Callable[[], Part]] = {
-    "table1": table1,
-    "figure2": figure2,
-    "figure3": figure3,
-    "table2": table2,
-    "figure6": figure6,
-    "figure7": figure7,
-    "gap": gap,
-    "figure8": figure8,
-    "figure9": figure9,
-    "figure10": figure10,
-    "figure11": figure11,
-}
+_IN_ORDER: tuple[Callable[[], Part], ...] = (
+    *(table1, figure2, figure3, table2, figure6, figure7),
+    *(gap, figure8, figure9, figure10, figure11),
+)
+PARTS: Mapping[str, Callable[[], Part]] = {part.__name__: part for part in _IN_ORDER}
 
 TITLES: Mapping[str, str] = {
     "table1": "Table 1: delays of the Internet loop from its overshoots",
@@ -91,12 +81,12 @@ class Reproduction:
         """
         counts = self.counts()
         numbers = (Verdict.EXACT, Verdict.PARTLY, Verdict.DIFFERENT)
-        said = (Verdict.CONFIRMED, Verdict.CONTRADICTED)
+        statements = (Verdict.CONFIRMED, Verdict.CONTRADICTED)
         return (
             f"{sum(counts[one] for one in numbers)} printed numbers: "
             f"{counts[Verdict.EXACT]} reproduced to every digit, {counts[Verdict.PARTLY]} to fewer "
             f"digits, {counts[Verdict.DIFFERENT]} not. "
-            f"{sum(counts[one] for one in said)} statements: {counts[Verdict.CONFIRMED]} "
+            f"{sum(counts[one] for one in statements)} statements: {counts[Verdict.CONFIRMED]} "
             f"confirmed, {counts[Verdict.CONTRADICTED]} not supported. "
             f"{counts[Verdict.MEASURED]} measurements, which are not compared."
         )

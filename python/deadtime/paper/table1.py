@@ -16,9 +16,7 @@ from deadtime.paper.inversion import (
     delay_by_simulation,
     overshoot,
 )
-from deadtime.paper.part import Grid
-
-__all__ = ["PRINTED_OVERSHOOTS", "Table1", "Table1Row", "table1"]
+from deadtime.paper.part import Grid, Part
 
 #: Gain: overshoot (%), damping ratio, delay (s), root, as printed.
 PRINTED = {
@@ -73,7 +71,7 @@ class Table1Row:
 
 
 @dataclass(frozen=True)
-class Table1:
+class Table1(Part):
     """Table 1, reproduced.
 
     Attributes
@@ -85,7 +83,6 @@ class Table1:
     """
 
     rows: tuple[Table1Row, ...]
-    comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
         """The delays by the dominant root and by the exact step response."""
@@ -148,7 +145,7 @@ def table1() -> Table1:
             note="text and table disagree",
         )
     )
-    return Table1(rows, tuple(compared))
+    return Table1(rows, comparisons=tuple(compared))
 
 
 def _row(gain: int, percent: float) -> Table1Row:

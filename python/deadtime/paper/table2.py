@@ -12,10 +12,8 @@ from dataclasses import dataclass
 import deadtime as dtm
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.inversion import overshoot
-from deadtime.paper.part import Grid
+from deadtime.paper.part import Grid, Part
 from deadtime.systems import Response
-
-__all__ = ["SAMPLE_TIME", "Table2", "Table2Row", "altitude_loop", "simulink", "table2"]
 
 #: Sample time of the loop over the wireless network, s.
 SAMPLE_TIME = 0.065
@@ -128,7 +126,7 @@ class Table2Row:
 
 
 @dataclass(frozen=True)
-class Table2:
+class Table2(Part):
     """Table 2, reproduced.
 
     Attributes
@@ -140,7 +138,6 @@ class Table2:
     """
 
     rows: tuple[Table2Row, ...]
-    comparisons: tuple[Comparison, ...]
 
     def grids(self) -> tuple[Grid, ...]:
         """Overshoots: printed, coarse, exact, and without the limit."""
@@ -214,4 +211,4 @@ def table2() -> Table2:
                 "Table 2", f"N={samples} Td=N Ts", printed_delay, delay, "N × 0.065 s"
             ),
         ]
-    return Table2(tuple(rows), tuple(compared))
+    return Table2(tuple(rows), comparisons=tuple(compared))

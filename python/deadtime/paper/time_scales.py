@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 import deadtime as dtm
 from deadtime.paper.table1 import PRINTED_OVERSHOOTS
 
-__all__ = ["Explanation", "Stretch", "explain", "stretch", "time_scale"]
-
 #: Step of the tried delays, and the longest of them, s.
 DELAY_STEP, LONGEST_DELAY = 5e-4, 0.14
 

@@ -11,10 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from deadtime._base.errors import RecordingError
-from deadtime._base.ranges import OpenRange, open_interval
+from deadtime._base.validation import OpenRange, open_interval
 from deadtime.recordings._recording import Recording
-
-__all__ = ["read_recording"]
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 

@@ -12,8 +12,6 @@ from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import unmasked
 
-__all__ = ["MINIMUM_SAMPLES", "Recording", "Step"]
-
 #: Largest absolute value. The squares of larger ones may overflow, and no physical quantity has
 #: them.
 LARGEST = 1e100
@@ -112,12 +110,9 @@ class Recording(ReadOnlyArrays):
         if len(set(lengths.values())) > 1:
             raise RecordingError(f"the columns of a recording differ in length: {lengths}")
         _check_time(arrays["time"])
-        object.__setattr__(self, "time", arrays["time"])
-        object.__setattr__(self, "reference", arrays["reference"])
-        object.__setattr__(self, "output", arrays["output"])
-        object.__setattr__(self, "command", arrays.get("command"))
-        object.__setattr__(self, "units", FrozenDict(units or {}))
-        object.__setattr__(self, "source", source)
+        held = {"command": None, **arrays, "units": FrozenDict(units or {}), "source": source}
+        for name, value in held.items():
+            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return int(self.time.size)

@@ -11,8 +11,6 @@ from deadtime.estimation._plots import plot_fits
 from deadtime.reports._study import Study
 from deadtime.systems._plots import plot_responses
 
-__all__ = ["write_report"]
-
 
 def write_report(study: Study, path: Path) -> Path:
     """Write the page to `path` and return it."""

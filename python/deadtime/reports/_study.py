@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from deadtime._base.progress import Stages, stage_report
-from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import OpenRange
 from deadtime.estimation import Comparison, DelayEstimate, compare_methods
 from deadtime.experiments import Experiment, Noise
 from deadtime.loops import PV, Controller, ControlLoop, Integrator, P, kit_plant
@@ -15,8 +15,6 @@ from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.recordings import Recording
 from deadtime.systems import Response
 from deadtime.tuning import Design, critical_gain, design
-
-__all__ = ["DemoRecording", "Study", "demo_recording", "study"]
 
 #: Largest safe gain as a share of the stability limit: the usual gain margin of 2.
 SAFE_SHARE = 0.5

@@ -28,8 +28,6 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array, unmasked
 
-__all__ = ["Chain", "chains_of"]
-
 _Floats: TypeAlias = NDArray[np.float64]
 
 #: Distance from an edge, in degrees of a polynomial, below which a point counts as on it.

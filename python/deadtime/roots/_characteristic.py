@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime import _deadtime
-from deadtime._base.ranges import OpenRange, open_interval
+from deadtime._base.validation import OpenRange, open_interval
 from deadtime.roots._chains import Chain, chains_of
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots.certificate._certificate import Certificate
 from deadtime.roots.certificate._proof import proved
-
-__all__ = ["Characteristic", "Edge"]
 
 #: What becomes of roots on the edge of a region.
 Edge: TypeAlias = Literal["error", "inside", "outside"]

@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 from deadtime import _deadtime
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays, read_only
-from deadtime._base.ranges import Range, interval, numbers_at
+from deadtime._base.validation import Range, interval, numbers_at
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.roots._parametric import ParametricQuasiPolynomial
 from deadtime.roots._quasipolynomial import QuasiPolynomial
-
-__all__ = ["Crossings", "crossings", "delay_margin", "margin_of_family"]
 
 _Floats: TypeAlias = NDArray[np.float64]
 

@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from deadtime.roots._quasipolynomial import QuasiPolynomial
 
-__all__ = ["Entry", "NotExpandedError", "expanded"]
-
 #: The coefficients of a quasi-polynomial by power of s and delay.
 Entry: TypeAlias = Mapping[tuple[int, float], float]
 #: The same without rounding: integer coefficients by power of s and exact delay.

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
 
-__all__ = ["Expansion"]
-
 
 @dataclass(frozen=True, eq=False)
 class Expansion(ReadOnlyArrays):

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Protocol, SupportsFloat
 
-from deadtime._base.ranges import numbers_at
+from deadtime._base.validation import numbers_at
 from deadtime.roots._parametric import ParametricQuasiPolynomial
-
-__all__ = ["HasFamily", "family_of"]
 
 
 class HasFamily(Protocol):

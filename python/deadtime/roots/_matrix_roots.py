@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime import _deadtime
-from deadtime._base.ranges import OpenRange, open_interval
+from deadtime._base.validation import OpenRange, open_interval
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots.certificate._certificate import Certificate
-
-__all__ = ["MatrixDeterminant"]
 
 _NOT_EXACT = (
     "with its delays taken as exact, a neutral system is judged by its expanded determinant, which "

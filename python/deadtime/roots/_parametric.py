@@ -19,13 +19,10 @@ from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple, SupportsFloat, cast
 
-from deadtime._base.ranges import numbers_at
-from deadtime._base.validation import finite
+from deadtime._base.validation import finite, numbers_at
 from deadtime._deadtime import Family
 from deadtime.roots._quasipolynomial import QuasiPolynomial, is_number
 from deadtime.roots._text import Delay, Monomial, Powers, Terms, family_text, latex
-
-__all__ = ["Parameter", "ParametricQuasiPolynomial", "parameters"]
 
 #: Most terms of a product: bounds memory and time.
 _MAX_TERMS = 100_000

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-__all__ = ["plot_root_set"]
-
 CHAIN: dict[str, Any] = {"color": "#d1481f", "lw": 1.0, "ls": "--", "zorder": 3}
 
 

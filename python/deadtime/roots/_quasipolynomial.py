@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
-from deadtime._base.ranges import Range
-from deadtime._base.validation import unmasked
+from deadtime._base.validation import Range, unmasked
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
 from deadtime.roots._text import joined, latex, row_text
@@ -32,7 +31,6 @@ from deadtime.roots._text import joined, latex, row_text
 if TYPE_CHECKING:
     from deadtime.systems import Margins, TransferFunction
 
-__all__ = ["QuasiPolynomial", "delay", "s"]
 
 Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "advanced"]
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from deadtime import _deadtime
     from deadtime.roots._chains import Chain
 
-__all__ = ["RootSet", "root_set"]
 
 _SHOWN = 12
 
@@ -149,7 +148,7 @@ def root_set(found: _deadtime.RootSet) -> RootSet:
     """The roots that the native part found."""
     return RootSet(
         roots=found.roots,
-        multiplicities=found.multiplicities,
+        multiplicities=found.multiplicities.astype(np.int64),
         radii=found.radii,
         resolved=found.resolved,
         counted=found.counted,

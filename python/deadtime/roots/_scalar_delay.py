@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime import _deadtime
 from deadtime.special._ufunc import UfuncOptions, apply, branches, finite, foreign, refuse
 
-__all__ = ["dde_roots", "rightmost_branches"]
-
 
 def dde_roots(
     a0: ArrayLike,

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from typing import TypeAlias
 
-__all__ = ["Delay", "Monomial", "Powers", "Terms", "family_text", "joined", "latex", "row_text"]
-
 #: Name and power of each parameter, by name.
 Powers: TypeAlias = tuple[tuple[str, int], ...]
 #: Constant part, and name and slope of each parameter, by name.

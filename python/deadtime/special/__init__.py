@@ -1,7 +1,7 @@
 """Lambert W on all its branches, as NumPy ufuncs, and the forms it is used in.
 
-`_lambertw` holds the function, `_forms` its derivative, logarithm and offset forms, `_low_level`
-the C pointers for compiled callers, `_ufunc` what the ufuncs share.
+`_lambertw` holds the function and its C pointers for compiled callers, `_forms` its derivative,
+logarithm and offset forms, `_ufunc` what the ufuncs share.
 """
 
 from deadtime.special._forms import (
@@ -11,8 +11,7 @@ from deadtime.special._forms import (
     lambertw_offset,
     wrightomega,
 )
-from deadtime.special._lambertw import lambertw, lambertw0, lambertwm1
-from deadtime.special._low_level import low_level_callable
+from deadtime.special._lambertw import lambertw, lambertw0, lambertwm1, low_level_callable
 
 __all__ = [
     "OffsetW",

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from deadtime import _deadtime
 from deadtime.special._ufunc import UfuncOptions, apply, branches
 
-__all__ = ["OffsetW", "lambertw_derivative", "lambertw_log", "lambertw_offset", "wrightomega"]
-
 
 def lambertw_log(
     log_z: ArrayLike,

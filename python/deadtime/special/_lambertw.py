@@ -1,4 +1,4 @@
-"""The Lambert W function: every branch, and the two real ones.
+"""The Lambert W function: every branch, the two real ones, and their C code.
 
 The functions are NumPy ufuncs with a thin layer on top: single numbers go past NumPy's machinery,
 which takes longer than W itself; and where NumPy refuses the arguments, the reason is looked up.
@@ -6,14 +6,15 @@ which takes longer than W itself; and where NumPy refuses the arguments, the rea
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from deadtime import _deadtime
 from deadtime.special._ufunc import UfuncOptions, apply, branches
 
-__all__ = ["lambertw", "lambertw0", "lambertwm1"]
+if TYPE_CHECKING:
+    import scipy
 
 
 def lambertw(
@@ -218,3 +219,56 @@ def lambertwm1(
         if number is not None:
             return number
     return apply(_deadtime.lambertwm1, (x,), options, out, where, dtype, threads)
+
+
+def low_level_callable(
+    name: Literal["lambertw", "lambertw0", "lambertwm1"],
+) -> scipy.LowLevelCallable:
+    r"""Return a function of this package as C code, which scipy calls without Python.
+
+    Parameters
+    ----------
+    name : {'lambertw0', 'lambertwm1', 'lambertw'}
+        The real branches have the signature ``double (double)``; `lambertw` has
+        ``void (double, double, int64_t, double *)``: real part, imaginary part, branch, and where
+        to put the two parts of W.
+
+    Returns
+    -------
+    scipy.LowLevelCallable
+        For `scipy.integrate.quad` and others. The functions hold no state, take no lock and may
+        be called from any thread.
+
+    Raises
+    ------
+    ValueError
+        There is no function of that name.
+
+    Notes
+    -----
+    The pointers are kept as a Cython module keeps its own, in ``__pyx_capi__``, so that numba
+    finds them as well::
+
+        address = numba.extending.get_cython_function_address("deadtime._deadtime", "lambertw0")
+        lambertw0 = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(address)
+
+    where ``lambertw0`` may then be called in functions that numba compiles.
+
+    Examples
+    --------
+    With :math:`x = w e^w`, the integral of :math:`W_0` from 0 to e is that of
+    :math:`w (1 + w) e^w` from 0 to 1, which is :math:`e - 1`.
+
+    >>> import math
+    >>> import deadtime as dtm
+    >>> from scipy.integrate import quad
+    >>> value, error = quad(dtm.special.low_level_callable("lambertw0"), 0.0, math.e)
+    >>> abs(value - (math.e - 1.0)) < 1e-12
+    True
+    """
+    import scipy
+
+    if name not in _deadtime.__pyx_capi__:
+        names = ", ".join(sorted(_deadtime.__pyx_capi__))
+        raise ValueError(f"name={name!r}: give one of {names}")
+    return scipy.LowLevelCallable.from_cython(_deadtime, name)

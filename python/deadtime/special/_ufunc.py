@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from deadtime import _deadtime
 from deadtime._base.validation import thread_number
 
-__all__ = ["UfuncOptions", "apply", "branches", "finite", "foreign", "refuse"]
-
 
 class UfuncOptions(TypedDict, total=False):
     """Rarely used options of every ufunc."""

@@ -1,7 +1,7 @@
 """Stability over ranges of gains and delays: maps, proved boxes, robust maps, stability radius.
 
 `_map` is `stability_map`, `_boundaries` its crossing curves; `_boxes`, `_robust` and `_radius`
-prove what holds for whole ranges, which `_intervals` reads from the arguments.
+prove what holds for whole ranges. `_arguments` reads axes and intervals.
 """
 
 from deadtime.stability._boxes import ProvedBoxes, largest_stable_box, proved_boxes

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.frozen import ReadOnlyArrays, read_only
-from deadtime._deadtime import MapBoundary
+from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.roots import ParametricQuasiPolynomial
-
-__all__ = ["Boundary", "boundaries_of", "chains_of"]
-
-_Floats: TypeAlias = NDArray[np.float64]
+from deadtime.stability._arguments import Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,8 +34,8 @@ class Boundary(ReadOnlyArrays):
     All arrays are read-only.
     """
 
-    values: dict[str, _Floats]
-    omega: _Floats
+    values: dict[str, Floats]
+    omega: Floats
     crossing: NDArray[np.int32]
     along: str
 
@@ -59,7 +54,7 @@ class Boundary(ReadOnlyArrays):
 
 def boundaries_of(
     family: ParametricQuasiPolynomial,
-    axes: dict[str, _Floats],
+    axes: dict[str, Floats],
     decay: float,
     damping: tuple[float, float] | None,
 ) -> tuple[Boundary, ...]:
@@ -71,19 +66,14 @@ def boundaries_of(
             "members stays at 0: cancel the factor s to see where the others cross"
         )
     return tuple(
-        _boundary(curve, axes) for curve in sorted(found, key=lambda curve: -len(curve.gain))
+        Boundary(
+            {
+                name: curve.gain if name == curve.along else points[curve.row]
+                for name, points in axes.items()
+            },
+            curve.omega,
+            curve.crossing,
+            curve.along,
+        )
+        for curve in sorted(found, key=lambda curve: -len(curve.gain))
     )
-
-
-def _boundary(curve: MapBoundary, axes: dict[str, _Floats]) -> Boundary:
-    values = {
-        name: curve.gain if name == curve.along else points[curve.row]
-        for name, points in axes.items()
-    }
-    return Boundary(values, curve.omega, curve.crossing, curve.along)
-
-
-def chains_of(family: ParametricQuasiPolynomial, axes: dict[str, _Floats]) -> _Floats:
-    """Abscissas of the chains of roots of the members of `family`, shape (n0, n1)."""
-    found: _Floats = read_only(family._family.chains(axes))
-    return found

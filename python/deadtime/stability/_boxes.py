@@ -8,6 +8,7 @@ infinity; both are excluded for all members of a box at once, and the roots of o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, SupportsFloat
@@ -18,22 +19,19 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress, reported
-from deadtime._base.ranges import Range
-from deadtime._base.validation import finite, positive, real_array, thread_number, whole_number
-from deadtime.roots._family import family_of
-from deadtime.stability._intervals import (
-    Floats,
-    Given,
-    System,
-    Values,
-    ranges_of,
-    side,
+from deadtime._base.validation import (
+    Range,
+    finite,
+    positive,
+    real_array,
+    thread_number,
+    whole_number,
 )
+from deadtime.roots._family import HasFamily, family_of
+from deadtime.stability._arguments import Floats, Given, ranges_of, side
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["ProvedBoxes", "largest_stable_box", "proved_boxes"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,7 +153,8 @@ class ProvedBoxes(ReadOnlyArrays):
         ValueError
             If not exactly two parameters have a range.
         """
-        from deadtime.stability._box_plots import plot_boxes, shown_axes
+        from deadtime._base.drawing import shown_axes
+        from deadtime.stability._plots import plot_boxes
 
         return plot_boxes(shown_axes(ax), self)
 
@@ -168,11 +167,11 @@ class ProvedBoxes(ReadOnlyArrays):
 
 
 def proved_boxes(
-    family: System,
+    family: HasFamily,
     ranges: Given,
     tol: float = 1e-3,
     *,
-    at: Values | None = None,
+    at: Mapping[str, SupportsFloat] | None = None,
     max_boxes: int = 1_000_000,
     threads: int | None = None,
     progress: Progress = False,
@@ -243,7 +242,7 @@ def proved_boxes(
     share = finite("tol", tol)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
-    with reported(progress) as report:
+    with nullcontext() if progress is False else reported(progress) as report:
         found = _deadtime.proved_boxes(
             family_of(family, tuple(ends), at)._family,
             ends,
@@ -254,11 +253,6 @@ def proved_boxes(
         )
         if report is not None:
             report(len(found.parameter))
-    tree: dict[str, NDArray[Any]] = {
-        "parameter": found.parameter,
-        "at": found.at,
-        "link": found.link,
-    }
     return ProvedBoxes(
         names=tuple(ends),
         ranges=ends,
@@ -266,15 +260,15 @@ def proved_boxes(
         high=found.high,
         unstable=found.unstable,
         undecided=max(found.undecided, 0.0),
-        _tree=tree,
+        _tree={"parameter": found.parameter, "at": found.at, "link": found.link},
     )
 
 
 def largest_stable_box(
-    family: System,
+    family: HasFamily,
     ranges: Given,
     *,
-    at: Values | None = None,
+    at: Mapping[str, SupportsFloat] | None = None,
     around: Mapping[str, SupportsFloat] | None = None,
     tol: float = 1e-3,
     threads: int | None = None,
@@ -320,12 +314,11 @@ def largest_stable_box(
     """
     ends = ranges_of(ranges)
     step = positive("tol", tol)
-    native = family_of(family, tuple(ends), at)._family
-    with reported(progress) as report:
+    with nullcontext() if progress is False else reported(progress) as report:
         found = _deadtime.largest_stable_box(
-            native,
+            family_of(family, tuple(ends), at)._family,
             ends,
-            around=None if around is None else _named("around", around, ends),
+            around=None if around is None else _point(around, ends),
             tol=step,
             threads=thread_number(threads),
             progress=report,
@@ -340,22 +333,18 @@ def largest_stable_box(
     return found
 
 
-def _named(
-    what: str,
-    given: Mapping[str, SupportsFloat],
-    ranges: Mapping[str, Range],
-) -> dict[str, float]:
+def _point(given: Mapping[str, SupportsFloat], ranges: Mapping[str, Range]) -> dict[str, float]:
     """A point in ranges; parameters with a value need not be named."""
     if not isinstance(given, Mapping):
-        raise TypeError(f"{what}={given!r}: give a dict such as {{'Kp': 2.0}}")
+        raise TypeError(f"around={given!r}: give a dict such as {{'Kp': 2.0}}")
     unknown = [name for name in given if name not in ranges]
     if unknown:
-        raise ValueError(f"{what}: {unknown[0]} has no range, but {', '.join(ranges)}")
+        raise ValueError(f"around: {unknown[0]} has no range, but {', '.join(ranges)}")
     point = {}
     for name, (low, high) in ranges.items():
         if name not in given and low < high:
-            raise ValueError(f"{what} has no {name}: give {', '.join(ranges)}")
+            raise ValueError(f"around has no {name}: give {', '.join(ranges)}")
         point[name] = finite(name, given.get(name, low))
         if not low <= point[name] <= high:
-            raise ValueError(f"{what}: {name}={point[name]} lies outside {low} to {high}")
+            raise ValueError(f"around: {name}={point[name]} lies outside {low} to {high}")
     return point

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, SupportsFloat, TypeAlias
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,22 +17,17 @@ from numpy.typing import NDArray
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, Report, reported
-from deadtime._base.ranges import Points, numbers_at
-from deadtime._base.validation import finite, thread_number
+from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop
-from deadtime.loops._family import numbers_of
-from deadtime.loops._stability import sampled_grid
+from deadtime.loops._characteristic import numbers_of
+from deadtime.loops._stability import SampledCells, sampled_grid
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.roots._family import HasFamily, family_of
-from deadtime.stability._boundaries import Boundary, boundaries_of, chains_of
-from deadtime.stability._map_axes import damping_demand, map_axes
+from deadtime.stability._arguments import Floats, damping_demand, map_axes, sides
+from deadtime.stability._boundaries import Boundary, boundaries_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["MapStatus", "StabilityMap", "stability_map"]
-
-_Floats: TypeAlias = NDArray[np.float64]
 
 
 class MapStatus(IntEnum):
@@ -79,9 +76,9 @@ class StabilityMap(ReadOnlyArrays):
     """
 
     names: tuple[str, str]
-    axes: dict[str, _Floats]
+    axes: dict[str, Floats]
     unstable: NDArray[np.int32]
-    abscissa: _Floats
+    abscissa: Floats
     status: NDArray[np.uint8]
     decay: float = 0.0
     damping: tuple[float, float] | None = None
@@ -118,7 +115,7 @@ class StabilityMap(ReadOnlyArrays):
         return boundaries_of(self.family, self.axes, self.decay, self.damping)
 
     @cached_property
-    def chain_abscissa(self) -> _Floats:
+    def chain_abscissa(self) -> Floats:
         """Abscissa of the chains of roots in 1/s, shape (n0, n1): -inf without chains.
 
         Chains are judged robustly, as in `QuasiPolynomial.chain_abscissa`.
@@ -130,7 +127,8 @@ class StabilityMap(ReadOnlyArrays):
         """
         if self.family is None:
             raise ValueError("the map of a sampled loop has no chains: its poles are finitely many")
-        return chains_of(self.family, self.axes)
+        found: Floats = read_only(self.family._family.chains(self.axes))
+        return found
 
     @cached_property
     def strongly_stable(self) -> NDArray[np.bool_]:
@@ -227,7 +225,7 @@ class StabilityMap(ReadOnlyArrays):
         matplotlib.axes.Axes
         """
         from deadtime._base.drawing import shown_axes
-        from deadtime.stability._map_plots import plot_stability_map
+        from deadtime.stability._plots import plot_stability_map
 
         if show not in (None, "abscissa", "counts"):
             raise ValueError(f"show={show!r}: give 'abscissa' or 'counts'")
@@ -274,11 +272,8 @@ class StabilityMap(ReadOnlyArrays):
         return table(("unstable roots", "cells"), rows, repr(self).strip("<>"))
 
     def __repr__(self) -> str:
-        sides = ", ".join(
-            f"{name} {axis[0]:.6g} to {axis[-1]:.6g} ({len(axis)})"
-            for name, axis in self.axes.items()
-        )
-        return f"<StabilityMap {sides}: {int(self.stable.sum())} of {self.stable.size} stable>"
+        stable = f"{int(self.stable.sum())} of {self.stable.size} stable"
+        return f"<StabilityMap {sides(self.axes)}: {stable}>"
 
 
 def stability_map(
@@ -366,30 +361,38 @@ def stability_map(
     >>> dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-0.9, 0.9)}, shape=(60, 37))
     <StabilityMap Kp 0.1 to 6 (60), Kv -0.9 to 0.9 (37): 1321 of 2220 stable>
     """
-    names, axes = map_axes(ranges, shape)
+    axes = map_axes(ranges, shape)
+    names = first, second = tuple(axes)
     fixed = numbers_at(at, names)
     threads = thread_number(threads)
     if proof not in ("curves", "cells"):
         raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
     question = _Question(bool(abscissa), finite("decay", decay), damping_demand(damping), proof)
-    cells = len(axes[names[0]]) * len(axes[names[1]])
-    sampled = isinstance(family, ControlLoop) and family.is_sampled
-    if sampled and question.damping is not None:
-        raise ValueError(
-            f"damping={question.damping}: a sampled loop is judged by a circle; ask for decay="
-        )
-    with reported(progress, cells) as report:
-        if isinstance(family, ControlLoop) and sampled:
+    size = len(axes[first]), len(axes[second])
+    judged: ParametricQuasiPolynomial | None = None
+    alpha: Floats
+    with nullcontext() if progress is False else reported(progress, math.prod(size)) as report:
+        if isinstance(family, ControlLoop) and family.is_sampled:
+            if question.damping is not None:
+                raise ValueError(
+                    f"damping={question.damping}: a sampled loop is judged by a circle; ask for "
+                    "decay="
+                )
             numbers = numbers_of(family.parameters, (*names, *fixed)) | fixed
-            found = _map_sampled(family, numbers, names, axes, question.decay, threads, report)
+            found = _sampled(family, numbers, axes, question.decay, threads, report)
+            unsure = (found.status == MapStatus.BOUNDARY) | (found.status == MapStatus.UNDECIDED)
+            unstable = np.where(unsure, np.int32(-2), found.unstable).reshape(size)
+            alpha, status = found.abscissa.reshape(size), found.status.reshape(size)
         else:
-            known = family_of(family, names, fixed)
-            found = _map_family(known, axes, question, threads, report)
+            judged = family_of(family, names, fixed)
+            cells = judged._family.map(axes, question, threads=threads, progress=report)
+            unstable, status = cells.unstable, cells.status
+            missing = np.broadcast_to(np.float64(np.nan), size)
+            alpha = missing if cells.abscissa is None else cells.abscissa
         if report is not None:
-            report(cells)
-    unstable, alpha, status, judged = found
+            report(math.prod(size))
     return StabilityMap(
-        names, axes, unstable, alpha, status, question.decay, question.damping, judged
+        (first, second), axes, unstable, alpha, status, question.decay, question.damping, judged
     )
 
 
@@ -403,45 +406,19 @@ class _Question:
     proof: str
 
 
-_Found: TypeAlias = tuple[
-    NDArray[np.int32], _Floats, NDArray[np.uint8], ParametricQuasiPolynomial | None
-]
-
-
-def _map_family(
-    family: ParametricQuasiPolynomial,
-    axes: dict[str, _Floats],
-    question: _Question,
-    threads: int | None,
-    report: Report | None,
-) -> _Found:
-    """Judge the members of a family."""
-    cells = family._family.map(axes, question, threads=threads, progress=report)
-    unstable, alpha = cells.unstable, cells.abscissa
-    if alpha is None:
-        alpha = np.broadcast_to(np.float64(np.nan), unstable.shape)
-    return unstable, alpha, cells.status, family
-
-
-def _map_sampled(
+def _sampled(
     loop: ControlLoop,
-    values: dict[str, Any],
-    names: tuple[str, str],
-    axes: dict[str, _Floats],
+    values: dict[str, float],
+    axes: dict[str, Floats],
     decay: float,
     threads: int | None,
     report: Report | None,
-) -> _Found:
+) -> SampledCells:
     """Eigenvalues of the transition matrix in every cell."""
-    first, second = np.meshgrid(*(axes[name] for name in names), indexing="ij")
-    grids = dict(zip(names, (first, second), strict=True))
+    grids = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
     for name in ("delay", "sample_time"):
         low = float(np.min(grids.get(name, values.get(name, 0.0))))
         if low < 0.0 or (name == "sample_time" and low == 0.0):
             raise ValueError(f"{name}={low}: delays are zero or more, sample times above zero")
     cells = values | {name: np.ravel(grid) for name, grid in grids.items()}
-    found = sampled_grid(loop.plant, loop.controller, cells, decay, threads, report)
-    unsure = (found.status == MapStatus.BOUNDARY) | (found.status == MapStatus.UNDECIDED)
-    unstable = np.where(unsure, np.int32(-2), found.unstable)
-    shape = first.shape
-    return unstable.reshape(shape), found.abscissa.reshape(shape), found.status.reshape(shape), None
+    return sampled_grid(loop.plant, loop.controller, cells, decay, threads, report)

@@ -9,12 +9,9 @@ from typing import SupportsFloat
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.ranges import Range
-from deadtime._base.validation import finite, positive
-from deadtime.roots._family import family_of
-from deadtime.stability._intervals import MOST_MOVING, System, Values
-
-__all__ = ["StabilityRadius", "stability_radius"]
+from deadtime._base.validation import Range, finite, positive
+from deadtime.roots._family import HasFamily, family_of
+from deadtime.stability._arguments import MOST_MOVING
 
 #: Upper limit on the boxes of a search for a radius (bounds memory and time); what is proved until
 #: then is the result.
@@ -45,11 +42,11 @@ class StabilityRadius(ReadOnlyArrays):
 
 
 def stability_radius(
-    family: System,
+    family: HasFamily,
     point: Mapping[str, SupportsFloat],
     scales: Mapping[str, SupportsFloat] | None = None,
     *,
-    at: Values | None = None,
+    at: Mapping[str, SupportsFloat] | None = None,
     tol: float = 1e-3,
 ) -> StabilityRadius:
     """How far gains and delays may move away from a point, all at once, without loss of stability.

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,23 +15,12 @@ from numpy.typing import NDArray
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress, reported
-from deadtime._base.ranges import Points, Range
-from deadtime._base.validation import thread_number
-from deadtime.roots._family import family_of
-from deadtime.stability._intervals import (
-    Floats,
-    Given,
-    System,
-    Values,
-    ranges_of,
-    side,
-)
-from deadtime.stability._map_axes import map_axes
+from deadtime._base.validation import Points, Range, thread_number
+from deadtime.roots._family import HasFamily, family_of
+from deadtime.stability._arguments import Floats, Given, map_axes, ranges_of, side, sides
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["RobustMap", "robust_map"]
 
 #: Upper limit on the boxes of one cell of a robust map (bounds time); a cell that needs more is
 #: undecided.
@@ -83,29 +73,24 @@ class RobustMap(ReadOnlyArrays):
         -------
         matplotlib.axes.Axes
         """
-        from deadtime.stability._box_plots import plot_robust_map, shown_axes
+        from deadtime._base.drawing import shown_axes
+        from deadtime.stability._plots import plot_robust_map
 
         return plot_robust_map(shown_axes(ax), self)
 
     def __repr__(self) -> str:
-        sides = ", ".join(
-            f"{name} {axis[0]:.6g} to {axis[-1]:.6g} ({len(axis)})"
-            for name, axis in self.axes.items()
-        )
         held = ", ".join(side(name, *self.over[name]) for name in self.over)
-        return (
-            f"<RobustMap {sides} for all {held}: {int(self.stable.sum())} of {self.stable.size} "
-            "stable>"
-        )
+        stable = f"{int(self.stable.sum())} of {self.stable.size} stable"
+        return f"<RobustMap {sides(self.axes)} for all {held}: {stable}>"
 
 
 def robust_map(
-    family: System,
+    family: HasFamily,
     ranges: Mapping[str, Points],
     over: Given,
     shape: tuple[int, int] = (101, 101),
     *,
-    at: Values | None = None,
+    at: Mapping[str, SupportsFloat] | None = None,
     threads: int | None = None,
     progress: Progress = False,
 ) -> RobustMap:
@@ -151,14 +136,15 @@ def robust_map(
     >>> chart
     <RobustMap Kp 0.1 to 5.9 (30), Kv -0.9 to 0.9 (19) for all T 0.3 to 0.4: 305 of 570 stable>
     """
-    axis_names, axes = map_axes(ranges, shape)
+    axes = map_axes(ranges, shape)
+    first, second = axes
     held = ranges_of(over)
     twice = [name for name in held if name in axes]
     if twice:
         raise ValueError(f"{twice[0]} is an axis and has an interval: give it one of the two")
-    known = family_of(family, (*axis_names, *held), at)
+    known = family_of(family, (first, second, *held), at)
     cells = math.prod(len(points) for points in axes.values())
-    with reported(progress, cells) as report:
+    with nullcontext() if progress is False else reported(progress, cells) as report:
         unstable = _deadtime.robust_map(
             known._family,
             axes,
@@ -169,4 +155,4 @@ def robust_map(
         )
         if report is not None:
             report(cells)
-    return RobustMap(axis_names, axes, held, unstable)
+    return RobustMap((first, second), axes, held, unstable)

@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.frozen import equal
 from deadtime._base.validation import non_negative, real_array, unmasked
 
-__all__ = ["DelayMatrices", "Matrices", "Matrix"]
-
 Matrix = NDArray[np.float64]
 #: One matrix, without delay, or matrices by their delays in s.
 Matrices: TypeAlias = ArrayLike | Mapping[float, ArrayLike]

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from deadtime._base.ranges import OpenRange
+from deadtime._base.validation import OpenRange
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, RootSet
 from deadtime.roots._crossings import margin_of_family
 from deadtime.roots._determinant import NotExpandedError, expanded
@@ -32,8 +32,6 @@ from deadtime.systems._realisation import Realisable, Realisation, of_matrices
 from deadtime.systems._responses import HasResponses
 from deadtime.systems._scaled_delays import scaled_family, smallest_delay
 from deadtime.systems._transfer import TransferFunction
-
-__all__ = ["DelaySystem"]
 
 
 class DelaySystem(DelayMatrices, HasPoles, HasResponses):

@@ -17,8 +17,6 @@ from deadtime.systems._margins import Margins, margins
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["FrequencyDomain"]
-
 
 class FrequencyDomain(ABC):
     """Base of `TransferFunction`: what is asked on the imaginary axis."""

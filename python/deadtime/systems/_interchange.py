@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 from deadtime.roots import QuasiPolynomial
 from deadtime.roots._determinant import expanded
 
-__all__ = ["Writable", "polynomials_of_control", "polynomials_of_scipy"]
-
 Vector = NDArray[np.float64]
 
 # Upper limit on the order of a Padé approximant: the coefficients of higher ones differ so much in

@@ -13,8 +13,6 @@ from deadtime._base.page import table, table_row
 from deadtime._deadtime import loop_margins
 from deadtime.roots import QuasiPolynomial
 
-__all__ = ["Margins", "margins"]
-
 Vector = NDArray[np.float64]
 
 

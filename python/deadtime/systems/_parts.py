@@ -12,8 +12,6 @@ from deadtime._base.validation import real_array
 from deadtime.roots import QuasiPolynomial
 from deadtime.roots._quasipolynomial import is_number
 
-__all__ = ["Polynomial", "quasi_polynomial", "without_common_delay", "without_common_powers"]
-
 Polynomial: TypeAlias = QuasiPolynomial | float | Sequence[float] | NDArray[Any]
 
 

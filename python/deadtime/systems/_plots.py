@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-__all__ = ["plot_bode", "plot_nyquist", "plot_responses"]
-
-
 class HasFrequencyResponse(Protocol):
     """What has a gain and a phase at each frequency."""
 

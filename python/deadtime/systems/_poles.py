@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from typing import SupportsFloat
 
-from deadtime._base.ranges import OpenRange, Range
+from deadtime._base.validation import OpenRange, Range
 from deadtime.roots import (
     Certificate,
     Crossings,
@@ -17,8 +17,6 @@ from deadtime.roots import (
 )
 from deadtime.roots._characteristic import Edge
 from deadtime.roots._matrix_roots import MatrixDeterminant
-
-__all__ = ["HasPoles"]
 
 
 class HasPoles(ABC):

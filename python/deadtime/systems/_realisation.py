@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from deadtime._deadtime import LinearSystem
 from deadtime.roots import QuasiPolynomial
 
-__all__ = ["Differentiable", "Realisable", "Realisation", "of_matrices", "of_ratio"]
-
 Group = Mapping[float, NDArray[np.float64]]
 _Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]
 

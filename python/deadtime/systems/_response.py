@@ -1,4 +1,4 @@
-"""The response of a loop or a system in time."""
+"""The response of a loop or a system in time, and how long that of a step is by default."""
 
 from __future__ import annotations
 
@@ -18,9 +18,19 @@ from deadtime.systems._step_metrics import OneSignal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Response"]
 
 Vector = NDArray[np.float64]
+
+# The default time of a step response is _SHORTEST times the longest of all time constants, delays
+# and _LEAST seconds. It is doubled, at most _DOUBLINGS times, until the last quarter of the _TIMES
+# outputs is within _SETTLED of the steady state, or one is farther from it than _LOST: a longer
+# first time and a smaller _SETTLED show more of a slow end and less of a fast beginning.
+_TIMES = 501
+_SHORTEST = 10.0
+_LEAST = 0.01
+_DOUBLINGS = 10
+_SETTLED = 0.005
+_LOST = 20.0
 
 #: The sensitivities of a response for which none were requested.
 NONE = FrozenDict()
@@ -230,3 +240,26 @@ class Response(ReadOnlyArrays):
         ax.set_xlabel("time in s")
         ax.legend()
         return ax
+
+
+def first_duration(A: NDArray[np.float64], delay: float) -> float:
+    """First duration of a step response in s, by its longest delay and its slowest pole."""
+    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(A) if abs(pole) > 0.0]
+    duration: float = _SHORTEST * max([delay, *slowest, _LEAST])
+    return duration
+
+
+def until_settled(run: Callable[[Vector], Response], A: Vector, delay: float) -> Response:
+    """Response of `run` at times that go on until it has settled, found by doubling the last."""
+    span = first_duration(A, delay)
+    for _ in range(_DOUBLINGS):
+        response = run(np.linspace(0.0, span, _TIMES))
+        rest, outputs = response.steady_state, np.atleast_2d(response.outputs)
+        final = outputs[:, -1] if rest is None else np.atleast_1d(rest)
+        error = np.abs(outputs - final[:, None]).max(axis=0)
+        # If the response returns to zero, its error is compared with its peak.
+        size = float(np.abs(final).max()) or float(error.max())
+        if error[-_TIMES // 4 :].max() <= _SETTLED * size or error.max() > _LOST * size:
+            break
+        span *= 2.0
+    return response

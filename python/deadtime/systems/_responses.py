@@ -13,8 +13,6 @@ from deadtime.systems._realisation import Realisable, Realisation
 from deadtime.systems._response import Response
 from deadtime.systems._run import Given, impulse_response, respond, step_response
 
-__all__ = ["HasResponses"]
-
 
 class HasResponses(ABC):
     """Base of systems that can be simulated, exactly to rounding."""

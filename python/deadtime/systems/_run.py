@@ -17,23 +17,10 @@ import deadtime.systems._signals as signals
 from deadtime._base.validation import finite, increasing, positive, real_array
 from deadtime._deadtime import Signal
 from deadtime.systems._realisation import Differentiable, Realisable, Realisation
-from deadtime.systems._response import Response
-
-__all__ = ["Given", "first_duration", "impulse_response", "respond", "step_response"]
+from deadtime.systems._response import Response, until_settled
 
 Vector = NDArray[np.float64]
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
-
-# The default time of a step response is _SHORTEST times the longest of all time constants, delays
-# and _LEAST seconds. It is doubled, at most _DOUBLINGS times, until the last quarter of the _POINTS
-# outputs is within _SETTLED of the steady state, or one is farther from it than _LOST: a longer
-# first time and a smaller _SETTLED show more of a slow end and less of a fast beginning.
-_POINTS = 501
-_SHORTEST = 10.0
-_LEAST = 0.01
-_DOUBLINGS = 10
-_SETTLED = 0.005
-_LOST = 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,13 +123,6 @@ def respond(
     )
 
 
-def first_duration(A: NDArray[np.float64], delay: float) -> float:
-    """First duration of a step response in s, by its longest delay and its slowest pole."""
-    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(A) if abs(pole) > 0.0]
-    duration: float = _SHORTEST * max([delay, *slowest, _LEAST])
-    return duration
-
-
 def step_response(
     system: Realisable,
     time: ArrayLike | None,
@@ -158,18 +138,7 @@ def step_response(
     height[index] = finite("amplitude", amplitude)
     if time is not None:
         return respond(system, time, height)
-    span = first_duration(model.A, model.longest)
-    for _ in range(_DOUBLINGS):
-        response = respond(system, np.linspace(0.0, span, _POINTS), height)
-        rest, outputs = response.steady_state, np.atleast_2d(response.outputs)
-        final = outputs[:, -1] if rest is None else np.atleast_1d(rest)
-        error = np.abs(outputs - final[:, None]).max(axis=0)
-        # If the response returns to zero, its error is compared with its peak.
-        size = float(np.abs(final).max()) or float(error.max())
-        if error[-_POINTS // 4 :].max() <= _SETTLED * size or error.max() > _LOST * size:
-            break
-        span *= 2.0
-    return response
+    return until_settled(lambda times: respond(system, times, height), model.A, model.longest)
 
 
 def impulse_response(system: Differentiable, time: ArrayLike | None, input: int) -> Response:  # noqa: A002

@@ -7,8 +7,6 @@ from typing import Any
 
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, delay, parameters, s
 
-__all__ = ["scaled_family", "smallest_delay"]
-
 
 def scaled_family(h: QuasiPolynomial, smallest: float) -> ParametricQuasiPolynomial:
     """Return h with all delays as multiples of the least one, the parameter `delay`."""

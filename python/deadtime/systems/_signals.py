@@ -17,8 +17,6 @@ from deadtime._base.validation import real_array
 from deadtime._deadtime import Signal
 from deadtime.systems._signals_fit import RESOLUTION, pieces
 
-__all__ = ["Fitted", "constant", "fitted", "held", "lines", "sampled", "step"]
-
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 

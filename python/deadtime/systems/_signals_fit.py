@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import legendre_tables
 
-__all__ = ["RESOLUTION", "Pieces", "pieces"]
-
 Vector = NDArray[np.float64]
 Blocks = NDArray[np.float64]
 Sampler = Callable[[Vector], NDArray[np.float64]]

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["OneSignal"]
-
 Vector = NDArray[np.float64]
 
 # Points in one magnification around an extremum or a crossing, and how often to magnify: the

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.ranges import OpenRange
-from deadtime._base.validation import non_negative, unmasked
+from deadtime._base.validation import OpenRange, non_negative, unmasked
 from deadtime._deadtime import ratio
 from deadtime.roots import (
     Parameter,
@@ -36,8 +35,6 @@ from deadtime.systems._responses import HasResponses
 
 if TYPE_CHECKING:
     pass
-
-__all__ = ["TransferFunction", "feedback"]
 
 
 class TransferFunction(FrequencyDomain, HasPoles, HasResponses, Writable):

@@ -1,10 +1,10 @@
 """Choose the gains of a loop whose delay is known up to an interval.
 
-`_specification` holds the arguments, `_problem` what is free and what is not known, `_stabilising`
-where to look for gains, `_objectives` what is made best, `_required_margins` what must hold.
-`_survey` maps the gains, `_search` finds the best of them, `_worst` looks for the delay at which
-they are worst, `_exchange` repeats that until it finds none that is worse, and `_made` puts the
-result together. `_filter_choice` chooses the filter of the derivative.
+`_problem` holds what is free and what is not known, `_stabilising` where to look for gains,
+`_objectives` what is made best, `_margins` what must hold. `_survey` maps the gains, `_search`
+finds the best of them, `_exchange` looks for the delay at which they are worst and repeats the
+search until it finds none that is worse, and `_made` puts the result together. `_filter_choice`
+chooses the filter of the derivative.
 """
 
 from deadtime.tuning._design import design

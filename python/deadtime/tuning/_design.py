@@ -9,15 +9,10 @@ from typing import Literal
 from deadtime.loops import PV, Controller, DerivativeFilter
 from deadtime.tuning._filter_choice import filter_choice
 from deadtime.tuning._made import made
-from deadtime.tuning._problem import controller_template, with_filter
+from deadtime.tuning._margins import RequiredMargins
+from deadtime.tuning._objectives import objective_named
+from deadtime.tuning._problem import ObjectiveName, controller_template, pose, with_filter
 from deadtime.tuning._result import Design
-from deadtime.tuning._specification import (
-    DesignSpecification,
-    FilterSpecification,
-    ObjectiveName,
-)
-
-__all__ = ["design"]
 
 
 def design(
@@ -110,28 +105,16 @@ def design(
     >>> print(best.traded[0].words)
     gain margin of at least 4 holds the design back: without it ...
     """
-    specification = DesignSpecification(
-        controller=controller,
-        delay=delay,
-        gain=gain,
-        objective=objective,
-        fixed=fixed,
-        gain_margin=gain_margin,
-        phase_margin=phase_margin,
-        delay_margin=delay_margin,
-        ranges=ranges,
-        shape=shape,
-        amplitude=amplitude,
-        threads=threads,
-    )
-    if filter == "auto":
-        choice = filter_choice(loop, specification, FilterSpecification())
-        return replace(
-            choice.design, filter_choice=choice, traded=(*choice.design.traded, choice.trade)
-        )
+    template = controller_template(controller)
     if isinstance(filter, DerivativeFilter):
-        template = with_filter(controller_template(controller), filter)
-        specification = replace(specification, controller=template)
-    elif filter is not None:
+        template = with_filter(template, filter)
+    elif filter not in (None, "auto"):
         raise ValueError(f"filter={filter!r}: give a DerivativeFilter, 'auto' or None")
-    return made(loop, specification)
+    goal = objective_named(objective)
+    required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)
+    problem = pose(loop, template, delay, gain, fixed, ranges, amplitude, threads)
+    if filter != "auto":
+        return made(problem, goal, required, shape)
+    choice = filter_choice(problem, goal, required, shape)
+    traded = (*choice.design.traded, choice.trade)
+    return replace(choice.design, filter_choice=choice, traded=traded)

@@ -7,22 +7,28 @@ middles), finds the best gains for those, looks over the whole interval for a p 
 adds it, and repeats until there is none (Hettich and Kortanek, "Semi-infinite programming", SIAM
 Review 35, 1993). The margins of the search are estimates: a requirement that the exact margins
 miss is raised by what is missing, in the same rounds.
+
+The look over the intervals is a search, not a proof: a fine grid of scenarios, and between the
+neighbours of the worst of them a search along the delay. Stability itself, the gain margin and the
+delay margin of a continuous loop are proved for all of the intervals at once, by boxes: a gain
+margin of 2 is the stability of all plants up to twice as strong, a delay margin that of all delays
+up to this margin longer.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from deadtime.tuning._objectives import NEVER
-from deadtime.tuning._problem import Scenario, Vector
-from deadtime.tuning._required_margins import MARGINS, UNITS, RequiredMargins, exact_margins
+from deadtime.loops import ControlLoop
+from deadtime.stability import proved_boxes
+from deadtime.tuning._margins import MARGINS, UNITS, RequiredMargins, exact_margins
+from deadtime.tuning._objectives import NEVER, Objective
+from deadtime.tuning._problem import Problem, Scenario, Vector
 from deadtime.tuning._search import Search
-from deadtime.tuning._worst import fine, worst_scenario
-
-__all__ = ["Found", "best_gains", "least_margins"]
 
 #: Most rounds of the exchange: two or three suffice where costs are continuous, and where steps are
 #: simulated, which jump, more do not help.
@@ -41,6 +47,14 @@ _STALLED = 1e-3
 #: Estimated shortfall of the margins beyond which further rounds cannot meet them.
 _HOPELESS = 3e-3
 
+#: Values of each unknown number in a check, for one and two of them: of the objective, and of the
+#: exact margins, which cost more.
+_FINE = {1: 33, 2: 9}
+_FINE_MARGINS = {1: 9, 2: 3}
+
+#: Most boxes of a proof (bounds time).
+_BOXES = 20_000
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -53,18 +67,15 @@ class Found:
     checked: int
 
 
-def best_gains(search: Search, required: RequiredMargins, start: Vector | None = None) -> Found:
+def best_gains(search: Search, start: Vector | None = None) -> Found:
     """The best gains in the worst scenario of all, from the map or from around a start."""
-    problem, objective = search.problem, search.objective
+    problem, objective, required = search.problem, search.objective, search.required
     scenarios = list(problem.corners)
-    aimed = required.scaled(1.0 + _ABOVE)
-    if start is None:
-        gains = search.globally(scenarios, aimed)
-    else:
-        gains = search.locally(start, scenarios, aimed)
+    search = replace(search, required=required.scaled(1.0 + _ABOVE), scenarios=tuple(scenarios))
+    gains = search.globally() if start is None else search.locally(start)
     best: Found | None = None
     for _ in range(_ROUNDS_SIMULATED if objective.simulated else _ROUNDS):
-        if required.named and search.short(gains, scenarios, aimed) > _HOPELESS:
+        if required.named and search.short(gains) > _HOPELESS:
             break
         everywhere = [*fine(problem), *scenarios[len(problem.corners) :]]
         cost, worst = worst_scenario(problem, objective, gains, everywhere)
@@ -84,8 +95,9 @@ def best_gains(search: Search, required: RequiredMargins, start: Vector | None =
         if not missing.any() and (stalled or not added):
             break
         scenarios += [one for i, one in enumerate(added) if one not in added[:i]]
-        aimed = aimed.raised(missing)
-        gains = search.locally(gains, scenarios, aimed)
+        aimed = search.required.raised(missing)
+        search = replace(search, required=aimed, scenarios=tuple(scenarios))
+        gains = search.locally(gains)
     if best is None:
         raise _unmet(search, required, gains)
     if best.cost >= NEVER:
@@ -130,3 +142,65 @@ def _unmet(search: Search, required: RequiredMargins, gains: Vector) -> ValueErr
 def _with_unit(name: str, value: float) -> str:
     number = "without end" if math.isinf(value) else f"{value:.4g}"
     return f"{name.replace('_', ' ')} {number}{UNITS[name]}"
+
+
+def fine(problem: Problem, margins: bool = False) -> tuple[Scenario, ...]:
+    """The scenarios a design is checked in."""
+    unknown = sum(low < high for low, high in problem.intervals.values())
+    return problem.scenarios((_FINE_MARGINS if margins else _FINE).get(unknown, 1))
+
+
+def worst_scenario(
+    problem: Problem, objective: Objective, gains: Vector, scenarios: Sequence[Scenario]
+) -> tuple[float, Scenario]:
+    """Cost of gains in the worst scenario, which may lie between those given, and that scenario."""
+    from scipy.optimize import minimize_scalar
+
+    costs = objective.costs(problem, gains[None, :], scenarios)[0]
+    place = int(np.argmax(costs))
+    worst, least = scenarios[place], float(costs[place])
+    delays = sorted({one["delay"] for one in scenarios})
+    at = delays.index(worst["delay"])
+    low, high = delays[max(at - 1, 0)], delays[min(at + 1, len(delays) - 1)]
+    if high > low and not objective.simulated:
+        found = minimize_scalar(
+            lambda late: -objective.worst(problem, gains, [worst | {"delay": float(late)}]),
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 1e-6 * high},
+        )
+        if -found.fun > least:
+            return float(-found.fun), worst | {"delay": float(found.x)}
+    return least, worst
+
+
+def proved(problem: Problem, gains: Vector, required: RequiredMargins) -> tuple[str, ...]:
+    """What of ``stable``, ``gain_margin``, ``delay_margin`` is proved for all of the intervals."""
+    if problem.loop.is_sampled:
+        return ()
+    loop = problem.at(gains)
+    found = []
+    delay, strong = problem.intervals["delay"], problem.intervals.get("gain")
+    if _stable_throughout(loop, delay, strong):
+        found.append("stable")
+    if required.gain_margin:
+        weak, most = strong or (loop.parameters["gain"],) * 2
+        if weak > 0.0 and _stable_throughout(loop, delay, (weak, required.gain_margin * most)):
+            found.append("gain_margin")
+    if required.delay_margin and _stable_throughout(
+        loop, (delay[0], delay[1] + required.delay_margin), strong
+    ):
+        found.append("delay_margin")
+    return tuple(found)
+
+
+def _stable_throughout(
+    loop: ControlLoop, delay: tuple[float, float], strong: tuple[float, float] | None
+) -> bool:
+    ranges = {"delay": delay} | ({} if strong is None else {"gain": strong})
+    moving = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
+    loop = loop.replace(**{name: ends[0] for name, ends in ranges.items()})
+    if not moving:
+        return loop.is_stable()
+    boxes = proved_boxes(loop, moving, tol=0.0, max_boxes=_BOXES)
+    return bool(np.all(boxes.unstable == 0))

@@ -17,30 +17,23 @@ where L is small: without a filter the noise gain is as large as the bandwidth.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from deadtime._base.validation import increasing, positive
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.tuning._exchange import best_gains
-from deadtime.tuning._made import made, required_margins
-from deadtime.tuning._margin_estimate import MarginEstimate
+from deadtime.tuning._exchange import best_gains, fine
+from deadtime.tuning._made import made
+from deadtime.tuning._margins import MarginEstimate, RequiredMargins
 from deadtime.tuning._objectives import Objective, objective_named
-from deadtime.tuning._problem import Problem, Vector, controller_template, pose, with_filter
+from deadtime.tuning._problem import ObjectiveName, Problem, Vector, controller_template, pose
 from deadtime.tuning._result import Design, FilterChoice
 from deadtime.tuning._search import Search
-from deadtime.tuning._specification import (
-    DesignSpecification,
-    FilterSpecification,
-    ObjectiveName,
-)
 from deadtime.tuning._survey import Survey, surveyed
-from deadtime.tuning._worst import fine
-
-__all__ = ["design_filter", "filter_choice", "noise_gain"]
 
 #: Number of corners tried, and the slowest and fastest in units of 1/(delay + lag + half a sample).
 #: Each corner costs a design.
@@ -132,61 +125,58 @@ def design_filter(
     >>> choice.noise_gain < choice.ideal_noise_gain
     True
     """
-    specification = DesignSpecification(
-        controller=controller,
-        delay=delay,
-        gain=gain,
-        objective=objective,
-        fixed=fixed,
-        gain_margin=gain_margin,
-        phase_margin=phase_margin,
-        delay_margin=delay_margin,
-        ranges=ranges,
-        shape=shape,
-        amplitude=amplitude,
-        threads=threads,
+    problem = pose(
+        loop, controller_template(controller), delay, gain, fixed, ranges, amplitude, threads
     )
-    wanted = FilterSpecification(loss, noise, command_noise, omegas, damping, bandwidth)
-    return filter_choice(loop, specification, wanted)
+    goal = objective_named(objective)
+    required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)
+    return filter_choice(
+        problem, goal, required, shape, loss, noise, command_noise, omegas, damping, bandwidth
+    )
 
 
 def filter_choice(
-    loop: object, specification: DesignSpecification, wanted: FilterSpecification
+    problem: Problem,
+    objective: Objective,
+    required: RequiredMargins,
+    shape: Sequence[int] | None,
+    loss: float = 0.1,
+    noise: float | None = None,
+    command_noise: float | None = None,
+    omegas: ArrayLike | None = None,
+    damping: float = 1.0,
+    bandwidth: float | None = None,
 ) -> FilterChoice:
-    """Check the arguments, design with every corner, and choose."""
-    if objective_named(specification.objective).name == "overshoot":
+    """Design with every corner, and choose."""
+    if objective.name == "overshoot":
         raise ValueError(
             "objective='overshoot': it can be none with any filter; choose by 'abscissa', "
             "'damping' or 'settling_time'"
         )
-    if wanted.noise is None and wanted.command_noise is not None:
+    if noise is None and command_noise is not None:
         raise ValueError("command_noise without noise: give the standard deviation of both")
-    template = controller_template(specification.controller)
-    specification = replace(specification, controller=with_filter(template, None))
-    ideal_problem = pose(loop, specification)
-    if specification.shape is None:
-        free = len(ideal_problem.free)
-        specification = replace(specification, shape=(_SIDE[free],) * free)
-    corners = _corners(ideal_problem, wanted.omegas)
-    bandwidth = _bandwidth(ideal_problem.loop, wanted.bandwidth, float(corners[-1]))
-    ideal = made(loop, specification)
-    survey = surveyed(ideal_problem, specification.shape)
-    task = _Task(loop, specification, wanted.damping, bandwidth, survey)
+    problem = problem.filtered(None)
+    if shape is None:
+        shape = (_SIDE[len(problem.free)],) * len(problem.free)
+    corners = _corners(problem, omegas)
+    white = _bandwidth(problem.loop, bandwidth, float(corners[-1]))
+    ideal = made(problem, objective, required, shape)
+    task = _Task(problem, objective, required, damping, white, surveyed(problem, shape))
     # From the fastest corner down, each from the gains of the one before: they change slowly.
-    gains = np.array([ideal.gains[name] for name in ideal_problem.free])
+    gains = np.array([ideal.gains[name] for name in problem.free])
     tried: list[_Tried] = []
     for corner in corners[::-1]:
         tried.insert(0, task.tried(float(corner), gains))
         gains = tried[0].gains
-    if wanted.noise is not None and wanted.command_noise is not None:
-        most = positive("command_noise", wanted.command_noise) / positive("noise", wanted.noise)
-        rule = f"the fastest with a command noise of at most {wanted.command_noise:g}"
+    if noise is not None and command_noise is not None:
+        most = positive("command_noise", command_noise) / positive("noise", noise)
+        rule = f"the fastest with a command noise of at most {command_noise:g}"
         omega = _fastest(task, corners, tried, most)
     else:
-        loss = positive("loss", wanted.loss)
+        loss = positive("loss", loss)
         rule = f"the slowest that loses at most {100 * loss:g} %"
         omega = _slowest(task, corners, tried, ideal, loss)
-    chosen = made(loop, task.specified(omega))
+    chosen = made(task.at(omega), objective, required, shape)
     return FilterChoice(
         omega=omega,
         rule=rule,
@@ -196,10 +186,10 @@ def filter_choice(
         values=np.array([one.value for one in tried]),
         noise_gains=np.array([one.noise_gain for one in tried]),
         value=chosen.value,
-        noise_gain=noise_gain(chosen.loop, bandwidth),
-        ideal_noise_gain=noise_gain(ideal.loop, bandwidth),
-        bandwidth=bandwidth,
-        noise=wanted.noise,
+        noise_gain=noise_gain(chosen.loop, white),
+        ideal_noise_gain=noise_gain(ideal.loop, white),
+        bandwidth=white,
+        noise=noise,
     )
 
 
@@ -211,8 +201,7 @@ def noise_gain(loop: ControlLoop, bandwidth: float) -> float:
     return float(np.sqrt(np.trapezoid(squared, omega) / bandwidth))
 
 
-@dataclass(frozen=True)
-class _Tried:
+class _Tried(NamedTuple):
     """The objective, the noise gain and the best gains with one corner."""
 
     value: float
@@ -224,32 +213,28 @@ class _Tried:
 class _Task:
     """Everything but the corner."""
 
-    loop: object
-    specification: DesignSpecification
+    problem: Problem
+    objective: Objective
+    required: RequiredMargins
     damping: float
     bandwidth: float
     survey: Survey
 
-    @property
-    def objective(self) -> Objective:
-        return objective_named(self.specification.objective)
-
-    def specified(self, corner: float) -> DesignSpecification:
-        """The design with one corner of the filter."""
-        ideal = controller_template(self.specification.controller)
-        smooth = with_filter(ideal, DerivativeFilter(corner, self.damping))
-        return replace(self.specification, controller=smooth)
+    def at(self, corner: float) -> Problem:
+        """The problem with one corner of the filter."""
+        return self.problem.filtered(DerivativeFilter(corner, self.damping))
 
     def tried(self, corner: float, start: Vector) -> _Tried:
         """Design with one corner from the gains of another; NaN where none meet the margins."""
-        problem = pose(self.loop, self.specified(corner))
+        problem = self.at(corner)
         alone = len(start) == 1
         try:
             # A map over one gain costs next to nothing.
-            survey = surveyed(problem, self.specification.shape) if alone else self.survey
-            search = Search(problem, self.objective, survey, MarginEstimate(problem))
-            required = required_margins(self.specification)
-            found = best_gains(search, required, None if alone else start)
+            shape = self.survey.abscissa.shape
+            survey = surveyed(problem, shape) if alone else self.survey
+            estimate = MarginEstimate(problem)
+            search = Search(problem, self.objective, survey, estimate, self.required)
+            found = best_gains(search, None if alone else start)
         except ValueError:
             return _Tried(math.nan, math.nan, start)
         value = self.objective.value(problem, found.gains, [*fine(problem), found.worst])
@@ -287,27 +272,23 @@ def _slowest(
     task: _Task, corners: Vector, tried: Sequence[_Tried], ideal: Design, loss: float
 ) -> float:
     """The slowest corner that loses no more, between the corners tried too."""
-
-    def keeps(one: _Tried) -> bool:
-        return task.objective.lost(one.value, ideal.value) <= loss
-
-    kept = [i for i, one in enumerate(tried) if keeps(one)]
+    lost = [task.objective.lost(one.value, ideal.value) for one in tried]
+    kept = [i for i, one in enumerate(lost) if one <= loss]
     if not kept:
-        lost = [task.objective.lost(one.value, ideal.value) for one in tried]
         if not np.isfinite(lost).any():
             raise ValueError("no corner has gains with the required margins: require less")
         raise ValueError(
             f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %: the "
             f"least is {100 * np.nanmin(lost):.3g} %; allow for more loss, or give faster omegas"
         )
-    first = kept[0]
-    if first == 0:
-        return float(corners[0])
-    low, high, start = float(corners[first - 1]), float(corners[first]), tried[first].gains
-    for _ in range(_HALVINGS):
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if keeps(task.tried(middle, start)) else (middle, high)
-    return high
+    return _towards(
+        corners,
+        kept[0],
+        -1,
+        lambda corner: (
+            task.objective.lost(task.tried(corner, tried[kept[0]].gains).value, ideal.value) <= loss
+        ),
+    )
 
 
 def _fastest(task: _Task, corners: Vector, tried: Sequence[_Tried], most: float) -> float:
@@ -319,13 +300,20 @@ def _fastest(task: _Task, corners: Vector, tried: Sequence[_Tried], most: float)
             f"least is {np.nanmin([one.noise_gain for one in tried]):.4g}; allow for more noise, "
             "give slower omegas, or smaller gains"
         )
-    last = kept[-1]
-    if last == len(corners) - 1:
-        return float(corners[-1])
-    low, high, start = float(corners[last]), float(corners[last + 1]), tried[last].gains
+    return _towards(
+        corners,
+        kept[-1],
+        1,
+        lambda corner: task.tried(corner, tried[kept[-1]].gains).noise_gain <= most,
+    )
+
+
+def _towards(corners: Vector, place: int, step: int, keeps: Callable[[float], bool]) -> float:
+    """The corner that still keeps to the rule, halving the way to the neighbour that does not."""
+    if not 0 <= place + step < len(corners):
+        return float(corners[place])
+    kept, other = float(corners[place]), float(corners[place + step])
     for _ in range(_HALVINGS):
-        middle = math.sqrt(low * high)
-        low, high = (
-            (middle, high) if task.tried(middle, start).noise_gain <= most else (low, middle)
-        )
-    return low
+        middle = math.sqrt(kept * other)
+        kept, other = (middle, other) if keeps(middle) else (kept, middle)
+    return kept

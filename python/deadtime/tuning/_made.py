@@ -1,38 +1,44 @@
-"""One design: search, check, and say what the requirements cost."""
+"""One design: search, check, and say what the requirements cost.
+
+What a requirement costs is told by the best gains without it, beside those with it.
+"""
 
 from __future__ import annotations
 
-from deadtime.tuning._exchange import best_gains, least_margins
-from deadtime.tuning._margin_estimate import MarginEstimate
-from deadtime.tuning._objectives import dominant_damping, objective_named
-from deadtime.tuning._problem import pose
-from deadtime.tuning._required_margins import RequiredMargins, exact_margins
-from deadtime.tuning._result import Design, LeastMargins
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from deadtime.tuning._exchange import Found, best_gains, fine, least_margins, proved
+from deadtime.tuning._margins import UNITS, MarginEstimate, RequiredMargins, exact_margins
+from deadtime.tuning._objectives import Objective, dominant_damping
+from deadtime.tuning._problem import Problem
+from deadtime.tuning._result import Design, LeastMargins, Trade, figure_in_words
 from deadtime.tuning._search import Search
-from deadtime.tuning._specification import DesignSpecification
-from deadtime.tuning._step import step_info
+from deadtime.tuning._settling import step_info
 from deadtime.tuning._survey import charts_at, surveyed
-from deadtime.tuning._trades import trades
-from deadtime.tuning._worst import fine, proved
 
-__all__ = ["made", "required_margins"]
+#: A margin at most this factor above its requirement limits the design.
+_ACTIVE = 1.0 + 1e-3
+
+#: Up to this factor above its requirement, a design without it is tried: the search may stop
+#: short of it.
+_NEAR = 1.05
+
+#: Relative loss that counts as none.
+_NOTHING = 1e-3
 
 
-def required_margins(specification: DesignSpecification) -> RequiredMargins:
-    """The margins that a design must have."""
-    return RequiredMargins.checked(
-        specification.gain_margin, specification.phase_margin, specification.delay_margin
-    )
-
-
-def made(loop: object, specification: DesignSpecification) -> Design:
-    """Find the gains for a loop or plant."""
-    objective = objective_named(specification.objective)
-    required = required_margins(specification)
-    problem = pose(loop, specification)
-    survey = surveyed(problem, specification.shape)
-    search = Search(problem, objective, survey, MarginEstimate(problem))
-    found = best_gains(search, required)
+def made(
+    problem: Problem,
+    objective: Objective,
+    required: RequiredMargins,
+    shape: Sequence[int] | None,
+) -> Design:
+    """Find the gains of a problem."""
+    survey = surveyed(problem, shape)
+    search = Search(problem, objective, survey, MarginEstimate(problem), required)
+    found = best_gains(search)
     judged = [*fine(problem), found.worst]
     loops = [problem.at(found.gains, one) for one in judged]
     value = objective.proved(problem, found.gains, judged)
@@ -55,6 +61,53 @@ def made(loop: object, specification: DesignSpecification) -> Design:
         worst=found.worst,
         checked=found.checked,
         proved=proved(problem, found.gains, required),
-        traded=trades(search, required, found, margins, value),
+        traded=_trades(search, found, margins, value),
         charts=charts_at(problem, survey, found.gains),
     )
+
+
+def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -> tuple[Trade, ...]:
+    """The price of each margin, of all of them, and of the intervals."""
+    objective, problem, required = search.objective, search.problem, search.required
+    made = []
+
+    def best_without(rest: RequiredMargins, scenarios: tuple[dict[str, float], ...]) -> float:
+        gains = replace(search, scenarios=scenarios, required=rest).globally()
+        return objective.value(problem, gains, scenarios)
+
+    for name, least in required.named.items():
+        achieved = float(getattr(margins, name))
+        active = achieved <= least * _ACTIVE
+        what = f"{name.replace('_', ' ')} of at least {least:g}{UNITS[name]}"
+        without = value
+        if achieved <= least * _NEAR:
+            without = best_without(required.without(name), found.scenarios)
+            active = active or objective.lost(value, without) > _NOTHING
+        if active:
+            words = f"{what} holds the design back: {_price(search, value, without)}"
+        else:
+            words = f"{what} is met anyway: {achieved:.4g}{UNITS[name]}"
+        made.append(Trade(name, least, achieved, active, without, words))
+    if sum(trade.active for trade in made) > 1:
+        without = best_without(RequiredMargins(), found.scenarios)
+        words = f"all margins together: {_price(search, value, without, 'them')}"
+        made.append(Trade("all_margins", math.nan, math.nan, True, without, words))
+    if any(low < high for low, high in problem.intervals.values()):
+        without = best_without(required, (problem.middle,))
+        lost = objective.lost(value, without)
+        names = " and ".join(name for name, (low, high) in problem.intervals.items() if low < high)
+        words = (
+            f"not knowing the {names}: were it in the middle of its interval for certain, "
+            f"{figure_in_words(objective.name, without)} could be had ({_part(lost)})"
+        )
+        made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))
+    return tuple(made)
+
+
+def _price(search: Search, value: float, without: float, what: str = "it") -> str:
+    lost = search.objective.lost(value, without)
+    return f"without {what} {figure_in_words(search.objective.name, without)} ({_part(lost)})"
+
+
+def _part(lost: float) -> str:
+    return f"{100.0 * lost:.2g} % lost" if lost > _NOTHING else "nothing lost"

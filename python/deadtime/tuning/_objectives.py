@@ -24,11 +24,8 @@ import numpy as np
 
 from deadtime.loops import ControlLoop, sweep
 from deadtime.loops._model import rest_of
-from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._problem import ObjectiveName, Problem, Scenario, Vector
 from deadtime.tuning._settling import BAND, proved_step
-from deadtime.tuning._specification import ObjectiveName
-
-__all__ = ["NEVER", "Objective", "dominant_damping", "objective_named"]
 
 #: Cost of a loop that is unstable or does not settle: above every other cost.
 NEVER = 1e6
@@ -130,7 +127,8 @@ class _Damping(Objective):
         return super().lost(-value, -reference)
 
 
-class _ByStep(Objective):
+class _SettlingTime(Objective):
+    name: ObjectiveName = "settling_time"
     simulated = True
     tolerance = 1e-3
 
@@ -162,16 +160,6 @@ class _ByStep(Objective):
             worst = max(worst, self._figure(*np.array(step)))
         return worst
 
-    @abstractmethod
-    def _cost(self, settling: Vector, overshoot: Vector) -> Vector: ...
-
-    @abstractmethod
-    def _figure(self, settling: Vector, overshoot: Vector) -> float: ...
-
-
-class _SettlingTime(_ByStep):
-    name: ObjectiveName = "settling_time"
-
     def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
         return settling
 
@@ -179,7 +167,7 @@ class _SettlingTime(_ByStep):
         return float(settling.max())
 
 
-class _Overshoot(_ByStep):
+class _Overshoot(_SettlingTime):
     name: ObjectiveName = "overshoot"
 
     def _cost(self, settling: Vector, overshoot: Vector) -> Vector:

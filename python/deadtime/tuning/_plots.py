@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from deadtime.systems import Response
     from deadtime.tuning._result import Design, FilterChoice
 
-__all__ = ["plot_design", "plot_filter_choice"]
-
 #: Points of a curve, and how far below and above the corner the controller is drawn.
 _POINTS = 801
 _BELOW = 0.02

@@ -5,28 +5,19 @@ from __future__ import annotations
 import inspect
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.ranges import Range, interval
-from deadtime._base.validation import finite, non_negative
+from deadtime._base.validation import Range, finite, interval, non_negative
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.tuning._specification import DesignSpecification
 from deadtime.tuning._stabilising import candidate_ranges
 
-__all__ = [
-    "Problem",
-    "Scenario",
-    "Vector",
-    "controller_template",
-    "pose",
-    "with_filter",
-]
-
 Vector: TypeAlias = NDArray[np.float64]
+
+ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
 
 #: Values of the unknown numbers of a loop, by name.
 Scenario: TypeAlias = dict[str, float]
@@ -69,6 +60,11 @@ class Problem:
         """The loop with these gains, in one scenario or in the middle."""
         return self.loop.replace(**self.named(gains), **(scenario or {}))
 
+    def filtered(self, smooth: DerivativeFilter | None) -> Problem:
+        """The same problem with another filter of the derivative, or none."""
+        controller = with_filter(self.loop.controller, smooth)
+        return replace(self, loop=self.loop.replace(controller=controller))
+
     def scenarios(self, points: int) -> tuple[Scenario, ...]:
         """Every combination of `points` values of each unknown number."""
         values = [
@@ -97,15 +93,20 @@ class Problem:
         return (low, 0.5 * (low + high), high) if low < high else (low,)
 
 
-def pose(loop: object, specification: DesignSpecification) -> Problem:
-    """Check the arguments of a design, and state its problem."""
-    template = controller_template(specification.controller)
-    delay, gain, ranges = specification.delay, specification.gain, specification.ranges
+def pose(
+    loop: object,
+    template: Controller,
+    delay: float | Range | None,
+    gain: float | Range | None,
+    fixed: Mapping[str, float] | None,
+    ranges: Mapping[str, Range] | None,
+    amplitude: float,
+    threads: int | None,
+) -> Problem:
+    """Check these arguments of `design`, and state its problem."""
     if not isinstance(loop, ControlLoop):
         loop, delay = _around(loop, template, delay)
-    held = {
-        name: finite(name, value) for name, value in _mapping("fixed", specification.fixed).items()
-    }
+    held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
     unknown = [name for name in held if name not in template.gains]
     if unknown:
         raise ValueError(
@@ -142,10 +143,10 @@ def pose(loop: object, specification: DesignSpecification) -> Problem:
         if set(given) != set(free):
             raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
         spans = ({name: interval(f"the range of {name}", given[name]) for name in free},)
-    height = finite("amplitude", specification.amplitude)
+    height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
-    return Problem(whole, free, spans, intervals, height, specification.threads)
+    return Problem(whole, free, spans, intervals, height, threads)
 
 
 def _around(
@@ -155,7 +156,7 @@ def _around(
     loop = ControlLoop(plant, template)
     if delay is None or loop.delay is None:
         return loop, delay
-    more = _interval("delay", delay)
+    more = _times(delay)
     return loop, (loop.delay + more[0], loop.delay + more[1])
 
 
@@ -196,16 +197,16 @@ def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
         if loop.delay is None:
             raise ValueError("the delay of the loop is not known: give delay=, or estimate it")
         return loop.delay, loop.delay
-    return _interval("delay", delay)
+    return _times(delay)
 
 
-def _interval(name: str, given: float | Range) -> Range:
-    """One time or an interval of times, s."""
-    if not isinstance(given, (tuple, list, np.ndarray)):
-        return non_negative(name, given), float(given)
-    low, high = interval(name, given, may_be_point=True)
+def _times(delay: float | Range) -> Range:
+    """One delay or an interval of delays, s."""
+    if not isinstance(delay, (tuple, list, np.ndarray)):
+        return non_negative("delay", delay), float(delay)
+    low, high = interval("delay", delay, may_be_point=True)
     if low < 0.0:
-        raise ValueError(f"{name}={given!r} is not an interval (low, high) of times >= 0")
+        raise ValueError(f"delay={delay!r} is not an interval (low, high) of times >= 0")
     return low, high
 
 

@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.loops import ControlLoop
 from deadtime.stability import StabilityMap
-from deadtime.tuning._problem import Scenario, Vector
-from deadtime.tuning._specification import ObjectiveName
+from deadtime.tuning._problem import ObjectiveName, Scenario, Vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["Design", "FilterChoice", "LeastMargins", "Trade", "figure_in_words"]
 
 
 class LeastMargins(NamedTuple):

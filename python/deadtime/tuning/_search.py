@@ -23,18 +23,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.tuning._margin_estimate import MarginEstimate
+from deadtime.tuning._margins import MarginEstimate, RequiredMargins
 from deadtime.tuning._objectives import NEVER, Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
-from deadtime.tuning._required_margins import RequiredMargins
 from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
-
-__all__ = ["Search"]
 
 #: Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
 #: gain in the objective pays for a shortfall.
@@ -99,74 +97,63 @@ Pair: TypeAlias = tuple[Vector, Vector]
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A search for the best gains: problem, objective, map and estimate of the margins."""
+    """A search for the gains that are best in some scenarios, with the required margins there."""
 
     problem: Problem
     objective: Objective
     survey: Survey
     estimate: MarginEstimate
+    required: RequiredMargins
+    scenarios: Sequence[Scenario] = ()
 
-    def globally(self, scenarios: Sequence[Scenario], required: RequiredMargins) -> Vector:
+    def globally(self) -> Vector:
         """The best gains, from the map."""
         points, stable = self.survey.points, np.flatnonzero(self.survey.stable)
         costs = np.full(len(points), np.inf)
         short = np.zeros(len(stable))
-        if required.named:
-            short = required.shortfall(self.estimate.of(points[stable], scenarios, _COARSE))
+        if self.required.named:
+            short = self._shortfalls(points[stable], _COARSE)
         met = stable[short <= _MET]
         if met.size:
-            costs[met] = self._map_costs(met, scenarios)
+            costs[met] = self._map_costs(met)
             if self.objective.simulated:
-                return self._firmest(points, costs, scenarios, required)
+                return self._firmest(points, costs)
             starts = self.survey.chosen(points, costs, _STARTS)
         else:
             # Perhaps the requirements are met between the cells.
             costs[stable] = short
             starts = self.survey.chosen(points, costs, 1)
-        found = [self._by_grids(start, scenarios, required) for start in starts]
-        best = min(found, key=lambda one: self._total(one[0], scenarios, required))
-        return self._polished(*best, scenarios, required)
+        found = [self._by_grids(start) for start in starts]
+        return self._polished(*min(found, key=lambda one: self._total(one[0])))
 
-    def _firmest(
-        self,
-        points: Vector,
-        costs: Vector,
-        scenarios: Sequence[Scenario],
-        required: RequiredMargins,
-    ) -> Vector:
+    def _firmest(self, points: Vector, costs: Vector) -> Vector:
         """The best gains with their neighbours, from more starts where those lose much by them."""
         for axes in self.survey.fringes:
             points = np.vstack([points, grid_points(axes)])
-            found = self._totals(axes, scenarios, required, self.objective.coarse)
+            found = self._totals(axes, self.objective.coarse)
             costs = np.append(costs, found)
         starts = self.survey.chosen(points, costs, _MOST_STARTS)
         best, least = starts[0], np.inf
         for i, start in enumerate(starts):
             if i >= _STARTS_SIMULATED and least <= _MUCH * costs.min():
                 break
-            gains = self._by_grids(start, scenarios, required)[0]
-            cost = self._total(gains, scenarios, required)
+            gains = self._by_grids(start)[0]
+            cost = self._total(gains)
             if cost < least:
                 best, least = gains, cost
         return np.asarray(best, dtype=np.float64)
 
-    def locally(
-        self, start: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
-    ) -> Vector:
+    def locally(self, start: Vector) -> Vector:
         """The best gains around a start."""
-        return self._polished(*self._by_grids(start, scenarios, required), scenarios, required)
+        return self._polished(*self._by_grids(start))
 
-    def _by_grids(
-        self, start: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
-    ) -> tuple[Vector, Vector]:
+    def _by_grids(self, start: Vector) -> Pair:
         """A better point, and how far around it a better one may still be."""
         reach = _REACH * self.survey.spacing
         low, high = np.array(self.survey.bounds).T
 
         def narrowed(judge: Judge, around: Vector, reach: Vector, grids: int) -> Pair:
-            def costs(axes: list[Vector]) -> Vector:
-                return self._totals(axes, scenarios, required, judge)
-
+            costs = partial(self._totals, judge=judge)
             return _by_grids(costs, around, reach, low, high, grids)
 
         if self.objective.simulated:
@@ -181,54 +168,41 @@ class Search:
             return start, reach
         return narrowed(self.objective.costs, start, reach, _GRIDS)
 
-    def _polished(
-        self, start: Vector, reach: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
-    ) -> Vector:
+    def _polished(self, start: Vector, reach: Vector) -> Vector:
         """The best point within reach, where costs are continuous."""
         low, high = np.array(self.survey.bounds).T
-
-        def cost(gains: Vector) -> float:
-            return self._total(gains, scenarios, required)
-
         if self.objective.simulated:
             return start
         if len(start) == 1:
-            return _between_neighbours(cost, start, reach, low, high)
-        return _by_simplices(cost, start, 0.5 * reach, low, high)
+            return _between_neighbours(self._total, start, reach, low, high)
+        return _by_simplices(self._total, start, 0.5 * reach, low, high)
 
-    def short(
-        self, gains: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
-    ) -> float:
+    def short(self, gains: Vector) -> float:
         """By how much gains fall short of the required margins, by the estimate."""
-        return float(required.shortfall(self.estimate.of(gains[None, :], scenarios))[0])
+        return float(self._shortfalls(gains[None, :])[0])
 
-    def _total(
-        self, gains: Vector, scenarios: Sequence[Scenario], required: RequiredMargins
-    ) -> float:
+    def _shortfalls(self, points: Vector, stride: int = 1) -> Vector:
+        """The same of every row of gains."""
+        return self.required.shortfall(self.estimate.of(points, self.scenarios, stride))
+
+    def _total(self, gains: Vector) -> float:
         """Cost of gains, shortfalls of margins included."""
-        cost = self.objective.worst(self.problem, gains, scenarios)
-        if not required.named:
+        cost = self.objective.worst(self.problem, gains, self.scenarios)
+        if not self.required.named:
             return cost
         # An unstable loop has crossings, which are no margins.
         stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
-        short = self.short(gains, scenarios, required) if stable else _UNSTABLE
+        short = self.short(gains) if stable else _UNSTABLE
         return cost + _PENALTY * self._scale * short
 
-    def _totals(
-        self,
-        axes: list[Vector],
-        scenarios: Sequence[Scenario],
-        required: RequiredMargins,
-        judge: Judge,
-    ) -> Vector:
+    def _totals(self, axes: list[Vector], judge: Judge) -> Vector:
         """The same of every point of a grid."""
         points = grid_points(axes)
-        late = worst_abscissa(self.problem, axes, scenarios).ravel()
+        late = worst_abscissa(self.problem, axes, self.scenarios).ravel()
         stable = np.isfinite(late)
         short = np.where(stable, 0.0, _UNSTABLE)
-        if required.named and stable.any():
-            estimated = self.estimate.of(points[stable], scenarios, _COARSE)
-            short[stable] = required.shortfall(estimated)
+        if self.required.named and stable.any():
+            short[stable] = self._shortfalls(points[stable], _COARSE)
         if self.objective.name == "abscissa":
             costs = np.where(stable, late, 0.0)
             return np.asarray(costs + _PENALTY * self._scale * short)
@@ -236,7 +210,7 @@ class Search:
         costs = NEVER * (1.0 + short)
         good = short <= _MET
         if good.any():
-            found = judge(self.problem, points[good], scenarios)
+            found = judge(self.problem, points[good], self.scenarios)
             costs[good] = found.max(axis=1)
         return costs
 
@@ -247,7 +221,7 @@ class Search:
             return abs(float(self.survey.abscissa.min()))
         return 1.0
 
-    def _map_costs(self, cells: NDArray[np.intp], scenarios: Sequence[Scenario]) -> Vector:
+    def _map_costs(self, cells: NDArray[np.intp]) -> Vector:
         """Costs of cells of the map; infinite for those left out where a cost takes long."""
         abscissa = self.survey.abscissa.ravel()[cells]
         if self.objective.name == "abscissa":
@@ -259,7 +233,7 @@ class Search:
         taken = np.append(order[: most // 3], rest[:: max(1, -(-rest.size * 3 // (2 * most)))])
         costs = np.full(len(cells), np.inf)
         points = self.survey.points[cells[taken]]
-        costs[taken] = self.objective.coarse(self.problem, points, scenarios).max(axis=1)
+        costs[taken] = self.objective.coarse(self.problem, points, self.scenarios).max(axis=1)
         return costs
 
 

@@ -19,8 +19,6 @@ from deadtime.loops import ControlLoop, P
 from deadtime.roots import crossings
 from deadtime.systems import TransferFunction
 
-__all__ = ["Range", "StableGains", "candidate_ranges", "critical_gain", "stable_gains"]
-
 Range = tuple[float, float]
 
 #: Highest frequency at which the gains of a continuous loop are sought: turns of the delay, and

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from deadtime.stability import StabilityMap, stability_map
 from deadtime.tuning._problem import Problem, Scenario, Vector
 
-__all__ = ["Survey", "charts_at", "grid_points", "surveyed", "worst_abscissa"]
-
 #: Points of the map along each free gain, for one, two and three of them: more points find narrower
 #: stable regions and cost time in proportion to their product.
 _SHAPES = {1: (401,), 2: (61, 61), 3: (21, 21, 9)}

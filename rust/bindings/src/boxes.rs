@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::column;
-use crate::by_name::ByName;
 use crate::runtime::run;
+use crate::stability::ByName;
 use crate::stability::{PyFamily, with_axes};
 
 type Range = (f64, f64);

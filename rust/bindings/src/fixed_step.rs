@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::owned;
-use crate::loop_run::LoopRun;
+use crate::dde::LoopRun;
 use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;

@@ -2,16 +2,14 @@
 
 mod arrays;
 mod boxes;
-mod by_name;
+mod certificate;
 mod dde;
 mod errors;
 mod fixed_step;
 mod frequency;
-mod loop_run;
 mod matrix;
 mod pointers;
 mod quasipoly;
-mod roots;
 mod runtime;
 mod sampled;
 mod solver;
@@ -33,6 +31,8 @@ mod _deadtime {
         stability_radius,
     };
     #[pymodule_export]
+    use super::certificate::{Certificate, Contour, Monotone, Segment};
+    #[pymodule_export]
     use super::dde::{LoopResponse, PyLinearLoop, on_samples};
     #[pymodule_export]
     use super::fixed_step::{FixedStepResponse, fixed_step_run};
@@ -46,7 +46,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::quasipoly::{Expansion, QuasiPolynomial};
     #[pymodule_export]
-    use super::roots::{Certificate, Contour, Monotone, RootSet, Segment, Sensitivity};
+    use super::quasipoly::{RootSet, Sensitivity};
     #[pymodule_export]
     use super::sampled::{SampledCells, sampled_abscissa_grid};
     #[pymodule_export]

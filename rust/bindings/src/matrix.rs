@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::rows;
 use crate::errors::to_python;
-use crate::roots::RootSet;
+use crate::quasipoly::RootSet;
 use crate::runtime::run;
 
 type ByDelay<'py> = Vec<(f64, PyReadonlyArray2<'py, f64>)>;
@@ -54,14 +54,14 @@ impl CharacteristicMatrix {
         let set = run(py, None, None, |task: &Task| {
             matrix::roots(&self.core, &Region { re, im }, task)
         })?;
-        RootSet::new(py, set)
+        Ok(RootSet::new(py, set))
     }
 
     fn rightmost(&self, py: Python<'_>, n: usize) -> PyResult<RootSet> {
         let set = run(py, None, None, |task: &Task| {
             matrix::rightmost(&self.core, n, task)
         })?;
-        RootSet::new(py, set)
+        Ok(RootSet::new(py, set))
     }
 
     fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {

@@ -8,8 +8,8 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDy
 use pyo3::prelude::*;
 
 use crate::arrays::{in_order, owned, rows};
+use crate::certificate::Certificate;
 use crate::errors::to_python;
-use crate::roots::{Certificate, RootSet, Sensitivity};
 use crate::runtime::{run, run_here};
 
 /// Fewer values than this are computed on the calling thread.
@@ -25,6 +25,46 @@ pub(crate) struct Expansion {
     coefficients: Py<PyArray1<Complex64>>,
     errors: Py<PyArray1<f64>>,
     delay: f64,
+}
+
+/// Roots with discs that are proved to hold them.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct RootSet {
+    roots: Py<PyArray1<Complex64>>,
+    multiplicities: Py<PyArray1<u32>>,
+    radii: Py<PyArray1<f64>>,
+    resolved: Py<PyArray1<bool>>,
+    counted: u64,
+    region: (Range, Range),
+}
+
+impl RootSet {
+    pub(crate) fn new(py: Python<'_>, set: roots::RootSet) -> Self {
+        Self {
+            roots: set.roots.into_pyarray(py).unbind(),
+            multiplicities: set.multiplicities.into_pyarray(py).unbind(),
+            radii: set.radii.into_pyarray(py).unbind(),
+            resolved: set.resolved.into_pyarray(py).unbind(),
+            counted: set.counted,
+            region: (set.region.re, set.region.im),
+        }
+    }
+}
+
+/// A root and its derivative by each of the coefficients that were asked for.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct Sensitivity {
+    root: Complex64,
+    coefficients: Py<PyArray1<Complex64>>,
+}
+
+impl Sensitivity {
+    pub(crate) fn new(py: Python<'_>, root: Complex64, coefficients: Vec<Complex64>) -> Self {
+        Self {
+            root,
+            coefficients: coefficients.into_pyarray(py).unbind(),
+        }
+    }
 }
 
 /// A quasi-polynomial of the core.
@@ -170,12 +210,12 @@ impl QuasiPolynomial {
         let set = run_here(py, |task| {
             roots::roots_with_edge(&self.core, &Region { re, im }, edge, task)
         })?;
-        RootSet::new(py, set)
+        Ok(RootSet::new(py, set))
     }
 
     fn rightmost(&self, py: Python<'_>, n: usize) -> PyResult<RootSet> {
         let set = run_here(py, |task| roots::rightmost(&self.core, n, task))?;
-        RootSet::new(py, set)
+        Ok(RootSet::new(py, set))
     }
 
     fn spectral_abscissa(&self, py: Python<'_>, strong: bool) -> PyResult<f64> {

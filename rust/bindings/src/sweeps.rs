@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{column, in_order};
-use crate::loop_run::LoopRun;
+use crate::dde::LoopRun;
 use crate::runtime::{run, run_here};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;

@@ -4,6 +4,22 @@ use num_complex::Complex64;
 
 use crate::memory::readable_size;
 
+/// Return [`Error::Argument`] with a formatted message.
+macro_rules! refuse {
+    ($($message:tt)+) => {
+        return Err($crate::Error::Argument(format!($($message)+)))
+    };
+}
+
+/// Return [`Error::Argument`] with a formatted message if the condition holds.
+macro_rules! refuse_if {
+    ($condition:expr, $($message:tt)+) => {
+        if $condition {
+            refuse!($($message)+);
+        }
+    };
+}
+
 /// Every error of the kernel. The message states what was wrong and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -113,6 +129,11 @@ impl Error {
     /// Shorthand for [`Error::Argument`].
     pub fn argument(message: impl Into<String>) -> Self {
         Self::Argument(message.into())
+    }
+
+    /// Shorthand for [`Error::Contour`].
+    pub(crate) const fn contour(place: Complex64, distance: f64) -> Self {
+        Self::Contour { place, distance }
     }
 
     /// Does the error end the whole computation? True when the caller asked to stop, or memory is

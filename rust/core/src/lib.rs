@@ -5,9 +5,11 @@
 //! Python. Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots
 //! ← stability ← frequency; quasipoly ← dde.
 
+#[macro_use]
+pub mod error;
+
 pub mod dde;
 pub mod elementary;
-pub mod error;
 pub mod frequency;
 pub mod lambertw;
 pub mod memory;
@@ -19,5 +21,4 @@ pub mod status;
 pub mod task;
 
 pub use error::Error;
-pub use simd::instructions;
 pub use task::Task;

@@ -1,9 +1,8 @@
 //! Errors of reading and writing.
 
-use std::fmt;
-
 /// A fault, and the byte at which it is.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{fault}, at byte {offset}")]
 pub struct Error {
     /// The fault, with the value.
     pub fault: Fault,
@@ -12,10 +11,11 @@ pub struct Error {
 }
 
 /// What is wrong.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
     /// The bytes end too early.
+    #[error("{length} bytes, of which it takes {needed} at least")]
     Short {
         /// Number of bytes.
         length: usize,
@@ -23,6 +23,7 @@ pub enum Fault {
         needed: usize,
     },
     /// A size that does not belong to this format.
+    #[error("{length} bytes in place of {wanted}")]
     Length {
         /// Number of bytes.
         length: usize,
@@ -30,6 +31,7 @@ pub enum Fault {
         wanted: usize,
     },
     /// More bytes than a packet may hold.
+    #[error("{length} bytes, of which there may be {limit} at most")]
     Long {
         /// Number of bytes.
         length: usize,
@@ -37,8 +39,13 @@ pub enum Fault {
         limit: usize,
     },
     /// The first four bytes belong to no known format.
+    #[error("0x{0:08x} is the header of no known format")]
     Header(u32),
     /// An option of navdata that is smaller than its own head, or ends beyond the packet.
+    #[error(
+        "the option of tag {tag} says that it has {size} bytes: 4 at least and {left} at most are \
+         possible"
+    )]
     OptionSize {
         /// Its tag.
         tag: u16,
@@ -48,8 +55,10 @@ pub enum Fault {
         left: usize,
     },
     /// Navdata without a checksum as its last option.
+    #[error("the last option is no checksum")]
     NoChecksum,
     /// The checksum differs from that of the bytes before it.
+    #[error("the checksum is {stated}, but the bytes before it sum to {summed}")]
     Checksum {
         /// The checksum that the packet states.
         stated: u32,
@@ -57,8 +66,10 @@ pub enum Fault {
         summed: u32,
     },
     /// A tag that is reserved for the checksum.
+    #[error("the tag {0} is that of the checksum alone")]
     Tag(u16),
     /// A number that is not finite.
+    #[error("{name}={value}: give a finite number")]
     NotFinite {
         /// Its name.
         name: &'static str,
@@ -66,6 +77,7 @@ pub enum Fault {
         value: f64,
     },
     /// A number outside the range of its field.
+    #[error("{name}={value} is out of its range")]
     Range {
         /// Its name.
         name: &'static str,
@@ -73,6 +85,7 @@ pub enum Fault {
         value: f64,
     },
     /// A character that is not allowed in this text.
+    #[error("{name} holds the byte 0x{byte:02x}, which has no place in it")]
     Sign {
         /// Name of the text.
         name: &'static str,
@@ -80,16 +93,22 @@ pub enum Fault {
         byte: u8,
     },
     /// A name that is invalid, or that of a command with a type of its own.
+    #[error("\"{0}\" is no name of another command")]
     Name(String),
     /// Bytes that are no UTF-8 text.
+    #[error("these bytes are no UTF-8 text")]
     Text,
     /// A line of the configuration without "section:key = value".
+    #[error("a line that is not of the form \"section:key = value\"")]
     Line,
     /// A key of the configuration that occurs twice, with two values.
+    #[error("the key {0} has two different values")]
     Twice(String),
     /// The configuration does not end with a NUL byte.
+    #[error("there is no NUL byte that ends the configuration")]
     NoEnd,
     /// Bytes after the end of the configuration.
+    #[error("bytes after the NUL that ends the configuration")]
     AfterEnd,
 }
 
@@ -102,58 +121,3 @@ impl Fault {
         }
     }
 }
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Fault::Short { length, needed } => {
-                write!(f, "{length} bytes, of which it takes {needed} at least")?;
-            }
-            Fault::Length { length, wanted } => {
-                write!(f, "{length} bytes in place of {wanted}")?;
-            }
-            Fault::Long { length, limit } => {
-                write!(f, "{length} bytes, of which there may be {limit} at most")?;
-            }
-            Fault::Header(found) => write!(f, "0x{found:08x} is the header of no known format")?,
-            Fault::OptionSize { tag, size, left } => write!(
-                f,
-                "the option of tag {tag} says that it has {size} bytes: 4 at least and {left} at \
-                 most are possible"
-            )?,
-            Fault::NoChecksum => f.write_str("the last option is no checksum")?,
-            Fault::Checksum { stated, summed } => write!(
-                f,
-                "the checksum is {stated}, but the bytes before it sum to {summed}"
-            )?,
-            Fault::Tag(tag) => write!(f, "the tag {tag} is that of the checksum alone")?,
-            Fault::NotFinite { name, value } => {
-                write!(f, "{name}={value}: give a finite number")?;
-            }
-            Fault::Range { name, value } => write!(f, "{name}={value} is out of its range")?,
-            Fault::Sign { name, byte } => {
-                write!(
-                    f,
-                    "{name} holds the byte 0x{byte:02x}, which has no place in it"
-                )?;
-            }
-            Fault::Name(name) => write!(f, "\"{name}\" is no name of another command")?,
-            Fault::Text => f.write_str("these bytes are no UTF-8 text")?,
-            Fault::Line => f.write_str("a line that is not of the form \"section:key = value\"")?,
-            Fault::Twice(key) => write!(f, "the key {key} has two different values")?,
-            Fault::NoEnd => f.write_str("there is no NUL byte that ends the configuration")?,
-            Fault::AfterEnd => f.write_str("bytes after the NUL that ends the configuration")?,
-        }
-        Ok(())
-    }
-}
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, at byte {}", self.fault, self.offset)
-    }
-}
-
-impl std::error::Error for Fault {}
-
-impl std::error::Error for Error {}

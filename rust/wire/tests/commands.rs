@@ -103,69 +103,33 @@ fn malformed_commands_are_left_out_and_their_neighbours_kept() {
     ] {
         let datagram = format!("AT*REF=1,512\rAT*{broken}\rAT*COMWDG=3\r");
         let read = at::read(datagram.as_bytes());
-        assert_eq!(
-            read,
-            [(1, reference(true, false)), (3, Command::Watchdog)],
-            "{broken}"
-        );
+        let neighbours = [(1, reference(true, false)), (3, Command::Watchdog)];
+        assert_eq!(read, neighbours, "{broken}");
     }
     // Its end lies beyond the limit of the drone.
     let datagram = format!("AT*REF=1,512\rAT*LED=2,{}\rAT*COMWDG=3\r", "9".repeat(1002));
     assert_eq!(at::read(datagram.as_bytes()), [(1, reference(true, false))]);
     // Beyond the range, but finite: clipped.
-    assert_eq!(
-        at::read(b"AT*PCMD=2,1,0,0,1088421888,0\r"),
-        [(2, motion(1, 1.0))]
-    );
+    let clipped = at::read(b"AT*PCMD=2,1,0,0,1088421888,0\r");
+    assert_eq!(clipped, [(2, motion(1, 1.0))]);
 }
 
 #[test]
 fn what_would_break_a_line_is_not_written() {
+    let sign = |name, byte| Fault::Sign { name, byte };
+    let (length, limit) = (1045, 1024);
     for (command, fault) in [
-        (
-            config("a:b", "c\r"),
-            Fault::Sign {
-                name: "value",
-                byte: b'\r',
-            },
-        ),
-        (
-            config("a\"b", "c"),
-            Fault::Sign {
-                name: "key",
-                byte: b'"',
-            },
-        ),
-        (
-            config("a:b", "é"),
-            Fault::Sign {
-                name: "value",
-                byte: 0xc3,
-            },
-        ),
-        (
-            other("LED", &["1,2"]),
-            Fault::Sign {
-                name: "argument",
-                byte: b',',
-            },
-        ),
-        (
-            other("LED", &["\"1"]),
-            Fault::Sign {
-                name: "argument",
-                byte: b'"',
-            },
-        ),
+        (config("a:b", "c\r"), sign("value", b'\r')),
+        (config("a\"b", "c"), sign("key", b'"')),
+        (config("a:b", "é"), sign("value", 0xc3)),
+        (other("LED", &["1,2"]), sign("argument", b',')),
+        (other("LED", &["\"1"]), sign("argument", b'"')),
         (other("PCMD", &["1"]), Fault::Name("PCMD".to_owned())),
         (other("", &[]), Fault::Name(String::new())),
         (other("led", &[]), Fault::Name("led".to_owned())),
         (
             config("a:b", &"c".repeat(1024)),
-            Fault::Long {
-                length: 1045,
-                limit: 1024,
-            },
+            Fault::Long { length, limit },
         ),
     ] {
         assert_eq!(at::write(&[command], 1).unwrap_err().fault, fault);

@@ -63,16 +63,12 @@ fn packets_of_a_loop_hold_finite_numbers() {
     }
     let mut packet = good.clone();
     packet[32..40].copy_from_slice(&(-1e-9f64).to_le_bytes());
-    assert!(matches!(
-        loop_packet::read(&packet).unwrap_err().fault,
-        Fault::Range { .. }
-    ));
+    let error = loop_packet::read(&packet).unwrap_err();
+    assert!(matches!(error.fault, Fault::Range { .. }));
     let mut packet = good.clone();
     packet[3] = b'2';
-    assert!(matches!(
-        loop_packet::read(&packet).unwrap_err().fault,
-        Fault::Header(_)
-    ));
+    let error = loop_packet::read(&packet).unwrap_err();
+    assert!(matches!(error.fault, Fault::Header(_)));
     for length in (0..good.len()).chain([57, 500]) {
         let packet: Vec<u8> = good.iter().copied().cycle().take(length).collect();
         assert!(loop_packet::read(&packet).is_err());

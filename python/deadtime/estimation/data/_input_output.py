@@ -6,6 +6,10 @@ With u_k the command held over each sample time h, or its mean over it, an integ
 the two samples, which for the integrator is the command (1-f) u_{k-d} + f u_{k-d-1} at a delay of
 (d + f) h. This includes the half sample of the hold; where the plant cannot be inverted, the half
 sample is subtracted from the delay.
+
+In a closed loop the sensor noise is in the output and, through the controller, in the command.
+Methods that assume that the command causes the output then also find the effect of the output on
+the command.
 """
 
 from __future__ import annotations
@@ -17,13 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation.data._commands import commands_over_samples
-from deadtime.estimation.data._excitation import check_moves
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.loops import ControlLoop, FirstOrder, Integrator
+from deadtime.estimation.data._checks import check_moves
+from deadtime.estimation.data._simulated import SimulatedRecording, commands_over_samples
+from deadtime.loops import FirstOrder, Integrator
 from deadtime.recordings import Recording
-
-__all__ = ["InputOutput", "read_input_output"]
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,12 @@ EVEN = 0.01
 
 #: Longest delay of the search, as a share of the record.
 LONGEST = 0.6
+
+#: The command is taken to follow the output below this p-value.
+FEEDBACK = 1e-3
+
+#: Past samples in the test.
+PAST = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +58,6 @@ class InputOutput:
         s.
     late : float
         Delay of the response besides the delay itself, s: what was not inverted of plant and hold.
-    source : str
-        Source of the commands.
     remark : str
         What else is part of the delay, in words; empty if nothing.
     """
@@ -61,7 +66,6 @@ class InputOutput:
     response: Array
     sample_time: float
     late: float
-    source: str
     remark: str
 
     @property
@@ -70,11 +74,12 @@ class InputOutput:
         return int(LONGEST * self.command.size)
 
 
-def read_input_output(
-    recording: Recording, loop: ControlLoop, simulated: SimulatedRecording, method: str
-) -> InputOutput:
-    """Input and output over the window of `simulated`; refuses constant ones."""
-    data = simulated.recording
+def read_input_output(simulated: SimulatedRecording, method: str) -> InputOutput:
+    """Input and output over its window, as far as the plant can be inverted.
+
+    Refuses a constant input or output.
+    """
+    data, loop = simulated.recording, simulated.loop
     steps = np.diff(data.time)
     h = data.sample_time
     if float(np.max(np.abs(steps - h))) > EVEN * h:
@@ -82,29 +87,54 @@ def read_input_output(
             f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: the "
             f"{method} method needs even ones; use method='output_error' or 'waveform'"
         )
-    command, source = commands_over_samples(data, loop)
+    command, _ = commands_over_samples(data, loop)
     if len(data) < FEWEST:
         raise NotIdentifiableError(
             f"{len(data)} samples are too few for the {method} method, {FEWEST} are needed: widen "
             "the window"
         )
     check_moves(data.output, command)
-    return _inverted(command, data.output, loop, h, source)
-
-
-def _inverted(
-    command: Array, output: Array, loop: ControlLoop, h: float, source: str
-) -> InputOutput:
-    """Command and response without the plant, as far as it can be inverted."""
-    plant = loop.plant
+    plant, output = loop.plant, data.output
     moved = output - float(output[0])
     if isinstance(plant, Integrator):
-        return InputOutput(command[:-1], np.diff(moved) / h, h, plant.lag, source, "")
+        return InputOutput(command[:-1], np.diff(moved) / h, h, plant.lag, "")
     if isinstance(plant, FirstOrder):
         kept = math.exp(-h / plant.time_constant)
         response = (moved[1:] - kept * moved[:-1]) / (1.0 - kept)
         resting = float(output[0]) / plant.gain
-        return InputOutput(command[:-1] - resting, response, h, 0.0, source, "")
+        return InputOutput(command[:-1] - resting, response, h, 0.0, "")
     remark = "; the plant was not inverted, so its lag is part of the delay"
     centred = output - float(output.mean())
-    return InputOutput(command - float(command.mean()), centred, h, 0.5 * h, source, remark)
+    return InputOutput(command - float(command.mean()), centred, h, 0.5 * h, remark)
+
+
+def feedback_p_value(recording: Recording) -> float:
+    """P-value of the test that the command does not depend on the output.
+
+    A Granger (1969) F test: whether the output, up to `PAST` samples back, improves the prediction
+    of the command by the reference and past commands.
+    """
+    from scipy import special
+
+    command = recording.command
+    if command is None:  # it is then computed from the output
+        return 0.0
+    rows = np.arange(PAST, command.size)
+
+    def back(values: Array, first: int) -> list[Array]:
+        return [values[rows - lag] for lag in range(first, PAST + 1)]
+
+    plain = [np.ones(rows.size), *back(command, 1), *back(recording.reference, 0)]
+    full = [*plain, *back(recording.output, 0)]
+    left, ranks = [], []
+    for columns in (plain, full):
+        matrix = np.stack(columns, axis=1)
+        weights, _, rank, _ = np.linalg.lstsq(matrix, command[rows], rcond=1e-10)
+        left.append(float(np.sum((command[rows] - matrix @ weights) ** 2)))
+        ranks.append(int(rank))
+    more, freedom = ranks[1] - ranks[0], rows.size - ranks[1]
+    floor = 1e-20 * float(np.sum((command - command.mean()) ** 2))
+    if more < 1 or freedom < 1 or left[0] <= floor:
+        return 1.0
+    ratio = (left[0] - left[1]) / more / (max(left[1], floor) / freedom)
+    return float(special.fdtrc(more, freedom, max(ratio, 0.0)))

@@ -17,8 +17,6 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.recordings import Recording
 
-__all__ = ["PeriodicSpectra", "periodic_spectra"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

@@ -1,4 +1,6 @@
-"""Simulations of the recorded loop over a window of the recording.
+"""Commands of a recording, and simulations of the recorded loop over a window of it.
+
+The command of every row is the logged one, or computed from the controller.
 
 This file alone turns a window of a recording into initial conditions: the loop starts at rest at
 its output at the beginning of the window, the simulation is evaluated at the time stamps of the
@@ -8,20 +10,24 @@ hold, are still to arrive.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.errors import RecordingError
-from deadtime.estimation.data._evidence import excited
-from deadtime.estimation.data._excitation import start_and_span
+from deadtime._base.errors import NotIdentifiableError, RecordingError
+from deadtime.estimation.data._checks import excited, start_and_span
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
 from deadtime.systems import Response
 
-__all__ = ["SimulatedRecording", "shortest_time"]
+#: A logged command is taken to be the P controller's where the two differ by less than this share
+#: of the command's standard deviation. Larger values accept more noise in the log, and more foreign
+#: commands.
+ALIKE = 0.2
 
 Array = NDArray[np.float64]
 
@@ -42,6 +48,61 @@ STEP_FROM_ZERO = 0.25
 
 IN_S = frozenset({"delay", "lag", "start"})
 NOT_NEGATIVE = frozenset({"delay", "lag"})
+
+
+def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]:
+    """Commands within the limit, and their source in words.
+
+    The command of a P controller depends on its sample alone, so it can be computed from the log;
+    the command of other controllers depends on samples before the log.
+    """
+    if recording.command is not None:
+        return _limited(recording.command, loop), "logged"
+    if not isinstance(loop.controller, P):
+        raise NotIdentifiableError(
+            "the recording holds no command, and only that of a P controller can be computed from "
+            "reference and output: log the command, or use method='waveform'"
+        )
+    command = loop.controller.Kp * (recording.reference - recording.output)
+    return _limited(command, loop), "computed from reference and output"
+
+
+def _limited(command: Array, loop: ControlLoop) -> Array:
+    limit = math.inf if loop.limit is None else loop.limit
+    return np.clip(command, -limit, limit)
+
+
+def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
+    """Whether a logged command is that of a continuous P controller, which is not held.
+
+    Any other logged command, such as a setpoint, is taken as held between rows.
+    """
+    if loop.is_sampled or recording.command is None or not isinstance(loop.controller, P):
+        return False
+    computed, _ = known_commands(replace(recording, command=None), loop)
+    logged, _ = known_commands(recording, loop)
+    return float(np.std(computed - logged)) < ALIKE * float(np.std(logged))
+
+
+def commands_over_samples(recording: Recording, loop: ControlLoop) -> tuple[Array, str]:
+    """Mean command from each sample to the next, and the source of the commands in words.
+
+    A sampled loop holds its command. In a continuous loop the mean is that of a straight line
+    between the samples (second order); where the reference steps at a sample, the line ends just
+    before the step.
+    """
+    command, source = known_commands(recording, loop)
+    if loop.is_sampled:
+        return command, source
+    before = command[1:].copy()
+    jumps = np.flatnonzero(np.diff(recording.reference))
+    if jumps.size and isinstance(loop.controller, P):
+        Kp, output = loop.controller.Kp, recording.output[jumps + 1]
+        old, new = (
+            _limited(Kp * (recording.reference[rows] - output), loop) for rows in (jumps, jumps + 1)
+        )
+        before[jumps] -= new - old
+    return np.append(0.5 * (command[:-1] + before), command[-1]), source
 
 
 class SimulatedRecording:
@@ -180,6 +241,4 @@ def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array
         return recording.command[:start]
     if not isinstance(loop.controller, P):
         return np.empty(0)
-    command = loop.controller.Kp * (recording.reference[:start] - recording.output[:start])
-    limit = np.inf if loop.limit is None else loop.limit
-    return np.clip(command, -limit, limit)
+    return known_commands(recording, loop)[0][:start]

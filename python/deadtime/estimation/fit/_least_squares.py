@@ -4,20 +4,28 @@ A model gives the misfit (simulated minus recorded output) of its recordings and
 The search is SciPy's trust-region method from a few starting points, because the cost has several
 local minima over the delay. With a quantity held, the other parameters are minimised over; delay +
 lag is held by changing the delay opposite to the lag.
+
+Several recordings of the same vehicle are fitted by one set of parameters.
+The parameters of the vehicle are common; each recording has its own initial output. The recordings
+are weighted. Where residuals are white, they are noise, and the weight is the inverse of their
+standard deviation, which is estimated too (iterated to convergence). Where they are not, the model
+is incomplete and its error grows with the motion: the weight is then the inverse of the excitation.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Ends", "Minimum", "Model", "ModelOfOne", "ProfileCost", "minimise", "solve"]
+from deadtime.estimation.data._checks import excited
+from deadtime.estimation.fit._residuals import whiteness_of
+from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
 
@@ -31,46 +39,12 @@ EVALUATIONS = 200
 #: where minima are compared or only the cost is needed, which is flat there.
 TO_ROUNDING, TO_COMPARE = 1e-14, 1e-6
 
+#: Most iterations of the weights, and the change at which they have converged.
+ITERATIONS, CONVERGED = 20, 1e-6
 
-class Model(Protocol):
-    """Misfit of one or several recordings as a function of parameters.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        Names of all parameters: `names` first, then the further fitted ones.
-    names : tuple of str
-        Names of the parameters to be estimated.
-    low, high, scale : ndarray, shape (p,)
-        Bounds and scales.
-    size : float
-        Size of the excitation.
-    sizes : tuple of int
-        Samples of each recording, in the order of the misfit.
-    """
-
-    @property
-    def labels(self) -> tuple[str, ...]: ...
-    @property
-    def names(self) -> tuple[str, ...]: ...
-    @property
-    def low(self) -> Array: ...
-    @property
-    def high(self) -> Array: ...
-    @property
-    def scale(self) -> Array: ...
-    @property
-    def size(self) -> float: ...
-    @property
-    def sizes(self) -> tuple[int, ...]: ...
-    def misfit(self, point: Array) -> Array:
-        """Simulated minus recorded output, shape (n,)."""
-
-    def jacobian(self, point: Array) -> Array:
-        """Derivatives of the misfit, shape (n, p)."""
-
-    def starts(self) -> list[Array]:
-        """Starting points, the best first."""
+#: Smallest residuals of a recording, as a share of the largest of any recording: below it is
+#: rounding, which must not outweigh the other recordings.
+LEAST_SHARE = 1e-6
 
 
 class Ends(NamedTuple):
@@ -81,17 +55,69 @@ class Ends(NamedTuple):
     scale: float
 
 
-class ModelOfOne(ABC):
-    """Base of models of one recording: bounds and scales by the names of parameters."""
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """One recording and its parameters: `names`, then the initial output if that is fitted too.
+
+    Attributes
+    ----------
+    recording : Recording
+        What is fitted.
+    names : tuple of str
+        Names of the parameters to be estimated.
+    offset : float or None
+        The output at the start where it is known.
+    """
+
+    recording: Recording
+    names: tuple[str, ...]
+    offset: float | None
 
     @property
-    @abstractmethod
     def labels(self) -> tuple[str, ...]:
-        """Names of the parameters."""
+        """Names of all parameters."""
+        return (*self.names, *(["initial output"] if self.offset is None else []))
+
+    def values(self, point: Array) -> dict[str, float]:
+        """The parameters to be estimated, by name."""
+        return dict(zip(self.names, point.tolist(), strict=False))
+
+    def start_of(self, point: Array) -> float:
+        """The output at the start."""
+        return float(point[-1]) if self.offset is None else self.offset
+
+
+class ModelOfOne(Fitted, ABC):
+    """Misfit of one recording as a function of its parameters."""
+
+    #: Factor on the residuals of each recording.
+    weights = (1.0,)
 
     @abstractmethod
     def ends(self, label: str) -> Ends:
-        """Bounds and scale of one of them."""
+        """Bounds and scale of one of the parameters."""
+
+    @abstractmethod
+    def misfit(self, point: Array) -> Array:
+        """Simulated minus recorded output, shape (n,)."""
+
+    @abstractmethod
+    def jacobian(self, point: Array) -> Array:
+        """Derivatives of the misfit, shape (n, p)."""
+
+    @abstractmethod
+    def starts(self) -> list[Array]:
+        """Starting points, the best first."""
+
+    @cached_property
+    def size(self) -> float:
+        """Size of the excitation."""
+        return excited(self.recording)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Samples of each recording, in the order of the misfit."""
+        return (len(self.recording),)
 
     @cached_property
     def low(self) -> Array:
@@ -121,6 +147,126 @@ class Minimum:
     def cost(self) -> float:
         """Sum of squares."""
         return float(self.misfit @ self.misfit)
+
+
+@dataclass(frozen=True, eq=False)
+class JointModel:
+    """The models of several recordings as one.
+
+    Attributes
+    ----------
+    parts : tuple of ModelOfOne
+        One for each recording; all have the same names.
+    weights : tuple of float
+        Factor on the residuals of each.
+    """
+
+    parts: tuple[ModelOfOne, ...]
+    weights: tuple[float, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the common parameters."""
+        return self.parts[0].names
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Names of all parameters: the common ones, then those of each recording."""
+        count = len(self.names)
+        own = [
+            f"{label} of recording {number}"
+            for number, part in enumerate(self.parts, 1)
+            for label in part.labels[count:]
+        ]
+        return (*self.names, *own)
+
+    @property
+    def size(self) -> float:
+        """Largest excitation of the recordings."""
+        return max(part.size for part in self.parts)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Samples of each recording."""
+        return tuple(size for part in self.parts for size in part.sizes)
+
+    @cached_property
+    def _places(self) -> list[Array]:
+        """Indices of the parameters of each recording among all parameters."""
+        count, after, places = len(self.names), len(self.names), []
+        for part in self.parts:
+            own = len(part.labels) - count
+            places.append(np.concatenate([np.arange(count), np.arange(after, after + own)]))
+            after += own
+        return places
+
+    def _joined(self, what: str, common: Callable[[list[Array]], Array]) -> Array:
+        """The common values of a bound or scale, then those of each recording."""
+        count = len(self.names)
+        ends = [getattr(part, what) for part in self.parts]
+        return np.concatenate(
+            [common([end[:count] for end in ends]), *(end[count:] for end in ends)]
+        )
+
+    @cached_property
+    def low(self) -> Array:
+        """Lower bounds: the largest over the recordings."""
+        return self._joined("low", lambda ends: np.max(ends, axis=0))
+
+    @cached_property
+    def high(self) -> Array:
+        """Upper bounds: the smallest over the recordings."""
+        return self._joined("high", lambda ends: np.min(ends, axis=0))
+
+    @cached_property
+    def scale(self) -> Array:
+        """Scales of the parameters."""
+        return self._joined("scale", lambda ends: ends[0])
+
+    def misfit(self, point: Array) -> Array:
+        """Weighted residuals, one recording after the other."""
+        return np.concatenate(
+            [
+                weight * part.misfit(point[place])
+                for part, weight, place in zip(self.parts, self.weights, self._places, strict=True)
+            ]
+        )
+
+    def jacobian(self, point: Array) -> Array:
+        """Derivatives of the weighted residuals."""
+        rows = []
+        for part, weight, place in zip(self.parts, self.weights, self._places, strict=True):
+            block = np.zeros((sum(part.sizes), point.size))
+            block[:, place] = weight * part.jacobian(point[place])
+            rows.append(block)
+        return np.concatenate(rows)
+
+    def starts(self) -> list[Array]:
+        """Starting points of every recording, completed by the best ones of the others."""
+        starts = [part.starts() for part in self.parts]
+        count = len(self.names)
+        own = [points[0][count:] for points in starts]
+        candidates = [
+            np.clip(np.concatenate([point[:count], *own]), self.low, self.high)
+            for points in starts
+            for point in points[:3]
+        ]
+        return sorted(candidates, key=lambda point: float(np.sum(self.misfit(point) ** 2)))
+
+    def scatter(self, minimum: Minimum) -> Array:
+        """Root mean square of the unweighted residuals of each recording."""
+        ends = np.cumsum(self.sizes)[:-1]
+        pieces = np.split(minimum.misfit, ends)
+        return np.array(
+            [
+                float(np.sqrt(np.mean(piece**2))) / weight
+                for piece, weight in zip(pieces, self.weights, strict=True)
+            ]
+        )
+
+
+#: A model of one recording, or of several.
+Model: TypeAlias = ModelOfOne | JointModel
 
 
 def solve(model: Model) -> Minimum:
@@ -188,52 +334,30 @@ def minimise(
     return Minimum(point, np.asarray(found.fun), model.jacobian(point))
 
 
-@dataclass(frozen=True)
-class ProfileCost:
-    """Least cost with one quantity held, the others free.
+def solve_jointly(parts: Sequence[ModelOfOne]) -> tuple[Model, Minimum]:
+    """Return the model of all recordings, its weights included, and its minimum."""
+    if len(parts) == 1:
+        return parts[0], solve(parts[0])
+    sizes = np.array([part.size for part in parts])
+    by_size = JointModel(tuple(parts), tuple((sizes.min() / sizes).tolist()))
+    first = solve(by_size)
+    model, found = _by_scatter(by_size, first)
+    if whiteness_of(found.misfit, len(model.names), model.sizes).white:
+        return model, found
+    return by_size, first
 
-    The search starts from the minimum of the linearised model. `known` holds the parameters that
-    were not fitted, which may be part of a sum.
-    """
 
-    model: Model
-    best: Minimum
-    known: Mapping[str, float]
-
-    def __call__(self, name: str, value: float) -> float:
-        """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
-        base, free = self._held(name.split("+"), value)
-        least = minimise(self.model, self._linear(base, free), base, free, TO_COMPARE).cost
-        # A parameter that is zero in the best fit is tried at zero here too.
-        for place in np.flatnonzero(self.best.point < self.model.low):
-            column = np.flatnonzero(free[place] == 1.0)
-            if column.size:
-                base[place] = self.best.point[place]
-                without = np.delete(free, column, axis=1)
-                start = self._linear(base, without)
-                found = minimise(self.model, start, base, without, TO_COMPARE)
-                least = min(least, found.cost)
-        return least
-
-    def _linear(self, base: Array, free: Array) -> Array:
-        """Minimum of the linearised model with one quantity held."""
-        jacobian = self.best.jacobian
-        away = jacobian @ (self.best.point - base)
-        moved, *_ = np.linalg.lstsq(jacobian @ free, away, rcond=None)
-        return np.asarray(base + free @ moved)
-
-    def _held(self, names: Sequence[str], value: float) -> tuple[Array, Array]:
-        """Base and directions in which the sum of `names` is `value`."""
-        labels = self.model.labels
-        value -= sum(self.known.get(name, 0.0) for name in names if name not in labels)
-        places = [labels.index(name) for name in names if name in labels]
-        fixed = places[0]
-        if len(places) == 1 and value != self.best.point[fixed]:
-            # Values between zero and the lower bound of the search are not simulated.
-            value = max(value, float(self.model.low[fixed]))
-        base = np.zeros(len(labels))
-        base[fixed] = value
-        free = np.delete(np.eye(len(labels)), fixed, axis=1)
-        for place in places[1:]:
-            free[fixed, place - (place > fixed)] = -1.0
-        return base, free
+def _by_scatter(model: JointModel, found: Minimum) -> tuple[JointModel, Minimum]:
+    """Iterate weights and fit until the weights converge."""
+    for _ in range(ITERATIONS):
+        scatter = model.scatter(found)
+        scatter = np.maximum(scatter, LEAST_SHARE * scatter.max())
+        if not scatter.max() > 0.0:
+            break
+        weights = scatter.min() / scatter
+        converged = np.max(np.abs(weights - model.weights)) <= CONVERGED
+        model = replace(model, weights=tuple(weights.tolist()))
+        found = minimise(model, found.point)
+        if converged:
+            break
+    return model, found

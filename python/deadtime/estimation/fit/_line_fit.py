@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 
-__all__ = ["LineProfile", "Lines", "fit_lines"]
-
 Array = NDArray[np.float64]
 Values: TypeAlias = dict[str, float]
 

@@ -15,8 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Whiteness", "pieces_of", "robust_covariance", "white_covariance", "whiteness_of"]
-
 #: Significance level of the whiteness test: this share of white residuals is called coloured.
 SIGNIFICANCE = 0.01
 

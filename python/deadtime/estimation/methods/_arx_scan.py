@@ -26,15 +26,16 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_decays, read_ringing
-from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
-from deadtime.estimation.data._input_output import InputOutput, read_input_output
-from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._input_output import (
+    FEEDBACK,
+    InputOutput,
+    feedback_p_value,
+    read_input_output,
+)
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-
-__all__ = ["ARXScan"]
+from deadtime.estimation.data._step_reading import check_decays, read_ringing
+from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
+from deadtime.estimation.methods._method import Method, Run
 
 Array = NDArray[np.float64]
 
@@ -79,7 +80,7 @@ class ARXScan(Method):
         check_delay_alone("arx_scan", free)
         simulated = SimulatedRecording(recording, loop, window)
         data = simulated.recording
-        read = read_input_output(recording, loop, simulated, "arx_scan")
+        read = read_input_output(simulated, "arx_scan")
         # Feedback within the same sample looks like a response without delay.
         feedback = feedback_p_value(data) < FEEDBACK
         least = 1 if feedback else 0
@@ -240,7 +241,10 @@ def _held_scan(read: InputOutput, sign: float, least: int) -> tuple[float, Array
     both = _losses(none, matrix, np.stack([seen[:-1], seen[1:]], axis=1))
     # Where the unconstrained weights have different signs, the best has one weight of zero.
     single = none - np.maximum(seen, 0.0) ** 2 / np.where(powers > 0.0, powers, 1.0)
-    inside = _both_positive(matrix, seen)
+    # Both weights are positive, by Cramer's rule.
+    first = seen[:-1] * matrix[:, 1, 1] - seen[1:] * matrix[:, 0, 1]
+    second = seen[1:] * matrix[:, 0, 0] - seen[:-1] * matrix[:, 0, 1]
+    inside = (first >= 0.0) & (second >= 0.0)
     screened = np.where(inside, both, np.minimum(single[:-1], single[1:]))
 
     def fitted(late: int) -> tuple[float, float]:
@@ -259,13 +263,6 @@ def _held_scan(read: InputOutput, sign: float, least: int) -> tuple[float, Array
     losses = _refined(np.maximum(screened, 0.0), least, lambda late: fitted(late)[0])
     best = least + int(np.argmin(losses[least:]))
     return best + fitted(best)[1], losses, none
-
-
-def _both_positive(matrix: Array, seen: Array) -> NDArray[np.bool_]:
-    """Whether both weights of each pair of delays are positive, by Cramer's rule."""
-    first = seen[:-1] * matrix[:, 1, 1] - seen[1:] * matrix[:, 0, 1]
-    second = seen[1:] * matrix[:, 0, 0] - seen[:-1] * matrix[:, 0, 1]
-    return np.asarray((first >= 0.0) & (second >= 0.0))
 
 
 def _check_response(least: float, none: float, samples: int, numbers: int) -> None:

@@ -1,9 +1,12 @@
-"""Turn a minimum of least squares into an estimate with its uncertainty.
+"""Turn a minimum of least squares, or what was read from a response, into an estimate.
 
 White residuals: covariance sigma^2 (J^T J)^-1, which is the Cramér-Rao bound. Coloured residuals:
 the robust covariance, because the model is only an approximation of the vehicle. Where a lag is
 fitted (the cost is then far from quadratic, and the lag may be at its bound) and where samples are
 few, intervals are those of the profile likelihood.
+
+The residuals of methods that read the delay from a few features of the response are those of the
+loop with the estimated parameters, so they show how well it explains the whole recording.
 """
 
 from __future__ import annotations
@@ -15,22 +18,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
-from deadtime.estimation.data._evidence import (
+from deadtime.estimation.data._checks import (
+    ROUNDING,
     check_distinguishable,
     check_response,
     embedded,
     standard_errors,
 )
-from deadtime.estimation.data._excitation import ROUNDING
-from deadtime.estimation.data._runs import Run
-from deadtime.estimation.fit._joint import JointModel
-from deadtime.estimation.fit._least_squares import Minimum, Model, ProfileCost, minimise
-from deadtime.estimation.fit._profile import Profile
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.fit._least_squares import Minimum, Model, minimise
+from deadtime.estimation.fit._profile import Profile, ProfileCost
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
-
-__all__ = ["concluded", "without_vanishing"]
+from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
 
@@ -121,11 +124,11 @@ def concluded(
     whiteness = whiteness_of(residuals, count, model.sizes)
     outputs = [part.recording.output for part in fitted]
     pieces = np.split(residuals, np.cumsum(model.sizes)[:-1])
-    for output, piece, weight in zip(outputs, pieces, _weights(model), strict=True):
+    for output, piece, weight in zip(outputs, pieces, model.weights, strict=True):
         check_response(output, piece / weight, count, whiteness.autocorrelation)
     exact = all(
         float(np.max(np.abs(piece))) <= ROUNDING * weight * float(np.ptp(output))
-        for piece, output, weight in zip(pieces, outputs, _weights(model), strict=True)
+        for piece, output, weight in zip(pieces, outputs, model.weights, strict=True)
     )
     white = embedded(white_covariance(jacobian[:, loose], residuals), loose, len(labels))
     spread = white
@@ -138,7 +141,7 @@ def concluded(
     adequate = whiteness.white or exact
     runs = tuple(
         FittedRun(part.recording, _with(part.loop, values), piece / weight)
-        for part, piece, weight in zip(fitted, pieces, _weights(model), strict=True)
+        for part, piece, weight in zip(fitted, pieces, model.weights, strict=True)
     )
     return DelayEstimate(
         method=method,
@@ -162,10 +165,6 @@ def concluded(
             preferred=reason,
         ),
     )
-
-
-def _weights(model: Model) -> tuple[float, ...]:
-    return model.weights if isinstance(model, JointModel) else (1.0,)
 
 
 def _with(loop: ControlLoop, values: Mapping[str, float]) -> ControlLoop:
@@ -219,3 +218,96 @@ def _message(done: str, held: list[str], reason: str, adequate: bool, advice: st
             f"the intervals are robust ones{advice}"
         )
     return text
+
+
+def is_rounding(residuals: NDArray[np.float64], recording: Recording) -> bool:
+    """Whether the model explains the recording to rounding."""
+    return float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(recording.output))
+
+
+def check_delay_alone(method: str, free: Sequence[str]) -> None:
+    """Refuse `free` without the delay; its other names are taken as given."""
+    if "delay" not in free:
+        raise ValueError(
+            f"the {method} method determines the delay alone, and free={tuple(free)!r} does not "
+            "ask for it"
+        )
+
+
+def read_off_estimate(
+    method: str,
+    simulated: SimulatedRecording,
+    values: Mapping[str, float],
+    cov: NDArray[np.float64] | None,
+    start: float,
+    *,
+    message: str,
+    uncalibrated: str,
+    details: Mapping[str, Any],
+) -> DelayEstimate:
+    """The result for these `values`, with the loop at rest at the output `start`.
+
+    Without a covariance the standard errors are NaN.
+    """
+    try:
+        residuals = simulated.residuals(values, start)
+    except ValueError as error:
+        found = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+        raise NotIdentifiableError(
+            f"the {method} method reads {found}, and a loop with these values cannot have been "
+            f"recorded ({error}): check gains, signs and units"
+        ) from None
+    return estimate_with_residuals(
+        method,
+        simulated.loop,
+        simulated.recording,
+        values,
+        cov,
+        residuals,
+        message=message,
+        uncalibrated=uncalibrated,
+        details=details,
+    )
+
+
+def estimate_with_residuals(
+    method: str,
+    loop: ControlLoop,
+    recording: Recording,
+    values: Mapping[str, float],
+    cov: NDArray[np.float64] | None,
+    residuals: NDArray[np.float64],
+    *,
+    message: str,
+    uncalibrated: str,
+    details: Mapping[str, Any],
+    crb: CramerRaoBound | None = None,
+    adequate: bool | None = None,
+    profile: Profile | None = None,
+) -> DelayEstimate:
+    """The result for these `values` of a method that has its own residuals.
+
+    By default it is adequate where they are white or rounding.
+    """
+    names = tuple(values)
+    if cov is None:
+        cov = np.full((len(names), len(names)), np.nan)
+    whiteness = whiteness_of(residuals, len(names))
+    if adequate is None:
+        adequate = whiteness.white or is_rounding(residuals, recording)
+    return DelayEstimate(
+        method=method,
+        loop=loop.replace(**values),
+        free=names,
+        stderr=standard_errors(names, cov),
+        cov=cov,
+        crb=crb,
+        recording=recording,
+        residuals=residuals,
+        whiteness=whiteness,
+        adequate=adequate,
+        message=message,
+        uncalibrated=uncalibrated,
+        details=details,
+        _profile=profile,
+    )

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -27,18 +28,22 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import check_distinguishable, checked_names, standard_errors
-from deadtime.estimation.data._excitation import check_excitation, check_gain, start_and_span
-from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._checks import (
+    check_delay_free,
+    check_distinguishable,
+    check_excitation,
+    check_gain,
+    checked_names,
+    standard_errors,
+    start_and_span,
+)
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import stiffness_of
+from deadtime.estimation.fit._least_squares import Fitted
 from deadtime.estimation.fit._residuals import robust_covariance
-from deadtime.estimation.methods._method import Method, check_initial_output
-from deadtime.estimation.methods._read_off import read_off_estimate
+from deadtime.estimation.methods._conclusion import read_off_estimate
+from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
-
-__all__ = ["CTA", "chebyshev_differentiation"]
 
 Array = NDArray[np.float64]
 
@@ -82,8 +87,7 @@ class CTA(Method):
         """Fit `free` to the one recording."""
         ((recording, loop, window),) = runs
         names = checked_names(free, loop)
-        if "delay" not in names:
-            raise ValueError("the cta method estimates the delay: keep it among `free`")
+        check_delay_free(names, "cta")
         stiffness_of(loop, "cta")
         if loop.is_sampled or loop.limit is not None:
             what = "a hold" if loop.is_sampled else "a limit"
@@ -94,12 +98,13 @@ class CTA(Method):
         simulated = SimulatedRecording(recording, loop, window)
         data = simulated.recording
         check_excitation(data, len(names))
-        fit = _Fit(data, loop, names, self.intervals, self.initial_output)
+        matrix = chebyshev_differentiation(self.intervals)
+        fit = _Fit(data, names, self.initial_output, loop, matrix)
         point, jacobian = fit.solve()
         misfit = fit.misfit(point)
         check_distinguishable(jacobian, fit.labels)
         cov = robust_covariance(jacobian, -misfit)[: len(names), : len(names)]
-        values = dict(zip(names, (float(value) for value in point), strict=False))
+        values = fit.values(point)
         check_gain(values, standard_errors(names, cov))
         return read_off_estimate(
             "cta",
@@ -136,45 +141,35 @@ def chebyshev_differentiation(order: int) -> Array:
     return np.asarray(matrix - np.diag(matrix.sum(axis=1)))
 
 
-class _Fit:
-    """The misfit as a function of `labels`."""
+@dataclass(frozen=True, eq=False)
+class _Fit(Fitted):
+    """The misfit as a function of the parameters."""
 
-    def __init__(
-        self,
-        data: Recording,
-        loop: ControlLoop,
-        names: tuple[str, ...],
-        order: int,
-        initial_output: float | None,
-    ) -> None:
-        self.data, self.loop, self.names = data, loop, names
-        self.initial_output = initial_output
-        self.matrix = chebyshev_differentiation(order)
-        self.start, self.span = start_and_span(data)
-        self.labels = [*names, *(["initial output"] if initial_output is None else [])]
-        rows = [0, *(step.index for step in data.steps())]
-        self.jump_times = data.time[rows]
-        self.levels = data.reference[rows]
+    loop: ControlLoop
+    matrix: Array
 
-    def start_of(self, point: Array) -> float:
-        return float(point[-1]) if self.initial_output is None else self.initial_output
+    @cached_property
+    def jumps(self) -> tuple[Array, Array]:
+        """Times of the steps, the first sample counted as one, and the references from there on."""
+        rows = [0, *(step.index for step in self.recording.steps())]
+        return self.recording.time[rows], self.recording.reference[rows]
 
     def misfit(self, point: Array) -> Array:
         """Approximated minus recorded output."""
-        values = dict(self.loop.parameters)
-        values |= dict(zip(self.names, (float(value) for value in point), strict=False))
+        values = {**self.loop.parameters, **self.values(point)}
         start = self.start_of(point)
-        jumps = np.diff(self.levels, prepend=start)
+        times, levels = self.jumps
+        jumps = np.diff(levels, prepend=start)
         late = values["delay"] if self.loop.delay_path == "command" else 0.0
         rates, weights = self._step_response(values)
-        output = np.full(len(self.data), start)
-        for time, jump in zip(self.jump_times, jumps, strict=True):
-            since = np.maximum(self.data.time - time - late, 0.0)
+        output = np.full(len(self.recording), start)
+        for time, jump in zip(times, jumps, strict=True):
+            since = np.maximum(self.recording.time - time - late, 0.0)
             exponents = np.minimum(np.outer(since, rates).real, LARGEST_EXPONENT)
             phases = np.outer(since, rates.imag)
             moved = np.exp(exponents + 1j * phases) @ weights
             output += jump * (1.0 + moved.real)
-        return np.asarray(output - self.data.output)
+        return np.asarray(output - self.recording.output)
 
     def _step_response(self, values: dict[str, float]) -> tuple[NDArray[np.complex128], ...]:
         """Rates λ and weights w of the unit step response 1 + sum w e^(λ t) of the output."""
@@ -202,12 +197,13 @@ class _Fit:
         from scipy.optimize import least_squares
 
         parameters = self.loop.parameters
-        shortest = 1e-4 * self.span
-        starts = {"gain": parameters["gain"], "lag": 0.02 * self.span, "initial output": self.start}
+        start, span = start_and_span(self.recording)
+        shortest = 1e-4 * span
+        starts = {"gain": parameters["gain"], "lag": 0.02 * span, "initial output": start}
         low = {"delay": shortest, "gain": 1e-3 * starts["gain"], "lag": 0.0}
-        high = {"delay": self.span, "gain": 1e3 * starts["gain"], "lag": self.span}
+        high = {"delay": span, "gain": 1e3 * starts["gain"], "lag": span}
         best, cost = np.empty(0), math.inf
-        for delay in np.geomspace(SHORTEST, LONGEST, POINTS) * self.span:
+        for delay in np.geomspace(SHORTEST, LONGEST, POINTS) * span:
             point = np.array([{"delay": delay, **starts}[label] for label in self.labels])
             found = float(np.sum(self.misfit(point) ** 2))
             if found < cost:
@@ -227,7 +223,7 @@ class _Fit:
             max_nfev=100,
         )
         delay = float(solution.x[0])
-        if not 1.01 * shortest < delay < 0.99 * self.span:
+        if not 1.01 * shortest < delay < 0.99 * span:
             raise NotIdentifiableError(
                 f"the fit ends at a delay of {delay:.3g} s, a bound of its search: the output is "
                 "no response of such a loop to this reference; check columns, signs and gains"

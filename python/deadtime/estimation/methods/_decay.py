@@ -25,17 +25,18 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_decays, read_extremes
-from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
+from deadtime.estimation.data._step_reading import (
+    CLEARANCE,
+    StepReading,
+    read_decaying_step,
+    stiffness_of,
+)
 from deadtime.estimation.fit._residuals import robust_covariance
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-from deadtime.estimation.models._held_transfer import held_transfer
+from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.models._held import held_transfer
 from deadtime.loops import ControlLoop
-
-__all__ = ["Decay"]
 
 Array = NDArray[np.float64]
 
@@ -75,9 +76,7 @@ class Decay(Method):
         check_delay_alone("decay", free)
         stiffness = stiffness_of(loop, "decay")
         simulated = SimulatedRecording(recording, loop, window)
-        reading = read_step(simulated.recording)
-        extremes = read_extremes(reading)
-        check_decays(extremes, "decay")
+        reading, extremes = read_decaying_step(simulated.recording, "decay")
         if extremes:
             raise NotIdentifiableError(
                 "the output overshoots, so the rightmost roots are complex and the tail is no "

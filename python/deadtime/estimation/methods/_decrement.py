@@ -25,22 +25,19 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import checked_names
-from deadtime.estimation.data._extremes import (
+from deadtime.estimation.data._checks import check_delay_free, checked_names
+from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.data._step_reading import (
     Extreme,
-    check_decays,
-    read_extremes,
+    StepReading,
+    read_decaying_step,
+    stiffness_of,
     weighted_slope,
 )
-from deadtime.estimation.data._runs import Run
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import StepReading, read_step, stiffness_of
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._read_off import read_off_estimate
-from deadtime.estimation.models._held_transfer import held_transfer
+from deadtime.estimation.methods._conclusion import read_off_estimate
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.models._held import held_transfer
 from deadtime.loops import ControlLoop
-
-__all__ = ["Decrement", "loop_with_root"]
 
 Array = NDArray[np.float64]
 
@@ -65,13 +62,10 @@ class Decrement(Method):
                 "the decrement method has two numbers, damping and frequency, for delay and gain: "
                 "fix the lag, or use method='waveform'"
             )
-        if "delay" not in names:
-            raise ValueError("the decrement method estimates the delay: keep it among `free`")
+        check_delay_free(names, "decrement")
         stiffness = stiffness_of(loop, "decrement")
         simulated = SimulatedRecording(recording, loop, window)
-        reading = read_step(simulated.recording)
-        extremes = read_extremes(reading)
-        check_decays(extremes, "decrement")
+        reading, extremes = read_decaying_step(simulated.recording, "decrement")
         extremes = _linear(extremes, reading, loop)
         pair, pair_cov = _ringing(extremes)
         lag = loop.parameters["lag"]

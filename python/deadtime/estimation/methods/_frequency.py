@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -29,26 +30,26 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._commands import commands_over_samples
-from deadtime.estimation.data._evidence import (
+from deadtime.estimation.data._checks import (
+    ROUNDING,
     check_distinguishable,
+    check_gain,
+    check_moves,
     checked_names,
     embedded,
+    integrator_of,
     standard_errors,
 )
-from deadtime.estimation.data._excitation import ROUNDING, check_gain, check_moves
 from deadtime.estimation.data._periodic import PeriodicSpectra, periodic_spectra
-from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.fit._line_fit import LineProfile, Lines, fit_lines
 from deadtime.estimation.fit._profile import Profile
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.models._held_response import HeldResponse
-from deadtime.estimation.models._held_transfer import held_transfer
-from deadtime.loops import ControlLoop, Integrator
+from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.models._held import HeldResponse, held_transfer
+from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-__all__ = ["Frequency"]
 
 Array = NDArray[np.float64]
 
@@ -97,11 +98,7 @@ class Frequency(Method):
 
         ((recording, loop, window),) = runs
         names = checked_names(free, loop)
-        if not isinstance(loop.plant, Integrator):
-            raise ValueError(
-                f"the frequency method is for an Integrator, the loop has a "
-                f"{type(loop.plant).__name__}: use method='waveform'"
-            )
+        integrator_of(loop, "frequency")
         data = recording.window(*window)
         rows = recording.rows(*window)
         _check_even(data)
@@ -132,23 +129,20 @@ class Frequency(Method):
         check_gain(values, errors)
         residuals = _residuals(data, response, found)
         whiteness = whiteness_of(residuals, len(names))
-        exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
-        adequate = exact or (p_value > SIGNIFICANCE if lines.known_noise else whiteness.white)
-        return DelayEstimate(
-            method="frequency",
-            loop=loop.replace(**values),
-            free=names,
-            stderr=errors,
-            cov=cov,
-            crb=None,
-            recording=data,
-            residuals=residuals,
-            whiteness=whiteness,
+        white = p_value > SIGNIFICANCE if lines.known_noise else whiteness.white
+        adequate = white or is_rounding(residuals, data)
+        return estimate_with_residuals(
+            "frequency",
+            loop,
+            data,
+            values,
+            cov,
+            residuals,
             adequate=adequate,
             message=_message(names, lines, source, adequate),
             uncalibrated=_why_uncalibrated(loop),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
-            _profile=Profile(
+            profile=Profile(
                 cost=LineProfile(lines, names, found),
                 best=power,
                 freedom=lines.freedom,
@@ -183,7 +177,7 @@ def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest
     if nyquist:
         weight[-1] = math.sqrt(1.0 / size)
 
-    misfit = _RecordMisfit(data, response, weight, kept)
+    misfit = partial(_record_misfit, data, response, weight, kept)
     describe = f"{int(kept.sum())} of one record"
     span = float(data.time[-1] - data.time[0])
     return Lines(misfit, False, real - numbers, 1.0, LONGEST * span, data.sample_time, describe)
@@ -201,47 +195,39 @@ def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) 
     widening = spectra.freedom / (spectra.freedom - 1.0)
     describe = f"{spectra.lines.size} of {spectra.periods} periods"
     longest = min(LONGEST * spectra.periods, 1.0) * spectra.samples * sample_time
-    misfit = _PeriodicMisfit(spectra, sample_time)
+    misfit = partial(_periodic_misfit, spectra, sample_time)
     return Lines(misfit, True, freedom, widening, longest, sample_time, describe)
 
 
-@dataclass(frozen=True, eq=False)
-class _RecordMisfit:
+def _record_misfit(
+    data: Recording,
+    response: HeldResponse,
+    weight: Array,
+    kept: NDArray[np.bool_],
+    values: dict[str, float],
+) -> Array:
     """Misfit at the `kept` lines of one record, times a weight."""
-
-    data: Recording
-    response: HeldResponse
-    weight: Array
-    kept: NDArray[np.bool_]
-
-    def __call__(self, values: dict[str, float]) -> Array:
-        path = _path(self.data, self.response, values)
-        spectrum = np.fft.rfft(self.data.output - values["gain"] * path)
-        lines = self.weight * spectrum[self.kept]
-        return np.concatenate([lines.real, lines.imag])
+    spectrum = np.fft.rfft(data.output - values["gain"] * _path(data, response, values))
+    lines = weight * spectrum[kept]
+    return np.concatenate([lines.real, lines.imag])
 
 
-@dataclass(frozen=True, eq=False)
-class _PeriodicMisfit:
+def _periodic_misfit(
+    spectra: PeriodicSpectra, sample_time: float, values: dict[str, float]
+) -> Array:
     """Misfit at the excited lines over their standard deviation between periods."""
-
-    spectra: PeriodicSpectra
-    sample_time: float
-
-    def __call__(self, values: dict[str, float]) -> Array:
-        spectra = self.spectra
-        z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
-        floor = ROUNDING * float(np.max(np.abs(spectra.output)))
-        g = values["gain"] * held_transfer(z, values["delay"], values["lag"], self.sample_time)
-        variance = (
-            spectra.output_variance
-            + np.abs(g) ** 2 * spectra.input_variance
-            - 2.0 * (spectra.covariance * np.conj(g)).real
-        )
-        # Per real part; the sum of squares of all parts is then a chi-square.
-        spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
-        lines = (spectra.output - g * spectra.input) / spread
-        return np.concatenate([lines.real, lines.imag])
+    z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
+    floor = ROUNDING * float(np.max(np.abs(spectra.output)))
+    g = values["gain"] * held_transfer(z, values["delay"], values["lag"], sample_time)
+    variance = (
+        spectra.output_variance
+        + np.abs(g) ** 2 * spectra.input_variance
+        - 2.0 * (spectra.covariance * np.conj(g)).real
+    )
+    # Per real part; the sum of squares of all parts is then a chi-square.
+    spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
+    lines = (spectra.output - g * spectra.input) / spread
+    return np.concatenate([lines.real, lines.imag])
 
 
 def _path(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:

@@ -25,15 +25,16 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_decays, read_ringing
-from deadtime.estimation.data._feedback import FEEDBACK, feedback_p_value
-from deadtime.estimation.data._input_output import InputOutput, read_input_output
-from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._input_output import (
+    FEEDBACK,
+    InputOutput,
+    feedback_p_value,
+    read_input_output,
+)
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._method import Method, check_choice
-from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-
-__all__ = ["GCC", "Weighting"]
+from deadtime.estimation.data._step_reading import check_decays, read_ringing
+from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
+from deadtime.estimation.methods._method import Method, Run, check_choice
 
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
 Array = NDArray[np.float64]
@@ -78,7 +79,7 @@ class GCC(Method):
         check_delay_alone("gcc", free)
         simulated = SimulatedRecording(recording, loop, window)
         data = simulated.recording
-        read = read_input_output(recording, loop, simulated, "gcc")
+        read = read_input_output(simulated, "gcc")
         if int(np.count_nonzero(np.diff(read.command))) < 2:
             raise NotIdentifiableError(
                 "the command changes at most once in the window, as when it is at its limit: its "

@@ -28,14 +28,15 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_decays, read_extremes
-from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
-from deadtime.estimation.methods._method import Method, check_choice
-from deadtime.estimation.methods._read_off import check_delay_alone, read_off_estimate
-
-__all__ = ["Construction", "Graphical"]
+from deadtime.estimation.data._step_reading import (
+    CLEARANCE,
+    StepReading,
+    read_decaying_step,
+    stiffness_of,
+)
+from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
+from deadtime.estimation.methods._method import Method, Run, check_choice
 
 Construction = Literal["tangent", "two_point", "first_movement"]
 Array = NDArray[np.float64]
@@ -82,8 +83,7 @@ class Graphical(Method):
         ((recording, loop, window),) = runs
         check_delay_alone("graphical", free)
         simulated = SimulatedRecording(recording, loop, window)
-        reading = read_step(simulated.recording)
-        check_decays(read_extremes(reading), "graphical")
+        reading, _ = read_decaying_step(simulated.recording, "graphical")
         moved = _first_movement(reading)
         delay, stderr = float(reading.since[moved]), math.nan
         if self.construction != "first_movement":

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -24,24 +25,24 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate
-from deadtime.estimation.data._evidence import (
+from deadtime.estimation.data._checks import (
+    ROUNDING,
+    check_delay_free,
     check_distinguishable,
+    check_ends,
+    check_excitation,
+    check_gain,
     checked_names,
     embedded,
     standard_errors,
-)
-from deadtime.estimation.data._excitation import (
-    ROUNDING,
-    check_excitation,
-    check_gain,
     start_and_span,
 )
-from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
+from deadtime.estimation.fit._least_squares import Ends
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
-from deadtime.estimation.methods._method import Method, check_initial_output
-
-__all__ = ["Grid"]
+from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
+from deadtime.estimation.methods._method import Method, Run, check_initial_output
+from deadtime.estimation.methods._waveform import SimulatedModel
 
 Array = NDArray[np.float64]
 
@@ -54,9 +55,6 @@ REFINED = 3
 #: A lag is set to zero where this raises the cost by no more than this share: next to zero it acts
 #: like a delay, and the two cannot be distinguished.
 VANISHING = 1e-6
-
-#: Bound of the misfit of simulations that diverge, in units of the output's range.
-LARGEST_MISFIT = 1e3
 
 #: Two-sided 95 % quantile of the normal distribution.
 TWO_SIDED_95 = 1.96
@@ -94,49 +92,41 @@ class Grid(Method):
         """Fit `free` to the one recording."""
         ((recording, loop, window),) = runs
         names = checked_names(free, loop)
-        if "delay" not in names:
-            raise ValueError("the grid method searches the delay: keep it among `free`")
+        check_delay_free(names, "grid")
         simulated = SimulatedRecording(recording, loop, window)
         data = simulated.recording
         check_excitation(data, len(names))
-        problem = _Problem(simulated, names, self.initial_output)
+        problem = _Problem(data, names, self.initial_output, simulated)
         grid = problem.grid() if self.delays is None else np.array(self.delays)
         costs, points = problem.over(grid)
         point = problem.refined(costs, points)
-        problem.check_ends(point)
+        check_ends(problem.labels, point, problem.low, problem.high)
 
         misfit, jacobian = problem.misfit(point), problem.jacobian(point)
         residuals = -misfit
-        held = [
-            i
-            for i, name in enumerate(problem.labels)
-            if name == "lag" and problem.at_least(point, i)
-        ]
-        loose = [i for i in range(len(problem.labels)) if i not in held]
+        at_zero = point <= problem.low * (1.0 + 1e-6) + 1e-9
+        loose = [i for i, name in enumerate(problem.labels) if name != "lag" or not at_zero[i]]
         check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
         whiteness = whiteness_of(residuals, len(names))
-        exact = float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(data.output))
-        adequate = whiteness.white or exact
+        adequate = whiteness.white or is_rounding(residuals, data)
         size, count = len(problem.labels), len(names)
         white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
         spread = white
         if not adequate:
             spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
         errors = standard_errors(names, spread)
-        check_gain(problem.values(point), errors)
+        values = problem.values(point)
+        check_gain(values, errors)
         noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
         low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
-        return DelayEstimate(
-            method="grid",
-            loop=loop.replace(**problem.values(point)),
-            free=names,
-            stderr=errors,
-            cov=spread[:count, :count],
-            crb=CramerRaoBound(tuple(problem.labels), noise, standard_errors(names, white)),
-            recording=data,
-            residuals=residuals,
-            whiteness=whiteness,
-            adequate=adequate,
+        return estimate_with_residuals(
+            "grid",
+            loop,
+            data,
+            values,
+            spread[:count, :count],
+            residuals,
+            crb=CramerRaoBound(problem.labels, noise, standard_errors(names, white)),
             message=_message(names, grid, adequate),
             uncalibrated=(
                 "the grid method fits the response to the reference, without the noise that the "
@@ -172,59 +162,52 @@ def _local_minima(costs: Array) -> list[int]:
     return [int(i) + 1 for i in np.flatnonzero((middle < costs[:-2]) & (middle <= costs[2:]))]
 
 
-@dataclass(eq=False)
-class _Problem:
-    """The misfit as a function of `labels`: the free parameters, then the initial output."""
+@dataclass(frozen=True, eq=False)
+class _Problem(SimulatedModel):
+    """The misfit as a function of the parameters, the delay first."""
 
-    simulated: SimulatedRecording
-    names: tuple[str, ...]
-    initial_output: float | None
+    @cached_property
+    def size(self) -> float:
+        """The larger range of output and reference."""
+        return max(float(np.ptp(self.recording.output)), float(np.ptp(self.recording.reference)))
 
-    def __post_init__(self) -> None:
-        data = self.simulated.recording
-        self.start, self.span = start_and_span(data)
-        self.range = max(float(np.ptp(data.output)), float(np.ptp(data.reference)))
-        self.sample = data.sample_time
-        self.labels = [*self.names, *(["initial output"] if self.initial_output is None else [])]
-        gain = self.simulated.loop.parameters.get("gain", 1.0)
-        low, high = sorted((1e-3 * gain, 1e3 * gain))
-        least = self.shortest
-        ends = {"delay": (least, self.span), "gain": (low, high), "lag": (least, self.span)}
-        bounds = [ends.get(label, (-np.inf, np.inf)) for label in self.labels]
-        self.low, self.high = (np.array(side) for side in zip(*bounds, strict=True))
-        scales = {"delay": self.sample, "gain": abs(gain), "lag": self.sample}
-        self.scale = np.array([scales.get(label, self.range) for label in self.labels])
-        guesses = {"gain": gain, "lag": self.sample, "initial output": self.start}
-        self.guess = np.array([guesses.get(label, 0.0) for label in self.labels])
+    @cached_property
+    def span(self) -> float:
+        """Time from the first step to the end, s."""
+        return start_and_span(self.recording)[1]
+
+    @property
+    def gain(self) -> float:
+        """The known gain."""
+        return self.simulated.loop.parameters.get("gain", 1.0)
+
+    def ends(self, label: str) -> Ends:
+        """Bounds of the search, and scales."""
+        low, high = sorted((1e-3 * self.gain, 1e3 * self.gain))
+        time = Ends(self.shortest, self.span, self.recording.sample_time)
+        found = {"delay": time, "gain": Ends(low, high, abs(self.gain)), "lag": time}
+        return found.get(label, Ends(-np.inf, np.inf, self.size))
+
+    def starts(self) -> list[Array]:
+        """The point from which each delay is tried."""
+        start, _ = start_and_span(self.recording)
+        guesses = {"gain": self.gain, "lag": self.recording.sample_time, "initial output": start}
+        return [np.array([guesses.get(label, 0.0) for label in self.labels])]
 
     @property
     def shortest(self) -> float:
         """Shortest delay and lag of the search."""
         if self.simulated.loop.is_sampled:
             return 0.0
-        return shortest_time(self.simulated.recording)
+        return shortest_time(self.recording)
 
     def grid(self) -> Array:
         """Delays from the shortest on, spaced geometrically."""
         points = np.geomspace(SHORTEST, LONGEST, POINTS) * self.span
         return np.concatenate([[self.shortest], points[points > self.shortest]])
 
-    def values(self, point: Array) -> dict[str, float]:
-        return dict(zip(self.names, (float(value) for value in point), strict=False))
-
-    def start_of(self, point: Array) -> float:
-        return float(point[-1]) if self.initial_output is None else self.initial_output
-
-    def misfit(self, point: Array) -> Array:
-        """Simulated minus recorded output, bounded where the simulation diverges."""
-        most = LARGEST_MISFIT * self.range
-        try:
-            output = self.simulated.output(self.values(point), self.start_of(point))
-        except ValueError:  # the response diverges
-            return np.full(len(self.simulated.recording), most)
-        return np.clip(output - self.simulated.recording.output, -most, most)
-
     def cost(self, point: Array) -> float:
+        """Sum of squares."""
         misfit = self.misfit(point)
         return float(misfit @ misfit)
 
@@ -242,10 +225,11 @@ class _Problem:
 
     def over(self, grid: Array) -> tuple[Array, Array]:
         """Least cost at each delay, and the parameters there."""
-        costs, points = np.empty(grid.size), np.empty((grid.size, self.guess.size))
-        point = self.guess
+        (guess,) = self.starts()
+        costs, points = np.empty(grid.size), np.empty((grid.size, guess.size))
+        point = guess
         for row, delay in enumerate(grid):
-            starts = [np.concatenate([[delay], start[1:]]) for start in (self.guess, point)]
+            starts = [np.concatenate([[delay], start[1:]]) for start in (guess, point)]
             point = self._improved(min(starts, key=self.cost))
             costs[row], points[row] = self.cost(point), point
         if int(np.argmin(costs)) == grid.size - 1:
@@ -281,7 +265,7 @@ class _Problem:
         without[delay] += point[lag] - self.low[lag]
         without[lag] = self.low[lag]
         without = self._minimised(without, held=lag)
-        rounding = len(self.simulated.recording) * (ROUNDING * self.range) ** 2
+        rounding = len(self.recording) * (ROUNDING * self.size) ** 2
         as_well = self.cost(without) <= self.cost(point) * (1.0 + VANISHING) + rounding
         return without if as_well else point
 
@@ -314,22 +298,6 @@ class _Problem:
             max_nfev=60,
         )
         return at(np.asarray(found.x))
-
-    def at_least(self, point: Array, place: int) -> bool:
-        """Whether a delay or lag is at the lower bound of the search."""
-        return bool(point[place] <= self.low[place] * (1.0 + 1e-6) + 1e-9)
-
-    def check_ends(self, point: Array) -> None:
-        """Refuse a parameter at a bound of its search; a delay or lag of zero is a valid result."""
-        for label, value, low, high in zip(self.labels, point, self.low, self.high, strict=True):
-            ends = (high,) if label in ("delay", "lag") else (low, high)
-            for end in ends:
-                if math.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
-                    raise NotIdentifiableError(
-                        f"the fit ends at a {label} of {end:g}, a bound of its search: the "
-                        "output is no response of such a loop to this reference; check columns, "
-                        "signs, units and gains, and choose a window around one step"
-                    )
 
 
 def _message(names: tuple[str, ...], grid: Array, adequate: bool) -> str:

@@ -1,17 +1,66 @@
-"""What every estimation method is: a frozen object that holds its options."""
+"""What every estimation method is, a frozen object that holds its options, and what it is given."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
-from deadtime._base.validation import finite
+from deadtime._base.validation import OpenRange, finite, is_range, open_interval
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._runs import Run
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
 
-__all__ = ["Method", "check_choice", "check_initial_output"]
+#: One recording, or several of the same vehicle.
+Recordings: TypeAlias = Recording | Sequence[Recording]
+
+#: One loop for all recordings, or one for each.
+Loops: TypeAlias = ControlLoop | Sequence[ControlLoop]
+
+#: The part to use: one window for all recordings, or a list of them, one for each.
+Windows: TypeAlias = OpenRange | list[OpenRange | None] | None
+
+
+class Run(NamedTuple):
+    """One recording, the loop that made it, and the part to use."""
+
+    recording: Recording
+    loop: ControlLoop
+    window: OpenRange = (None, None)
+
+
+def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> list[Run]:
+    """Pair recordings with loops and windows; a single loop or window applies to all."""
+    recordings = list(recording) if isinstance(recording, (list, tuple)) else [recording]
+    if not recordings:
+        raise ValueError("no recording was given: give one, or a list of them")
+    number = len(recordings)
+    loops = list(loop) if isinstance(loop, (list, tuple)) else [loop] * number
+    windows: list[Any] = [window] * number
+    if isinstance(window, (tuple, list)) and not (is_range(window) and len(window) == 2):
+        windows = list(window)
+    for name, given in (("loop", loops), ("window", windows)):
+        if len(given) != number:
+            raise ValueError(
+                f"{number} recordings and {len(given)} of `{name}`: give one for all, or one each"
+            )
+    runs = []
+    for index, (one, its_loop, ends) in enumerate(zip(recordings, loops, windows, strict=True)):
+        if not isinstance(one, Recording):
+            raise TypeError(f"recording[{index}] must be a Recording, got {type(one).__name__}")
+        if not isinstance(its_loop, ControlLoop):
+            raise TypeError(f"loop[{index}] must be a ControlLoop, got {type(its_loop).__name__}")
+        open_interval("window", ends)
+        low, high = (None, None) if ends is None else ends
+        runs.append(Run(one, its_loop, (low, high)))
+    plants = {type(run.loop.plant).__name__ for run in runs}
+    if len(plants) > 1:
+        raise ValueError(
+            f"the loops have different plants ({', '.join(sorted(plants))}): recordings that are "
+            "fitted together must be of one vehicle"
+        )
+    return runs
 
 
 @dataclass(frozen=True)

@@ -22,23 +22,18 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._commands import (
+from deadtime.estimation.data._checks import check_moves, checked_names
+from deadtime.estimation.data._simulated import (
     commands_over_samples,
     known_commands,
     moves_between_rows,
 )
-from deadtime.estimation.data._evidence import checked_names, excited
-from deadtime.estimation.data._excitation import check_moves
-from deadtime.estimation.data._runs import Run
-from deadtime.estimation.fit._joint import solve_jointly
-from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
+from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
-from deadtime.estimation.methods._method import Method, check_initial_output
-from deadtime.estimation.models._plant_path import Path, path_of
+from deadtime.estimation.methods._method import Method, Run, check_initial_output
+from deadtime.estimation.models._held import Path, path_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-__all__ = ["OutputError", "estimate_from_commands"]
 
 Array = NDArray[np.float64]
 
@@ -99,7 +94,10 @@ def estimate_from_commands(
     longest = min(LONGEST * one.span for one in models)
     delay = dict(zip(names, found.point.tolist(), strict=False)).get("delay", 0.0)
     if delay >= longest * (1.0 - 1e-3):
-        _refuse_longest(longest)
+        raise NotIdentifiableError(
+            f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is "
+            "no response to this command; check columns and units, or choose a longer window"
+        )
     sources = {one.source for one in models}
     message = f"least squares over {', '.join(names)} on the response to the command"
     if computed:
@@ -123,26 +121,11 @@ def estimate_from_commands(
 
 @dataclass(frozen=True, eq=False)
 class _Model(ModelOfOne):
-    """Residuals of one recording; parameters are `names`, then the initial output if fitted."""
+    """Residuals of one recording."""
 
-    recording: Recording
     path: Path
-    names: tuple[str, ...]
     known: Mapping[str, float]
-    offset: float | None
     source: str
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        return (*self.names, *(["initial output"] if self.offset is None else []))
-
-    @cached_property
-    def size(self) -> float:
-        return excited(self.recording)
-
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        return (len(self.recording),)
 
     @cached_property
     def span(self) -> float:
@@ -161,17 +144,13 @@ class _Model(ModelOfOne):
             "initial output": Ends(-np.inf, np.inf, self.size),
         }.get(label, Ends(-np.inf, np.inf, size))
 
-    def _values(self, point: Array) -> dict[str, float]:
-        return {**self.known, **dict(zip(self.names, point.tolist(), strict=False))}
-
     def misfit(self, point: Array) -> Array:
-        values = self._values(point)
-        offset = float(point[-1]) if self.offset is None else self.offset
+        values = {**self.known, **self.values(point)}
         path = self.path.value(self.recording.time - values["delay"], values)
-        return values["gain"] * path + (offset - self.recording.output)
+        return values["gain"] * path + (self.start_of(point) - self.recording.output)
 
     def jacobian(self, point: Array) -> Array:
-        values = self._values(point)
+        values = {**self.known, **self.values(point)}
         times = self.recording.time - values["delay"]
         slopes = self.path.slopes(times, values, self.names)
         columns = {name: values["gain"] * slope for name, slope in slopes.by.items()}
@@ -238,13 +217,6 @@ class _Model(ModelOfOne):
             gains = np.full(delays.size, values["gain"])
         left = target - gains[:, None] * moved
         return np.einsum("ij,ij->i", left, left), gains, level - gains * centres
-
-
-def _refuse_longest(longest: float) -> None:
-    raise NotIdentifiableError(
-        f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is no "
-        "response to this command; check columns and units, or choose a longer window"
-    )
 
 
 def _model(

@@ -29,45 +29,22 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._extremes import check_decays, read_extremes
-from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import CLEARANCE, StepReading, read_step, stiffness_of
-from deadtime.estimation.methods._method import Method, check_choice
-from deadtime.estimation.methods._read_off import read_off_estimate
-from deadtime.recordings import Step
-
-__all__ = ["Overshoot", "OvershootMap", "damping_ratio"]
+from deadtime.estimation.data._step_reading import (
+    CLEARANCE,
+    StepReading,
+    check_decays,
+    read_extremes,
+    read_step,
+    stiffness_of,
+)
+from deadtime.estimation.methods._conclusion import read_off_estimate
+from deadtime.estimation.methods._method import Method, Run, check_choice
 
 OvershootMap = Literal["dominant", "exact", "saturated"]
 
 #: Below x = 1/e the rightmost root is real and the response does not overshoot.
 SMALLEST_X = math.exp(-1.0)
-
-
-@dataclass(frozen=True)
-class OvershootReading:
-    """The overshoot of one step of a recording.
-
-    Attributes
-    ----------
-    value : float
-        Peak beyond the reference over the size of the step; 0.3 is 30 %.
-    noise : float
-        Standard deviation of `value` by the sensor noise.
-    start : float
-        Output before the step.
-    step : Step
-        The step.
-    peak_time : float
-        Time of the peak, s.
-    """
-
-    value: float
-    noise: float
-    start: float
-    step: Step
-    peak_time: float
 
 
 def damping_ratio(overshoot: float) -> float:
@@ -189,33 +166,33 @@ class Overshoot(Method):
         reading = read_step(simulated.recording)
         if self.map != "saturated":  # which simulates the limit
             check_decays(read_extremes(reading), "overshoot")
-        read = read_overshoot(reading)
+        overshoot, noise = _overshoot(reading)
 
         def delay_of(value: float) -> float:
             if self.map == "dominant":
                 return dominant_x(value) / stiffness
             if self.map == "exact":
                 return exact_x(value) / stiffness
-            return _saturated_delay(value, read, simulated, exact_x(value) / stiffness)
+            return _saturated_delay(value, reading, simulated, exact_x(value) / stiffness)
 
-        delay = delay_of(read.value)
+        delay = delay_of(overshoot)
         # A difference quotient with the noise as its step: the map is smooth and the noise small.
-        change = max(read.noise, 1e-6)
+        change = max(noise, 1e-6)
         slope = (
-            abs(delay_of(read.value + change) - delay) / change if read.value + change < 1 else 0.0
+            abs(delay_of(overshoot + change) - delay) / change if overshoot + change < 1 else 0.0
         )
-        stderr = slope * read.noise
-        details = {"map": self.map, "overshoot": read.value, "overshoot_noise": read.noise}
-        if 0.0 < read.value < 1.0:
-            details["damping_ratio"] = damping_ratio(read.value)
+        stderr = slope * noise
+        details = {"map": self.map, "overshoot": overshoot, "overshoot_noise": noise}
+        if 0.0 < overshoot < 1.0:
+            details["damping_ratio"] = damping_ratio(overshoot)
         return read_off_estimate(
             "overshoot",
             simulated,
             {"delay": delay},
             np.array([[stderr**2]]),
-            read.start,
+            reading.start,
             message=(
-                f"{100 * read.value:.2f} % overshoot, map {self.map!r}: assumes a gain of "
+                f"{100 * overshoot:.2f} % overshoot, map {self.map!r}: assumes a gain of "
                 f"{loop.parameters['gain']:g} and no lag"
             ),
             uncalibrated=(
@@ -227,10 +204,12 @@ class Overshoot(Method):
         )
 
 
-def read_overshoot(reading: StepReading) -> OvershootReading:
-    """The overshoot of a step response; refuses one without overshoot."""
-    row = int(np.argmax(reading.travelled))
-    value = float(reading.travelled[row]) - 1.0
+def _overshoot(reading: StepReading) -> tuple[float, float]:
+    """The overshoot of a step response as a share of the step, and its standard deviation.
+
+    Refuses a response without overshoot.
+    """
+    value = float(np.max(reading.travelled)) - 1.0
     settled = max(0.0, float(np.mean(reading.tail)) - 1.0)
     if value - settled <= max(CLEARANCE * reading.noise, 1e-9):
         beyond = max(0.0, value - settled)
@@ -240,21 +219,19 @@ def read_overshoot(reading: StepReading) -> OvershootReading:
             "near 1/e, where the overshoot does not determine the delay: raise Kp, or use "
             "method='waveform'"
         )
-    deviation = reading.noise * math.sqrt(1.0 + 1.0 / reading.start_samples)
-    peak_time = reading.step.time + float(reading.since[row])
-    return OvershootReading(value, deviation, reading.start, reading.step, peak_time)
+    return value, reading.noise * math.sqrt(1.0 + 1.0 / reading.start_samples)
 
 
 def _saturated_delay(
-    overshoot: float, read: OvershootReading, simulated: SimulatedRecording, start: float
+    overshoot: float, reading: StepReading, simulated: SimulatedRecording, start: float
 ) -> float:
     """Delay at which the simulated loop overshoots by this much at the recorded times."""
     from scipy.optimize import brentq
 
     def excess(delay: float) -> float:
-        output = simulated.output({"delay": delay}, read.start)
-        size = read.step.after - read.start
-        return float(np.max((output[read.step.index :] - read.start) / size)) - 1.0 - overshoot
+        output = simulated.output({"delay": delay}, reading.start)
+        share = (output[reading.step.index :] - reading.start) / reading.size
+        return float(np.max(share)) - 1.0 - overshoot
 
     low, high = 0.5 * start, 1.5 * start
     for _ in range(40):
@@ -266,7 +243,7 @@ def _saturated_delay(
             f"the loop overshoots by more than {100 * overshoot:.3g} % with no delay at all: the "
             "hold alone explains it; check the gains and the sample time"
         )
-    span = float(simulated.recording.time[-1] - read.step.time)
+    span = float(simulated.recording.time[-1] - reading.step.time)
     while excess(high) < 0.0:
         high *= 1.3
         if high > span:

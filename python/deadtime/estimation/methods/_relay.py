@@ -27,15 +27,12 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._runs import Run
+from deadtime.estimation.data._checks import integrator_of
 from deadtime.estimation.data._step_reading import noise_of_second_differences
-from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._read_off import check_delay_alone, estimate_with_residuals
-from deadtime.estimation.models._held_response import HeldResponse
-from deadtime.loops import Integrator
+from deadtime.estimation.methods._conclusion import check_delay_alone, estimate_with_residuals
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.models._held import HeldResponse
 from deadtime.recordings import Recording
-
-__all__ = ["Relay"]
 
 Array = NDArray[np.float64]
 
@@ -87,12 +84,7 @@ class Relay(Method):
         """Fit `free` to the one recording."""
         ((recording, loop, window),) = runs
         check_delay_alone("relay", free)
-        plant = loop.plant
-        if not isinstance(plant, Integrator):
-            raise ValueError(
-                f"the relay method is for an Integrator, the loop has a {type(plant).__name__}: "
-                "use method='waveform'"
-            )
+        plant = integrator_of(loop, "relay")
         data = recording.window(*window)
         signs, height = _relay(data, self.amplitude)
         error = data.output - data.reference
@@ -101,7 +93,8 @@ class Relay(Method):
         switches = _switches(data.time, signs, crossings, loop.is_sampled)
         half = float(np.mean(np.diff(crossings)))
         readings = 0.5 * (crossings[1:] + crossings[:-1]) - switches
-        cycles = _paired(readings)
+        # Means of pairs of successive half cycles.
+        cycles = readings[readings.size % 2 :].reshape(-1, 2).mean(axis=1)
         late = _delay_by_lag(plant.lag, half)
         delay = float(cycles.mean()) - late
         stderr = _error_of_mean(cycles)
@@ -110,9 +103,10 @@ class Relay(Method):
                 f"a quarter of the period, {0.5 * half:.3g} s, is explained by lag and hold: the "
                 f"lag is shorter than the given {plant.lag:g} s, or there is no delay"
             )
-        path = _Path(data, switches, signs, delay, plant.lag)
-        first, last = data.time[path.rows[[0, -1]]]
-        slope = abs(plant.gain) * height if height is not None else path.slope
+        rows, path, output = _path(data, switches, delay, plant.lag)
+        first, last = data.time[rows[[0, -1]]]
+        fitted = float(path @ output) / float(path @ path)
+        slope = abs(plant.gain) * height if height is not None else abs(fitted)
         waits = float(np.mean(switches - crossings[:-1]))
         peaks = _peaks(data.time, error, crossings)
         return estimate_with_residuals(
@@ -121,7 +115,7 @@ class Relay(Method):
             data.window(float(first), float(last)),
             {"delay": delay},
             np.array([[stderr**2]]),
-            path.residuals(slope),
+            output - math.copysign(slope, fitted) * path,
             message=(
                 f"{cycles.size} cycles of {2.0 * half:.4g} s; "
                 + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
@@ -138,7 +132,7 @@ class Relay(Method):
                 "wait_of_hold": waits,
                 "amplitude": float(peaks.mean()),
                 "amplitude_expected": slope * (delay + waits),
-                "slope": path.slope,
+                "slope": abs(fitted),
             },
         )
 
@@ -240,12 +234,6 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
     return np.array(found)
 
 
-def _paired(readings: Array) -> Array:
-    """Means of pairs of successive half cycles."""
-    even = readings[readings.size % 2 :]
-    return np.asarray(even.reshape(-1, 2).mean(axis=1))
-
-
 def _error_of_mean(cycles: Array) -> float:
     """Standard error of the mean of cycles that share a crossing with their neighbours.
 
@@ -278,40 +266,18 @@ def _delay_by_lag(lag: float, half: float) -> float:
     return float(brentq(output, 0.5 * half, half)) - 0.5 * half
 
 
-@dataclass(frozen=True)
-class _Path:
-    """The output caused by the switches, from the second of them on."""
+def _path(
+    data: Recording, switches: Array, delay: float, lag: float
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Rows from the second switch on; the unit path caused by the switches, and the output there.
 
-    data: Recording
-    switches: Array
-    signs: Array
-    delay: float
-    lag: float
-
-    @property
-    def rows(self) -> NDArray[np.intp]:
-        begin = self.switches[1] + self.delay
-        return np.flatnonzero(
-            (self.data.time >= begin) & (self.data.time <= self.switches[-1] + self.delay)
-        )
-
-    def fitted(self) -> tuple[Array, float, Array]:
-        """Unit path, slope and recorded output at `rows`, both about their means."""
-        first = -1.0 if self.data.output[self.rows[0]] > self.data.reference[self.rows[0]] else 1.0
-        values = np.full(self.switches.size, first)
-        values[::2] = -first
-        response = HeldResponse(self.switches, values)
-        path = response.at(self.data.time[self.rows] - self.delay, self.lag).value
-        output = self.data.output[self.rows]
-        path, output = path - path.mean(), output - output.mean()
-        return path, float(path @ output) / float(path @ path), output
-
-    @property
-    def slope(self) -> float:
-        """Slope of the best fit."""
-        return abs(self.fitted()[1])
-
-    def residuals(self, slope: float) -> Array:
-        """Recorded output minus the path of this slope."""
-        path, found, output = self.fitted()
-        return np.asarray(output - math.copysign(slope, found) * path)
+    Path and output are about their means.
+    """
+    begin, end = switches[1] + delay, switches[-1] + delay
+    rows = np.flatnonzero((data.time >= begin) & (data.time <= end))
+    first = -1.0 if data.output[rows[0]] > data.reference[rows[0]] else 1.0
+    values = np.full(switches.size, first)
+    values[::2] = -first
+    path = HeldResponse(switches, values).at(data.time[rows] - delay, lag).value
+    output = data.output[rows]
+    return rows, path - path.mean(), output - output.mean()

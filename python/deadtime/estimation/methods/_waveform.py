@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal, get_args
@@ -28,22 +28,21 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._evidence import (
+from deadtime.estimation.data._checks import (
     LOOP_PARAMETERS,
+    ROUNDING,
     VEHICLE_PARAMETERS,
+    check_ends,
+    check_excitation,
     checked_names,
     excited,
+    start_and_span,
 )
-from deadtime.estimation.data._excitation import ROUNDING, check_excitation, start_and_span
-from deadtime.estimation.data._runs import Run
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
-from deadtime.estimation.fit._joint import solve_jointly
-from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
+from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
-from deadtime.estimation.methods._method import Method, check_choice, check_initial_output
+from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.estimation.methods._output_error import estimate_from_commands
-
-__all__ = ["NoisePath", "Waveform"]
 
 Array = NDArray[np.float64]
 
@@ -118,12 +117,12 @@ class Waveform(Method):
         models = [_model(run, names, self.initial_output) for run in runs]
         model, found = solve_jointly(models)
         found = without_vanishing(model, found)
-        _check_ends(dict(zip(names, found.point.tolist(), strict=False)), model.low, model.high)
+        check_ends(names, found.point, model.low, model.high)
         return concluded(
             self.name,
             model,
             found,
-            [Run(one.simulated.recording, run.loop) for one, run in zip(models, runs, strict=True)],
+            [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)],
             message=f"least squares over {', '.join(names)} on the response of the loop",
             details={
                 "initial_output": float([*found.point, self.initial_output][len(names)]),
@@ -145,34 +144,37 @@ def _unlikelihood(fit: DelayEstimate) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Model(ModelOfOne):
-    """Residuals of one recording; parameters are `names`, then the initial output if fitted."""
+class SimulatedModel(ModelOfOne):
+    """Residuals of the simulated loop, bounded where simulations diverge."""
 
     simulated: SimulatedRecording
-    names: tuple[str, ...]
-    offset: float | None
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        return (*self.names, *(["initial output"] if self.offset is None else []))
+    @cached_property
+    def bound(self) -> float:
+        """Largest residual."""
+        return LARGEST_MISFIT * self.size
 
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        return (len(self.simulated.recording),)
+    def misfit(self, point: Array) -> Array:
+        """Simulated minus recorded output; bounded where the loop with these numbers is not."""
+        recorded = self.recording.output
+        try:
+            output = self.simulated.output(self.values(point), self.start_of(point))
+        except ValueError:  # the response with these numbers grows without bound
+            return np.full(recorded.size, self.bound)
+        return np.clip(output - recorded, -self.bound, self.bound)
 
+
+@dataclass(frozen=True, eq=False)
+class _Model(SimulatedModel):
     @cached_property
     def span(self) -> float:
-        return start_and_span(self.simulated.recording)[1]
-
-    @cached_property
-    def size(self) -> float:
-        return excited(self.simulated.recording)
+        return start_and_span(self.recording)[1]
 
     @cached_property
     def _shortest(self) -> float:
         if self.simulated.loop.is_sampled:
-            return LEAST_LAG * self.simulated.recording.sample_time
-        return shortest_time(self.simulated.recording)
+            return LEAST_LAG * self.recording.sample_time
+        return shortest_time(self.recording)
 
     def ends(self, label: str) -> Ends:
         tenth, shortest = 0.1 * self.span, self._shortest
@@ -189,36 +191,19 @@ class _Model(ModelOfOne):
         low, high = sorted((1e-3 * value, 1e3 * value))
         return Ends(low, high, abs(value))
 
-    def _values(self, point: Array) -> tuple[dict[str, float], float]:
-        """Numbers of the loop, and the output at the start."""
-        start = float(point[-1]) if self.offset is None else self.offset
-        return dict(zip(self.names, point.tolist(), strict=False)), start
-
-    def misfit(self, point: Array) -> Array:
-        """Simulated minus recorded output; bounded where the loop with these numbers is not."""
-        bound = LARGEST_MISFIT * self.size
-        recorded = self.simulated.recording.output
-        try:
-            output = self.simulated.output(*self._values(point))
-        except ValueError:  # the response with these numbers grows without bound
-            return np.full(recorded.size, bound)
-        return np.clip(output - recorded, -bound, bound)
-
     def jacobian(self, point: Array) -> Array:
         """Derivatives of the misfit; zero where it is at its bound."""
         try:
-            slopes = self.simulated.slopes(*self._values(point))
+            slopes = self.simulated.slopes(self.values(point), self.start_of(point))
         except ValueError:
-            return np.zeros((sum(self.sizes), point.size))
+            return np.zeros((len(self.recording), point.size))
         columns = np.stack([slopes[label] for label in self.labels], axis=1)
-        bounded = (
-            np.abs(slopes["output"] - self.simulated.recording.output) < LARGEST_MISFIT * self.size
-        )
+        bounded = np.abs(slopes["output"] - self.recording.output) < self.bound
         return np.where(bounded[:, None], columns, 0.0)
 
     def starts(self) -> list[Array]:
         """The points of a grid over delay and gain, the best first."""
-        start, _ = start_and_span(self.simulated.recording)
+        start, _ = start_and_span(self.recording)
         along = [start] if self.offset is None else []
         points = [np.array([*point, *along]) for point in itertools.product(*self._grid())]
         costs = [float(np.sum(self.misfit(point) ** 2)) for point in points]
@@ -239,17 +224,4 @@ def _model(run: Run, names: tuple[str, ...], offset: float | None = None) -> _Mo
     simulated = SimulatedRecording(*run)
     in_motion = simulated.recording.time[0] > run.recording.time[0]
     check_excitation(simulated.recording, len(names), in_motion=in_motion)
-    return _Model(simulated, names, offset)
-
-
-def _check_ends(values: Mapping[str, float], low: Array, high: Array) -> None:
-    """Refuse a fit at a bound of its search; a delay or lag of zero is a valid result."""
-    for (name, value), least, most in zip(values.items(), low, high, strict=False):
-        for end in (least, most):
-            inner = name in ("delay", "lag") and end == least
-            if not inner and abs(value - end) <= 1e-3 * abs(end):
-                raise NotIdentifiableError(
-                    f"the fit ends at a {name} of {end:g}, a bound of its search: the output is "
-                    "no response of such a loop to this reference; check columns, signs, units "
-                    "and gains, and choose a window around one step"
-                )
+    return _Model(simulated.recording, names, offset, simulated)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,14 +13,14 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress
 from deadtime._base.validation import finite, positive, whole_number
-from deadtime.estimation._estimate import method_of
-from deadtime.estimation.data._evidence import VEHICLE_PARAMETERS, checked_names
+from deadtime.estimation._estimate import estimate_delay, method_of
+from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._waveform import Waveform
-from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, Plan, run_many_times
+from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, run_many_times
 from deadtime.estimation.planning._planned_bound import (
     PlannedBound,
     bound_of,
@@ -32,8 +33,6 @@ from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["Identifiability", "identifiability"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,18 +155,18 @@ class Identifiability(ReadOnlyArrays):
         """
         if known is None:
             known = self.loop.replace(delay=None) if "delay" in self.free else self.loop
-        plan = Plan(
-            loop=self.loop,
-            experiment=self.experiment,
-            noise=self.noise,
-            free=self.free,
-            initial_output=self.initial_output,
-            known=known,
-            method=self._informed(method_of(method, [self.recording])),
-            noise_in_loop=noise_in_loop,
-            level=level,
+        informed = self._informed(method_of(method, [self.recording]))
+        return run_many_times(
+            informed.name,
+            self.loop.parameters,
+            partial(self.experiment.run, self.loop, self.noise, noise_in_loop=noise_in_loop),
+            partial(estimate_delay, loop=known, method=informed, free=self.free),
+            runs,
+            seed,
+            level,
+            processes,
+            progress,
         )
-        return run_many_times(plan, runs, seed, processes, progress)
 
     def _informed(self, method: Method) -> Method:
         """The method, with the output at the start where that is known and it has the option."""
@@ -216,7 +215,7 @@ class Identifiability(ReadOnlyArrays):
         ValueError
             If `ax` holds another number of axes.
         """
-        from deadtime.estimation.planning._plots import plot_identifiability
+        from deadtime.estimation._plots import plot_identifiability
 
         return plot_identifiability(self, ax)
 

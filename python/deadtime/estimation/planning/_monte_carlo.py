@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,8 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.processes import shared_out
 from deadtime._base.progress import Progress
 from deadtime._base.validation import whole_number
-from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.methods._method import Method
-from deadtime.experiments import Experiment
-from deadtime.loops import ControlLoop
-
-__all__ = ["SLOW", "MonteCarlo", "Plan", "run_many_times"]
+from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
 
@@ -93,19 +88,11 @@ class MonteCarlo(ReadOnlyArrays):
         return f"<MonteCarlo of {self.method}: {self.runs} runs, rmse {errors}>"
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """What is simulated, and how each run is estimated from."""
+#: Simulates the recording of one run from its seed.
+Simulate: TypeAlias = Callable[[np.random.SeedSequence], Recording]
 
-    loop: ControlLoop
-    experiment: Experiment
-    noise: float
-    free: tuple[str, ...]
-    initial_output: float | None
-    known: ControlLoop
-    method: Method
-    noise_in_loop: bool
-    level: float
+#: Estimates from it.
+Estimate: TypeAlias = Callable[[Recording], DelayEstimate]
 
 
 class _Outcome(NamedTuple):
@@ -118,39 +105,49 @@ class _Outcome(NamedTuple):
 
 
 def run_many_times(
-    plan: Plan,
+    method: str,
+    truth: Mapping[str, float],
+    simulate: Simulate,
+    estimate: Estimate,
     runs: int,
     seed: int,
+    level: float,
     processes: int | None,
     progress: Progress,
 ) -> MonteCarlo:
     """Simulate and estimate `runs` times, and collect the statistics."""
     count = whole_number("runs", runs)
-    if not 0.0 < plan.level < 1.0:
-        raise ValueError(f"level={plan.level!r} is not between 0 and 1: 0.95 is usual")
-    outcomes = shared_out(partial(_outcomes, plan, seed), count, processes, progress)
-    return _summed_up(plan, outcomes)
+    if not 0.0 < level < 1.0:
+        raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+    truth = _with_sum(truth)
+    some = partial(_outcomes, truth, simulate, estimate, level, seed)
+    return _summed_up(method, truth, level, shared_out(some, count, processes, progress))
 
 
-def _outcomes(plan: Plan, seed: int, runs: range) -> list[_Outcome]:
-    # The children of one seed, as its `spawn` makes them.
-    return [_outcome(plan, np.random.SeedSequence(seed, spawn_key=(i,))) for i in runs]
-
-
-def _outcome(plan: Plan, seed: np.random.SeedSequence) -> _Outcome:
-    recording = plan.experiment.run(plan.loop, plan.noise, seed, plan.noise_in_loop)
-    try:
-        fit = estimate_delay(recording, plan.known, method=plan.method, free=plan.free)
-        truth = _with_sum(plan.loop.parameters)
-        fitted = _with_sum(fit.loop.parameters)
-        values = {name: fitted[name] for name in fit.stderr}
-        bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
-        held = {}
-        if fit.calibrated:
-            held = {name: _holds(fit, name, truth[name], plan.level) for name in values}
-    except DeadtimeError as refusal:
-        return _Outcome({}, {}, {}, str(refusal))
-    return _Outcome(values, bounds, held)
+def _outcomes(
+    truth: Mapping[str, float],
+    simulate: Simulate,
+    estimate: Estimate,
+    level: float,
+    seed: int,
+    runs: range,
+) -> list[_Outcome]:
+    found = []
+    for i in runs:
+        # The children of one seed, as its `spawn` makes them.
+        recording = simulate(np.random.SeedSequence(seed, spawn_key=(i,)))
+        try:
+            fit = estimate(recording)
+            fitted = _with_sum(fit.loop.parameters)
+            values = {name: fitted[name] for name in fit.stderr}
+            bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
+            held = {}
+            if fit.calibrated:
+                held = {name: _holds(fit, name, truth[name], level) for name in values}
+            found.append(_Outcome(values, bounds, held))
+        except DeadtimeError as refusal:
+            found.append(_Outcome({}, {}, {}, str(refusal)))
+    return found
 
 
 def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
@@ -174,20 +171,23 @@ def _with_sum(values: Mapping[str, float]) -> dict[str, float]:
     return dict(values) | {"delay+lag": values["delay"]} | sums
 
 
-def _summed_up(plan: Plan, outcomes: list[_Outcome]) -> MonteCarlo:
+def _summed_up(
+    method: str, everything: Mapping[str, float], level: float, outcomes: list[_Outcome]
+) -> MonteCarlo:
     answered = [outcome for outcome in outcomes if not outcome.refusal]
-    reasons = Counter(_without_numbers(outcome.refusal) for outcome in outcomes if outcome.refusal)
+    # Numbers are left out, so that equal reasons are counted together.
+    refusals = [outcome.refusal for outcome in outcomes if outcome.refusal]
+    reasons = Counter(re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", one) for one in refusals)
     if not answered:
         raise NotIdentifiableError(
             f"all {len(outcomes)} runs were refused, most of them because "
             f"{reasons.most_common(1)[0][0]}"
         )
-    everything = _with_sum(plan.loop.parameters)
     truth = {name: everything[name] for name in answered[0].values}
     estimates = {name: np.array([one.values[name] for one in answered]) for name in truth}
     errors = {name: estimates[name] - truth[name] for name in truth}
     return MonteCarlo(
-        method=plan.method.name,
+        method=method,
         runs=len(outcomes),
         truth=truth,
         estimates=estimates,
@@ -197,14 +197,9 @@ def _summed_up(plan: Plan, outcomes: list[_Outcome]) -> MonteCarlo:
             name: float(np.mean([one.bounds[name] for one in answered]))
             for name in answered[0].bounds
         },
-        level=plan.level,
+        level=level,
         coverage={
             name: float(np.mean([one.held[name] for one in answered])) for name in answered[0].held
         },
         failures=dict(reasons.most_common()),
     )
-
-
-def _without_numbers(reason: str) -> str:
-    """The reason with its numbers left out, so that equal reasons are counted together."""
-    return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", reason)

@@ -24,14 +24,12 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
-from deadtime.estimation.data._evidence import check_distinguishable, standard_errors
+from deadtime.estimation.data._checks import check_distinguishable, standard_errors
 from deadtime.experiments import Experiment
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 from deadtime.roots import delay, s
 from deadtime.systems import TransferFunction
-
-__all__ = ["PlannedBound", "bound_of", "from_the_command", "from_the_reference"]
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,6 @@ import asyncio
 import math
 import warnings
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Self
 
 from deadtime._base.errors import FlightAbortedError, LinkError
@@ -22,22 +21,21 @@ from deadtime.links.ardrone2.reader import (
     on_ground,
     phase_of,
 )
+from deadtime.links.clock import now
 from deadtime.links.safety import Limits, UnitCommand
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["ARDrone2"]
-
 #: Longest wait for the first navdata, and for the end of bootstrap, s.
-FIRST_NEWS = 5.0
+FIRST_NAVDATA = 5.0
 
 #: Longest duration of a take-off until the drone holds its height, and of a landing, s.
-TAKING_OFF, LANDING = 15.0, 20.0
+LONGEST_TAKE_OFF, LONGEST_LANDING = 15.0, 20.0
 
 #: Time between two checks of the link while nothing else is waited for, s.
-LOOKING = 0.1
+CHECK_EVERY = 0.1
 
 #: Time for the drone to calibrate its level, s.
-TRIMMING = 0.3
+TRIM_TIME = 0.3
 
 #: Longest silence while landing, s: the watchdog of the drone lands it within this time.
 SILENT_LANDING = 3.0
@@ -108,7 +106,7 @@ class ARDrone2:
         self._restarts = 0
         self._vz_max: float | None = None
         self._settings = LimitSettings(host)
-        self._asked_up = -math.inf
+        self._take_off_sent = -math.inf
         self._link = self._new_link()
 
     def _new_link(self) -> Connection:
@@ -162,14 +160,14 @@ class ARDrone2:
 
     async def _configure(self) -> None:
         link, host = self._link, self.host
-        heard = await link.until(lambda navdata: True, FIRST_NEWS)
+        heard = await link.until(lambda navdata: True, FIRST_NAVDATA)
         if not heard:
             raise LinkError(
-                f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NEWS:g} s: "
-                "is the drone on, this computer in its network, and no other client connected?"
+                f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NAVDATA:g} "
+                "s: is the drone on, this computer in its network, and no other client connected?"
             )
         await self._settings.set(link, self.control_port, self.limits, self.full)
-        if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NEWS):
+        if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NAVDATA):
             raise LinkError(f"{host} sends navdata without height and battery: restart it")
         self._vz_max = self._settings.vz_max
         self._restarts = self._reader.restarts
@@ -202,29 +200,29 @@ class ARDrone2:
                 f"vertical speed of {speed:g} m/s: give a smaller one"
             )
         self._link.send(FlatTrim())
-        asked = self._link.now
-        await asyncio.sleep(TRIMMING)
-        late = self._link.now - asked - TRIMMING
+        asked = now()
+        await asyncio.sleep(TRIM_TIME)
+        late = now() - asked - TRIM_TIME
         if late > self.limits.command_age:
             raise LinkError(
                 f"this program was paused for {late:.2f} s just before the take-off of "
                 f"{self.host}, so its last known state is old: take off again"
             )
-        self._asked_up = self._link.now
+        self._take_off_sent = now()
         self._sender.fly()
         try:
             await self._rise()
         except BaseException:
             self._sender.land()
             raise
-        self._sender.guard(self._link.now)
+        self._sender.guard(now())
 
     async def _rise(self) -> None:
-        deadline = self._link.now + TAKING_OFF
-        while not await self._link.until(_is_up, LOOKING):
+        deadline = now() + LONGEST_TAKE_OFF
+        while not await self._link.until(_is_up, CHECK_EVERY):
             self._check_link()
-            if self._link.now > deadline:
-                raise LinkError(f"{self.host} is not up {TAKING_OFF:g} s after the take-off")
+            if now() > deadline:
+                raise LinkError(f"{self.host} is not up {LONGEST_TAKE_OFF:g} s after the take-off")
         navdata = self._link.reader.navdata
         if navdata is None or navdata.emergency:
             raise FlightAbortedError(f"{self.host} went into emergency while taking off")
@@ -240,8 +238,8 @@ class ARDrone2:
         """
         if not self._link.is_open:
             raise LinkError(f"{self.host} is not connected")
-        if self._reader.newest is None and not await self._link.until(_tells_state, FIRST_NEWS):
-            raise LinkError(f"no state from {self.host} within {FIRST_NEWS:g} s")
+        if self._reader.newest is None and not await self._link.until(_has_state, FIRST_NAVDATA):
+            raise LinkError(f"no state from {self.host} within {FIRST_NAVDATA:g} s")
         self._check_link()
         state = self._reader.newest
         assert state is not None
@@ -252,7 +250,7 @@ class ARDrone2:
             raise LinkError(
                 f"the listener of {self.host} has failed: {self._link.failure}"
             ) from self._link.failure
-        self._check_wish()
+        self._check_flight()
         if self._sender.rival is not None:
             raise LinkError(self._sender.rival)
         if self._link.silent > LOST:
@@ -260,7 +258,7 @@ class ARDrone2:
         if self._vz_max is not None and self._reader.restarts > self._restarts:
             raise LinkError(self._link.forgotten)
 
-    def _check_wish(self) -> None:
+    def _check_flight(self) -> None:
         """Raise if the flight has ended without `land`."""
         self._link.age()
         if self._sender.expired is not None:
@@ -292,10 +290,10 @@ class ARDrone2:
         requested = finite("climb", climb)
         if self._sender.expired is None and not self._sender.guarded:
             raise LinkError(f"{self.host} is not in the air: take off before commanding it")
-        self._check_wish()
+        self._check_flight()
         most = min(self.limits.max_climb, self.vz_max)
         share = UnitCommand.saturated(max(-most, min(most, requested)) / self.vz_max)
-        sent = self._sender.climb(share, self._link.now)
+        sent = self._sender.climb(share, now())
         self._link.send()
         return float(sent) * self.vz_max
 
@@ -307,8 +305,8 @@ class ARDrone2:
         LinkError
             If the flight has ended without `land`, as of `command`.
         """
-        self._check_wish()
-        self._sender.hover(self._link.now)
+        self._check_flight()
+        self._sender.hover(now())
         self._link.send()
 
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
@@ -333,21 +331,21 @@ class ARDrone2:
         if not self._link.is_open or self._reader.newest is None:
             return
         self._link.send()
-        deadline = self._link.now + LANDING
-        while not await self._link.until(self._is_down, LOOKING):
+        deadline = now() + LONGEST_LANDING
+        while not await self._link.until(self._is_down, CHECK_EVERY):
             silent = self._link.silent
             if silent > SILENT_LANDING:
                 raise LinkError(
                     f"nothing received from {self.host} for {silent:.1f} s while landing: its own "
                     "watchdog lands it 2 s after the last command it received"
                 )
-            if self._link.now > deadline:
-                raise LinkError(f"{self.host} has not landed within {LANDING:g} s")
+            if now() > deadline:
+                raise LinkError(f"{self.host} has not landed within {LONGEST_LANDING:g} s")
 
     def _is_down(self, navdata: Navdata) -> bool:
         """Whether a drone is down, by navdata new enough to show the beginning of a take-off."""
-        sent = self._link.news_sent
-        return on_ground(navdata) and sent is not None and sent >= self._asked_up + ANSWERED
+        sent = self._link.newest_sent
+        return on_ground(navdata) and sent is not None and sent >= self._take_off_sent + ANSWERED
 
     async def close(self) -> None:
         """Land if in the air, restore the settings of the drone, and close the link.
@@ -415,17 +413,17 @@ class ARDrone2:
         the old state.
         """
         link = self._link
-        deadline = link.now + TOGGLING
+        deadline = now() + TOGGLING
         while not await link.until(requested, 0.0):
             self._sender.cut = True
             link.send(copies=COPIES)
-            toggled = link.now
-            while not await link.until(requested, LOOKING):
-                if link.now > deadline:
+            toggled = now()
+            while not await link.until(requested, CHECK_EVERY):
+                if now() > deadline:
                     return False
                 # Packets that waited in the socket during a pause of this program are old too.
                 since = max(toggled, self._sender.resumed)
-                if link.news_sent is not None and link.news_sent >= since + ANSWERED:
+                if link.newest_sent is not None and link.newest_sent >= since + ANSWERED:
                     break
         return True
 
@@ -433,12 +431,7 @@ class ARDrone2:
         await self.connect()
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             await self.close()
         except LinkError as problem:
@@ -447,17 +440,17 @@ class ARDrone2:
             _note(error, str(problem), *getattr(problem, "__notes__", ()))
 
 
-def _note(error: BaseException, *said: str | None) -> None:
-    for one in said:
-        if one is not None:
-            error.add_note(one)
+def _note(error: BaseException, *notes: str | None) -> None:
+    for note in notes:
+        if note is not None:
+            error.add_note(note)
 
 
 def _is_up(navdata: Navdata) -> bool:
     return navdata.emergency or (navdata.flying and phase_of(navdata) in (FLYING, HOVERING))
 
 
-def _tells_state(navdata: Navdata) -> bool:
+def _has_state(navdata: Navdata) -> bool:
     return navdata.demo is not None
 
 

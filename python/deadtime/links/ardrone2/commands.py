@@ -11,25 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
 
-from deadtime.links._wire import at_read, at_write
+from deadtime._deadtime import at_read, at_write
 from deadtime.links.safety import UnitCommand
-
-__all__ = [
-    "Calibrate",
-    "Command",
-    "Config",
-    "ConfigIds",
-    "Control",
-    "FlatTrim",
-    "Hover",
-    "Move",
-    "MoveFrom",
-    "Other",
-    "Ref",
-    "Watchdog",
-    "decode",
-    "encode",
-]
 
 NONE = UnitCommand(0.0)
 

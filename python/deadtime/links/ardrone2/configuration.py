@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from deadtime.links._wire import configuration_read, configuration_write
-
-__all__ = ["parse_configuration", "write_configuration"]
+from deadtime._deadtime import configuration_read, configuration_write
 
 
 def parse_configuration(dump: bytes) -> dict[str, str]:

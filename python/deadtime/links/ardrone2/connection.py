@@ -15,8 +15,6 @@ from deadtime.links.clock import now
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import VehicleState
 
-__all__ = ["LOST", "Connection"]
-
 #: Silence after which the link counts as lost, s.
 LOST = 1.0
 
@@ -73,11 +71,6 @@ class Connection:
         return self._cycle is not None
 
     @property
-    def now(self) -> float:
-        """The clock of all ages, s."""
-        return now()
-
-    @property
     def forgotten(self) -> str:
         """Message for a drone whose numbers have restarted."""
         return (
@@ -94,7 +87,7 @@ class Connection:
         )
 
     @property
-    def news_sent(self) -> float | None:
+    def newest_sent(self) -> float | None:
         """When the newest navdata were sent, s; when they arrived, if the drone sends no clock."""
         return self.reader.heard if self.reader.sent is None else self.reader.sent
 
@@ -102,7 +95,7 @@ class Connection:
     def silent(self) -> float:
         """Time since the last packet, s."""
         heard = self.reader.heard
-        return 0.0 if heard is None else self.now - heard
+        return 0.0 if heard is None else now() - heard
 
     async def open(self) -> None:
         """Open the sockets and begin to send: the command to be on the ground, until changed.
@@ -148,8 +141,8 @@ class Connection:
         try:
             while self._navdata is not None:
                 quiet = self.reader.heard is None or self.silent > WAKE_AGAIN
-                if quiet and self.now - self._woken >= WAKE_AGAIN:
-                    self._woken = self.now
+                if quiet and now() - self._woken >= WAKE_AGAIN:
+                    self._woken = now()
                     self._navdata.sendto(WAKE_UP)
                 self.send()
                 await asyncio.sleep(CYCLE)
@@ -169,13 +162,13 @@ class Connection:
         self.age()
         navdata = self.reader.navdata
         alive = navdata is None or navdata.com_watchdog or self.silent > WAKE_AGAIN
-        datagram = self.sender.datagram(self.now, alive, more)
+        datagram = self.sender.datagram(now(), alive, more)
         for _ in range(copies):
             self._commands.sendto(datagram)
 
     def age(self) -> None:
         """Let commands expire that are too old."""
-        self.sender.age(self.now)
+        self.sender.age(now())
         if self.silent > LOST:  # it may have landed: commands may not reach it either
             self.sender.give_up(self.unheard)
 
@@ -183,7 +176,7 @@ class Connection:
         """Process a packet of the drone."""
         reader = self.reader
         before, restarts = reader.navdata, reader.restarts
-        state = reader.accept(packet, self.now)
+        state = reader.accept(packet, now())
         if reader.restarts > restarts:
             self.sender.give_up(self.forgotten)
         if reader.navdata is not None and reader.navdata is not before:
@@ -199,12 +192,12 @@ class Connection:
 
     async def until(self, holds: Callable[[Navdata], bool], timeout: float) -> bool:
         """Wait until the condition holds of the navdata; False after the timeout, s."""
-        deadline = self.now + timeout
+        deadline = now() + timeout
         while True:
             navdata = self.reader.navdata
             if navdata is not None and holds(navdata):
                 return True
-            left = deadline - self.now
+            left = deadline - now()
             if left <= 0.0:
                 return False
             self._arrived.clear()

@@ -14,8 +14,6 @@ from deadtime.links.ardrone2.commands import Command, Config, Control
 from deadtime.links.ardrone2.configuration import parse_configuration
 from deadtime.links.ardrone2.navdata import Navdata
 
-__all__ = ["Handshake", "check_configuration"]
-
 #: Modes of CTRL.
 SEND_CONFIGURATION, ACKNOWLEDGE = 4, 5
 

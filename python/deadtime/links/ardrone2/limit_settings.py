@@ -12,8 +12,6 @@ from deadtime.links.ardrone2.handshake import Handshake, check_configuration
 from deadtime.links.ardrone2.reader import on_ground
 from deadtime.links.safety import Limits
 
-__all__ = ["LimitSettings"]
-
 #: Ranges of the drone for its largest vertical speed, mm/s, and its largest height, mm.
 VZ_MAX, ALTITUDE_MAX = (200, 2000), (500, 5000)
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args, get_type_hints
 
-from deadtime.links._wire import navdata_full, navdata_layouts, navdata_read, navdata_write
+from deadtime._deadtime import navdata_full, navdata_layouts, navdata_read, navdata_write
 from deadtime.links.ardrone2.navdata_options import (
     AltitudeOption,
     Demo,
@@ -26,26 +26,6 @@ from deadtime.links.ardrone2.navdata_options import (
     VideoStream,
     Wifi,
 )
-
-__all__ = [
-    "DEMO_OPTIONS",
-    "FULL_OPTIONS",
-    "AltitudeOption",
-    "Demo",
-    "KalmanPressure",
-    "Navdata",
-    "PhysicalMeasures",
-    "Pressure",
-    "Pwm",
-    "RawMeasures",
-    "RcReferences",
-    "References",
-    "State",
-    "VideoStream",
-    "Wifi",
-    "build_navdata",
-    "parse_navdata",
-]
 
 Options: TypeAlias = tuple[tuple[int, bytes], ...]
 
@@ -211,22 +191,15 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-_KINDS: dict[str, Any] = {
-    "demo": Demo,
-    "raw_measures": RawMeasures,
-    "physical_measures": PhysicalMeasures,
-    "references": References,
-    "rc_references": RcReferences,
-    "pwm": Pwm,
-    "altitude": AltitudeOption,
-    "video_stream": VideoStream,
-    "pressure": Pressure,
-    "kalman_pressure": KalmanPressure,
-    "wifi": Wifi,
-}
+#: Name and type of the fields that are options, by tag.
 _FIELDS: dict[int, tuple[str, Any]] = {1: ("clock", float)} | {
-    kind.tag: (name, kind) for name, kind in _KINDS.items()
+    kind.tag: (name, kind)
+    for name, annotation in get_type_hints(Navdata).items()
+    for kind in get_args(annotation)
+    if hasattr(kind, "tag")
 }
+#: Tags of the options with known fields, by their names in `Navdata`.
+TAGS = {name: tag for tag, (name, _) in _FIELDS.items()}
 _LENGTHS = {layout.tag: layout.length for layout in navdata_layouts()}
 
 

@@ -8,20 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-__all__ = [
-    "AltitudeOption",
-    "Demo",
-    "KalmanPressure",
-    "PhysicalMeasures",
-    "Pressure",
-    "Pwm",
-    "RawMeasures",
-    "RcReferences",
-    "References",
-    "VideoStream",
-    "Wifi",
-]
-
 
 @dataclass(frozen=True)
 class Demo:

@@ -17,16 +17,6 @@ from deadtime.links.ardrone2.navdata import Navdata, State, parse_navdata
 from deadtime.links.safety import jumps
 from deadtime.links.vehicle import VehicleState
 
-__all__ = [
-    "FLYING",
-    "HOVERING",
-    "LinkStatistics",
-    "NavdataReader",
-    "on_ground",
-    "phase_of",
-    "unasked_end",
-]
-
 #: The drone's clock counts its seconds in 11 bits.
 CLOCK_TURN = 2048.0
 

@@ -22,8 +22,6 @@ from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import on_ground, unasked_end
 from deadtime.links.safety import Limits, UnitCommand
 
-__all__ = ["CYCLE", "CommandSender"]
-
 #: Time between two datagrams, s.
 CYCLE = 0.03
 

@@ -16,26 +16,20 @@ import sys
 from collections.abc import Coroutine, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from deadtime._base.errors import DeadtimeError
+from deadtime._base.plain import plain
 from deadtime.links.addresses import Address
 from deadtime.links.parent_watch import parent_ended
 from deadtime.links.udp.controller import Controller, ControllerOptions
-from deadtime.links.udp.described import (
-    DELAYS,
-    POLICIES,
-    network_from,
-    network_of,
-    plain,
-    policy_of,
-)
+from deadtime.links.udp.described import DELAYS, POLICIES, network_from, network_of, policy_of
 from deadtime.links.udp.endpoint import resolved, speaking_to
 from deadtime.links.udp.plant import Plant
 from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.relay import Relay, RelayOptions
 
-__all__ = ["main"]
+T = TypeVar("T", ControllerOptions, PlantOptions)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -63,45 +57,32 @@ async def _until_stopped(work: Coroutine[Any, Any, None], until_input_ends: bool
         await task
 
 
-def _say(**what: Any) -> None:
+def _print_line(**what: Any) -> None:
     print(json.dumps(plain(what), allow_nan=False), flush=True)
 
 
 def _ready(part: str, address: Address) -> None:
-    _say(ready=part, host=address[0], port=address[1])
+    _print_line(ready=part, host=address[0], port=address[1])
+
+
+def _options(kind: type[T], given: argparse.Namespace) -> T:
+    """The options of a part, from the arguments of the same names."""
+    return kind(**{name: getattr(given, name) for name in kind.__dataclass_fields__})
 
 
 async def _run_controller(given: argparse.Namespace) -> None:
-    options = ControllerOptions(
-        gain=given.gain,
-        listen=given.listen,
-        plant=given.plant,
-        limit=given.limit,
-        watchdog=given.watchdog,
-        safe=given.safe,
-        every=given.every,
-        recording=given.recording,
-        doubles=given.doubles,
-    )
-    async with Controller(options) as controller:
+    async with Controller(_options(ControllerOptions, given)) as controller:
         _ready("controller", controller.address)
         try:
             await controller.running(given.duration)
         finally:
-            _say(report=controller.report().to_dict())
+            _print_line(report=controller.report().to_dict())
 
 
 async def _run_relay(given: argparse.Namespace) -> None:
     words = {name: getattr(given, name) for name in PATHS}
-    both = network_of(
-        given.delays,
-        given.delay,
-        given.jitter,
-        given.loss,
-        given.burst,
-        given.duplication,
-        given.ordered,
-    )
+    names = ("delay", "jitter", "loss", "burst", "duplication", "ordered")
+    both = network_of(given.delays, **{name: getattr(given, name) for name in names})
     ways = {name: both if text is None else network_from(text) for name, text in words.items()}
     options = RelayOptions(given.to, **ways, seed=given.seed, listen=given.listen)
     async with Relay(options) as relay:
@@ -111,33 +92,20 @@ async def _run_relay(given: argparse.Namespace) -> None:
         finally:
             paths = {name: getattr(relay, name) for name in PATHS}
             counts = {name: path.counts() for name, path in paths.items()}
-            _say(report={**counts, "overflowed": relay.overflowed})
+            _print_line(report={**counts, "overflowed": relay.overflowed})
 
 
 async def _run_plant(given: argparse.Namespace) -> None:
     controller = await resolved(given.controller)
-    options = PlantOptions(
-        controller=controller,
-        listen=given.listen or speaking_to(controller),
-        gain=given.gain,
-        lag=given.lag,
-        sample_time=given.sample_time,
-        duration=given.duration,
-        rest=given.rest,
-        amplitude=given.amplitude,
-        limit=given.limit,
-        policy=policy_of(given.policy, given.policy_number),
-        watchdog=given.watchdog,
-        safe=given.safe,
-        recording=given.recording,
-        doubles=given.doubles,
-    )
-    async with Plant(options) as plant:
+    given.controller = controller
+    given.listen = given.listen or speaking_to(controller)
+    given.policy = policy_of(given.policy, given.policy_number)
+    async with Plant(_options(PlantOptions, given)) as plant:
         _ready("plant", plant.address)
         try:
             await plant.running()
         finally:
-            _say(report=plant.report().to_dict())
+            _print_line(report=plant.report().to_dict())
 
 
 #: From the plant to the controller, and from the controller to the plant.

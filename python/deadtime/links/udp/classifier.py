@@ -14,8 +14,6 @@ from enum import Enum
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.recordings._recording import LARGEST
 
-__all__ = ["REMEMBERED", "Classifier", "Verdict"]
-
 #: Number of remembered packets, sent or received.
 REMEMBERED = 4096
 

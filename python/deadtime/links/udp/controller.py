@@ -10,23 +10,18 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
-from collections import deque
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from deadtime._base.validation import finite, positive
 from deadtime.links.addresses import Address
-from deadtime.links.journal import Journal
 from deadtime.links.udp.endpoint import Endpoint
+from deadtime.links.udp.loop_end import LoopEnd
 from deadtime.links.udp.packets import LoopPacket
-from deadtime.links.udp.statistics import KEPT, LinkReport, Percentiles
-from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
+from deadtime.links.udp.statistics import LinkReport, Percentiles
+from deadtime.links.udp.wires import SAFE, wire_of
 from deadtime.recordings import Recording
-from deadtime.recordings._recording import MINIMUM_SAMPLES
-
-__all__ = ["Controller", "ControllerOptions", "ControllerReport"]
 
 #: Columns of the controller's recording.
 COLUMNS = ("time_s", "reference", "output", "command", "measured_s")
@@ -114,38 +109,28 @@ class ControllerReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON; without the recording."""
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        plain = {**vars(self), "link": self.link.to_dict(), "period": vars(self.period)}
         del plain["recording"]
-        plain["link"] = self.link.to_dict()
-        plain["period"] = vars(self.period)
         return plain
 
 
-class Controller:
+class Controller(LoopEnd):
     """A running controller: ``async with Controller(options) as controller``."""
 
     def __init__(self, options: ControllerOptions) -> None:
         self.options = options
-        self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
-        self._endpoint = Endpoint(self._wire, self._take, options.plant)
-        self._journal: Journal | None = None
+        endpoint = Endpoint(wire_of(options.doubles), self._take, options.plant)
+        super().__init__(endpoint, "the controller")
         self._newest = 0
         self._sequence = 0
         self._last: tuple[LoopPacket, float] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self._started = math.nan
-        self._rows: deque[tuple[float, ...]] = deque(maxlen=KEPT)
         self._answered = self._drained = self._trips = 0
         self._largest = 0.0
 
     async def __aenter__(self) -> Controller:
-        self._loop = asyncio.get_running_loop()
-        await self._endpoint.open(self.options.listen)
-        with ExitStack() as stack:
-            stack.callback(self._endpoint.close)
-            if self.options.recording is not None:
-                self._journal = stack.enter_context(Journal(self.options.recording, COLUMNS))
-            self._stack = stack.pop_all()
+        await self._open(self.options.listen, self.options.recording, COLUMNS)
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -162,11 +147,6 @@ class Controller:
         Raises errors that stop the loop, for example `OSError` when the disk is full.
         """
         await self._endpoint.running(time)
-
-    @property
-    def address(self) -> Address:
-        """The address of the controller."""
-        return self._endpoint.address
 
     def _take(self, batch: list[tuple[LoopPacket, float]]) -> None:
         """Answer the newest measurement of a batch, or every one."""
@@ -247,11 +227,7 @@ class Controller:
 
     def report(self) -> ControllerReport:
         """The report until now."""
-        recording = None
         times = [row[0] for row in self._rows]
-        if len(self._rows) >= MINIMUM_SAMPLES:
-            time, reference, output, command, _ = zip(*self._rows, strict=True)
-            recording = Recording(time, reference, output, command, source="the controller")
         return ControllerReport(
             link=self._endpoint.statistics.report(),
             period=Percentiles.of([b - a for a, b in itertools.pairwise(times)]),
@@ -259,5 +235,5 @@ class Controller:
             drained=self._drained,
             trips=self._trips,
             largest_command=self._largest,
-            recording=recording,
+            recording=self._recording(),
         )

@@ -9,8 +9,6 @@ from typing import Protocol
 
 from deadtime._base.validation import non_negative, positive
 
-__all__ = ["Constant", "Delays", "LogNormal", "Normal", "ShiftedGamma"]
-
 
 class Delays(Protocol):
     """A distribution of one-way delays."""

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import asdict, fields
-from typing import Any
 
 from deadtime.links.udp.controller import ControllerOptions
 from deadtime.links.udp.delays import Constant, Delays, LogNormal, Normal, ShiftedGamma
@@ -13,16 +11,6 @@ from deadtime.links.udp.network import Bursts, Network
 from deadtime.links.udp.plant_options import PlantOptions
 from deadtime.links.udp.policies import DropLate, HoldThenZero, JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.relay import RelayOptions
-
-__all__ = [
-    "DELAYS",
-    "POLICIES",
-    "arguments_of",
-    "network_from",
-    "network_of",
-    "plain",
-    "policy_of",
-]
 
 #: Names of delays and policies in options.
 DELAYS = ("normal", "gamma", "lognormal")
@@ -114,17 +102,6 @@ def policy_of(name: str, number: float | None = None) -> Policy:
             raise ValueError(f"the policy 'hold' needs a whole number of samples, not {number:g}")
         return HoldThenZero(int(number))
     return (DropLate if name == "drop-late" else JitterBuffer)(number)
-
-
-def plain(value: Any) -> Any:
-    """The value with None in place of numbers that JSON cannot represent."""
-    if isinstance(value, dict):
-        return {key: plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def network_text(network: Network) -> str:

@@ -17,8 +17,6 @@ from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.statistics import LinkStatistics
 from deadtime.links.udp.wires import SAFE, Wire
 
-__all__ = ["Endpoint", "Socket", "open_socket", "resolved", "speaking_to"]
-
 #: Largest batch, so that a flood does not delay its processing.
 LARGEST_BATCH = 64
 

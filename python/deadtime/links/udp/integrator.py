@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 from deadtime._base.validation import finite, non_negative
 
-__all__ = ["HeldIntegrator"]
-
 
 @dataclass
 class HeldIntegrator:

@@ -15,8 +15,6 @@ from dataclasses import dataclass, field
 from deadtime._base.validation import finite, non_negative, positive, whole_number
 from deadtime.links.udp.delays import Constant, Delays
 
-__all__ = ["Bursts", "Network", "Path"]
-
 
 @dataclass(frozen=True)
 class Bursts:

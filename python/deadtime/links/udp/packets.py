@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Self
 
-from deadtime.links._wire import doubles_read, doubles_write, loop_packet_read, loop_packet_write
-
-__all__ = ["LoopPacket", "decode_doubles", "encode_doubles"]
+from deadtime._deadtime import doubles_read, doubles_write, loop_packet_read, loop_packet_write
 
 
 @dataclass(frozen=True)
@@ -73,16 +71,7 @@ class LoopPacket:
             If it has another length or header, or a number in it is not finite.
         """
         found = loop_packet_read(packet)
-        return cls(
-            sequence=found.sequence,
-            sent=found.sent,
-            echo_sequence=found.echo_sequence,
-            echo_sent=found.echo_sent,
-            held=found.held,
-            value=found.value,
-            reference=found.reference,
-            flags=found.flags,
-        )
+        return cls(**{field.name: getattr(found, field.name) for field in fields(cls)})
 
 
 def encode_doubles(values: Iterable[float]) -> bytes:

@@ -11,21 +11,15 @@ from __future__ import annotations
 import asyncio
 import math
 from collections import deque
-from contextlib import ExitStack
 
-from deadtime.links.addresses import Address
-from deadtime.links.journal import Journal
 from deadtime.links.udp.classifier import REMEMBERED
 from deadtime.links.udp.endpoint import Endpoint
 from deadtime.links.udp.integrator import HeldIntegrator
+from deadtime.links.udp.loop_end import LoopEnd
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.statistics import KEPT, Percentiles
-from deadtime.links.udp.wires import SAFE, Doubles, Stamped, Wire
-from deadtime.recordings import Recording
-from deadtime.recordings._recording import MINIMUM_SAMPLES
-
-__all__ = ["Plant", "run_plant"]
+from deadtime.links.udp.wires import SAFE, wire_of
 
 #: Columns of the plant's recording.
 COLUMNS = ("time_s", "reference", "output", "command", "age_s")
@@ -46,21 +40,18 @@ async def run_plant(options: PlantOptions) -> PlantReport:
         return plant.report()
 
 
-class Plant:
+class Plant(LoopEnd):
     """A running plant: ``async with Plant(options) as plant``."""
 
     def __init__(self, options: PlantOptions) -> None:
         self.options = options
-        self._wire: Wire = Stamped() if options.doubles is None else Doubles(*options.doubles)
+        self._wire = wire_of(options.doubles)
         # More than can be answered in time, to distinguish late answers from impossible ones.
-        self._endpoint = Endpoint(
-            self._wire,
-            self._take,
-            options.controller,
-            answers_only=True,
-            remembered=max(REMEMBERED, 2 * math.ceil(options.watchdog / options.sample_time)),
+        remembered = max(REMEMBERED, 2 * math.ceil(options.watchdog / options.sample_time))
+        endpoint = Endpoint(
+            self._wire, self._take, options.controller, answers_only=True, remembered=remembered
         )
-        self._journal: Journal | None = None
+        super().__init__(endpoint, "the plant")
         self._model = HeldIntegrator(options.gain, options.lag)
         self._command, self._stamp = options.safe, math.nan
         self._newest = 0
@@ -70,7 +61,6 @@ class Plant:
         self._hold: asyncio.TimerHandle | None = None
         self._tick: asyncio.Handle | None = None
         self._waiting: set[asyncio.TimerHandle] = set()
-        self._rows: deque[tuple[float, ...]] = deque(maxlen=KEPT)
         self._periods: deque[float] = deque(maxlen=KEPT)
         self._ages: deque[float] = deque(maxlen=KEPT)
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=KEPT)
@@ -81,13 +71,7 @@ class Plant:
         self._largest_command = self._largest_output = 0.0
 
     async def __aenter__(self) -> Plant:
-        self._loop = asyncio.get_running_loop()
-        await self._endpoint.open(self.options.listen)
-        with ExitStack() as stack:
-            stack.callback(self._endpoint.close)
-            if self.options.recording is not None:
-                self._journal = stack.enter_context(Journal(self.options.recording, COLUMNS))
-            self._stack = stack.pop_all()
+        await self._open(self.options.listen, self.options.recording, COLUMNS)
         self._started = self._clock = self._loop.time()
         self._due = 0
         self._tick = self._loop.call_soon(self._sample)
@@ -103,11 +87,6 @@ class Plant:
     async def running(self) -> None:
         """Run for the duration of the options; raises errors that stop the loop."""
         await self._endpoint.running(self.options.duration)
-
-    @property
-    def address(self) -> Address:
-        """The address of the plant."""
-        return self._endpoint.address
 
     def _pass_time(self, now: float) -> None:
         """Advance the plant and the mean age of the command to now."""
@@ -217,7 +196,8 @@ class Plant:
         now = self._loop.time()
         self._pass_time(now)
         self._newest = number
-        self._command = _clipped(packet.value, self.options.limit)
+        limit = self.options.limit
+        self._command = max(-limit, min(limit, packet.value))  # the value is finite
         self._largest_command = max(self._largest_command, abs(self._command))
         self._applied += 1
         if self._wire.has_times:
@@ -231,19 +211,19 @@ class Plant:
             self._hold.cancel()
         if self.options.policy.holds is not None:
             held = self.options.policy.holds * self.options.sample_time
-            self._hold = self._loop.call_later(held, self._let_go)
+            self._hold = self._loop.call_later(held, self._end_hold)
 
     def _arm_watchdog(self) -> None:
         if self._watchdog is not None:
             self._watchdog.cancel()
-        self._watchdog = self._loop.call_later(self.options.watchdog, self._bite)
+        self._watchdog = self._loop.call_later(self.options.watchdog, self._watchdog_trips)
 
-    def _let_go(self) -> None:
+    def _end_hold(self) -> None:
         """End the hold of the last command."""
         self._pass_time(self._loop.time())
         self._command, self._stamp = 0.0, math.nan
 
-    def _bite(self) -> None:
+    def _watchdog_trips(self) -> None:
         """Apply the safe command, and accept a restarted controller."""
         self._endpoint.forget_peer()
         self._make_safe()
@@ -265,10 +245,6 @@ class Plant:
         """The report until now."""
         self._pass_time(self._loop.time())
         since = self._clock if self._safe_since is None else self._safe_since
-        recording = None
-        if len(self._rows) >= MINIMUM_SAMPLES:
-            time, reference, output, command = zip(*self._rows, strict=True)
-            recording = Recording(time, reference, output, command, source="the plant")
         return PlantReport(
             link=self._endpoint.statistics.report(),
             period=Percentiles.of(self._periods),
@@ -282,10 +258,5 @@ class Plant:
             largest_command=self._largest_command,
             largest_output=self._largest_output,
             arrivals=tuple(self._arrivals),
-            recording=recording,
+            recording=self._recording(),
         )
-
-
-def _clipped(command: float, limit: float) -> float:
-    """A command within the limit; `command` is finite."""
-    return max(-limit, min(limit, command))

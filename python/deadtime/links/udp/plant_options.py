@@ -12,8 +12,6 @@ from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.statistics import LinkReport, Percentiles
 from deadtime.recordings import Recording
 
-__all__ = ["PlantOptions", "PlantReport"]
-
 
 @dataclass(frozen=True)
 class PlantOptions:
@@ -135,9 +133,7 @@ class PlantReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON; without the recording."""
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        del plain["recording"]
-        plain["link"] = self.link.to_dict()
-        plain["period"] = vars(self.period)
+        plain = {**vars(self), "link": self.link.to_dict(), "period": vars(self.period)}
         plain["age_when_applied"] = vars(self.age_when_applied)
+        del plain["recording"]
         return plain

@@ -8,47 +8,39 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 from deadtime._base.validation import positive, whole_number
 
-__all__ = ["DropLate", "HoldThenZero", "JitterBuffer", "NewestWins", "Policy"]
 
-
-class Policy(Protocol):
+class Policy:
     """Treatment of a command by the age of the measurement that it answers."""
 
-    @property
-    def needs_times(self) -> bool:
-        """Whether the policy requires packets with time stamps."""
+    #: Whether the policy requires packets with time stamps.
+    needs_times: ClassVar[bool] = False
 
     @property
     def holds(self) -> int | None:
         """Sample times for which the last command holds; None until the watchdog."""
+        return None
 
     @property
     def oldest(self) -> float:
         """Largest accepted age, s."""
+        return math.inf
 
     def wait(self, age: float) -> float | None:
         """Wait before the command is applied, s; None if it is too late."""
-
-
-@dataclass(frozen=True)
-class NewestWins:
-    """Apply a command on arrival, unless a newer one was applied."""
-
-    needs_times: ClassVar[bool] = False
-    holds: ClassVar[int | None] = None
-    oldest: ClassVar[float] = math.inf
-
-    def wait(self, age: float) -> float | None:
-        """No wait."""
         return 0.0
 
 
 @dataclass(frozen=True)
-class DropLate:
+class NewestWins(Policy):
+    """Apply a command on arrival, unless a newer one was applied."""
+
+
+@dataclass(frozen=True)
+class DropLate(Policy):
     """Do not apply commands that answer too old a measurement.
 
     Parameters
@@ -59,7 +51,6 @@ class DropLate:
 
     older_than: float
     needs_times: ClassVar[bool] = True
-    holds: ClassVar[int | None] = None
 
     def __post_init__(self) -> None:
         positive("older_than", self.older_than)
@@ -75,7 +66,7 @@ class DropLate:
 
 
 @dataclass(frozen=True)
-class HoldThenZero:
+class HoldThenZero(Policy):
     """Hold the last command for some sample times; then apply zero.
 
     Parameters
@@ -85,8 +76,6 @@ class HoldThenZero:
     """
 
     samples: int
-    needs_times: ClassVar[bool] = False
-    oldest: ClassVar[float] = math.inf
 
     def __post_init__(self) -> None:
         whole_number("samples", self.samples)
@@ -96,13 +85,9 @@ class HoldThenZero:
         """Sample times for which the last command holds."""
         return self.samples
 
-    def wait(self, age: float) -> float | None:
-        """No wait."""
-        return 0.0
-
 
 @dataclass(frozen=True)
-class JitterBuffer:
+class JitterBuffer(Policy):
     """Apply every command at the same age of its measurement, which makes the delay constant.
 
     Later commands are not applied. The constant delay is as long as that of the latest commands
@@ -116,7 +101,6 @@ class JitterBuffer:
 
     delay: float
     needs_times: ClassVar[bool] = True
-    holds: ClassVar[int | None] = None
 
     def __post_init__(self) -> None:
         positive("delay", self.delay)

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -14,10 +13,9 @@ from typing import Any
 
 from deadtime._base.errors import LinkError
 from deadtime.links.addresses import Address
+from deadtime.links.parent_watch import first_line
 from deadtime.links.udp.described import arguments_of
 from deadtime.links.udp.trial import ENDS, Trial
-
-__all__ = ["part", "run_processes"]
 
 #: Longest time until a process is ready, and until it has ended, s.
 TIMEOUT = 30.0
@@ -41,31 +39,24 @@ class Part:
 
     def address(self) -> Address:
         """Its address, once it is ready."""
-        assert self.process.stdout is not None
-        # A process that prints nothing is killed, which ends the read.
-        timer = threading.Timer(TIMEOUT, self.process.kill)
-        timer.start()
-        try:
-            line = self.process.stdout.readline()
-        finally:
-            timer.cancel()
+        line = first_line(self.process, TIMEOUT)
         if not line:
-            _, said = self.process.communicate()
-            raise LinkError(f"the {self.name} did not start: {_last_line(said)}")
+            _, errors = self.process.communicate()
+            raise LinkError(f"the {self.name} did not start: {_last_line(errors)}")
         ready = json.loads(line)
         return ready["host"], ready["port"]
 
     def report(self, within: float) -> dict[str, Any]:
         """Its report at its end, which has to be within so many seconds."""
         try:
-            out, said = self.process.communicate(timeout=within)
+            out, errors = self.process.communicate(timeout=within)
         except subprocess.TimeoutExpired:
             raise LinkError(f"the {self.name} did not end within {within:g} s") from None
         lines = out.splitlines()
         if self.process.returncode != 0 or not lines:
             raise LinkError(
                 f"the {self.name} ended before its time (exit code {self.process.returncode}): "
-                f"{_last_line(said)}"
+                f"{_last_line(errors)}"
             )
         found: dict[str, Any] = json.loads(lines[-1])["report"]
         return found
@@ -77,8 +68,8 @@ class Part:
         os.close(self._parent_watch)
 
 
-def _last_line(said: str) -> str:
-    return said.strip().splitlines()[-1] if said.strip() else "it printed no error"
+def _last_line(errors: str) -> str:
+    return errors.strip().splitlines()[-1] if errors.strip() else "it printed no error"
 
 
 @contextmanager

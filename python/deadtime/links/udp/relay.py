@@ -16,8 +16,6 @@ from deadtime.links.addresses import Address
 from deadtime.links.udp.endpoint import Socket, open_socket, resolved, speaking_to
 from deadtime.links.udp.network import Network, Path
 
-__all__ = ["Relay", "RelayOptions"]
-
 #: Most packets in transit; further ones are dropped (bounds memory).
 MOST_IN_TRANSIT = 10_000
 

@@ -23,15 +23,6 @@ import numpy as np
 from deadtime.links.udp.classifier import REMEMBERED
 from deadtime.links.udp.packets import LoopPacket
 
-__all__ = [
-    "KEPT",
-    "ClockOffset",
-    "LinkReport",
-    "LinkStatistics",
-    "Percentiles",
-    "histogram",
-]
-
 #: Number of newest packets whose times are kept (bounds memory in runs of days).
 KEPT = 100_000
 

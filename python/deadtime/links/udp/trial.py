@@ -15,8 +15,6 @@ from deadtime.links.udp.plant_options import PlantOptions, PlantReport
 from deadtime.links.udp.policies import JitterBuffer, NewestWins, Policy
 from deadtime.links.udp.relay import Relay, RelayOptions
 
-__all__ = ["Trial", "TrialReport", "run_trial"]
-
 UNUSED_ADDRESS = ("127.0.0.1", 0)
 
 
@@ -89,19 +87,9 @@ class Trial:
         self, controller: tuple[str, int], recording: Path | None = None
     ) -> PlantOptions:
         """Options of the plant, on a free port of this computer."""
-        return PlantOptions(
-            controller=controller,
-            gain=self.plant_gain,
-            lag=self.lag,
-            sample_time=self.sample_time,
-            duration=self.duration,
-            rest=self.rest,
-            limit=self.limit,
-            policy=self.policy,
-            watchdog=self.watchdog,
-            safe=self.safe,
-            recording=recording,
-        )
+        names = ("sample_time", "duration", "rest", "lag", "limit", "policy", "watchdog", "safe")
+        shared = {name: getattr(self, name) for name in names}
+        return PlantOptions(controller, gain=self.plant_gain, recording=recording, **shared)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,27 +8,13 @@ trip.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar, TypeAlias
 
 from deadtime._base.validation import whole_number
 from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_doubles
 
-__all__ = ["SAFE", "Doubles", "Stamped", "Wire"]
-
 #: Flag of a packet with the safe command of the controller, which is no answer.
 SAFE = 1
-
-
-class Wire(Protocol):
-    """A wire format of loop packets."""
-
-    has_times: ClassVar[bool]
-
-    def encode(self, packet: LoopPacket) -> bytes:
-        """Bytes of a packet."""
-
-    def decode(self, data: bytes) -> LoopPacket:
-        """The packet in these bytes; raises PacketError if there is none."""
 
 
 @dataclass
@@ -83,3 +69,12 @@ class Doubles:
         self._count += 1
         reference = values[1] if len(values) > 1 else 0.0
         return LoopPacket(self._count, sent=0.0, value=values[0], reference=reference)
+
+
+#: A wire format of loop packets.
+Wire: TypeAlias = Stamped | Doubles
+
+
+def wire_of(doubles: tuple[int, int] | None) -> Wire:
+    """The wire format with these numbers of plain doubles from and to the other end, if any."""
+    return Stamped() if doubles is None else Doubles(*doubles)

@@ -16,7 +16,6 @@ from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Range, S
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Certificate"]
 
 _T = TypeVar("_T")
 

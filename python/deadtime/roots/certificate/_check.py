@@ -36,8 +36,6 @@ from deadtime.roots.certificate._function import (
 )
 from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Segment
 
-__all__ = ["check"]
-
 
 def check(certificate: Proof) -> int:
     """Verify all claims of a certificate and return its count.

@@ -13,8 +13,6 @@ from __future__ import annotations
 from functools import lru_cache
 from math import isqrt
 
-__all__ = ["angle", "cos_sin", "dyadic", "exponential", "pi"]
-
 _GUARD = 16
 
 # Upper limits, as powers of two, on exponents and angles: no certificate has larger ones, because

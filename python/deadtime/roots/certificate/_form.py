@@ -12,8 +12,6 @@ from typing import Any, Final
 
 from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Segment
 
-__all__ = ["check_form"]
-
 # Upper limit on the scale: coefficients are doubles, between 2^-1074 and 2^1024, so that no larger
 # power of two is needed.
 _LARGEST_SCALE: Final = 1 << 12

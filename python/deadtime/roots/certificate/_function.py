@@ -17,8 +17,6 @@ from typing import NoReturn, TypeAlias
 from deadtime._base.errors import CertificateError
 from deadtime.roots.certificate._enclosures import cos_sin, dyadic, exponential, shifted
 
-__all__ = ["Enclosure", "ExactFunction", "above", "affordable", "exponential_above", "fail", "pair"]
-
 # Binary digits of a value, in relation to its size: more take longer, fewer refuse true claims
 # close to a root. Doubles have 53.
 _DIGITS = 120

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-__all__ = ["Contour", "Monotone", "Proof", "Segment"]
-
 Range: TypeAlias = tuple[float, float]
 
 

@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-__all__ = ["plot_certificate"]
-
-
 def plot_certificate(ax: Axes, proof: Certificate) -> None:
     """Draw the segments of a certificate, coloured by the argument of the function.
 

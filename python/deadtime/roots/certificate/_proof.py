@@ -8,8 +8,6 @@ from deadtime import _deadtime
 from deadtime.roots.certificate._certificate import Certificate
 from deadtime.roots.certificate._parts import Contour, Monotone, Segment
 
-__all__ = ["proved"]
-
 _T = TypeVar("_T")
 
 

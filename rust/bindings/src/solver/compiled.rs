@@ -7,7 +7,7 @@ use deadtime::dde::spectral::{Columns, Equation};
 use deadtime::{Error, Task};
 use pyo3::prelude::*;
 
-use super::callback::Failing;
+use super::functions::Failing;
 
 /// t, y, z (delay, component), dz likewise, dy, user data.
 type Function =

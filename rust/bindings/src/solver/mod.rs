@@ -4,12 +4,9 @@
 //! nearly all the time, and Python code hands the interpreter to other threads by itself. A
 //! compiled one releases it.
 
-mod callback;
 mod compiled;
-mod numbers;
-mod past;
+mod functions;
 mod pieces;
-mod python;
 
 use deadtime::dde::breaks::BreakingPoint;
 use deadtime::dde::spectral::{Equation, Event, Jump, Outcome, Problem, Solution, Sparsity, solve};
@@ -20,11 +17,10 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use callback::{Callbacks, Failing, WithCallbacks};
 use compiled::CompiledEquation;
+use functions::{Callbacks, Failing, PythonEquation, WithCallbacks};
 pub(crate) use pieces::DelayPieces;
-use pieces::array;
-use python::PythonEquation;
+use pieces::{array, read_history};
 
 use crate::arrays::{column, converted};
 use crate::runtime::{run_attached, run_here};
@@ -99,7 +95,7 @@ pub(crate) fn solve_dde(py: Python<'_>, problem: DelayProblem<'_>) -> PyResult<D
     let slope = problem.history_derivative.as_ref();
     let slope = slope.filter(|_| problem.neutral);
     let breaks = problem.history_breaks.as_array().to_vec();
-    past::read(&mut checked, &problem.history, slope, &breaks)?;
+    read_history(&mut checked, &problem.history, slope, &breaks)?;
     let events = problem.events.into_iter().map(|event| event.function);
     let changes = problem.jumps.into_iter().map(|jump| jump.change);
     let callbacks = Callbacks::new(events.collect(), changes.collect(), &problem.args);

@@ -33,14 +33,14 @@ pub(crate) fn slack<S: Scalar>(t: S, delay: S) -> f64 {
 /// [`Error::Argument`] with the first one that is not.
 pub(crate) fn finite<S: Scalar>(name: &str, values: &[S]) -> Result<(), Error> {
     match values.iter().find(|value| !value.is_finite()) {
-        Some(value) => Err(Error::argument(format!(
+        Some(value) => refuse!(
             "{name} holds {}: give finite numbers",
             if value.value().is_finite() {
                 value.slope()
             } else {
                 value.value()
             }
-        ))),
+        ),
         None => Ok(()),
     }
 }

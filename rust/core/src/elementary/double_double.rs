@@ -35,10 +35,7 @@ fn two_sum(a: f64, b: f64) -> DoubleDouble {
 #[inline(always)]
 fn ordered_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
-    DoubleDouble {
-        high,
-        low: b - (high - a),
-    }
+    DoubleDouble::new(high, b - (high - a))
 }
 
 /// a b without error, up to 2⁹⁹⁵.
@@ -56,8 +53,6 @@ fn two_product(a: f64, b: f64) -> DoubleDouble {
 }
 
 impl DoubleDouble {
-    /// Zero.
-    pub const ZERO: Self = Self::new(0.0, 0.0);
     /// One.
     pub const ONE: Self = Self::new(1.0, 0.0);
 

@@ -93,10 +93,7 @@ fn sin_cos_one_by_one(y: &[f64], sines: &mut [f64], cosines: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::Columns;
-    use crate::simd::Instructions;
-    use crate::simd::Kernel;
-    use crate::simd::sweep_on;
+    use crate::simd::{Columns, Instructions, Kernel, sweep_on};
 
     struct Both;
 

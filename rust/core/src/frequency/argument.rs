@@ -50,11 +50,10 @@ pub fn argument(h: &QuasiPolynomial, omega: &[f64], task: &Task) -> Result<Vec<f
     let Some(highest) = order.last().map(|last| omega[*last]) else {
         return Ok(Vec::new());
     };
-    if !(highest * centre).is_finite() {
-        return Err(Error::argument(format!(
-            "omega={highest:e}: the phase, {centre} s times that, is beyond 1e308"
-        )));
-    }
+    refuse_if!(
+        !(highest * centre).is_finite(),
+        "omega={highest:e}: the phase, {centre} s times that, is beyond 1e308"
+    );
     let (far, c) = beyond_lower_powers(&h);
     let only_leading = QuasiPolynomial::new(
         h.coefficients().iter().map(|row| vec![lead(row)]).collect(),
@@ -131,17 +130,15 @@ impl<'a> Way<'a> {
 
     /// Go on to `end`.
     fn follow(&mut self, end: f64, task: &Task) -> Result<f64, Error> {
-        if !(moduli(self.rows.h)
-            .iter()
-            .rev()
-            .fold(0.0, |sum, c| sum * end + c))
-        .is_finite()
-        {
-            return Err(Error::argument(format!(
-                "omega={end:e}: its powers leave the range of doubles, and no term outweighs the \
-                 others up to there; ask for lower frequencies or choose another unit of time"
-            )));
-        }
+        refuse_if!(
+            !(moduli(self.rows.h)
+                .iter()
+                .rev()
+                .fold(0.0, |sum, c| sum * end + c))
+            .is_finite(),
+            "omega={end:e}: its powers leave the range of doubles, and no term outweighs the \
+             others up to there; ask for lower frequencies or choose another unit of time"
+        );
         let mut open = vec![(self.at, end)];
         while let Some((a, b)) = open.pop() {
             if b <= a {
@@ -151,12 +148,11 @@ impl<'a> Way<'a> {
             if self.intervals.is_multiple_of(256) {
                 task.check()?;
             }
-            if self.intervals > MOST {
-                return Err(Error::argument(format!(
-                    "the phase takes more than {MOST} intervals up to {end:e} rad/s, since no term \
-                     outweighs the others near {a:e}: ask for lower frequencies"
-                )));
-            }
+            refuse_if!(
+                self.intervals > MOST,
+                "the phase takes more than {MOST} intervals up to {end:e} rad/s, since no term \
+                 outweighs the others near {a:e}: ask for lower frequencies"
+            );
             match self.turned(a, b) {
                 Some(turned) => self.argument += turned,
                 None => {

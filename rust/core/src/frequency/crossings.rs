@@ -72,14 +72,13 @@ fn crossings_of_gain(
         .zip(ends)
         .filter(|(start, end)| start < end)
         .collect();
-    if listed.is_empty() {
-        return Err(Error::argument(format!(
-            "for every {} from {low} to {high} the leading coefficient does not outweigh the later \
-             ones of the highest power of s: chains of infinitely many roots may reach the imaginary \
-             axis",
-            equation.name
-        )));
-    }
+    refuse_if!(
+        listed.is_empty(),
+        "for every {} from {low} to {high} the leading coefficient does not outweigh the later \
+         ones of the highest power of s: chains of infinitely many roots may reach the imaginary \
+         axis",
+        equation.name
+    );
     let mut crossings = Vec::new();
     for part in listed {
         let found = crossings_along(equation.family, &[0.0], 0, part, task)?;

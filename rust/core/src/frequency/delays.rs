@@ -40,13 +40,12 @@ pub(super) fn crossings_of_delay(
     task: &Task,
 ) -> Result<Vec<Crossing>, Error> {
     let (lead, rest) = equation.leading(low, high)?;
-    if lead <= rest {
-        return Err(Error::argument(format!(
-            "the equation is neutral and its leading coefficient does not outweigh the later ones: \
-             chains of infinitely many roots may reach the imaginary axis for some {}",
-            equation.name
-        )));
-    }
+    refuse_if!(
+        lead <= rest,
+        "the equation is neutral and its leading coefficient does not outweigh the later ones: \
+         chains of infinitely many roots may reach the imaginary axis for some {}",
+        equation.name
+    );
     let passages = passages(equation, task)?;
     let turns = |passage: &Passage| {
         let from = ((low - passage.first) / passage.period).ceil();
@@ -59,12 +58,11 @@ pub(super) fn crossings_of_delay(
         .iter()
         .map(|passage| turns(passage).1.max(0.0))
         .sum();
-    if many > MOST {
-        return Err(Error::argument(format!(
-            "more than {MOST} crossings: choose a smaller range of {}",
-            equation.name
-        )));
-    }
+    refuse_if!(
+        many > MOST,
+        "more than {MOST} crossings: choose a smaller range of {}",
+        equation.name
+    );
     let mut found = Vec::with_capacity(many as usize);
     for passage in &passages {
         let (from, many) = turns(passage);
@@ -90,16 +88,14 @@ pub fn delay_margin(family: &Family, start: f64, task: &Task) -> Result<f64, Err
     let equation = Equation::new(family)?;
     equation.is_delay()?;
     let name = equation.name;
-    if equation.slopes().first().is_some_and(|slope| *slope < 0.0) {
-        return Err(Error::argument(format!(
-            "a delay falls as {name} grows: the equation has no delay margin"
-        )));
-    }
-    if !equation.is_stable_at(start, task)? {
-        return Err(Error::argument(format!(
-            "not stable at {name}={start}: it has no delay margin"
-        )));
-    }
+    refuse_if!(
+        equation.slopes().first().is_some_and(|slope| *slope < 0.0),
+        "a delay falls as {name} grows: the equation has no delay margin"
+    );
+    refuse_if!(
+        !equation.is_stable_at(start, task)?,
+        "not stable at {name}={start}: it has no delay margin"
+    );
     let (_, high) = stable_range_of(&equation, (start, start), task)?;
     Ok(high - start)
 }
@@ -144,22 +140,20 @@ fn passages(equation: &Equation<'_>, task: &Task) -> Result<Vec<Passage>, Error>
         return Ok(Vec::new());
     };
     let at_zero = parts.iter().flat_map(|part| part.coefficients().iter());
-    if at_zero.filter_map(|row| row.first()).sum::<f64>() == 0.0 {
-        return Err(Error::argument(format!(
-            "a root stays at s = 0 whatever {name} is: divide the equation by s"
-        )));
-    }
+    refuse_if!(
+        at_zero.filter_map(|row| row.first()).sum::<f64>() == 0.0,
+        "a root stays at s = 0 whatever {name} is: divide the equation by s"
+    );
     let [a, b] = &parts[..] else {
         let multiples: Vec<f64> = slopes.iter().map(|slope| slope - early).collect();
         return crossings_of_multiples(&parts, &multiples, name, task);
     };
     let (frequencies, searched) = gain_crossovers(b, a, task)?;
-    if searched < f64::INFINITY {
-        return Err(Error::argument(format!(
-            "neither the terms with {name} nor those without outweigh the others at high \
-             frequencies: there is no end to the frequencies at which roots may cross"
-        )));
-    }
+    refuse_if!(
+        searched < f64::INFINITY,
+        "neither the terms with {name} nor those without outweigh the others at high \
+         frequencies: there is no end to the frequencies at which roots may cross"
+    );
     let mut difference = DifferenceOfSquares::new(a, b);
     let sizes = moduli(a);
     let mut found = Vec::with_capacity(frequencies.len());
@@ -169,10 +163,10 @@ fn passages(equation: &Equation<'_>, task: &Task) -> Result<Vec<Passage>, Error>
         if direction == 0 && size <= COMMON * polynomial(&sizes, omega) {
             // Six digits are what is known of a multiple zero.
             let omega = format!("{omega:.5e}").parse().unwrap_or(omega);
-            return Err(Error::argument(format!(
+            refuse!(
                 "a root stays at omega = {omega} rad/s whatever {name} is: divide the equation \
                  by what all its terms share"
-            )));
+            );
         }
         let quotient = over(b, a, omega);
         let turn = angle(-quotient.im, -quotient.re);

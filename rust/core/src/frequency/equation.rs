@@ -18,11 +18,11 @@ impl<'a> Equation<'a> {
     pub(super) fn new(family: &'a Family) -> Result<Self, Error> {
         match family.names() {
             [name] => Ok(Self { family, name }),
-            names => Err(Error::argument(format!(
+            names => refuse!(
                 "{} parameters have no value ({}): one number varies at a time",
                 names.len(),
                 names.join(", ")
-            ))),
+            ),
         }
     }
 
@@ -56,13 +56,12 @@ impl<'a> Equation<'a> {
     /// [`Error::Argument`] where it is both.
     pub(super) fn is_delay(&self) -> Result<bool, Error> {
         let is_delay = self.slopes().iter().any(|slope| *slope != 0.0);
-        if is_delay && self.highest_power() > 0 {
-            return Err(Error::argument(format!(
-                "{} is both a factor and a delay: crossings are those of a gain, or of a delay; a \
-                 map over it and a second parameter shows its counts",
-                self.name
-            )));
-        }
+        refuse_if!(
+            is_delay && self.highest_power() > 0,
+            "{} is both a factor and a delay: crossings are those of a gain, or of a delay; a \
+             map over it and a second parameter shows its counts",
+            self.name
+        );
         Ok(is_delay)
     }
 
@@ -132,13 +131,12 @@ impl<'a> Equation<'a> {
             }
         }
         let lead = f64::abs(lead);
-        if !is_one || lead == 0.0 {
-            return Err(Error::argument(format!(
-                "for some {} from {low} on the highest power of s is not without further delay: \
-                 such an equation is not causal and has infinitely many unstable roots",
-                self.name
-            )));
-        }
+        refuse_if!(
+            !is_one || lead == 0.0,
+            "for some {} from {low} on the highest power of s is not without further delay: \
+             such an equation is not causal and has infinitely many unstable roots",
+            self.name
+        );
         Ok((lead * (1.0 - super::chains::ROOM), all - lead))
     }
 

@@ -152,29 +152,26 @@ fn least(values: &[f64], places: &[f64], size: impl Fn(f64) -> Option<f64>) -> (
 }
 
 fn refuse_what_has_none(n: &QuasiPolynomial, d: &QuasiPolynomial) -> Result<(), Error> {
-    if d.is_zero() {
-        return Err(Error::argument(
-            "the loop gain is infinite everywhere: its denominator is zero",
-        ));
-    }
-    if n.degree() > d.degree() {
-        return Err(Error::argument(format!(
-            "the loop gain grows with frequency (degree {} over {}): any delay, however small, \
-             makes such a loop unstable, so it has no margins; add the roll-off that the real loop \
-             has, for example a DerivativeFilter",
-            n.degree(),
-            d.degree()
-        )));
-    }
+    refuse_if!(
+        d.is_zero(),
+        "the loop gain is infinite everywhere: its denominator is zero"
+    );
+    refuse_if!(
+        n.degree() > d.degree(),
+        "the loop gain grows with frequency (degree {} over {}): any delay, however small, \
+         makes such a loop unstable, so it has no margins; add the roll-off that the real loop \
+         has, for example a DerivativeFilter",
+        n.degree(),
+        d.degree()
+    );
     let (own, other) = (first_delay(d), first_delay(n));
-    if d.kind() == Kind::Advanced || other < own {
-        return Err(Error::argument(format!(
-            "the loop gain answers its input before it comes (the smallest delay of the \
-             denominator is {own} s, that of the numerator {other} s, and the denominator is {}): \
-             such a loop is not causal and has no margins",
-            d.kind().name()
-        )));
-    }
+    refuse_if!(
+        d.kind() == Kind::Advanced || other < own,
+        "the loop gain answers its input before it comes (the smallest delay of the \
+         denominator is {own} s, that of the numerator {other} s, and the denominator is {}): \
+         such a loop is not causal and has no margins",
+        d.kind().name()
+    );
     Ok(())
 }
 

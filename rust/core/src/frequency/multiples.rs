@@ -25,6 +25,25 @@ use crate::{Error, Task};
 /// Largest multiple: the determinant has the order of it.
 const MOST: usize = 5;
 
+/// Relative difference of frequencies, and difference of angles in rad, below which two crossings
+/// are one: larger ones merge neighbours, smaller ones list a crossing twice.
+const SAME_OMEGA: f64 = 1e-9;
+const SAME_TURN: f64 = 1e-7;
+
+/// Sine of the angle between the derivatives by frequency and by angle below which they are taken
+/// for parallel: larger values give up Newton's iteration where it would still converge.
+const PARALLEL: f64 = 1e-14;
+
+/// Relative length of the last step of Newton's iteration; below it steps are rounding errors.
+const SETTLED: f64 = 1e-15;
+
+/// Share of the sum of the moduli below which a value is a rounding error: larger values accept
+/// what is no root.
+const ROUNDING: f64 = 1e-12;
+
+/// Sine of the angle at which a root crosses below which it counts as touching the axis.
+const TANGENT: f64 = 1e-8;
+
 /// How exactly the multiples are whole ones of one.
 const WHOLE: f64 = 1e-9;
 
@@ -82,8 +101,8 @@ pub(super) fn crossings_of_multiples(
             };
             let same = |known: &(f64, f64)| {
                 let apart = (known.1 - place.1).rem_euclid(std::f64::consts::TAU);
-                (known.0 - place.0).abs() <= 1e-9 * known.0
-                    && apart.min(std::f64::consts::TAU - apart) <= 1e-7
+                (known.0 - place.0).abs() <= SAME_OMEGA * known.0
+                    && apart.min(std::f64::consts::TAU - apart) <= SAME_TURN
             };
             if !found.iter().any(same) {
                 found.push(place);
@@ -120,12 +139,12 @@ fn common(slopes: &[f64], name: &str) -> Result<(f64, Vec<usize>), Error> {
         .skip(1)
         .map(|slope| format!("{slope} {name}"))
         .collect();
-    Err(Error::argument(format!(
+    refuse!(
         "{name} enters as several delays ({}): its crossings are known where these are whole \
          multiples of one, up to {MOST} of it; a map over {name} and a second parameter shows its \
          counts",
         shown.join(", ")
-    )))
+    )
 }
 
 fn schur_cohn(p: &[TwoSided]) -> Vec<Vec<TwoSided>> {
@@ -185,10 +204,10 @@ fn highest(parts: &[QuasiPolynomial], name: &str) -> Result<f64, Error> {
     if radius.is_finite() {
         return Ok(radius);
     }
-    Err(Error::argument(format!(
+    refuse!(
         "the terms with {name} outweigh the leading one at high frequencies: there is no end to the \
          frequencies at which roots may cross"
-    )))
+    )
 }
 
 fn roots_near_circle(parts: &[Part], omega: f64, order: usize) -> Vec<Complex64> {
@@ -237,7 +256,7 @@ fn refined(parts: &[Part], omega: f64, z: Complex64) -> Option<(f64, f64)> {
         let here = at(parts, place, turn);
         let (a, b) = (Complex64::I * here.slope, Complex64::I * here.by_turn);
         let area = a.re * b.im - a.im * b.re;
-        if area.abs() <= 1e-14 * a.norm() * b.norm() {
+        if area.abs() <= PARALLEL * a.norm() * b.norm() {
             // Roots only touch the axis here: the two numbers are known to what that leaves.
             return ((z.norm() - 1.0).abs() <= TOUCHING).then_some((place, turn));
         }
@@ -248,18 +267,18 @@ fn refined(parts: &[Part], omega: f64, z: Complex64) -> Option<(f64, f64)> {
         if (place - omega).abs() > MOVE * omega {
             return None;
         }
-        if by_omega.abs() <= 1e-15 * place && by_angle.abs() <= 1e-15 {
+        if by_omega.abs() <= SETTLED * place && by_angle.abs() <= SETTLED {
             break;
         }
     }
     let here = at(parts, place, turn);
-    (here.value.norm() <= 1e-12 * here.size).then_some((place, turn))
+    (here.value.norm() <= ROUNDING * here.size).then_some((place, turn))
 }
 
 fn direction(here: &At, omega: f64) -> i32 {
     let below = Complex64::new(0.0, omega) * here.by_turn;
     let across = (here.slope * below.conj()).re;
-    if across.abs() <= 1e-8 * here.slope.norm() * below.norm() {
+    if across.abs() <= TANGENT * here.slope.norm() * below.norm() {
         0
     } else if across > 0.0 {
         2

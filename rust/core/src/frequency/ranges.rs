@@ -106,12 +106,11 @@ pub fn corner_range(
     if c.is_zero() {
         return Ok((0.0, f64::INFINITY));
     }
-    if highest == f64::INFINITY {
-        return Err(Error::argument(
-            "the loop gain does not stay below one at high frequencies for every corner of the \
-             filter: the range of its corner is known where it does",
-        ));
-    }
+    refuse_if!(
+        highest == f64::INFINITY,
+        "the loop gain does not stay below one at high frequencies for every corner of the \
+         filter: the range of its corner is known where it does"
+    );
     // Im X Im Y = Re(X conj Y − X Y)/2.
     let both = |x: &TwoSided, y: &TwoSided| x.times(&y.mirrored()).plus(-1.0, &x.times(y));
     let (ac, ab, bc) = (product(&a, &c), product(&a, &b), product(&b, &c));
@@ -209,9 +208,9 @@ impl<'a> Search<'a> {
             }
             width *= GROWTH;
         }
-        Err(Error::argument(format!(
+        refuse!(
             "the loop is stable from {name}={value} to {reach}, and nothing beyond is ruled out"
-        )))
+        )
     }
 
     /// All crossings there are from the value on, where one search finds them.

@@ -11,14 +11,9 @@ use super::two_sided::TwoSided;
 use super::waves::Waves;
 use super::zeros::{ORDER, RealFunction, zeros_between};
 use super::*;
-use crate::quasipoly::QuasiPolynomial;
+use crate::quasipoly::{QuasiPolynomial, make};
 use crate::stability::{Affine, Family, Term};
 use crate::{Error, Task};
-
-fn make(rows: &[&[f64]], delays: &[f64]) -> QuasiPolynomial {
-    let rows = rows.iter().map(|row| row.to_vec()).collect();
-    QuasiPolynomial::new(rows, delays.to_vec()).unwrap()
-}
 
 /// Coefficient, power of the parameter, power of s, constant delay, slope of the delay.
 fn family(terms: &[(f64, u32, u32, f64, f64)]) -> Family {

@@ -6,7 +6,7 @@
 //! with u = 2⁻⁵³ a coefficient is within `roundings` · u · size of its value. Delays that agree to
 //! SAME_DELAY of the longest sum of delays are one sum in another order, and are merged.
 
-use crate::quasipoly::QuasiPolynomial;
+use crate::quasipoly::{QuasiPolynomial, convolve};
 
 /// Delays closer than this, relative to the longest one, are the same.
 pub(super) const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
@@ -128,8 +128,8 @@ impl TwoSided {
             for b in &other.rows {
                 rows.push(Row {
                     delay: a.delay + b.delay,
-                    values: convolved(&a.values, &b.values),
-                    sizes: convolved(&a.sizes, &b.sizes),
+                    values: convolve(&a.values, &b.values),
+                    sizes: convolve(&a.sizes, &b.sizes),
                 });
             }
         }
@@ -141,14 +141,4 @@ impl TwoSided {
             self.roundings + other.roundings + summands,
         )
     }
-}
-
-fn convolved(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
-    for (shift, x) in a.iter().enumerate() {
-        for (total, y) in product.iter_mut().skip(shift).zip(b) {
-            *total += x * y;
-        }
-    }
-    product
 }

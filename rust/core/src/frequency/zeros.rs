@@ -78,23 +78,21 @@ pub(super) fn zeros_between(
         if looked_at % 256 == 0 {
             task.check()?;
         }
-        if looked_at > MOST {
-            return Err(Error::argument(format!(
-                "between {low:e} and {high:e} rad/s there are too many crossings to list (the gain \
-                 is one, or the phase a multiple of 180 degrees, on a whole range of frequencies, or \
-                 the delay is very long for such frequencies)"
-            )));
-        }
+        refuse_if!(
+            looked_at > MOST,
+            "between {low:e} and {high:e} rad/s there are too many crossings to list (the gain \
+             is one, or the phase a multiple of 180 degrees, on a whole range of frequencies, or \
+             the delay is very long for such frequencies)"
+        );
         let (m, r) = (0.5 * (a + b), 0.5 * (b - a));
         let here = f.taylor(m);
         let (change, slope_change) = here.change(r, f.bound(b));
         let (value, error) = (here.values[0].abs(), here.errors[0]);
-        if !change.is_finite() || !error.is_finite() {
-            return Err(Error::argument(format!(
-                "at {b:e} rad/s powers of the frequency leave the range of doubles: choose another \
-                 unit of time"
-            )));
-        }
+        refuse_if!(
+            !change.is_finite() || !error.is_finite(),
+            "at {b:e} rad/s powers of the frequency leave the range of doubles: choose another \
+             unit of time"
+        );
         if value > change + error {
             continue;
         }

@@ -20,16 +20,30 @@ fn marked<S: Simd>(mask: Mask<S>, like: Real<S>) -> Real<S> {
     mask.select(1.0, like.constant(0.0))
 }
 
-struct LambertW;
-
-impl Kernel<3, 3> for LambertW {
-    #[inline(always)]
-    fn lanes<S: Simd>(&self, [re, im, k]: [Real<S>; 3]) -> [Real<S>; 3] {
-        let z = Complex::new(re, im);
-        let w = kernel::lambertw(Point::new(z), k).w;
-        [w.re, w.im, marked(kernel::out_of_reach(z, k), re)]
-    }
+#[inline(always)]
+fn value<S: Simd>(z: Complex<S>, k: Real<S>) -> Complex<S> {
+    kernel::lambertw(Point::new(z), k).w
 }
+
+/// A kernel of a complex argument and a branch, with a mark where it does not handle them. Its
+/// functions are inlined by force: in a closure they would not get the instructions of the machine.
+macro_rules! by_branch {
+    ($name:ident, $value:path, $out_of_reach:path) => {
+        struct $name;
+
+        impl Kernel<3, 3> for $name {
+            #[inline(always)]
+            fn lanes<S: Simd>(&self, [re, im, k]: [Real<S>; 3]) -> [Real<S>; 3] {
+                let z = Complex::new(re, im);
+                let w = $value(z, k);
+                [w.re, w.im, marked($out_of_reach(z, k), re)]
+            }
+        }
+    };
+}
+by_branch!(LambertW, value, kernel::out_of_reach);
+by_branch!(LambertWLog, log_form::lambertw, log_form::out_of_reach);
+by_branch!(Derivative, kernel::derivative, kernel::out_of_reach);
 
 /// `w[i] = W_k[i](z[i])`.
 ///
@@ -112,17 +126,6 @@ pub fn lambertwm1(x: &[f64], w: &mut [f64]) {
     real_to_real(&LambertWm1, x, w);
 }
 
-struct LambertWLog;
-
-impl Kernel<3, 3> for LambertWLog {
-    #[inline(always)]
-    fn lanes<S: Simd>(&self, [re, im, k]: [Real<S>; 3]) -> [Real<S>; 3] {
-        let log = Complex::new(re, im);
-        let w = log_form::lambertw(log, k);
-        [w.re, w.im, marked(log_form::out_of_reach(log, k), re)]
-    }
-}
-
 /// `w[i] = W_k[i](e^log_z[i])`: the solution of w + log w = log z + 2 pi i k, also where
 /// |Im log z| exceeds pi.
 pub fn lambertw_log(log_z: &[Complex64], k: &[i64], w: &mut [Complex64]) {
@@ -132,19 +135,8 @@ pub fn lambertw_log(log_z: &[Complex64], k: &[i64], w: &mut [Complex64]) {
 /// `w[i]`, the Wright omega function of `z[i]`: the solution of w + log w = z.
 pub fn wright_omega(z: &[Complex64], w: &mut [Complex64]) {
     let load = |i| z.get(i).map(|z: &Complex64| [z.re, z.im, 0.0]);
-    run(
-        &LambertWLog,
-        z.len().min(w.len()),
-        load,
-        |i, [re, im, beyond]: [f64; 3]| {
-            *w.get_mut(i)? = if beyond == 0.0 {
-                Complex64::new(re, im)
-            } else {
-                log_form::far(*z.get(i)?, 0)
-            };
-            Some(())
-        },
-    );
+    let far = |i| Some(log_form::far(*z.get(i)?, 0));
+    complex_values(&LambertWLog, w, z.len(), load, far);
 }
 
 /// `w[i]`, the Wright omega function of a real number.
@@ -163,17 +155,6 @@ pub fn real_wright_omega(x: &[f64], w: &mut [f64]) {
             Some(())
         },
     );
-}
-
-struct Derivative;
-
-impl Kernel<3, 3> for Derivative {
-    #[inline(always)]
-    fn lanes<S: Simd>(&self, [re, im, k]: [Real<S>; 3]) -> [Real<S>; 3] {
-        let z = Complex::new(re, im);
-        let slope = kernel::derivative(z, k);
-        [slope.re, slope.im, marked(kernel::out_of_reach(z, k), re)]
-    }
 }
 
 /// `slope[i]`, the derivative of `W_k[i]` at `z[i]`.
@@ -266,20 +247,12 @@ pub fn dde_root(a0: &[f64], a1: &[f64], delay: &[f64], k: &[i64], s: &mut [Compl
         let k: &i64 = k.get(i)?;
         Some([*a0.get(i)?, *a1.get(i)?, *delay.get(i)?, *k as f64])
     };
-    let length = a0
-        .len()
-        .min(a1.len())
-        .min(delay.len())
-        .min(k.len())
-        .min(s.len());
-    run(&DdeRoot, length, load, |i, [re, im, beyond]: [f64; 3]| {
-        *s.get_mut(i)? = if beyond == 0.0 {
-            Complex64::new(re, im)
-        } else {
-            delay::far_root(*a0.get(i)?, *a1.get(i)?, *delay.get(i)?, *k.get(i)?)
-        };
-        Some(())
-    });
+    let far = |i| {
+        let (a0, a1, delay, k) = (a0.get(i)?, a1.get(i)?, delay.get(i)?, k.get(i)?);
+        Some(delay::far_root(*a0, *a1, *delay, *k))
+    };
+    let length = a0.len().min(a1.len()).min(delay.len()).min(k.len());
+    complex_values(&DdeRoot, s, length, load, far);
 }
 
 /// `out[i] = kernel(z[i], k[i])`, or `far` where the kernel marks that it does not handle the
@@ -295,12 +268,25 @@ fn by_branch<K: Kernel<3, 3>>(
         let (z, k): (&Complex64, &i64) = (z.get(i)?, k.get(i)?);
         Some([z.re, z.im, *k as f64])
     };
-    let length = z.len().min(k.len()).min(out.len());
+    let far = |i| Some(far(*z.get(i)?, *k.get(i)?));
+    complex_values(kernel, out, z.len().min(k.len()), load, far);
+}
+
+/// `out[i] = kernel(load(i))` for all i below `length`, or `far(i)` where the kernel marks that it
+/// does not handle the argument.
+fn complex_values<K: Kernel<IN, 3>, const IN: usize>(
+    kernel: &K,
+    out: &mut [Complex64],
+    length: usize,
+    load: impl Fn(usize) -> Option<[f64; IN]>,
+    far: impl Fn(usize) -> Option<Complex64>,
+) {
+    let length = length.min(out.len());
     run(kernel, length, load, |i, [re, im, beyond]: [f64; 3]| {
         *out.get_mut(i)? = if beyond == 0.0 {
             Complex64::new(re, im)
         } else {
-            far(*z.get(i)?, *k.get(i)?)
+            far(i)?
         };
         Some(())
     });

@@ -191,65 +191,56 @@ pub(super) fn rough_angle<S: Simd>(z: Complex<S>) -> Real<S> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use pulp::{Scalar128b, cast};
+    use pulp::Scalar128b;
 
     /// The errors of two factors.
     const BOUND: f64 = 1.0 / (1_u64 << 60) as f64;
 
-    fn lane(value: f64) -> Real<Scalar128b> {
-        Real::splat(Scalar128b, value)
-    }
-
-    fn first(value: Real<Scalar128b>) -> f64 {
-        let [lanes, _]: [[f64; 2]; 2] = value.lanes().map(cast);
-        lanes[0]
-    }
-
     /// The difference between a double-double that should be 1 and 1.
     fn beside_one(value: DoubleDouble<Scalar128b>) -> f64 {
-        ((first(value.hi) - 1.0) + first(value.lo)).abs()
+        ((Real::first(value.hi) - 1.0) + Real::first(value.lo)).abs()
     }
 
     proptest! {
         #[test]
         fn exponentials_of_opposite_arguments_multiply_to_one(a in -2000.0..2000.0_f64) {
-            let zero = lane(0.0);
-            let ((p, up), (q, down)) = (exp(lane(a), zero), exp(lane(-a), zero));
+            let zero = Real::lane(0.0);
+            let ((p, up), (q, down)) = (exp(Real::lane(a), zero), exp(Real::lane(-a), zero));
             let power = (up + down).power_of_two();
             prop_assert!(beside_one(p.times(q).scaled(power)) < BOUND);
-            prop_assert!((0.7..1.42).contains(&first(p.hi)));
+            prop_assert!((0.7..1.42).contains(&Real::first(p.hi)));
         }
 
         #[test]
         fn the_second_word_of_the_argument_counts(a in -10.0..10.0_f64, low in -1e-17..1e-17_f64) {
-            let ((p, n), (q, m)) = (exp(lane(a), lane(low)), exp(lane(a), lane(0.0)));
-            prop_assert_eq!(first(n), first(m));
-            let change = (first(p.hi - q.hi) + first(p.lo - q.lo)) / first(q.hi);
+            let ((p, n), (q, m)) = (exp(Real::lane(a), Real::lane(low)), exp(Real::lane(a), Real::lane(0.0)));
+            prop_assert_eq!(Real::first(n), Real::first(m));
+            let change = (Real::first(p.hi - q.hi) + Real::first(p.lo - q.lo)) / Real::first(q.hi);
             prop_assert!((change - low).abs() < BOUND);
         }
 
         #[test]
         fn the_squares_of_cosine_and_sine_add_to_one(b in -8e6..8e6_f64) {
-            let Reduced { cosine: c, sine: s, .. } = cos_sin(lane(b), lane(0.0));
+            let Reduced { cosine: c, sine: s, .. } = cos_sin(Real::lane(b), Real::lane(0.0));
             prop_assert!(beside_one(c.times(c).plus(s.times(s))) < BOUND);
         }
 
         #[test]
         fn first_words_agree_with_the_library(a in -700.0..700.0_f64, b in -1e3..1e3_f64) {
-            let (factor, n) = exp(lane(a), lane(0.0));
+            let (factor, n) = exp(Real::lane(a), Real::lane(0.0));
             let near = |x: f64, y: f64| (x - y).abs() <= 2.0 * f64::EPSILON * y.abs();
-            prop_assert!(near(first(factor.hi * n.power_of_two()), libm::exp(a)));
-            let reduced = cos_sin(lane(b), lane(0.0));
+            prop_assert!(near(Real::first(factor.hi * n.power_of_two()), libm::exp(a)));
+            let reduced = cos_sin(Real::lane(b), Real::lane(0.0));
             let conjugate = Complex::new(reduced.cosine.hi, -reduced.sine.hi);
             let z = turned_back(conjugate, reduced.quarters);
-            prop_assert!(near(first(z.re), libm::cos(b)) && near(first(-z.im), libm::sin(b)));
+            prop_assert!(near(Real::first(z.re), libm::cos(b)) && near(Real::first(-z.im), libm::sin(b)));
         }
 
         #[test]
         fn rough_ones_are_as_good_as_they_say(x in -700.0..700.0_f64, angle in -3.1..3.1_f64) {
-            prop_assert!((first(rough_log(lane(x.exp()))) - x).abs() < 3e-7);
-            let z = Complex::new(lane(angle.cos() * 7.0), lane(angle.sin() * 7.0));
-            prop_assert!((first(rough_angle(z)) - angle).abs() < 5e-6);
+            prop_assert!((Real::first(rough_log(Real::lane(x.exp()))) - x).abs() < 3e-7);
+            let z = Complex::new(Real::lane(angle.cos() * 7.0), Real::lane(angle.sin() * 7.0));
+            prop_assert!((Real::first(rough_angle(z)) - angle).abs() < 5e-6);
         }
     }
 }

@@ -17,7 +17,8 @@ const MAX_ORDER: u32 = 10_000;
 /// Relative difference of delays of a product below which they are merged.
 const SAME_DELAY: f64 = 4.0 * f64::EPSILON;
 
-fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
+/// The coefficients of a product of polynomials.
+pub(crate) fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; (a.len() + b.len()).saturating_sub(1)];
     for (shift, x) in a.iter().enumerate() {
         for (total, y) in product.iter_mut().skip(shift).zip(b) {
@@ -42,28 +43,12 @@ pub(crate) fn equate_close_delays(rows: &mut [(Vec<f64>, f64)]) {
 }
 
 impl QuasiPolynomial {
-    /// The constant function.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] unless `value` is finite.
-    pub fn constant(value: f64) -> Result<Self, Error> {
-        Self::new(vec![vec![value]], vec![0.0])
-    }
-
     /// The function s.
     pub fn variable() -> Self {
         Self {
             coefficients: vec![vec![0.0, 1.0]],
             delays: vec![0.0],
         }
-    }
-
-    /// The function e^(−s `delay`).
-    ///
-    /// # Errors
-    /// [`Error::Argument`] unless `delay` is finite and not negative.
-    pub fn exponential(delay: f64) -> Result<Self, Error> {
-        Self::new(vec![vec![1.0]], vec![delay])
     }
 
     /// The highest k such that sᵏ divides every row exactly; 0 for the zero function.
@@ -106,11 +91,7 @@ impl QuasiPolynomial {
     /// # Errors
     /// [`Error::Argument`] when `factor` is not finite or a coefficient overflows.
     pub fn scale(&self, factor: f64) -> Result<Self, Error> {
-        if !factor.is_finite() {
-            return Err(Error::argument(format!(
-                "factor {factor}: give a finite number"
-            )));
-        }
+        refuse_if!(!factor.is_finite(), "factor {factor}: give a finite number");
         let mut rows = self.rows();
         for value in rows.iter_mut().flat_map(|(row, _)| row) {
             *value *= factor;
@@ -149,11 +130,10 @@ impl QuasiPolynomial {
         for (a, first) in self.terms() {
             for (b, second) in other.terms() {
                 let delay = first + second;
-                if !delay.is_finite() {
-                    return Err(Error::argument(format!(
-                        "delays {first} s and {second} s add up to more than double precision holds"
-                    )));
-                }
+                refuse_if!(
+                    !delay.is_finite(),
+                    "delays {first} s and {second} s add up to more than double precision holds"
+                );
                 rows.push((convolve(a, b), delay));
             }
         }
@@ -169,7 +149,7 @@ impl QuasiPolynomial {
     /// # Errors
     /// As [`QuasiPolynomial::mul`].
     pub fn pow(&self, exponent: u32) -> Result<Self, Error> {
-        let mut result = Self::constant_unchecked(1.0);
+        let mut result = Self::constant(1.0);
         for bit in (0..u32::BITS - exponent.leading_zeros()).rev() {
             result = result.mul(&result)?;
             if exponent >> bit & 1 == 1 {

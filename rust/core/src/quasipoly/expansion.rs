@@ -14,9 +14,12 @@ use num_complex::Complex64;
 
 use super::double_double::{Complex, LAST_ROUNDING, ROUNDING, Turn, turn};
 use super::jet::{FLOOR, TINY, modulus};
-use super::probe::Probe;
+use super::probe::{ENLARGED, Probe};
 use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{DoubleDouble, exp_above};
+
+/// Added to an exponent: larger than its rounding errors where the exponential does not overflow.
+const EXPONENT_ROUNDING: f64 = 1e-12;
 
 /// Taylor coefficients of g(s) = h(s) e^(s τ) at a point, lowest first.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,7 +158,7 @@ pub(crate) fn remainder(
             power *= gap.abs() / (order - i + 1) as f64;
         }
         // The exponent is below 1500 in modulus; otherwise the result is infinite or negligible.
-        total += sum * exp_above(gap.abs() * radius - gap * s.re + 1e-12);
+        total += sum * exp_above(gap.abs() * radius - gap * s.re + EXPONENT_ROUNDING);
     }
-    (total + FLOOR) * (1.0 + 1e-9)
+    (total + FLOOR) * ENLARGED
 }

@@ -17,7 +17,7 @@ mod probe;
 mod quasi_polynomial;
 mod value;
 
-pub(crate) use algebra::equate_close_delays;
+pub(crate) use algebra::{convolve, equate_close_delays};
 pub(crate) use double_double::relative_turn;
 pub use expansion::Expansion;
 pub(crate) use expansion::{expansion, remainder};
@@ -30,3 +30,5 @@ pub use value::Scaled;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::make;

@@ -14,6 +14,8 @@
 //! added to every |coefficient| and weight, exceeds its effect in Horner's rule, and FLOOR the
 //! rest. `curvature` bounds |g″| ≤ Σ (P_j″ + 2|d| P_j′ + d² P_j)(|s| + r) max e^(−x d_j) nearby.
 
+use std::ops::{Add, AddAssign, Mul, Sub};
+
 use num_complex::Complex64;
 
 use super::double_double;
@@ -27,6 +29,10 @@ const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 /// Largest relative error of an exponential, in units of u: its phase is wrong by at most half a
 /// turn.
 const OPPOSITE: f64 = 5.0 / f64::EPSILON;
+
+/// Factor on a computed bound: larger than the rounding errors of its sums and powers with
+/// millions of operations, and too small to weaken the bound.
+pub(super) const ENLARGED: f64 = 1.0 + 1e-9;
 
 /// Number of evaluations that one in double-double arithmetic counts for.
 const DOUBLE_DOUBLE_COST: u64 = 20;
@@ -148,35 +154,56 @@ impl<'a> Probe<'a> {
         if s.im == 0.0 {
             return self.real_jet(s.re);
         }
-        let modulus = modulus(s);
         let reach = s.re.abs() + s.im.abs();
+        let turn = |gap: f64, weight: f64| {
+            if gap == 0.0 {
+                return Complex64::new(weight, 0.0);
+            }
+            let (sine, cosine) = sin_cos(gap * s.im);
+            Complex64::new(weight * cosine, -weight * sine)
+        };
+        let size = |term: Complex64| term.norm_sqr();
+        self.jet_of(s, (modulus(s), reach), turn, size, 16.0)
+    }
+
+    /// [`jet`](Self::jet) on the real axis, where every operation has a smaller error, so that the
+    /// bounds of the complex ones hold; `weights` are those at `x`.
+    fn real_jet(&mut self, x: f64) -> Jet {
+        self.jet_of(x, (x.abs(), x.abs()), |_, weight| weight, f64::abs, 4.0)
+    }
+
+    /// The jet at a real or complex `s`. `turn` is e^(−s gap), `size` a measure of a term, and a
+    /// term this many times larger than that of the reference is told.
+    #[inline(always)]
+    fn jet_of<V>(
+        &mut self,
+        s: V,
+        (modulus, reach): (f64, f64),
+        turn: impl Fn(f64, f64) -> V,
+        size: impl Fn(V) -> f64,
+        excess: f64,
+    ) -> Jet
+    where
+        V: Copy + Default + Into<Complex64> + AddAssign + Add<Output = V> + Sub<Output = V>,
+        V: Mul<Output = V> + Mul<f64, Output = V> + Add<f64, Output = V>,
+    {
         let count = self.gaps.len() as f64;
-        let (mut value, mut slope) = (Complex64::ZERO, Complex64::ZERO);
+        let (mut value, mut slope) = (V::default(), V::default());
         let (mut value_error, mut slope_error) = (0.0, 0.0);
         let (mut own_size, mut gaps) = (0.0, 0.0);
         let mut largest = (0.0, self.reference);
-        let terms = self
-            .h
-            .coefficients()
-            .iter()
-            .zip(&self.gaps)
-            .zip(&self.weights)
-            .zip(&mut self.parts);
+        let rows = self.h.coefficients().iter();
+        let terms = rows.zip(&self.gaps).zip(&self.weights).zip(&mut self.parts);
         for (index, (((row, &gap), &weight), part)) in terms.enumerate() {
-            let (mut p, mut dp) = (Complex64::ZERO, Complex64::ZERO);
+            let (mut p, mut dp) = (V::default(), V::default());
             let (mut bound, mut slope_bound) = (0.0, 0.0);
-            for c in row.iter().rev() {
+            for &c in row.iter().rev() {
                 dp = dp * s + p;
                 p = p * s + c;
                 slope_bound = slope_bound * modulus + bound;
                 bound = bound * modulus + (c.abs() + TINY);
             }
-            let turn = if gap == 0.0 {
-                Complex64::new(weight, 0.0)
-            } else {
-                let (sine, cosine) = sin_cos(gap * s.im);
-                Complex64::new(weight * cosine, -weight * sine)
-            };
+            let turn = turn(gap, weight);
             let term = p * turn;
             let own_slope = dp * turn - term * gap;
             value += term;
@@ -186,63 +213,12 @@ impl<'a> Probe<'a> {
             let weight = weight + TINY;
             gaps += gap.abs();
             *part = Part {
-                slope: own_slope,
-                size: bound * weight,
-            };
-            value_error += (4.0 * length + shared) * bound * weight;
-            slope_error += (8.0 * length + shared) * (slope_bound + gap.abs() * bound) * weight;
-            let size = term.norm_sqr();
-            if index == self.reference {
-                own_size = size;
-            }
-            if size > largest.0 {
-                largest = (size, index);
-            }
-        }
-        self.parts_at = Some(s);
-        Jet {
-            value,
-            slope,
-            value_error: ROUNDING * value_error + FLOOR,
-            slope_error: ROUNDING * slope_error + FLOOR * (1.0 + gaps),
-            overtaken_by: (largest.0 > 16.0 * own_size).then_some(largest.1),
-        }
-    }
-
-    /// [`jet`](Self::jet) on the real axis, where every operation has a smaller error, so that the
-    /// bounds of the complex ones hold; `weights` are those at `x`.
-    fn real_jet(&mut self, x: f64) -> Jet {
-        let size = x.abs();
-        let count = self.gaps.len() as f64;
-        let (mut value, mut slope) = (0.0, 0.0);
-        let (mut value_error, mut slope_error) = (0.0, 0.0);
-        let (mut own_size, mut gaps) = (0.0, 0.0);
-        let mut largest = (0.0, self.reference);
-        let rows = self.h.coefficients().iter();
-        let terms = rows.zip(&self.gaps).zip(&self.weights).zip(&mut self.parts);
-        for (index, (((row, &gap), &weight), part)) in terms.enumerate() {
-            let (mut p, mut dp, mut bound, mut slope_bound) = (0.0, 0.0, 0.0, 0.0);
-            for c in row.iter().rev() {
-                dp = dp * x + p;
-                p = p * x + c;
-                slope_bound = slope_bound * size + bound;
-                bound = bound * size + (c.abs() + TINY);
-            }
-            let term: f64 = p * weight;
-            let own_slope = dp * weight - term * gap;
-            value += term;
-            slope += own_slope;
-            let length = row.len() as f64;
-            let shared = count + 8.0 + (4.0 * gap.abs() * size).min(OPPOSITE);
-            let weight = weight + TINY;
-            gaps += gap.abs();
-            *part = Part {
                 slope: own_slope.into(),
                 size: bound * weight,
             };
             value_error += (4.0 * length + shared) * bound * weight;
             slope_error += (8.0 * length + shared) * (slope_bound + gap.abs() * bound) * weight;
-            let size = term.abs();
+            let size = size(term);
             if index == self.reference {
                 own_size = size;
             }
@@ -250,13 +226,13 @@ impl<'a> Probe<'a> {
                 largest = (size, index);
             }
         }
-        self.parts_at = Some(x.into());
+        self.parts_at = Some(s.into());
         Jet {
             value: value.into(),
             slope: slope.into(),
             value_error: ROUNDING * value_error + FLOOR,
             slope_error: ROUNDING * slope_error + FLOOR * (1.0 + gaps),
-            overtaken_by: (largest.0 > 4.0 * own_size).then_some(largest.1),
+            overtaken_by: (largest.0 > excess * own_size).then_some(largest.1),
         }
     }
 
@@ -294,7 +270,7 @@ impl<'a> Probe<'a> {
         }
         // Exponents are below 746 in modulus, or the weight is 0 or infinite; their error is at
         // most 2e-13. This, the rounding of the sums and of `modulus` together are far below 1e-9.
-        (total + FLOOR) * (1.0 + 1e-9)
+        (total + FLOOR) * ENLARGED
     }
 
     fn terms(&self) -> impl Iterator<Item = ((&Vec<f64>, &f64), &f64)> {
@@ -341,8 +317,8 @@ impl<'a> Probe<'a> {
         }
         (small && other).then_some(DominatedTerms {
             slope,
-            bend: bend * (1.0 + 1e-9),
-            perturbation: (perturbation + FLOOR) * (1.0 + 1e-9),
+            bend: bend * ENLARGED,
+            perturbation: (perturbation + FLOOR) * ENLARGED,
         })
     }
 }

@@ -27,27 +27,21 @@ impl QuasiPolynomial {
     /// [`Error::Argument`] when rows and delays differ in number, there is none, a coefficient is
     /// not finite, or a delay is negative or not finite.
     pub fn new(coefficients: Vec<Vec<f64>>, delays: Vec<f64>) -> Result<Self, Error> {
-        if coefficients.len() != delays.len() {
-            return Err(Error::argument(format!(
-                "{} rows of coefficients but {} delays: give one delay for every row",
-                coefficients.len(),
-                delays.len()
-            )));
-        }
-        if delays.is_empty() {
-            return Err(Error::argument(
-                "a quasi-polynomial needs at least one row of coefficients and its delay",
-            ));
-        }
+        refuse_if!(
+            coefficients.len() != delays.len(),
+            "{} rows of coefficients but {} delays: give one delay for every row",
+            coefficients.len(),
+            delays.len()
+        );
+        refuse_if!(
+            delays.is_empty(),
+            "a quasi-polynomial needs at least one row of coefficients and its delay"
+        );
         if let Some(delay) = delays.iter().find(|d| !(d.is_finite() && **d >= 0.0)) {
-            return Err(Error::argument(format!(
-                "delay {delay} s: delays must be finite and not negative"
-            )));
+            refuse!("delay {delay} s: delays must be finite and not negative");
         }
         if let Some(value) = coefficients.iter().flatten().find(|c| !c.is_finite()) {
-            return Err(Error::argument(format!(
-                "coefficient {value}: coefficients must be finite"
-            )));
+            refuse!("coefficient {value}: coefficients must be finite");
         }
         let rows = coefficients.into_iter().zip(delays).collect();
         Self::from_rows(rows)
@@ -73,15 +67,13 @@ impl QuasiPolynomial {
         if merged.is_empty() {
             return Ok(Self::zero());
         }
-        if merged
-            .iter()
-            .any(|(row, _)| row.iter().any(|c| !c.is_finite()))
-        {
-            return Err(Error::argument(
-                "a coefficient of the result is too large for double precision: scale the \
-                 equation or its unit of time",
-            ));
-        }
+        refuse_if!(
+            merged
+                .iter()
+                .any(|(row, _)| row.iter().any(|c| !c.is_finite())),
+            "a coefficient of the result is too large for double precision: scale the \
+             equation or its unit of time"
+        );
         let (coefficients, delays) = merged.into_iter().unzip();
         Ok(Self {
             coefficients,
@@ -91,10 +83,10 @@ impl QuasiPolynomial {
 
     /// The zero function.
     pub fn zero() -> Self {
-        Self::constant_unchecked(0.0)
+        Self::constant(0.0)
     }
 
-    pub(super) fn constant_unchecked(value: f64) -> Self {
+    pub(super) fn constant(value: f64) -> Self {
         Self {
             coefficients: vec![vec![value]],
             delays: vec![0.0],

@@ -4,9 +4,9 @@ use proptest::prelude::*;
 use super::{Kind, Probe, QuasiPolynomial};
 use crate::Error;
 
-fn make(rows: &[&[f64]], delays: &[f64]) -> QuasiPolynomial {
-    QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec())
-        .unwrap_or_else(|_| QuasiPolynomial::zero())
+pub(crate) fn make(rows: &[&[f64]], delays: &[f64]) -> QuasiPolynomial {
+    let rows = rows.iter().map(|row| row.to_vec()).collect();
+    QuasiPolynomial::new(rows, delays.to_vec()).unwrap()
 }
 
 fn any() -> impl Strategy<Value = QuasiPolynomial> {

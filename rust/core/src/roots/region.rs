@@ -42,11 +42,10 @@ impl Region {
     pub(super) fn check(&self) -> Result<(), Error> {
         for (name, (low, high)) in [("re", self.re), ("im", self.im)] {
             let increasing = low < high && low < f64::INFINITY && high > f64::NEG_INFINITY;
-            if !increasing {
-                return Err(Error::argument(format!(
-                    "{name}=({low}, {high}): a range needs a lower end below its upper end"
-                )));
-            }
+            refuse_if!(
+                !increasing,
+                "{name}=({low}, {high}): a range needs a lower end below its upper end"
+            );
         }
         Ok(())
     }

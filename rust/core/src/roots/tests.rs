@@ -2,15 +2,10 @@ use num_complex::Complex64;
 use proptest::prelude::*;
 
 use super::*;
-use crate::quasipoly::QuasiPolynomial;
+use crate::quasipoly::{QuasiPolynomial, make};
 use crate::{Error, Task};
 
 const OPEN: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
-
-fn make(rows: &[&[f64]], delays: &[f64]) -> QuasiPolynomial {
-    QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec())
-        .unwrap_or_else(|_| QuasiPolynomial::zero())
-}
 
 fn counted(h: &QuasiPolynomial, re: (f64, f64), im: (f64, f64)) -> Result<u64, Error> {
     count(h, &Region { re, im }, &Task::new())
@@ -43,49 +38,25 @@ fn open_sides_are_closed_by_bounds() {
 #[test]
 fn silly_input_gets_a_clear_answer() {
     let h = make(&[&[0.0, 1.0], &[1.0]], &[0.0, 1.0]);
-    for re in [
-        (1.0, 1.0),
-        (2.0, 1.0),
-        (f64::NAN, 1.0),
-        (f64::INFINITY, f64::INFINITY),
-    ] {
-        assert!(matches!(
-            counted(&h, re, (0.0, 1.0)),
-            Err(Error::Argument(_))
-        ));
+    let is_refused = |error: Option<Error>| matches!(error, Some(Error::Argument(_)));
+    let count_in = |h, re| counted(h, re, (0.0, 1.0)).err();
+    let count_beyond = |h, sigma| count_right_of(h, sigma, &Task::new()).err();
+    let leading = |h, n| rightmost(h, n, &Task::new());
+    let endless = f64::INFINITY;
+    for re in [(1.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0), (endless, endless)] {
+        assert!(is_refused(count_in(&h, re)));
     }
     let zero = QuasiPolynomial::zero();
-    assert!(matches!(
-        counted(&zero, (0.0, 1.0), (0.0, 1.0)),
-        Err(Error::Argument(_))
-    ));
-    assert!(matches!(
-        rightmost(&zero, 1, &Task::new()),
-        Err(Error::Argument(_))
-    ));
+    assert!(is_refused(count_in(&zero, (0.0, 1.0))));
+    assert!(is_refused(leading(&zero, 1).err()));
     let constant = make(&[&[3.0]], &[0.0]);
     assert_eq!(counted(&constant, OPEN, OPEN), Ok(0));
-    assert_eq!(
-        rightmost(&constant, 1, &Task::new()).map(|set| set.roots.len()),
-        Ok(0)
-    );
+    assert_eq!(leading(&constant, 1).map(|set| set.roots.len()), Ok(0));
     let advanced = make(&[&[1.0], &[0.0, 1.0]], &[0.0, 1.0]);
-    assert!(matches!(
-        rightmost(&advanced, 1, &Task::new()),
-        Err(Error::Argument(_))
-    ));
-    assert!(matches!(
-        count_right_of(&advanced, 0.0, &Task::new()),
-        Err(Error::Argument(_))
-    ));
-    assert!(matches!(
-        rightmost(&h, 0, &Task::new()),
-        Err(Error::Argument(_))
-    ));
-    assert!(matches!(
-        count_right_of(&h, f64::NAN, &Task::new()),
-        Err(Error::Argument(_))
-    ));
+    assert!(is_refused(leading(&advanced, 1).err()));
+    assert!(is_refused(count_beyond(&advanced, 0.0)));
+    assert!(is_refused(leading(&h, 0).err()));
+    assert!(is_refused(count_beyond(&h, f64::NAN)));
 }
 
 #[test]

@@ -137,43 +137,36 @@ impl<S: Simd> Real<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pulp::Scalar128b;
-
-    fn lane(value: f64) -> Real<Scalar128b> {
-        Real::splat(Scalar128b, value)
-    }
-
-    fn first(value: Real<Scalar128b>) -> f64 {
-        let [lanes, _]: [[f64; 2]; 2] = value.lanes().map(cast);
-        lanes[0]
-    }
 
     #[test]
     fn every_normal_power_of_two_goes_there_and_back() {
         for n in -1022..=1023 {
             let n = f64::from(n);
-            assert_eq!(first(lane(n).power_of_two()), n.exp2());
-            assert_eq!(first(lane(n.exp2()).exponent()), n);
-            assert_eq!(first(lane(n.exp2() * 1.999).binade()), n.exp2());
-            assert_eq!(first(lane(n.exp2() * -1.75).mantissa()), 1.75);
+            assert_eq!(Real::first(Real::lane(n).power_of_two()), n.exp2());
+            assert_eq!(Real::first(Real::lane(n.exp2()).exponent()), n);
+            assert_eq!(Real::first(Real::lane(n.exp2() * 1.999).binade()), n.exp2());
+            assert_eq!(Real::first(Real::lane(n.exp2() * -1.75).mantissa()), 1.75);
         }
     }
 
     #[test]
     fn signs_of_zeros_are_signs() {
         for (value, negative) in [(0.0, false), (-0.0, true), (-2.5, true), (3.0, false)] {
-            assert_eq!(lane(value).is_negative().any(), negative);
+            assert_eq!(Real::lane(value).is_negative().any(), negative);
             assert_eq!(
-                first(lane(value).sign()).to_bits(),
+                Real::first(Real::lane(value).sign()).to_bits(),
                 (if negative { -0.0_f64 } else { 0.0 }).to_bits()
             );
-            assert_eq!(first(lane(7.0).signed(lane(value).sign())) < 0.0, negative);
             assert_eq!(
-                first(lane(-7.0).flipped(lane(value).sign())) > 0.0,
+                Real::first(Real::lane(7.0).signed(Real::lane(value).sign())) < 0.0,
+                negative
+            );
+            assert_eq!(
+                Real::first(Real::lane(-7.0).flipped(Real::lane(value).sign())) > 0.0,
                 negative
             );
         }
-        assert_eq!(first(lane(2.5).nearest()), 2.0);
-        assert_eq!(first(lane(-1e6 - 0.4).nearest()), -1e6);
+        assert_eq!(Real::first(Real::lane(2.5).nearest()), 2.0);
+        assert_eq!(Real::first(Real::lane(-1e6 - 0.4).nearest()), -1e6);
     }
 }

@@ -79,12 +79,3 @@ impl Instructions {
         }
     }
 }
-
-/// The instruction set that kernels run on: `avx512`, `avx2`, `neon` or `plain`.
-///
-/// ```
-/// assert!(["avx512", "avx2", "neon", "plain"].contains(&deadtime::instructions()));
-/// ```
-pub fn instructions() -> &'static str {
-    Instructions::chosen().name()
-}

@@ -27,30 +27,21 @@ pub(crate) fn sum<S: Simd>(a: Real<S>, b: Real<S>) -> DoubleDouble<S> {
     let hi = a + b;
     let from_b = hi - a;
     let from_a = hi - from_b;
-    DoubleDouble {
-        hi,
-        lo: (a - from_a) + (b - from_b),
-    }
+    DoubleDouble::new(hi, (a - from_a) + (b - from_b))
 }
 
 /// `a + b` without loss when `|a| >= |b|` or `a == 0`.
 #[inline(always)]
 pub(crate) fn ordered_sum<S: Simd>(a: Real<S>, b: Real<S>) -> DoubleDouble<S> {
     let hi = a + b;
-    DoubleDouble {
-        hi,
-        lo: b - (hi - a),
-    }
+    DoubleDouble::new(hi, b - (hi - a))
 }
 
 /// `a * b` without loss.
 #[inline(always)]
 pub(crate) fn product<S: Simd>(a: Real<S>, b: Real<S>) -> DoubleDouble<S> {
     let hi = a * b;
-    DoubleDouble {
-        hi,
-        lo: a.mul_sub(b, hi),
-    }
+    DoubleDouble::new(hi, a.mul_sub(b, hi))
 }
 
 impl<S: Simd> DoubleDouble<S> {
@@ -125,18 +116,10 @@ impl<S: Simd> DoubleDouble<S> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use pulp::{Scalar128b, cast};
-
-    fn lane(value: f64) -> Real<Scalar128b> {
-        Real::splat(Scalar128b, value)
-    }
+    use pulp::Scalar128b;
 
     fn words(value: DoubleDouble<Scalar128b>) -> (f64, f64) {
-        let first = |value: Real<Scalar128b>| {
-            let [lanes, _]: [[f64; 2]; 2] = value.lanes().map(cast);
-            lanes[0]
-        };
-        (first(value.hi), first(value.lo))
+        (value.hi.first(), value.lo.first())
     }
 
     proptest! {
@@ -145,14 +128,14 @@ mod tests {
             // Whole multiples of 2^-60 below 2^30 fit the 128-bit integers used as truth.
             let whole = |x: f64| (x * 2.0_f64.powi(60)) as i128;
             let (a, b) = ((a * 1024.0).round() / 1024.0, (b * 2.0_f64.powi(50)).round() / 2.0_f64.powi(50));
-            let (hi, lo) = words(sum(lane(a), lane(b)));
+            let (hi, lo) = words(sum(Real::lane(a), Real::lane(b)));
             prop_assert_eq!(whole(hi) + whole(lo), whole(a) + whole(b));
             prop_assert_eq!(hi, a + b);
         }
 
         #[test]
         fn a_product_loses_nothing(a in 1_u64 << 52..1_u64 << 53, b in 1_u64 << 52..1_u64 << 53) {
-            let (hi, lo) = words(product(lane(a as f64), lane(b as f64)));
+            let (hi, lo) = words(product(Real::lane(a as f64), Real::lane(b as f64)));
             prop_assert_eq!(hi as i128 + lo as i128, i128::from(a) * i128::from(b));
             prop_assert!(lo.abs() <= hi * f64::EPSILON / 2.0);
         }
@@ -160,10 +143,13 @@ mod tests {
 
     #[test]
     fn two_words_multiply_to_more_than_a_hundred_bits() {
-        let third = DoubleDouble::new(lane(1.0 / 3.0), lane(1.0 / 3.0 * 2.0_f64.powi(-54)));
-        let (hi, lo) = words(third.times_word(lane(3.0)));
+        let third = DoubleDouble::new(
+            Real::lane(1.0 / 3.0),
+            Real::lane(1.0 / 3.0 * 2.0_f64.powi(-54)),
+        );
+        let (hi, lo) = words(third.times_word(Real::lane(3.0)));
         assert!(((hi - 1.0) + lo).abs() < 2.0_f64.powi(-103));
-        let (hi, lo) = words(third.times(third).times_word(lane(9.0)));
+        let (hi, lo) = words(third.times(third).times_word(Real::lane(9.0)));
         assert!(((hi - 1.0) + lo).abs() < 2.0_f64.powi(-102));
     }
 }

@@ -19,6 +19,5 @@ pub(crate) use columns::sweep_on;
 pub(crate) use columns::{Columns, Kernel, SHORT, sweep};
 pub(crate) use complex::Complex;
 pub(crate) use dispatch::Instructions;
-pub use dispatch::instructions;
 pub(crate) use pulp::Simd;
 pub(crate) use real::{Mask, Real};

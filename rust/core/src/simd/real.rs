@@ -22,6 +22,18 @@ pub(crate) struct Mask<S: Simd> {
     lanes: [S::m64s; 2],
 }
 
+/// A method that compares lane by lane.
+macro_rules! comparison {
+    ($name:ident, $lanes:ident) => {
+        #[inline(always)]
+        pub(crate) fn $name(self, other: impl Operand<S>) -> Mask<S> {
+            let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
+            let simd = self.simd;
+            Mask::new(simd, [simd.$lanes(a, c), simd.$lanes(b, d)])
+        }
+    };
+}
+
 impl<S: Simd> Real<S> {
     #[inline(always)]
     pub(crate) fn new(simd: S, lanes: [S::f64s; 2]) -> Self {
@@ -92,25 +104,9 @@ impl<S: Simd> Real<S> {
         Self::new(self.simd, [self.simd.sqrt_f64s(a), self.simd.sqrt_f64s(b)])
     }
 
-    #[inline(always)]
-    pub(crate) fn lt(self, other: impl Operand<S>) -> Mask<S> {
-        let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
-        let simd = self.simd;
-        Mask::new(simd, [simd.less_than_f64s(a, c), simd.less_than_f64s(b, d)])
-    }
-
-    #[inline(always)]
-    pub(crate) fn le(self, other: impl Operand<S>) -> Mask<S> {
-        let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
-        let simd = self.simd;
-        Mask::new(
-            simd,
-            [
-                simd.less_than_or_equal_f64s(a, c),
-                simd.less_than_or_equal_f64s(b, d),
-            ],
-        )
-    }
+    comparison!(lt, less_than_f64s);
+    comparison!(le, less_than_or_equal_f64s);
+    comparison!(eq, equal_f64s);
 
     #[inline(always)]
     pub(crate) fn gt(self, other: impl Operand<S>) -> Mask<S> {
@@ -120,13 +116,6 @@ impl<S: Simd> Real<S> {
     #[inline(always)]
     pub(crate) fn ge(self, other: impl Operand<S>) -> Mask<S> {
         other.spread(self).le(self)
-    }
-
-    #[inline(always)]
-    pub(crate) fn eq(self, other: impl Operand<S>) -> Mask<S> {
-        let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
-        let simd = self.simd;
-        Mask::new(simd, [simd.equal_f64s(a, c), simd.equal_f64s(b, d)])
     }
 
     /// The larger of two numbers neither of which is NaN.
@@ -163,49 +152,25 @@ impl<S: Simd> Operand<S> for f64 {
     }
 }
 
-impl<S: Simd, T: Operand<S>> Add<T> for Real<S> {
-    type Output = Self;
+/// An operator that acts lane by lane.
+macro_rules! operator {
+    ($trait:ident, $name:ident, $lanes:ident) => {
+        impl<S: Simd, T: Operand<S>> $trait<T> for Real<S> {
+            type Output = Self;
 
-    #[inline(always)]
-    fn add(self, other: T) -> Self {
-        let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
-        let simd = self.simd;
-        Self::new(simd, [simd.add_f64s(a, c), simd.add_f64s(b, d)])
-    }
+            #[inline(always)]
+            fn $name(self, other: T) -> Self {
+                let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
+                let simd = self.simd;
+                Self::new(simd, [simd.$lanes(a, c), simd.$lanes(b, d)])
+            }
+        }
+    };
 }
-
-impl<S: Simd, T: Operand<S>> Sub<T> for Real<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: T) -> Self {
-        let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
-        let simd = self.simd;
-        Self::new(simd, [simd.sub_f64s(a, c), simd.sub_f64s(b, d)])
-    }
-}
-
-impl<S: Simd, T: Operand<S>> Mul<T> for Real<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: T) -> Self {
-        let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
-        let simd = self.simd;
-        Self::new(simd, [simd.mul_f64s(a, c), simd.mul_f64s(b, d)])
-    }
-}
-
-impl<S: Simd, T: Operand<S>> Div<T> for Real<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn div(self, other: T) -> Self {
-        let ([a, b], [c, d]) = (self.lanes, other.spread(self).lanes);
-        let simd = self.simd;
-        Self::new(simd, [simd.div_f64s(a, c), simd.div_f64s(b, d)])
-    }
-}
+operator!(Add, add, add_f64s);
+operator!(Sub, sub, sub_f64s);
+operator!(Mul, mul, mul_f64s);
+operator!(Div, div, div_f64s);
 
 impl<S: Simd> Neg for Real<S> {
     type Output = Self;
@@ -278,5 +243,18 @@ impl<S: Simd> Not for Mask<S> {
     fn not(self) -> Self {
         let [a, b] = self.lanes;
         Self::new(self.simd, [self.simd.not_m64s(a), self.simd.not_m64s(b)])
+    }
+}
+
+#[cfg(test)]
+impl Real<pulp::Scalar128b> {
+    /// The same number in every lane.
+    pub(crate) fn lane(value: f64) -> Self {
+        Self::splat(pulp::Scalar128b, value)
+    }
+
+    /// The number in the first lane.
+    pub(crate) fn first(self) -> f64 {
+        self.numbers().first().copied().unwrap_or(f64::NAN)
     }
 }

@@ -152,10 +152,9 @@ fn violating(h: &QuasiPolynomial, specification: Specification, task: &Task) -> 
         Err(Error::Contour { .. }) => roots(h, &Region::right_of(1.01 * line), task)?,
         set => set?,
     };
-    specification.violating(&set).ok_or(Error::Contour {
-        place: Complex64::new(line, 0.0),
-        distance: 0.0,
-    })
+    specification
+        .violating(&set)
+        .ok_or(Error::contour(Complex64::new(line, 0.0), 0.0))
 }
 
 /// Count and status where the chains alone decide.

@@ -88,9 +88,7 @@ impl Family {
     /// [`Error::TooMuch`] for too many terms.
     pub fn new(names: Vec<String>, terms: Vec<Term>) -> Result<Self, Error> {
         if let Some(name) = repeated(&names) {
-            return Err(Error::argument(format!(
-                "parameter {name} is given twice: give every parameter its own name"
-            )));
+            refuse!("parameter {name} is given twice: give every parameter its own name");
         }
         if terms.len() > MAX_TERMS {
             return Err(Error::TooMuch {
@@ -121,28 +119,24 @@ impl Family {
 
     fn check(&self, term: &Term) -> Result<(), Error> {
         let count = self.names.len();
-        if term.exponents.len() != count || term.delay.slopes.len() != count {
-            return Err(Error::argument(format!(
-                "a term has {} exponents and {} slopes of its delay for {count} parameters: give \
-                 one of each for every parameter",
-                term.exponents.len(),
-                term.delay.slopes.len()
-            )));
-        }
+        refuse_if!(
+            term.exponents.len() != count || term.delay.slopes.len() != count,
+            "a term has {} exponents and {} slopes of its delay for {count} parameters: give \
+             one of each for every parameter",
+            term.exponents.len(),
+            term.delay.slopes.len()
+        );
         let mut numbers = std::iter::once(&term.coefficient)
             .chain([&term.delay.constant])
             .chain(&term.delay.slopes);
         if let Some(number) = numbers.find(|number| !number.is_finite()) {
-            return Err(Error::argument(format!(
-                "{number} in a term: coefficients and delays must be finite"
-            )));
+            refuse!("{number} in a term: coefficients and delays must be finite");
         }
         let highest = term.exponents.iter().fold(term.power, |a, b| a.max(*b));
-        if highest > MAX_POWER {
-            return Err(Error::argument(format!(
-                "a power of {highest}: give powers up to {MAX_POWER}"
-            )));
-        }
+        refuse_if!(
+            highest > MAX_POWER,
+            "a power of {highest}: give powers up to {MAX_POWER}"
+        );
         Ok(())
     }
 
@@ -246,18 +240,15 @@ impl Family {
     }
 
     fn check_values(&self, values: &[f64]) -> Result<(), Error> {
-        if values.len() != self.names.len() {
-            return Err(Error::argument(format!(
-                "{} values for {} parameters ({}): give one value for each parameter",
-                values.len(),
-                self.names.len(),
-                self.names.join(", ")
-            )));
-        }
+        refuse_if!(
+            values.len() != self.names.len(),
+            "{} values for {} parameters ({}): give one value for each parameter",
+            values.len(),
+            self.names.len(),
+            self.names.join(", ")
+        );
         match self.names.iter().zip(values).find(|(_, v)| !v.is_finite()) {
-            Some((name, value)) => Err(Error::argument(format!(
-                "{name}={value}: parameters must be finite"
-            ))),
+            Some((name, value)) => refuse!("{name}={value}: parameters must be finite"),
             None => Ok(()),
         }
     }
@@ -285,9 +276,7 @@ impl Family {
         } else {
             format!(" at {}", place.join(", "))
         };
-        Err(Error::argument(format!(
-            "a delay is {value} s{place}: delays must not be negative"
-        )))
+        refuse!("a delay is {value} s{place}: delays must not be negative")
     }
 }
 

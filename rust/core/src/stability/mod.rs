@@ -18,7 +18,7 @@ mod specification;
 pub use boxes::{Boxes, Limits, Node, Radius, largest_stable_box, proved_boxes, stability_radius};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub(crate) use crossings::radius_of_members;
-pub use crossings::{AxisCrossing, crossings_along};
+pub use crossings::{Crossing, crossings_along};
 pub use family::{Affine, Family, Term};
 pub use map::{
     Axis, Boundaries, Chart, Proof, Question, Vertex, boundaries, chains, map, robust_map,

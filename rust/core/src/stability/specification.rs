@@ -62,27 +62,24 @@ impl Specification {
     /// # Errors
     /// [`Error::Argument`] where numbers are not finite or do not fit together.
     pub fn check(&self) -> Result<(), Error> {
-        if !self.decay.is_finite() {
-            return Err(Error::argument(format!(
-                "decay={}: give a finite number, in 1/s",
-                self.decay
-            )));
-        }
+        refuse_if!(
+            !self.decay.is_finite(),
+            "decay={}: give a finite number, in 1/s",
+            self.decay
+        );
         let Some(Damping { ratio, horizon }) = self.damping else {
             return Ok(());
         };
-        if !(ratio > 0.0 && ratio < 1.0) {
-            return Err(Error::argument(format!(
-                "a damping ratio of {ratio}: give one between 0 and 1"
-            )));
-        }
-        if !(self.decay >= 0.0 && horizon > self.decay && horizon.is_finite()) {
-            return Err(Error::argument(format!(
-                "a damping ratio for roots right of -{horizon} with decay={}: the horizon must be \
-                 finite and beyond the decay, which must not be negative",
-                self.decay
-            )));
-        }
+        refuse_if!(
+            !(ratio > 0.0 && ratio < 1.0),
+            "a damping ratio of {ratio}: give one between 0 and 1"
+        );
+        refuse_if!(
+            !(self.decay >= 0.0 && horizon > self.decay && horizon.is_finite()),
+            "a damping ratio for roots right of -{horizon} with decay={}: the horizon must be \
+             finite and beyond the decay, which must not be negative",
+            self.decay
+        );
         Ok(())
     }
 

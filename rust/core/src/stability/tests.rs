@@ -6,7 +6,7 @@ use super::{
     Affine, Axis, Damping, ENDLESS, Family, Proof, Question, Specification, Term, UNKNOWN, Vertex,
     boundaries, judge, map,
 };
-use crate::quasipoly::QuasiPolynomial;
+use crate::quasipoly::{QuasiPolynomial, make};
 use crate::roots::{count_right_of, spectral_abscissa};
 use crate::status::CellStatus;
 use crate::{Error, Task};
@@ -69,6 +69,11 @@ fn line(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count)
         .map(|i| low + (high - low) * i as f64 / (count - 1) as f64)
         .collect()
+}
+
+/// The axes of the first two parameters.
+fn axes<'a>(first: &'a [f64], second: &'a [f64]) -> [Axis<'a>; 2] {
+    [(0, first), (1, second)].map(|(parameter, points)| Axis { parameter, points })
 }
 
 #[test]
@@ -151,50 +156,38 @@ fn bad_families_and_values_are_refused() {
 #[test]
 fn cells_of_every_kind_are_told_apart() {
     let task = Task::new();
-    let make = |rows: &[&[f64]], delays: &[f64]| {
-        QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec()).unwrap()
-    };
     let told = |h: &QuasiPolynomial| {
         let cell = judge(h, Specification::default(), true, &task).unwrap();
         (cell.unstable, cell.status)
     };
     let s: &[f64] = &[0.0, 1.0];
-    assert_eq!(told(&make(&[s, &[2.0]], &[0.0, 0.36])), (0, CellStatus::Ok));
-    assert_eq!(told(&make(&[s, &[5.0]], &[0.0, 0.36])), (2, CellStatus::Ok));
-    assert_eq!(told(&make(&[s], &[0.0])), (UNKNOWN, CellStatus::Boundary));
-    // A root 7e-5 right of the chain was once taken for the chain.
-    let root_leads = make(&[s, &[0.12, 0.984]], &[0.0, 0.36]);
-    assert_eq!(told(&root_leads), (0, CellStatus::Ok));
-    // |s + 0.12| > |s|: every root of the chain lies left of its limit.
+    let known: [(&[&[f64]], i32, CellStatus); 10] = [
+        (&[s, &[2.0]], 0, CellStatus::Ok),
+        (&[s, &[5.0]], 2, CellStatus::Ok),
+        // A root 7e-5 right of the chain was once taken for the chain.
+        (&[s, &[0.12, 0.984]], 0, CellStatus::Ok),
+        // |s + 0.12| > |s|: every root of the chain lies left of its limit.
+        (&[&[0.12, 1.0], &[0.0, 0.984]], 0, CellStatus::Chain),
+        (&[s, &[2.0, 1.0]], UNKNOWN, CellStatus::Boundary),
+        (&[s, &[2.0, -1.1]], ENDLESS, CellStatus::Infinite),
+        (&[&[1.0], s], ENDLESS, CellStatus::Infinite),
+        (&[&[1.0], &[0.5]], 0, CellStatus::Chain),
+        (&[&[1.0], &[2.5]], ENDLESS, CellStatus::Infinite),
+        (&[&[3.0], &[0.0]], 0, CellStatus::Ok),
+    ];
+    for (rows, unstable, status) in known {
+        assert_eq!(
+            told(&make(rows, &[0.0, 0.36])),
+            (unstable, status),
+            "{rows:?}"
+        );
+    }
     let chain_leads = make(&[&[0.12, 1.0], &[0.0, 0.984]], &[0.0, 0.36]);
-    assert_eq!(told(&chain_leads), (0, CellStatus::Chain));
     let cell = judge(&chain_leads, Specification::default(), true, &task).unwrap();
     assert!((cell.abscissa - 0.984f64.ln() / 0.36).abs() < 1e-14);
-    assert_eq!(
-        told(&make(&[s, &[2.0, 1.0]], &[0.0, 0.36])),
-        (UNKNOWN, CellStatus::Boundary)
-    );
-    assert_eq!(
-        told(&make(&[s, &[2.0, -1.1]], &[0.0, 0.36])),
-        (ENDLESS, CellStatus::Infinite)
-    );
-    assert_eq!(
-        told(&make(&[&[1.0], s], &[0.0, 0.36])),
-        (ENDLESS, CellStatus::Infinite)
-    );
-    assert_eq!(
-        told(&make(&[&[1.0], &[0.5]], &[0.0, 0.36])),
-        (0, CellStatus::Chain)
-    );
-    assert_eq!(
-        told(&make(&[&[1.0], &[2.5]], &[0.0, 0.36])),
-        (ENDLESS, CellStatus::Infinite)
-    );
-    assert_eq!(told(&make(&[&[3.0]], &[0.0])), (0, CellStatus::Ok));
-    assert_eq!(
-        told(&QuasiPolynomial::zero()),
-        (UNKNOWN, CellStatus::Undecided)
-    );
+    assert_eq!(told(&make(&[s], &[0.0])), (UNKNOWN, CellStatus::Boundary));
+    let zero = QuasiPolynomial::zero();
+    assert_eq!(told(&zero), (UNKNOWN, CellStatus::Undecided));
 }
 
 /// The pairs of s + K e^(−s T) cross at K T = π/2 + 2πk; for K < 0 a real root is unstable and
@@ -215,44 +208,23 @@ fn unstable_by_hand(gain: f64, delay: f64) -> i32 {
 #[test]
 fn the_delayed_integrator_follows_the_closed_form_everywhere() {
     let (gains, delays) = (line(-30.0, 30.0, 40), line(0.0, 2.0, 31));
-    let axes = [
-        Axis {
-            parameter: 0,
-            points: &gains,
-        },
-        Axis {
-            parameter: 1,
-            points: &delays,
-        },
-    ];
     let task = Task::new();
+    let axes = axes(&gains, &delays);
     let chart = map(&integrator(), &[0.0, 0.0], axes, COUNTS, &task).unwrap();
     assert_eq!(task.done(), 40 * 31);
     let cells = gains
         .iter()
         .flat_map(|gain| delays.iter().map(move |delay| (*gain, *delay)));
     for ((gain, delay), unstable) in cells.zip(&chart.unstable) {
-        assert_eq!(
-            *unstable,
-            unstable_by_hand(gain, delay),
-            "K={gain}, T={delay}"
-        );
+        let truth = unstable_by_hand(gain, delay);
+        assert_eq!(*unstable, truth, "K={gain}, T={delay}");
     }
 }
 
 #[test]
 fn the_bits_do_not_depend_on_the_number_of_threads() {
     let (kp, kv) = (line(-1.0, 6.0, 15), line(-1.2, 1.2, 13));
-    let axes = [
-        Axis {
-            parameter: 0,
-            points: &kp,
-        },
-        Axis {
-            parameter: 1,
-            points: &kv,
-        },
-    ];
+    let axes = axes(&kp, &kv);
     let run = |threads| {
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -269,50 +241,33 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_stopped_map_stops_and_bad_axes_are_refused() {
     let points = line(0.1, 1.0, 3);
-    let axis = |parameter| Axis {
-        parameter,
-        points: &points,
-    };
     let run = |values: &[f64], axes, task: &Task| map(&integrator(), values, axes, COUNTS, task);
+    let [good, other] = axes(&points, &points);
     let task = Task::new();
     task.stop();
     assert_eq!(
-        run(&[0.0; 2], [axis(0), axis(1)], &task),
+        run(&[0.0; 2], [good, other], &task),
         Err(Error::Interrupted)
     );
     let task = Task::new();
-    assert!(run(&[0.0; 2], [axis(0), axis(0)], &task).is_err());
-    assert!(run(&[0.0; 2], [axis(0), axis(2)], &task).is_err());
-    assert!(run(&[0.0; 1], [axis(0), axis(1)], &task).is_err());
-    let negative = [0.1, -0.1];
-    let delays = Axis {
-        parameter: 1,
-        points: &negative,
+    let beyond = Axis {
+        parameter: 2,
+        ..good
     };
-    assert!(run(&[0.0; 2], [axis(0), delays], &task).is_err());
-    let endless = [f64::NAN];
-    let gains = Axis {
-        parameter: 0,
-        points: &endless,
-    };
-    assert!(run(&[0.0; 2], [gains, axis(1)], &task).is_err());
+    for bad in [
+        [good, good],
+        [good, beyond],
+        axes(&points, &[0.1, -0.1]),
+        axes(&[f64::NAN], &points),
+    ] {
+        assert!(run(&[0.0; 2], bad, &task).is_err());
+    }
+    assert!(run(&[0.0; 1], [good, other], &task).is_err());
     let many = vec![1.0; 10_000];
-    let [a, b] = [0, 1].map(|parameter| Axis {
-        parameter,
-        points: &many,
-    });
-    assert!(matches!(
-        run(&[0.0; 2], [a, b], &task),
-        Err(Error::TooMuch { .. })
-    ));
-    let none = Axis {
-        parameter: 0,
-        points: &[],
-    };
-    assert_eq!(
-        run(&[0.0; 2], [none, axis(1)], &task).unwrap().status.len(),
-        0
-    );
+    let found = run(&[0.0; 2], axes(&many, &many), &task);
+    assert!(matches!(found, Err(Error::TooMuch { .. })));
+    let found = run(&[0.0; 2], axes(&[], &points), &task);
+    assert_eq!(found.unwrap().status.len(), 0);
     assert_eq!(task.done(), 0);
 }
 
@@ -405,8 +360,7 @@ fn boundaries_are_closed_forms_in_order() {
     // s + (Kp + Kv s) e^(−0.36 s): Kp = w sin(0.36 w), Kv = −cos(0.36 w).
     let gains = [0.5, 6.0];
     let others: Vec<f64> = (0..61).map(|i| -0.6 + 0.02 * f64::from(i)).collect();
-    let axes =
-        [(0, &gains[..]), (1, &others[..])].map(|(parameter, points)| Axis { parameter, points });
+    let axes = axes(&gains, &others);
     let found = boundaries(
         &velocity(),
         &[0.0, 0.0],
@@ -440,9 +394,8 @@ fn a_curve_that_turns_back_is_one() {
         term(1.0, &[0, 1], 1, 0.3, &none),
     ];
     let family = Family::new(names("Kp Kd"), terms).unwrap();
-    let (first, second) = (range(-130.0, 20.0, 31), range(0.02, 8.0, 400));
-    let axes =
-        [(0, &first[..]), (1, &second[..])].map(|(parameter, points)| Axis { parameter, points });
+    let (first, second) = (line(-130.0, 20.0, 31), line(0.02, 8.0, 400));
+    let axes = axes(&first, &second);
     let found = boundaries(&family, &none, axes, Specification::default(), &Task::new());
     let found = found.unwrap().unwrap();
     // The real root crosses in the opposite direction where the pair reaches it, at Kd = 0.3.
@@ -479,9 +432,4 @@ fn a_curve_that_turns_back_is_one() {
     for row in second.iter().position(|kd| *kd > 0.31).unwrap()..=top {
         assert_eq!(curve.iter().filter(|vertex| vertex.row == row).count(), 2);
     }
-}
-
-fn range(low: f64, high: f64, count: u32) -> Vec<f64> {
-    let point = |i| low + (high - low) * f64::from(i) / f64::from(count - 1);
-    (0..count).map(point).collect()
 }

@@ -1,8 +1,4 @@
 //! Kinds of numbers inside an option, each with its unit.
-//!
-//! Writing a value that is already stored does not change its bytes: two bit patterns may represent
-//! one value (two NaNs, or 1.2 s and 0 s with 1 200 000 µs), and what was read has to be written
-//! again unchanged.
 
 use crate::bytes::{array, put};
 
@@ -34,12 +30,6 @@ macro_rules! whole {
 }
 whole!(u8, u16, i16, u32, i32);
 
-/// Do the bytes already hold the value to be written?
-fn said(there: Option<f64>, value: f64) -> bool {
-    there
-        .is_some_and(|there| there.to_bits() == value.to_bits() || there.is_nan() && value.is_nan())
-}
-
 /// A single-precision number, `1 / PER` of a unit.
 pub(super) struct Real<const PER: u32>;
 
@@ -50,53 +40,25 @@ impl<const PER: u32> Field for Real<PER> {
         array(bytes, at).map(|four| f64::from(f32::from_le_bytes(four)) / f64::from(PER))
     }
     fn put(bytes: &mut [u8], at: usize, value: f64) -> Option<()> {
-        if said(Self::get(bytes, at), value) {
-            return Some(());
+        let single = (value * f64::from(PER)) as f32;
+        if !single.is_finite() {
+            return None;
         }
-        single(bytes, at, value * f64::from(PER))
+        put(bytes, at, single.to_le_bytes())
     }
 }
 
-/// Writes a finite number that single precision can hold.
-fn single(bytes: &mut [u8], at: usize, value: f64) -> Option<()> {
-    let single = value as f32;
-    if !single.is_finite() {
-        return None;
-    }
-    put(bytes, at, single.to_le_bytes())
-}
+/// An angle in single precision, `1 / PER` of a degree; rad outside.
+pub(super) struct Degrees<const PER: u32>;
 
-/// Thousandths of a degree in single precision; rad outside.
-pub(super) struct Millidegrees;
-
-impl Field for Millidegrees {
+impl<const PER: u32> Field for Degrees<PER> {
     type Value = f64;
     const WIDTH: usize = 4;
     fn get(bytes: &[u8], at: usize) -> Option<f64> {
-        Real::<1000>::get(bytes, at).map(f64::to_radians)
+        Real::<PER>::get(bytes, at).map(f64::to_radians)
     }
     fn put(bytes: &mut [u8], at: usize, value: f64) -> Option<()> {
-        if said(Self::get(bytes, at), value) {
-            return Some(());
-        }
-        single(bytes, at, value.to_degrees() * 1000.0)
-    }
-}
-
-/// Degrees in single precision; rad outside.
-pub(super) struct Degrees;
-
-impl Field for Degrees {
-    type Value = f64;
-    const WIDTH: usize = 4;
-    fn get(bytes: &[u8], at: usize) -> Option<f64> {
-        Real::<1>::get(bytes, at).map(f64::to_radians)
-    }
-    fn put(bytes: &mut [u8], at: usize, value: f64) -> Option<()> {
-        if said(Self::get(bytes, at), value) {
-            return Some(());
-        }
-        single(bytes, at, value.to_degrees())
+        Real::<PER>::put(bytes, at, value.to_degrees())
     }
 }
 
@@ -129,9 +91,6 @@ impl Field for Ticks {
         Some(f64::from(word >> 21) + f64::from(word & 0x001f_ffff) * 1e-6)
     }
     fn put(bytes: &mut [u8], at: usize, value: f64) -> Option<()> {
-        if said(Self::get(bytes, at), value) {
-            return Some(());
-        }
         if !value.is_finite() || value < 0.0 {
             return None;
         }

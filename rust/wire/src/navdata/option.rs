@@ -41,10 +41,22 @@ integers!(u8, u16, i16, u32, i32);
 impl TryFrom<Value> for f64 {
     type Error = f64;
     fn try_from(value: Value) -> Result<f64, f64> {
-        Ok(match value {
-            Value::Integer(value) => value as f64,
-            Value::Real(value) => value,
-        })
+        Ok(value.number())
+    }
+}
+
+impl Value {
+    fn number(self) -> f64 {
+        match self {
+            Self::Integer(value) => value as f64,
+            Self::Real(value) => value,
+        }
+    }
+
+    /// The same value, bit by bit; all NaNs are one.
+    fn is(self, other: Self) -> bool {
+        let (one, two) = (self.number(), other.number());
+        one.to_bits() == two.to_bits() || one.is_nan() && two.is_nan()
     }
 }
 
@@ -95,6 +107,10 @@ impl Layout {
 }
 
 /// Writes one field.
+///
+/// Writing a value that is already stored does not change its bytes: two bit patterns may represent
+/// one value (two NaNs, or 1.2 s and 0 s with 1 200 000 µs), and what was read has to be written
+/// again unchanged.
 pub(super) fn put<F: Field>(
     option: &mut [u8],
     at: usize,
@@ -108,6 +124,9 @@ where
         let (length, needed) = (option.len(), at + F::WIDTH);
         return Err(Fault::Short { length, needed }.at(length));
     }
+    if F::get(option, at).is_some_and(|there| there.into().is(value.into())) {
+        return Ok(());
+    }
     F::put(option, at, value).ok_or_else(|| out_of_range(value.into(), name).at(at))
 }
 
@@ -120,10 +139,7 @@ pub(super) fn take<T: TryFrom<Value, Error = f64>>(
 }
 
 fn out_of_range(value: Value, name: &'static str) -> Fault {
-    let value = match value {
-        Value::Integer(value) => value as f64,
-        Value::Real(value) => value,
-    };
+    let value = value.number();
     if value.is_finite() {
         Fault::Range { name, value }
     } else {

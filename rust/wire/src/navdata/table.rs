@@ -2,43 +2,27 @@
 //!
 //! Fields have the names of the drone's own headers where these have one.
 
-use super::field::{Degrees, Field, Millidegrees, Real, Thousandths, Ticks};
+use super::field::{Degrees, Field, Real, Thousandths, Ticks};
 use super::option::{Known, Layout, options, put, take};
 use crate::error::{Error, Fault};
 
 /// Tag and size of every option of a full packet, checksum left out: 2190 bytes in all.
-pub const FULL: &[(u16, usize)] = &[
-    (0, 148),
-    (1, 8),
-    (2, 52),
-    (3, 46),
-    (4, 16),
-    (5, 12),
-    (6, 88),
-    (7, 16),
-    (8, 24),
-    (9, 92),
-    (10, 56),
-    (11, 16),
-    (12, 44),
-    (13, 92),
-    (14, 108),
-    (15, 364),
-    (16, 328),
-    (17, 8),
-    (18, 40),
-    (19, 65),
-    (20, 12),
-    (21, 18),
-    (22, 83),
-    (23, 64),
-    (24, 72),
-    (25, 32),
-    (26, 8),
-    (27, 216),
-    (28, 6),
-    (29, 32),
-];
+pub const FULL: &[(u16, usize)] = &with_tags([
+    148, 8, 52, 46, 16, 12, 88, 16, 24, 92, 56, 16, 44, 92, 108, 364, 328, 8, 40, 65, 12, 18, 83,
+    64, 72, 32, 8, 216, 6, 32,
+]);
+
+/// Each size with its tag: 0, 1, 2, …
+#[expect(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+const fn with_tags(sizes: [usize; 30]) -> [(u16, usize); 30] {
+    let mut options = [(0, 0); 30];
+    let mut tag = 0;
+    while tag < options.len() {
+        options[tag] = (tag as u16, sizes[tag]);
+        tag += 1;
+    }
+    options
+}
 
 options! {
     /// The data that every packet in flight holds.
@@ -51,11 +35,11 @@ options! {
         /// Percent.
         battery: u32 as u32 = 8,
         /// rad, nose up positive.
-        pitch: f64 as Millidegrees = 12,
+        pitch: f64 as Degrees<1000> = 12,
         /// rad, right side down positive.
-        roll: f64 as Millidegrees = 16,
+        roll: f64 as Degrees<1000> = 16,
         /// rad.
-        yaw: f64 as Millidegrees = 20,
+        yaw: f64 as Degrees<1000> = 20,
         /// m; below zero at times.
         height: f64 as Thousandths = 24,
         /// m/s, forwards.
@@ -113,11 +97,11 @@ options! {
         /// In units of the standard gravity.
         acceleration_z: f64 as Real<1000> = 18,
         /// rad/s.
-        rate_x: f64 as Degrees = 22,
+        rate_x: f64 as Degrees<1> = 22,
         /// rad/s.
-        rate_y: f64 as Degrees = 26,
+        rate_y: f64 as Degrees<1> = 26,
         /// rad/s.
-        rate_z: f64 as Degrees = 30,
+        rate_z: f64 as Degrees<1> = 30,
     }
 
     /// References of the drone's controllers.

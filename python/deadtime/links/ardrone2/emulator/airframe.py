@@ -10,16 +10,14 @@ import numpy as np
 from deadtime.links.ardrone2.emulator.clock import Micros
 from deadtime.links.ardrone2.emulator.motion import (
     GRAVITY,
+    LINEAR_PLANTS,
     FreeFall,
     LinearMotion,
     Motion,
     PlantName,
-    linear_plant,
 )
 from deadtime.links.ardrone2.emulator.thrust import Thruster, ThrustMotion
 from deadtime.loops import FirstOrder, Integrator, RationalPlant
-
-__all__ = ["Airframe", "Pose"]
 
 #: Time constants of roll, pitch and turning speed, s.
 ATTITUDE_LAG = 0.15
@@ -65,7 +63,7 @@ class Airframe:
 
     def __init__(self, plant: PlantName) -> None:
         self._hover: Motion = (
-            ThrustMotion(Thruster()) if plant == "thrust" else LinearMotion(linear_plant(plant))
+            ThrustMotion(Thruster()) if plant == "thrust" else LinearMotion(LINEAR_PLANTS[plant])
         )
         self._fall = FreeFall()
         self._vertical: Motion = self._hover
@@ -116,10 +114,6 @@ class Airframe:
         height, climb = self._vertical.at(time)
         self._fall.drop(time, height, climb)
         self._vertical, self.setpoint = self._fall, 0.0
-
-    def height_at(self, time: Micros) -> float:
-        """Height, m."""
-        return self._vertical.at(time)[0]
 
     def vertical_at(self, time: Micros) -> tuple[float, float]:
         """Height and climb, m and m/s."""

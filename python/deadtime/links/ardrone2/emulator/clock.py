@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-__all__ = ["SECOND", "Micros", "micros", "seconds"]
-
 #: A time or a duration in microseconds.
 Micros: TypeAlias = int
 

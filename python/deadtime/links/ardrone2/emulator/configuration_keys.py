@@ -11,8 +11,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["ENTRIES", "LONGEST", "NAVDATA_OPTIONS", "NO_ID", "Entry", "Kind"]
-
 #: DEMO and VISION_DETECT.
 NAVDATA_OPTIONS = 65537
 
@@ -45,14 +43,6 @@ def _number(value: float, low: float, high: float) -> Entry:
     return Entry(f"{value:.7e}", "number", low, high)
 
 
-def _truth(value: str) -> Entry:
-    return Entry(value, "truth")
-
-
-def _text(value: str) -> Entry:
-    return Entry(value, "text")
-
-
 def _vector(*values: float) -> Entry:
     """Numbers of a calibration, in the format of the drone; they are read-only."""
     return Entry(f"{{ {' '.join(f'{value:.7e}' for value in values)} }}")
@@ -64,30 +54,28 @@ MOTORS = {
     for what, version in (("soft", "1.43"), ("hard", "6.0"), ("supplier", "1.1"))
 }
 
-GENERAL = {
+#: All keys. The ranges are those of the developer guide; those it does not give are wide.
+ENTRIES: dict[str, Entry] = {
     "general:num_version_config": Entry("1"),
     "general:num_version_mb": Entry("34"),
     "general:num_version_soft": Entry("2.4.8"),
     "general:drone_serial": Entry("EMULATED"),
     "general:soft_build_date": Entry("1970-01-01 00:00"),
     **MOTORS,
-    "general:ardrone_name": _text("deadtime emulator"),
+    "general:ardrone_name": Entry("deadtime emulator", "text"),
     "general:flying_time": Entry("0"),
-    "general:navdata_demo": _truth("TRUE"),
+    "general:navdata_demo": Entry("TRUE", "truth"),
     "general:navdata_options": _whole(NAVDATA_OPTIONS, 0),
     "general:com_watchdog": Entry("2"),
-    "general:video_enable": _truth("TRUE"),
-    "general:vision_enable": _truth("TRUE"),
+    "general:video_enable": Entry("TRUE", "truth"),
+    "general:vision_enable": Entry("TRUE", "truth"),
     "general:vbat_min": Entry("9000"),
     "general:localtime": _whole(0, 0),
-    "general:localtime_zone": _text("UTC"),
-    "general:timezone": _text("UTC"),
+    "general:localtime_zone": Entry("UTC", "text"),
+    "general:timezone": Entry("UTC", "text"),
     "general:battery_type": _whole(0),
     "general:gps_soft": Entry("0"),
     "general:gps_hard": Entry("0"),
-}
-
-CONTROL = {
     "control:accs_offset": _vector(-2048.0, 2048.0, 2048.0),
     "control:accs_gains": _vector(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0),
     "control:gyros_offset": _vector(0.0, 0.0, 0.0),
@@ -109,10 +97,10 @@ CONTROL = {
     "control:control_iphone_tilt": _number(0.34906584, 0.0, 0.87),
     "control:control_vz_max": _number(700.0, 200.0, 2000.0),
     "control:control_yaw": _number(1.7453293, 0.7, 6.11),
-    "control:outdoor": _truth("FALSE"),
-    "control:flight_without_shell": _truth("FALSE"),
-    "control:autonomous_flight": _truth("FALSE"),
-    "control:manual_trim": _truth("FALSE"),
+    "control:outdoor": Entry("FALSE", "truth"),
+    "control:flight_without_shell": Entry("FALSE", "truth"),
+    "control:autonomous_flight": Entry("FALSE", "truth"),
+    "control:manual_trim": Entry("FALSE", "truth"),
     "control:indoor_euler_angle_max": _number(0.20943952, 0.0, 0.52),
     "control:indoor_control_vz_max": _number(700.0, 200.0, 2000.0),
     "control:indoor_control_yaw": _number(1.7453293, 0.7, 6.11),
@@ -121,26 +109,17 @@ CONTROL = {
     "control:outdoor_control_yaw": _number(3.4906585, 0.7, 6.11),
     "control:flying_mode": _whole(0, 0, 3),
     "control:hovering_range": _whole(1000, 0),
-    "control:flight_anim": _text("0,0"),
-    "control:flying_camera_enable": _truth("FALSE"),
-    "control:flying_camera_mode": _text("0,0,0,0,0,0,0,0,0,0"),
-}
-
-NETWORK = {
-    "network:ssid_single_player": _text("ardrone2_emulated"),
-    "network:ssid_multi_player": _text("ardrone2_emulated"),
+    "control:flight_anim": Entry("0,0", "text"),
+    "control:flying_camera_enable": Entry("FALSE", "truth"),
+    "control:flying_camera_mode": Entry("0,0,0,0,0,0,0,0,0,0", "text"),
+    "network:ssid_single_player": Entry("ardrone2_emulated", "text"),
+    "network:ssid_multi_player": Entry("ardrone2_emulated", "text"),
     "network:wifi_mode": _whole(0, 0, 2),
     "network:wifi_rate": _whole(0),
-    "network:owner_mac": _text("00:00:00:00:00:00"),
-}
-
-PIC = {
+    "network:owner_mac": Entry("00:00:00:00:00:00", "text"),
     "pic:ultrasound_freq": _whole(8),
     "pic:ultrasound_watchdog": _whole(3),
     "pic:pic_version": Entry("262192"),
-}
-
-VIDEO = {
     "video:camif_fps": Entry("30"),
     "video:codec_fps": _whole(30, 15, 30),
     "video:camif_buffers": Entry("2"),
@@ -154,15 +133,12 @@ VIDEO = {
     "video:bitrate_ctrl_mode": _whole(0, 0, 2),
     "video:bitrate_storage": _whole(4000, 0),
     "video:video_channel": _whole(0, 0, 3),
-    "video:video_on_usb": _truth("TRUE"),
+    "video:video_on_usb": Entry("TRUE", "truth"),
     "video:video_file_index": _whole(1, 0),
-    "video:exposure_mode": _text("0"),
-    "video:saturation_mode": _text("0"),
-    "video:whitebalance_mode": _text("0"),
-}
-
-OTHERS = {
-    "leds:leds_anim": _text("0,0,0"),
+    "video:exposure_mode": Entry("0", "text"),
+    "video:saturation_mode": Entry("0", "text"),
+    "video:whitebalance_mode": Entry("0", "text"),
+    "leds:leds_anim": Entry("0,0,0", "text"),
     "detect:enemy_colors": _whole(1),
     "detect:groundstripe_colors": _whole(16),
     "detect:enemy_without_shell": _whole(0),
@@ -173,29 +149,15 @@ OTHERS = {
     "syslog:output": _whole(7),
     "syslog:max_size": _whole(102_400),
     "syslog:nb_files": _whole(5),
-    "userbox:userbox_cmd": _text("0"),
+    "userbox:userbox_cmd": Entry("0", "text"),
     # Doubles, sent as the decimal integer of their 64 bits: stored as received.
-    "gps:latitude": _text("5.0000000000000000e+02"),
-    "gps:longitude": _text("5.0000000000000000e+02"),
-    "gps:altitude": _text("0.0000000000000000e+00"),
-}
-
-CUSTOM = {
+    "gps:latitude": Entry("5.0000000000000000e+02", "text"),
+    "gps:longitude": Entry("5.0000000000000000e+02", "text"),
+    "gps:altitude": Entry("0.0000000000000000e+00", "text"),
     "custom:application_id": Entry(NO_ID, "id"),
-    "custom:application_desc": _text("Default application configuration"),
+    "custom:application_desc": Entry("Default application configuration", "text"),
     "custom:profile_id": Entry(NO_ID, "id"),
-    "custom:profile_desc": _text("Default profile configuration"),
+    "custom:profile_desc": Entry("Default profile configuration", "text"),
     "custom:session_id": Entry(NO_ID, "id"),
-    "custom:session_desc": _text("Default session configuration"),
-}
-
-#: All keys. The ranges are those of the developer guide; those it does not give are wide.
-ENTRIES: dict[str, Entry] = {
-    **GENERAL,
-    **CONTROL,
-    **NETWORK,
-    **PIC,
-    **VIDEO,
-    **OTHERS,
-    **CUSTOM,
+    "custom:session_desc": Entry("Default session configuration", "text"),
 }

@@ -12,8 +12,6 @@ from collections.abc import Callable
 
 from deadtime.links.addresses import canonical
 
-__all__ = ["Connection", "Door"]
-
 #: Most connections to a port at a time, and most unread bytes of one.
 MOST_CONNECTIONS = 4
 MOST_UNREAD = 65536
@@ -25,23 +23,23 @@ IDLE = 30.0
 class Connection(asyncio.Protocol):
     """A connection for writing; received data are ignored."""
 
-    def __init__(self, door: Door) -> None:
-        self._door = door
+    def __init__(self, port: PortConnections) -> None:
+        self._port = port
         self._transport: asyncio.Transport | None = None
         self.host = ""
         #: Time of the last activity of its host.
-        self.heard = 0.0
+        self.active_at = 0.0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Called by asyncio."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         self.host = canonical(transport.get_extra_info("peername")[0])
-        self._door.enter(self)
+        self._port.add(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Called by asyncio."""
-        self._door.leave(self)
+        self._port.remove(self)
 
     def write(self, data: bytes) -> None:
         """Send data; close the connection if the client does not read them."""
@@ -68,42 +66,42 @@ class Connection(asyncio.Protocol):
         return self._transport is not None and not self._transport.is_closing()
 
 
-class Door:
-    """Accepts the connections of a TCP port.
+class PortConnections:
+    """The accepted connections of a TCP port.
 
     Parameters
     ----------
-    answers : callable
+    accepts : callable
         Whether a host is accepted.
-    welcome : callable
+    connected : callable
         Called with each accepted connection.
     """
 
     def __init__(
-        self, answers: Callable[[str], bool], welcome: Callable[[Connection], None]
+        self, accepts: Callable[[str], bool], connected: Callable[[Connection], None]
     ) -> None:
-        self._answers, self._welcome = answers, welcome
+        self._accepts, self._connected = accepts, connected
         self._open: dict[Connection, asyncio.TimerHandle] = {}
 
     def __call__(self) -> Connection:
         """A protocol for asyncio."""
         return Connection(self)
 
-    def enter(self, connection: Connection) -> None:
+    def add(self, connection: Connection) -> None:
         """Accept a new connection, if its host is allowed."""
-        if not self._answers(connection.host):
+        if not self._accepts(connection.host):
             connection.abort()
             return
         if len(self._open) >= MOST_CONNECTIONS:
             latest = next(reversed(self._open))
-            self.leave(latest)
+            self.remove(latest)
             latest.abort()
         loop = asyncio.get_running_loop()
-        connection.heard = loop.time()
+        connection.active_at = loop.time()
         self._open[connection] = loop.call_later(IDLE, self._check_activity, connection)
-        self._welcome(connection)
+        self._connected(connection)
 
-    def leave(self, connection: Connection) -> None:
+    def remove(self, connection: Connection) -> None:
         """Remove a connection."""
         timer = self._open.pop(connection, None)
         if timer is not None:
@@ -112,18 +110,18 @@ class Door:
     def _check_activity(self, connection: Connection) -> None:
         """Close a connection whose host is inactive, or check again later."""
         loop = asyncio.get_running_loop()
-        end = connection.heard + IDLE
+        end = connection.active_at + IDLE
         if loop.time() >= end:
-            self.leave(connection)
+            self.remove(connection)
             connection.abort()
         else:
             # The connection keeps its position in the order of age.
             self._open[connection] = loop.call_at(end, self._check_activity, connection)
 
-    def hear(self, host: str) -> None:
+    def note_activity(self, host: str) -> None:
         """Note activity of a host."""
         for connection in self.of(host):
-            connection.heard = asyncio.get_running_loop().time()
+            connection.active_at = asyncio.get_running_loop().time()
 
     def of(self, host: str) -> list[Connection]:
         """The open connections of a host."""
@@ -132,5 +130,5 @@ class Door:
     def close(self) -> None:
         """Close all connections."""
         for connection in list(self._open):
-            self.leave(connection)
+            self.remove(connection)
             connection.abort()

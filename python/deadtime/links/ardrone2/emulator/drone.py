@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from deadtime.links.addresses import Address
 from deadtime.links.ardrone2.commands import (
     Command,
     Config,
@@ -26,12 +27,10 @@ from deadtime.links.ardrone2.commands import (
 from deadtime.links.ardrone2.configuration import write_configuration
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, micros, seconds
 from deadtime.links.ardrone2.emulator.flight import HOVER, TICK, Flight, Phase, Setpoints
-from deadtime.links.ardrone2.emulator.link import Address, Listener, Order
+from deadtime.links.ardrone2.emulator.link import Listener, Order
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.sensors import Reading, Sensors
 from deadtime.links.ardrone2.emulator.settings import IDS, Settings
-
-__all__ = ["Drone", "Truth"]
 
 #: Time after the last motion command at which a drone hovers, except in the worst case.
 HOVER_AFTER: Micros = SECOND // 4
@@ -96,7 +95,7 @@ class Drone:
     ----------
     settings : Settings
         Its configuration.
-    deaf : bool
+    no_echo : bool
         Set it to make the drone report that its ultrasound receives no echo.
 
     Examples
@@ -114,7 +113,7 @@ class Drone:
     def __init__(self, options: EmulatorOptions, start: float = 0.0) -> None:
         self.options = options
         self.settings = Settings()
-        self.deaf = False
+        self.no_echo = False
         self._start = start
         self._time: Micros = 0
         self._flight = Flight(options, self.settings)
@@ -386,7 +385,7 @@ class Drone:
             link_lost=self._order.lost,
             bootstrap=self._bootstrap,
             options=settings.options if settings.demo else None,
-            deaf=self.deaf,
+            no_echo=self.no_echo,
         )
         leaves = time + micros(self.options.downlink)
         self._packets.append((leaves, self._sensors.packet(reading), address))

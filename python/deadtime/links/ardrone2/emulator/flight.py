@@ -14,8 +14,6 @@ from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, seconds
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
 from deadtime.links.ardrone2.emulator.settings import Settings
 
-__all__ = ["TICK", "Flight", "Phase", "Setpoints"]
-
 #: Time between two steps of the autopilot.
 TICK: Micros = SECOND // 200
 
@@ -130,7 +128,7 @@ class Flight:
         if self.phase is Phase.LANDED:
             return
         down = self.phase in (Phase.LANDING, Phase.FALLING)
-        if down and self.airframe.height_at(time) <= 0.0:
+        if down and self.airframe.vertical_at(time)[0] <= 0.0:
             self._enter(Phase.LANDED, time)
             self.airframe.stand(time)
             return
@@ -146,7 +144,7 @@ class Flight:
         if self.phase is Phase.TAKING_OFF:
             height, climb = _rising(time - self._since)
             if time - self._since >= SPIN_UP:
-                error = height - airframe.height_at(time)
+                error = height - airframe.vertical_at(time)[0]
                 airframe.climb_at(time, climb + HEIGHT_GAIN * error)
         elif self.phase is Phase.LANDING:
             airframe.lean(time, 0.0, 0.0, 0.0)
@@ -161,7 +159,7 @@ class Flight:
         """The climb, limited so that the height stays in its range and slows towards its ends."""
         lowest, highest = self._settings.heights
         fastest = self._settings.climb_limit
-        height = self.airframe.height_at(time)
+        height = self.airframe.vertical_at(time)[0]
         climb = min(climb, HEIGHT_GAIN * (highest - height))
         climb = max(climb, HEIGHT_GAIN * (min(lowest, highest) - height))
         return min(max(climb, -fastest), fastest)

@@ -8,13 +8,8 @@ without activity of its host.
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
+from deadtime.links.addresses import Address
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
-
-__all__ = ["LINK_LOST_AFTER", "Address", "Listener", "Order"]
-
-Address: TypeAlias = tuple[str, int]
 
 #: Time without commands after which the drone warns in its navdata (state bit 30).
 COM_WATCHDOG: Micros = 50_000

@@ -20,16 +20,6 @@ from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
 from deadtime.loops import Integrator, Plant, kit_plant
 from deadtime.loops._plants import rest
 
-__all__ = [
-    "DELAYS",
-    "GRAVITY",
-    "FreeFall",
-    "LinearMotion",
-    "Motion",
-    "PlantName",
-    "linear_plant",
-]
-
 PlantName: TypeAlias = Literal["kit", "paper", "real", "thrust"]
 
 #: Transport delay of each plant, s.
@@ -161,15 +151,12 @@ class FreeFall(Motion):
         return height + (climb - 0.5 * GRAVITY * t) * t, climb - GRAVITY * t
 
 
-def linear_plant(name: PlantName) -> Plant:
-    """The linear plant of a name: from commanded climb to height, without the transport delay."""
-    if name == "kit":
-        return kit_plant()
-    if name == "paper":
-        return Integrator()
-    if name == "real":
-        return Integrator(gain=0.79, lag=0.135)  # fitted to flights of the vehicle
-    raise ValueError(f"the plant {name!r} is not linear")
+#: The linear plants: from commanded climb to height, without the transport delay.
+LINEAR_PLANTS: dict[str, Plant] = {
+    "kit": kit_plant(),
+    "paper": Integrator(),
+    "real": Integrator(gain=0.79, lag=0.135),  # fitted to flights of the vehicle
+}
 
 
 def _exponential(matrix: list[list[float]]) -> tuple[Row, ...]:

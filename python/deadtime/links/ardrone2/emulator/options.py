@@ -10,8 +10,6 @@ from deadtime._base.validation import non_negative
 from deadtime.links.addresses import canonical, is_loopback
 from deadtime.links.ardrone2.emulator.motion import DELAYS, PlantName
 
-__all__ = ["LOOPBACK", "PORT_BASE", "EmulatorOptions", "ports_from"]
-
 LOOPBACK = "127.0.0.1"
 
 #: First port of the vehicle: navdata, commands and control.

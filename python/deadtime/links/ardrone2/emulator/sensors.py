@@ -20,22 +20,17 @@ from deadtime.links.ardrone2.emulator.clock import SECOND, Micros, seconds
 from deadtime.links.ardrone2.emulator.flight import LOW_BATTERY, TICK, Phase
 from deadtime.links.ardrone2.emulator.motion import GRAVITY
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
-from deadtime.links.ardrone2.navdata import (
-    FULL_OPTIONS,
+from deadtime.links.ardrone2.navdata import FULL_OPTIONS, TAGS, Navdata, State, build_navdata
+from deadtime.links.ardrone2.navdata_options import (
     AltitudeOption,
     Demo,
     KalmanPressure,
-    Navdata,
     PhysicalMeasures,
     Pressure,
     Pwm,
     RawMeasures,
-    State,
     VideoStream,
-    build_navdata,
 )
-
-__all__ = ["Reading", "Sensors"]
 
 #: Period of the ultrasound, and its largest height, m.
 ECHO_EVERY: Micros = SECOND // 25
@@ -64,19 +59,6 @@ WORKING = (
     | State.VIDEO_THREAD
     | State.ACQUISITION_THREAD
 )
-
-#: Tags of the options that are filled in, by their names in `Navdata`; the others are zero.
-TAGS = {
-    "demo": Demo.tag,
-    "clock": 1,
-    "raw_measures": RawMeasures.tag,
-    "physical_measures": PhysicalMeasures.tag,
-    "pwm": Pwm.tag,
-    "altitude": AltitudeOption.tag,
-    "video_stream": VideoStream.tag,
-    "pressure": Pressure.tag,
-    "kalman_pressure": KalmanPressure.tag,
-}
 
 #: Control states: the upper half of the word in navdata.
 DEFAULT, LANDED, FLYING, HOVERING, TAKING_OFF, GOING_UP, LANDING = 0, 2, 3, 4, 6, 7, 8
@@ -108,7 +90,7 @@ class Reading:
     bootstrap: bool
     #: The options of short navdata, one bit a tag; None for the long ones.
     options: int | None
-    deaf: bool
+    no_echo: bool
 
 
 class _Noise:
@@ -190,7 +172,7 @@ class Sensors:
             (State.BOOTSTRAP, reading.bootstrap),
             (State.COMMUNICATION_LOST, reading.link_lost),
             (State.BATTERY_LOW, reading.charge < LOW_BATTERY),
-            (State.ULTRASOUND_DEAF, reading.deaf or reading.pose.height > HEARS_UP_TO),
+            (State.ULTRASOUND_DEAF, reading.no_echo or reading.pose.height > HEARS_UP_TO),
             (State.COM_WATCHDOG, reading.link_late),
             (State.EMERGENCY, reading.emergency),
         ):
@@ -254,10 +236,10 @@ def _chosen(bits: int) -> tuple[tuple[int, bytes], ...]:
 
 
 def _control_state(reading: Reading) -> int:
-    if reading.phase is Phase.LANDED:
-        return LANDED
-    if reading.phase is Phase.TAKING_OFF:
-        return GOING_UP if reading.lifted else TAKING_OFF
-    if reading.phase is Phase.FLYING:
-        return HOVERING if reading.hovering else FLYING
-    return LANDING if reading.phase is Phase.LANDING else DEFAULT
+    return {
+        Phase.LANDED: LANDED,
+        Phase.TAKING_OFF: GOING_UP if reading.lifted else TAKING_OFF,
+        Phase.FLYING: HOVERING if reading.hovering else FLYING,
+        Phase.LANDING: LANDING,
+        Phase.FALLING: DEFAULT,
+    }[reading.phase]

@@ -13,17 +13,13 @@ import asyncio
 import math
 from collections.abc import Callable
 from functools import partial
-from types import TracebackType
 from typing import Self
 
 from deadtime._base.errors import LinkError
-from deadtime.links.addresses import canonical, for_socket
-from deadtime.links.ardrone2.emulator.connections import Connection, Door
+from deadtime.links.addresses import Address, canonical, for_socket
+from deadtime.links.ardrone2.emulator.connections import Connection, PortConnections
 from deadtime.links.ardrone2.emulator.drone import Drone, Truth
-from deadtime.links.ardrone2.emulator.link import Address
 from deadtime.links.ardrone2.emulator.options import EmulatorOptions
-
-__all__ = ["Emulator"]
 
 #: Age beyond which navdata that could not be sent in time are dropped, s.
 STALE = 0.25
@@ -93,10 +89,10 @@ class Emulator:
         self.control_port = self.options.control_port
         self.ftp_port, self.video_port = self.options.ftp_port, self.options.video_port
         answers = self.options.answers
-        self._doors = {
-            "control_port": Door(answers, self._connected),
-            "ftp_port": Door(answers, _refuse_files),
-            "video_port": Door(answers, lambda connection: None),
+        self._connections = {
+            "control_port": PortConnections(answers, self._connected),
+            "ftp_port": PortConnections(answers, _refuse_files),
+            "video_port": PortConnections(answers, lambda connection: None),
         }
         self._opening = "navdata_port"
         self._unread: dict[str, tuple[float, bytes]] = {}
@@ -117,12 +113,7 @@ class Emulator:
             ) from error
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await self.close()
 
     async def _open(self) -> None:
@@ -130,11 +121,11 @@ class Emulator:
         self.drone = Drone(self.options, start=loop.time())
         self._navdata = await self._listen("navdata_port", self._woken)
         self._commands = await self._listen("command_port", self._commanded)
-        for name, door in self._doors.items():
+        for name, port in self._connections.items():
             self._opening = name
             if getattr(self, name) is None:
                 continue
-            server = await loop.create_server(door, self.host, getattr(self, name))
+            server = await loop.create_server(port, self.host, getattr(self, name))
             self._servers.append(server)
             setattr(self, name, server.sockets[0].getsockname()[1])
         self._process_events()
@@ -160,8 +151,8 @@ class Emulator:
         for server in self._servers:
             server.close()
         self._servers.clear()
-        for door in self._doors.values():
-            door.close()
+        for port in self._connections.values():
+            port.close()
         self._timer = self._navdata = self._commands = None
 
     def truth(self) -> Truth:
@@ -174,8 +165,8 @@ class Emulator:
 
     def _commanded(self, datagram: bytes, source: Address) -> None:
         self.drone.commanded(datagram, source, asyncio.get_running_loop().time())
-        for door in self._doors.values():
-            door.hear(source[0])
+        for port in self._connections.values():
+            port.note_activity(source[0])
         for host, dump in self.drone.dumps():
             self._send_configuration(host, dump)
         self._process_events()
@@ -206,7 +197,7 @@ class Emulator:
 
         Some clients connect only after their request: their configuration is kept for a time.
         """
-        readers = self._doors["control_port"].of(host)
+        readers = self._connections["control_port"].of(host)
         for reader in readers:
             reader.write(dump)
         if not readers:

@@ -13,8 +13,6 @@ import re
 
 from deadtime.links.ardrone2.emulator.configuration_keys import ENTRIES, LONGEST, NO_ID, Entry
 
-__all__ = ["IDS", "Settings"]
-
 IDS = ("custom:session_id", "custom:profile_id", "custom:application_id")
 
 #: Keys with separate values for indoors and outdoors; `control:outdoor` selects which applies.

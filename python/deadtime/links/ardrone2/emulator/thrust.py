@@ -25,8 +25,6 @@ from deadtime._base.validation import positive
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
 from deadtime.links.ardrone2.emulator.motion import GRAVITY, Motion
 
-__all__ = ["ThrustMotion", "Thruster"]
-
 #: Largest step of the integration: a shorter one is more accurate and slower.
 STEP: Micros = 1000
 
@@ -148,11 +146,6 @@ class ThrustMotion(Motion):
             self._go_to(whole)
         height, climb, _ = self._step(self._state, time - self._time)
         return height, climb
-
-    @property
-    def rotor_speed(self) -> float:
-        """Speed of a rotor at the last evaluation, rad/s."""
-        return self._state[2]
 
     def _go_to(self, time: Micros) -> None:
         while self._time < time:

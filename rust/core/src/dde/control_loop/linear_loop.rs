@@ -13,6 +13,7 @@
 
 use crate::Error;
 use crate::dde::limits::finite;
+use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
 
 /// The matrices of the loop, row-major; n is the length of `b`.
@@ -53,6 +54,11 @@ impl<S: Scalar> Equations<S> {
     /// y.
     pub(crate) fn output(&self, x: &[S], w: S) -> S {
         dot(&self.c, x) + self.d * w
+    }
+
+    /// The change of the states over a time `h` with constant w and r.
+    pub(crate) fn over(&self, h: S) -> Propagator<S> {
+        Propagator::new(&self.a, &[&self.b, &self.e], h)
     }
 }
 
@@ -110,11 +116,10 @@ impl<S: Scalar> LinearLoop<S> {
             ("C", equations.c.len(), n),
         ];
         for (name, found, wanted) in lengths {
-            if found != wanted {
-                return Err(Error::argument(format!(
-                    "{name} has {found} elements, {wanted} are needed for {n} states"
-                )));
-            }
+            refuse_if!(
+                found != wanted,
+                "{name} has {found} elements, {wanted} are needed for {n} states"
+            );
         }
         finite("A", &equations.a)?;
         finite("B", &equations.b)?;
@@ -125,27 +130,26 @@ impl<S: Scalar> LinearLoop<S> {
             "L, M, D, impulse",
             &[equations.l, equations.m, equations.d, equations.impulse],
         )?;
-        if !(delay.is_finite() && delay.value() >= 0.0) {
-            return Err(Error::argument(format!(
-                "delay={}: give a finite number of seconds, zero or more",
-                delay.value()
-            )));
-        }
+        refuse_if!(
+            !(delay.is_finite() && delay.value() >= 0.0),
+            "delay={}: give a finite number of seconds, zero or more",
+            delay.value()
+        );
         if let Some(ts) = sample_time
             && !(ts.is_finite() && ts.value() > 0.0)
         {
-            return Err(Error::argument(format!(
+            refuse!(
                 "sample_time={}: give a positive number of seconds, or none for continuous time",
                 ts.value()
-            )));
+            );
         }
         if let Some(limit) = limit
             && (limit.value().is_nan() || limit.value() <= 0.0)
         {
-            return Err(Error::argument(format!(
+            refuse!(
                 "limit={}: give a positive bound of the command, or none for no limit",
                 limit.value()
-            )));
+            );
         }
         Ok(Self {
             equations,
@@ -164,17 +168,15 @@ impl<S: Scalar> LinearLoop<S> {
             update.command.len(),
             update.reference.len(),
         );
-        if lengths != (n * n, n, n) {
-            return Err(Error::argument(format!(
-                "the update of a sample has {lengths:?} elements, {:?} are needed for {n} states",
-                (n * n, n, n)
-            )));
-        }
-        if self.sample_time.is_none() {
-            return Err(Error::argument(
-                "states that change at samples need a sample_time",
-            ));
-        }
+        refuse_if!(
+            lengths != (n * n, n, n),
+            "the update of a sample has {lengths:?} elements, {:?} are needed for {n} states",
+            (n * n, n, n)
+        );
+        refuse_if!(
+            self.sample_time.is_none(),
+            "states that change at samples need a sample_time"
+        );
         finite("the update of a sample", &update.states)?;
         finite("the update of a sample", &update.command)?;
         finite("the update of a sample", &update.reference)?;

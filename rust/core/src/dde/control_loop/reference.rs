@@ -14,21 +14,21 @@ pub struct Reference {
 impl Reference {
     /// `values[i]` holds from `times[i]` (increasing) on, `before` until the first of them.
     pub fn new(before: f64, times: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
-        if times.len() != values.len() {
-            return Err(Error::argument(format!(
-                "{} reference values for {} reference times: give one value for each time",
-                values.len(),
-                times.len()
-            )));
-        }
+        refuse_if!(
+            times.len() != values.len(),
+            "{} reference values for {} reference times: give one value for each time",
+            values.len(),
+            times.len()
+        );
         finite("reference before the start", &[before])?;
         finite("reference", &values)?;
         finite("reference time", &times)?;
         if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
-            return Err(Error::argument(format!(
+            refuse!(
                 "reference time {} follows {}: sort the times and drop repeated ones",
-                pair[1], pair[0]
-            )));
+                pair[1],
+                pair[0]
+            );
         }
         // Only true jumps are kept, because each one ends an element of time.
         let mut last = before;

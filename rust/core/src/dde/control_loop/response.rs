@@ -132,14 +132,14 @@ fn increasing(name: &str, times: &[f64]) -> Result<(), Error> {
         .find(|(_, (before, time))| !(time > before && time.is_finite()))
     {
         None => Ok(()),
-        Some((_, (_, time))) if !time.is_finite() => Err(Error::argument(format!(
-            "{name} holds {time}: give finite times"
-        ))),
-        Some((at, (before, time))) => Err(Error::argument(format!(
+        Some((_, (_, time))) if !time.is_finite() => {
+            refuse!("{name} holds {time}: give finite times")
+        }
+        Some((at, (before, time))) => refuse!(
             "{name}[{at}]={time:?} does not come after {name}[{}]={before:?}: give increasing \
              times",
             at - 1
-        ))),
+        ),
     }
 }
 

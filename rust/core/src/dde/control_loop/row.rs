@@ -52,11 +52,11 @@ impl<'a, S: Scalar> Row<'a, S> {
                     limit,
                 })
             }
-            _ => Err(Error::argument(format!(
+            _ => refuse!(
                 "a row of {} numbers: a loop with {n} states has {}",
                 row.len(),
                 width(n)
-            ))),
+            ),
         }
     }
 

@@ -52,9 +52,9 @@ pub fn sensitivities(
                         .map(|(&value, &slope)| Dual::new(value, slope))
                         .collect())
                 }
-                _ => Err(Error::argument(format!(
-                    "slopes of parameter {i} are missing: give {length} for each parameter"
-                ))),
+                _ => {
+                    refuse!("slopes of parameter {i} are missing: give {length} for each parameter")
+                }
             }
         };
         let row = duals(of.row, of.row_slopes, width)?;

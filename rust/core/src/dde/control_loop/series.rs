@@ -64,6 +64,19 @@ impl<S: Scalar> Series<S> {
         horner(&self.coefficients, 0, 1, self.degree, sigma)
     }
 
+    /// Bounds of the values on [0, 1].
+    pub(crate) fn range(&self) -> (f64, f64) {
+        let (mut low, mut high) = (self.coefficients[0].value(), self.coefficients[0].value());
+        for c in self.terms()[1..].iter().map(|c| c.value()) {
+            if c > 0.0 {
+                high += c;
+            } else {
+                low += c;
+            }
+        }
+        (low, high)
+    }
+
     /// The polynomial's values alone.
     pub(crate) fn values(&self) -> Series {
         Series {

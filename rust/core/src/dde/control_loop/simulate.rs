@@ -36,15 +36,10 @@ impl<S: Scalar> LinearLoop<S> {
             if let Some(&first) = times.first()
                 && first < 0.0
             {
-                return Err(Error::argument(format!(
-                    "time {first} lies before the start of the run: leave it out"
-                )));
+                refuse!("time {first} lies before the start of the run: leave it out");
             }
             if let Some(pair) = times.windows(2).find(|pair| pair[1] < pair[0]) {
-                return Err(Error::argument(format!(
-                    "time {} follows {}: sort the times",
-                    pair[1], pair[0]
-                )));
+                refuse!("time {} follows {}: sort the times", pair[1], pair[0]);
             }
         }
         match self.sample_time() {
@@ -55,22 +50,21 @@ impl<S: Scalar> LinearLoop<S> {
 
     fn check_start(&self, start: &Start<S>) -> Result<(), Error> {
         let n = self.equations().states();
-        if start.state.len() != n {
-            return Err(Error::argument(format!(
-                "the initial state has {} elements, the loop has {n} states",
-                start.state.len()
-            )));
-        }
+        refuse_if!(
+            start.state.len() != n,
+            "the initial state has {} elements, the loop has {n} states",
+            start.state.len()
+        );
         finite("initial state", &start.state)?;
         finite("command before the start", &[start.command])?;
         finite("command_history", &start.command_history)?;
         match self.sample_time() {
             Some(ts) if !(0.0..ts.value()).contains(&start.sample_phase) => {
-                Err(Error::argument(format!(
+                refuse!(
                     "sample_phase={}: the first sample lies in [0, {}) s after the start",
                     start.sample_phase,
                     ts.value()
-                )))
+                )
             }
             None if !start.command_history.is_empty() || start.sample_phase != 0.0 => {
                 Err(Error::argument(

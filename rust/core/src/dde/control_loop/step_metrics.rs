@@ -76,7 +76,7 @@ impl StepMetrics {
             self.record.bottom = (begin, begins_at);
             Levels::new(begin, self.steady, &self.criteria)
         });
-        let (low, high) = range(y);
+        let (low, high) = y.range();
         let mut zeros = std::mem::take(&mut self.zeros);
 
         // The points at which the output may be greatest or least, in order.
@@ -184,19 +184,6 @@ fn may_turn(y: &Series) -> bool {
     let slopes = y.terms().iter().enumerate().skip(2);
     let others: f64 = slopes.map(|(j, c)| j as f64 * c.abs()).sum();
     y.degree > 1 && others >= y.coefficients[1].abs()
-}
-
-/// Bounds of a polynomial on [0, 1].
-fn range(y: &Series) -> (f64, f64) {
-    let (mut low, mut high) = (y.coefficients[0], y.coefficients[0]);
-    for &c in &y.terms()[1..] {
-        if c > 0.0 {
-            high += c;
-        } else {
-            low += c;
-        }
-    }
-    (low, high)
 }
 
 #[cfg(test)]

@@ -37,15 +37,20 @@ fn lagged(kp: f64, lag: f64) -> Equations {
     }
 }
 
-fn step(plant: &LinearLoop, times: &[f64]) -> Trajectory {
-    let start = Start {
+fn at_rest(plant: &LinearLoop) -> Start {
+    Start {
         state: vec![0.0; plant.equations().states()],
         ..Start::default()
-    };
-    let reference = Reference::step(0.0, 1.0).unwrap();
-    plant
-        .simulate(&start, &reference, times, times, &Task::new())
-        .unwrap()
+    }
+}
+
+fn try_step(plant: &LinearLoop, times: &[f64], task: &Task) -> Result<Trajectory, Error> {
+    let reference = Reference::step(0.0, 1.0)?;
+    plant.simulate(&at_rest(plant), &reference, times, times, task)
+}
+
+fn step(plant: &LinearLoop, times: &[f64]) -> Trajectory {
+    try_step(plant, times, &Task::new()).unwrap()
 }
 
 fn grid(end: f64, n: u32) -> Vec<f64> {
@@ -83,16 +88,9 @@ fn a_limited_loop_without_delay_runs_at_the_limit_and_then_settles() {
     let plant = LinearLoop::new(drone(4.0, 0.0), 0.0, None, Some(1.0)).unwrap();
     let found = step(&plant, &grid(3.0, 60));
     // At the limit until 4 (1 − y) = 1, that is y = 3/4 at t = 3/4.
-    let truth: Vec<f64> = grid(3.0, 60)
-        .iter()
-        .map(|&t| {
-            if t < 0.75 {
-                t
-            } else {
-                1.0 - 0.25 * (-4.0 * (t - 0.75)).exp()
-            }
-        })
-        .collect();
+    let settling = |t: f64| 1.0 - 0.25 * (-4.0 * (t - 0.75)).exp();
+    let truth = |t: f64| if t < 0.75 { t } else { settling(t) };
+    let truth: Vec<f64> = grid(3.0, 60).into_iter().map(truth).collect();
     assert!(apart(&found.outputs, &truth) < 1e-15);
     assert_eq!(found.output_breaks.len(), 1);
     assert!((found.output_breaks[0] - 0.75).abs() < 1e-15);
@@ -101,14 +99,7 @@ fn a_limited_loop_without_delay_runs_at_the_limit_and_then_settles() {
 #[test]
 fn an_algebraic_loop_that_nothing_satisfies_is_refused() {
     let plant = LinearLoop::new(drone(1.0, -1.0), 0.0, None, None).unwrap();
-    let start = Start {
-        state: vec![0.0],
-        ..Start::default()
-    };
-    let reference = Reference::step(0.0, 1.0).unwrap();
-    let error = plant
-        .simulate(&start, &reference, &[1.0], &[], &Task::new())
-        .unwrap_err();
+    let error = try_step(&plant, &[1.0], &Task::new()).unwrap_err();
     assert!(error.to_string().contains("L = 1"), "{error}");
 }
 
@@ -144,18 +135,9 @@ fn neutral_jumps_travel() {
 #[test]
 fn an_unstable_loop_says_when_it_left_the_numbers() {
     let plant = LinearLoop::new(drone(30.0, 0.0), 0.36, None, None).unwrap();
-    let start = Start {
-        state: vec![0.0],
-        ..Start::default()
-    };
-    let reference = Reference::step(0.0, 1.0).unwrap();
-    let error = plant
-        .simulate(&start, &reference, &[1e4], &[], &Task::new())
-        .unwrap_err();
-    assert!(
-        error.to_string().contains("exceeds 1e150 at t ="),
-        "{error}"
-    );
+    let error = try_step(&plant, &[1e4], &Task::new()).unwrap_err();
+    let told = error.to_string().contains("exceeds 1e150 at t =");
+    assert!(told, "{error}");
 }
 
 #[test]
@@ -163,13 +145,7 @@ fn a_stopped_task_stops_the_run() {
     let plant = LinearLoop::new(drone(1.0, 0.0), 1e-6, None, None).unwrap();
     let task = Task::new();
     task.stop();
-    let start = Start {
-        state: vec![0.0],
-        ..Start::default()
-    };
-    let reference = Reference::step(0.0, 1.0).unwrap();
-    let found = plant.simulate(&start, &reference, &[1.0], &[], &task);
-    assert_eq!(found, Err(Error::Interrupted));
+    assert_eq!(try_step(&plant, &[1.0], &task), Err(Error::Interrupted));
 }
 
 #[test]
@@ -179,13 +155,9 @@ fn references_that_jump_at_the_pace_of_the_delay_leave_no_dust() {
     let levels: Vec<f64> = (0..200).map(|i| f64::from(i % 2)).collect();
     let reference = Reference::new(0.0, jumps, levels).unwrap();
     let plant = LinearLoop::new(drone(1.31, 0.0), td, None, Some(1.0)).unwrap();
-    let start = Start {
-        state: vec![0.0],
-        ..Start::default()
-    };
     let times = grid(72.0, 100);
     let found = plant
-        .simulate(&start, &reference, &times, &times, &Task::new())
+        .simulate(&at_rest(&plant), &reference, &times, &times, &Task::new())
         .unwrap();
     let gaps = found
         .output_breaks

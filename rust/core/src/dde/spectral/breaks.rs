@@ -126,16 +126,6 @@ impl Breaks {
         }
         order.map(|order| BreakingPoint { time, order })
     }
-
-    /// Number of points stored.
-    pub fn len(&self) -> usize {
-        self.ahead.len()
-    }
-
-    /// Is no point stored?
-    pub fn is_empty(&self) -> bool {
-        self.ahead.is_empty()
-    }
 }
 
 /// The largest K with C(m + K, m) ≤ DESCENDANTS for m delays, at least 3.
@@ -157,6 +147,13 @@ fn followed(delays: usize) -> u32 {
 mod tests {
     use super::*;
 
+    /// What follows from one point.
+    fn following(time: f64, order: u32, delays: &[f64], neutral: bool) -> Breaks {
+        let mut breaks = Breaks::new(time, delays, neutral, 30);
+        breaks.follow(BreakingPoint { time, order });
+        breaks
+    }
+
     fn all(breaks: &mut Breaks, until: f64) -> Vec<(f64, u32)> {
         let mut found = Vec::new();
         while let Some(point) = breaks.next() {
@@ -172,11 +169,7 @@ mod tests {
 
     #[test]
     fn retarded_points_lose_an_order_each_delay_and_end() {
-        let mut breaks = Breaks::new(0.0, &[0.36], false, 30);
-        breaks.follow(BreakingPoint {
-            time: 0.0,
-            order: 1,
-        });
+        let mut breaks = following(0.0, 1, &[0.36], false);
         let found = all(&mut breaks, 100.0);
         assert_eq!(found.len() as u32, breaks.smooth() - 2);
         for (k, (time, order)) in found.iter().enumerate() {
@@ -187,11 +180,7 @@ mod tests {
 
     #[test]
     fn neutral_points_keep_their_order() {
-        let mut breaks = Breaks::new(1.0, &[0.5], true, 30);
-        breaks.follow(BreakingPoint {
-            time: 1.0,
-            order: 0,
-        });
+        let mut breaks = following(1.0, 0, &[0.5], true);
         let found = all(&mut breaks, 50.9);
         assert_eq!(found.len(), 99);
         assert!(found.iter().all(|(_, order)| *order == 1));
@@ -200,11 +189,7 @@ mod tests {
     #[test]
     fn points_of_two_delays_merge() {
         // 1/3 and 1/5: 2/5 and 1/3 + 1/5 by two ways each, all multiples of 1/15.
-        let mut breaks = Breaks::new(0.0, &[1.0 / 3.0, 0.2], false, 30);
-        breaks.follow(BreakingPoint {
-            time: 0.0,
-            order: 0,
-        });
+        let mut breaks = following(0.0, 0, &[1.0 / 3.0, 0.2], false);
         let times: Vec<f64> = all(&mut breaks, 1.01)
             .iter()
             .map(|(t, _)| 15.0 * t)
@@ -217,16 +202,12 @@ mod tests {
     #[test]
     fn many_delays_stay_bounded() {
         let delays: Vec<f64> = (1..=40).map(|k| f64::from(k).sqrt()).collect();
-        let mut breaks = Breaks::new(0.0, &delays, true, 30);
-        breaks.follow(BreakingPoint {
-            time: 0.0,
-            order: 1,
-        });
+        let mut breaks = following(0.0, 1, &delays, true);
         for _ in 0..2000 {
             let point = breaks.next().unwrap();
             let point = breaks.reach(point.time).unwrap();
             breaks.follow(point);
-            assert!(breaks.len() <= MOST);
+            assert!(breaks.ahead.len() <= MOST);
         }
     }
 }

@@ -73,7 +73,7 @@ impl Delayed {
                 }
                 let index = history.locate(time);
                 let Some(piece) = index.and_then(|index| history.piece(index)) else {
-                    return Err(Error::argument("the history is empty: give one"));
+                    refuse!("the history is empty: give one");
                 };
                 let mut beyond = first + 1;
                 while beyond < n && inwards(place.t, beyond) - delay < piece.end {

@@ -137,22 +137,22 @@ impl Watch {
         }
         // Row by row: the samples at the nodes, then those that check them.
         let mut samples = self.last.clone();
+        let mut sample = |time: f64, y: &[f64]| {
+            let first = samples.len();
+            samples.resize(first + count, 0.0);
+            equation.events(time, y, 0..count, &mut samples[first..])
+        };
         let mut column = vec![0.0; y.len() / n];
         for node in 1..n {
             for (value, row) in column.iter_mut().zip(y.chunks_exact(n)) {
                 *value = row[node];
             }
-            let time = time_at(piece.start, piece.end, nodes.points[node]);
-            let first = samples.len();
-            samples.resize(first + count, 0.0);
-            equation.events(time, &column, 0..count, &mut samples[first..])?;
+            sample(time_at(piece.start, piece.end, nodes.points[node]), &column)?;
         }
         for x in CHECKED {
             let time = time_at(piece.start, piece.end, x);
             piece.value(time, &mut column);
-            let first = samples.len();
-            samples.resize(first + count, 0.0);
-            equation.events(time, &column, 0..count, &mut samples[first..])?;
+            sample(time, &column)?;
         }
         let mut found = Vec::new();
         for event in 0..count {

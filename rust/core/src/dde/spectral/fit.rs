@@ -195,10 +195,8 @@ fn divide(
     }
     for pair in joints.windows(2) {
         if pair[0] > joints[0] {
-            found.breaks.push(BreakingPoint {
-                time: pair[0],
-                order: 0,
-            });
+            let time = pair[0];
+            found.breaks.push(BreakingPoint { time, order: 0 });
         }
         // (start, end, depth), the earliest on top.
         let mut open = vec![(pair[0], pair[1], 0)];
@@ -478,13 +476,8 @@ mod tests {
     fn declared_breaks_are_joints() {
         let found = fitted(&[-0.3, 4.0], |t| (t + 0.3).abs());
         assert_eq!(found.pieces.len(), 2);
-        assert_eq!(
-            found.breaks,
-            [BreakingPoint {
-                time: -0.3,
-                order: 0
-            }]
-        );
+        let time = -0.3;
+        assert_eq!(found.breaks, [BreakingPoint { time, order: 0 }]);
     }
 
     #[test]

@@ -113,9 +113,10 @@ pub struct Problem {
 }
 
 /// Outcome of a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Outcome {
     /// At the end of the interval.
+    #[default]
     Finished,
     /// At a terminal event.
     Event,
@@ -128,7 +129,7 @@ pub enum Outcome {
 }
 
 /// A solution.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solution {
     /// Times of the output.
     pub t: Vec<f64>,

@@ -115,18 +115,9 @@ impl<'a> Run<'a> {
         let mut run = Self {
             problem,
             solution: Solution {
-                t: Vec::new(),
-                y: Vec::new(),
                 history: problem.history.clone(),
                 end: problem.start,
-                t_events: Vec::new(),
-                y_events: Vec::new(),
-                breaks: Vec::new(),
-                nfev: 0,
-                n_nodes: 0,
-                n_elements: 0,
-                n_rejected: 0,
-                outcome: Outcome::Finished,
+                ..Solution::default()
             },
             breaks,
             jump: first.unwrap_or(problem.jumps.len()),

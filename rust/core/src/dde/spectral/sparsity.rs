@@ -22,12 +22,11 @@ pub struct Sparsity {
 impl Sparsity {
     /// A pattern from the row and column of each entry.
     pub fn new(dim: usize, rows: &[usize], columns: &[usize]) -> Result<Self, Error> {
-        if rows.len() != columns.len() || rows.iter().chain(columns).any(|index| *index >= dim) {
-            return Err(Error::argument(format!(
-                "jac_sparsity has entries outside {dim} rows and columns: give the pattern of a \
-                 ({dim}, {dim}) matrix"
-            )));
-        }
+        refuse_if!(
+            rows.len() != columns.len() || rows.iter().chain(columns).any(|index| *index >= dim),
+            "jac_sparsity has entries outside {dim} rows and columns: give the pattern of a \
+             ({dim}, {dim}) matrix"
+        );
         let mut entries: Vec<(usize, usize)> = columns
             .iter()
             .copied()

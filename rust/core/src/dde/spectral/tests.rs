@@ -7,30 +7,27 @@ use super::history::{History, Piece};
 use super::*;
 use crate::{Error, Task};
 
-/// A right-hand side node by node: f(t, y, z, dz, out).
-struct Plain<F> {
-    function: F,
-    delays: usize,
-}
+/// The right-hand side of one equation, node by node: f(t, y, z).
+struct Plain<F>(F);
 
-impl<F: FnMut(f64, &[f64], &[f64], &[f64], &mut [f64])> Equation for Plain<F> {
+impl<F: FnMut(f64, f64, f64) -> f64> Equation for Plain<F> {
     fn slope(&mut self, at: Columns<'_>, out: &mut [f64], _task: &Task) -> Result<(), Error> {
-        let n = at.t.len();
-        let dim = at.y.len() / n;
-        let column = |values: &[f64], node: usize| -> Vec<f64> {
-            values.chunks_exact(n).map(|row| row[node]).collect()
-        };
-        assert_eq!(at.z.len(), self.delays * dim * n);
-        let mut f = vec![0.0; dim];
-        for node in 0..n {
-            let (y, z, dz) = (column(at.y, node), column(at.z, node), column(at.dz, node));
-            (self.function)(at.t[node], &y, &z, &dz, &mut f);
-            for (row, f) in out.chunks_exact_mut(n).zip(&f) {
-                row[node] = *f;
-            }
+        assert_eq!([at.y.len(), at.z.len()], [at.t.len(); 2]);
+        for (node, out) in out.iter_mut().enumerate() {
+            *out = (self.0)(at.t[node], at.y[node], at.z[node]);
         }
         Ok(())
     }
+}
+
+/// y on [−`delay`, 0].
+fn past(delay: f64, gap: f64, tolerance: f64, y: impl Fn(f64) -> f64) -> History {
+    let write = |t: f64, out: &mut [f64]| {
+        out[0] = y(t);
+        Ok(())
+    };
+    let found = approximate((-delay, 0.0), gap, &[], 1, |_, _| tolerance, write);
+    History::new(found.unwrap().pieces)
 }
 
 fn constant(value: f64, start: f64, memory: f64) -> History {
@@ -73,10 +70,7 @@ fn steps(t: f64) -> f64 {
 }
 
 fn linear_decay() -> impl Equation {
-    Plain {
-        function: |_, _: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| out[0] = -z[0],
-        delays: 1,
-    }
+    Plain(|_, _, z: f64| -z)
 }
 
 #[test]
@@ -104,12 +98,7 @@ fn a_breaking_point_within_rounding_of_the_end_is_the_end() {
 #[test]
 fn memory_is_bounded_where_nobody_asks_for_the_past() {
     // At this gain the solution oscillates without end.
-    let mut equation = Plain {
-        function: |_, _: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| {
-            out[0] = -std::f64::consts::FRAC_PI_2 * z[0];
-        },
-        delays: 1,
-    };
+    let mut equation = Plain(|_, _, z: f64| -std::f64::consts::FRAC_PI_2 * z);
     let mut problem = scalar(1.0, 2000.0, 1e-8);
     let most = solve(&problem, &mut equation, &Task::new()).unwrap();
     assert!(most.n_elements > 300 && most.history.len() < 10);
@@ -128,18 +117,7 @@ fn a_delay_far_shorter_than_the_elements_costs_no_more() {
         s = -(-s * delay).exp();
     }
     let mut problem = scalar(delay, 10.0, 1e-9);
-    let past = approximate(
-        (-delay, 0.0),
-        1e-3 * delay,
-        &[],
-        1,
-        |_, _| 1e-14,
-        |t, out| {
-            out[0] = (s * t).exp();
-            Ok(())
-        },
-    );
-    problem.history = History::new(past.unwrap().pieces);
+    problem.history = past(delay, 1e-3 * delay, 1e-14, |t| (s * t).exp());
     let found = solve(&problem, &mut linear_decay(), &Task::new()).unwrap();
     assert!((found.y[0] - (10.0 * s).exp()).abs() < 1e-9);
     assert!(found.n_elements < 100, "{}", found.n_elements);
@@ -147,25 +125,11 @@ fn a_delay_far_shorter_than_the_elements_costs_no_more() {
 
 #[test]
 fn stiff_equations_take_long_elements() {
-    let mut equation = Plain {
-        function: |t: f64, y: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| {
-            out[0] = -1e6 * (y[0] - t.cos()) - t.sin() + 5e5 * (z[0] - (t - 1.0).cos());
-        },
-        delays: 1,
-    };
+    let mut equation = Plain(|t: f64, y: f64, z: f64| {
+        -1e6 * (y - t.cos()) - t.sin() + 5e5 * (z - (t - 1.0).cos())
+    });
     let mut problem = scalar(1.0, 5.0, 1e-8);
-    let past = approximate(
-        (-1.0, 0.0),
-        1e-3,
-        &[],
-        1,
-        |_, _| 1e-13,
-        |t, out| {
-            out[0] = t.cos();
-            Ok(())
-        },
-    );
-    problem.history = History::new(past.unwrap().pieces);
+    problem.history = past(1.0, 1e-3, 1e-13, f64::cos);
     let found = solve(&problem, &mut equation, &Task::new()).unwrap();
     assert!((found.y[0] - 5.0_f64.cos()).abs() < 1e-8);
     assert!(found.n_elements < 150, "{}", found.n_elements);
@@ -174,76 +138,33 @@ fn stiff_equations_take_long_elements() {
 #[test]
 fn what_cannot_go_on_says_where() {
     // y′ = y² + z ends at a finite time; the square root leaves its domain.
-    let mut explosive = Plain {
-        function: |_, y: &[f64], _: &[f64], _: &[f64], out: &mut [f64]| out[0] = y[0] * y[0],
-        delays: 1,
-    };
+    let mut explosive = Plain(|_, y: f64, _| y * y);
     let found = solve(&scalar(1.0, 3.0, 1e-6), &mut explosive, &Task::new()).unwrap();
     assert!(found.outcome != Outcome::Finished && (found.end - 1.0).abs() < 1e-3);
-    let mut root = Plain {
-        function: |t: f64, _: &[f64], _: &[f64], _: &[f64], out: &mut [f64]| {
-            out[0] = (0.5 - t).sqrt();
-        },
-        delays: 1,
-    };
+    let mut root = Plain(|t: f64, _, _| (0.5 - t).sqrt());
     let found = solve(&scalar(1.0, 3.0, 1e-6), &mut root, &Task::new()).unwrap();
     assert!(found.outcome != Outcome::Finished && (found.end - 0.5).abs() < 1e-3);
 }
 
 #[test]
 fn bad_problems_are_refused() {
-    let good = scalar(1.0, 3.0, 1e-6);
-    let bad = [
-        Problem {
-            delays: vec![0.0],
-            ..good.clone()
-        },
-        Problem {
-            delays: vec![-1.0],
-            ..good.clone()
-        },
-        Problem {
-            delays: vec![f64::NAN],
-            ..good.clone()
-        },
-        Problem {
-            delays: vec![1e-20],
-            ..good.clone()
-        },
-        Problem {
-            end: -1.0,
-            ..good.clone()
-        },
-        Problem {
-            y0: vec![f64::NAN],
-            ..good.clone()
-        },
-        Problem {
-            rtol: 0.0,
-            ..good.clone()
-        },
-        Problem {
-            atol: vec![-1.0],
-            ..good.clone()
-        },
-        Problem {
-            max_step: 0.0,
-            ..good.clone()
-        },
-        Problem {
-            t_eval: Some(vec![4.0]),
-            ..good.clone()
-        },
-        Problem {
-            history: constant(0.0, 0.0, 0.5),
-            ..good.clone()
-        },
-        Problem {
-            history: History::default(),
-            ..good
-        },
+    let spoilt: [fn(&mut Problem); 12] = [
+        |problem| problem.delays = vec![0.0],
+        |problem| problem.delays = vec![-1.0],
+        |problem| problem.delays = vec![f64::NAN],
+        |problem| problem.delays = vec![1e-20],
+        |problem| problem.end = -1.0,
+        |problem| problem.y0 = vec![f64::NAN],
+        |problem| problem.rtol = 0.0,
+        |problem| problem.atol = vec![-1.0],
+        |problem| problem.max_step = 0.0,
+        |problem| problem.t_eval = Some(vec![4.0]),
+        |problem| problem.history = constant(0.0, 0.0, 0.5),
+        |problem| problem.history = History::default(),
     ];
-    for problem in bad {
+    for spoil in spoilt {
+        let mut problem = scalar(1.0, 3.0, 1e-6);
+        spoil(&mut problem);
         let refused = solve(&problem, &mut linear_decay(), &Task::new());
         assert!(matches!(refused, Err(Error::Argument(_))), "{problem:?}");
     }
@@ -253,12 +174,7 @@ fn bad_problems_are_refused() {
 fn elements_have_the_order_of_radau_collocation() {
     // y′ = cos(t) y z with z = 1: one element of four nodes, at its end and within.
     let errors = |length: f64| {
-        let mut equation = Plain {
-            function: |t: f64, y: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| {
-                out[0] = t.cos() * y[0] * z[0];
-            },
-            delays: 1,
-        };
+        let mut equation = Plain(|t: f64, y: f64, z: f64| t.cos() * y * z);
         let mut problem = scalar(10.0, 8.0, 1e-13);
         problem.history = constant(1.0, 0.0, 10.0);
         let mut element = element::Element::default();
@@ -297,16 +213,9 @@ proptest! {
     fn exponentials_are_solutions(delay in 0.01..3.0_f64, rate in -1.5..0.5_f64) {
         // y′ = r e^{rτ} y(t − τ) has the solution e^{rt}.
         let factor = rate * (rate * delay).exp();
-        let mut equation = Plain {
-            function: |_, _: &[f64], z: &[f64], _: &[f64], out: &mut [f64]| out[0] = factor * z[0],
-            delays: 1,
-        };
+        let mut equation = Plain(|_, _, z: f64| factor * z);
         let mut problem = scalar(delay, 4.0, 1e-9);
-        let past = approximate((-delay, 0.0), 1e-3 * delay, &[], 1, |_, _| 1e-13, |t, out| {
-            out[0] = (rate * t).exp();
-            Ok(())
-        });
-        problem.history = History::new(past.unwrap().pieces);
+        problem.history = past(delay, 1e-3 * delay, 1e-13, |t| (rate * t).exp());
         let found = solve(&problem, &mut equation, &Task::new()).unwrap();
         prop_assert!((found.y[0] - (4.0 * rate).exp()).abs() < 1e-8 * (1.0 + (4.0 * rate).exp()));
     }

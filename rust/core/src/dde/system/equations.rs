@@ -74,25 +74,24 @@ impl Signal {
         breaks: Vec<usize>,
     ) -> Result<Self, Error> {
         let count = edges.len().saturating_sub(1);
-        if count == 0 || terms == 0 || terms > TERMS {
-            return Err(Error::argument(format!(
-                "{} edges and {terms} coefficients make no signal: give at least two edges and 1 \
-                 to {} coefficients",
-                edges.len(),
-                TERMS
-            )));
-        }
-        if series.len() != count * width * terms {
-            return Err(Error::argument(format!(
-                "{} coefficients for {count} pieces of {width} columns with {terms} each",
-                series.len()
-            )));
-        }
+        refuse_if!(
+            count == 0 || terms == 0 || terms > TERMS,
+            "{} edges and {terms} coefficients make no signal: give at least two edges and 1 \
+             to {} coefficients",
+            edges.len(),
+            TERMS
+        );
+        refuse_if!(
+            series.len() != count * width * terms,
+            "{} coefficients for {count} pieces of {width} columns with {terms} each",
+            series.len()
+        );
         if let Some(pair) = edges.windows(2).find(|pair| pair[1] <= pair[0]) {
-            return Err(Error::argument(format!(
+            refuse!(
                 "the time {} of a signal does not come after {}: give increasing times",
-                pair[1], pair[0]
-            )));
+                pair[1],
+                pair[0]
+            );
         }
         finite("a signal", series)?;
         // A piece with its series; a run works on a copy.
@@ -104,11 +103,10 @@ impl Signal {
                 .filter_map(|column| column.iter().rposition(|c| *c != 0.0))
                 .max()
                 .unwrap_or(0);
-            if degree > 0 && !(pair[0].is_finite() && pair[1].is_finite()) {
-                return Err(Error::argument(
-                    "a piece of a signal without a finite start and end must be constant",
-                ));
-            }
+            refuse_if!(
+                degree > 0 && !(pair[0].is_finite() && pair[1].is_finite()),
+                "a piece of a signal without a finite start and end must be constant"
+            );
             let series = own
                 .chunks_exact(terms)
                 .flat_map(|column| &column[..=degree])

@@ -231,10 +231,10 @@ fn check_growth(x: &[f64], t: f64) -> Result<(), Error> {
     if x.iter().all(|x| x.abs() <= DIVERGED) {
         return Ok(());
     }
-    Err(Error::argument(format!(
+    refuse!(
         "the response exceeds {DIVERGED:e} at t = {t} s after the start: the system is unstable, \
          end the simulation earlier"
-    )))
+    )
 }
 
 fn endless() -> Error {

@@ -28,17 +28,11 @@ impl LinearSystem {
                 term.check(name, rows, columns)?;
             }
         }
-        if equations.derivative.iter().any(|term| term.delay == 0.0) {
-            return Err(Error::argument(
-                "N has a matrix with delay 0: take it to the other side, into E",
-            ));
-        }
+        refuse_if!(
+            equations.derivative.iter().any(|term| term.delay == 0.0),
+            "N has a matrix with delay 0: take it to the other side, into E"
+        );
         Ok(Self { equations })
-    }
-
-    /// The matrices.
-    pub fn equations(&self) -> &SystemEquations {
-        &self.equations
     }
 
     /// y, x and u at `times` (increasing, ≥ 0, s).
@@ -56,37 +50,30 @@ impl LinearSystem {
             ("the input", inputs.track.width(), self.equations.inputs),
         ];
         for (name, found, wanted) in widths {
-            if found != wanted {
-                return Err(Error::argument(format!(
-                    "{name} has {found} components, not {wanted}"
-                )));
-            }
+            refuse_if!(
+                found != wanted,
+                "{name} has {found} components, not {wanted}"
+            );
         }
-        if past
-            .slopes
-            .as_ref()
-            .is_some_and(|slopes| slopes.track.width() != n)
-        {
-            return Err(Error::argument(format!(
-                "the derivative of the history does not have {n} components"
-            )));
-        }
+        refuse_if!(
+            past.slopes
+                .as_ref()
+                .is_some_and(|slopes| slopes.track.width() != n),
+            "the derivative of the history does not have {n} components"
+        );
         finite("the initial state", &past.state)?;
         if let Some(time) = times.iter().find(|time| !time.is_finite()) {
-            return Err(Error::argument(format!(
-                "the times hold {time}: give finite ones"
-            )));
+            refuse!("the times hold {time}: give finite ones");
         }
         if let Some(first) = times.first().filter(|first| **first < 0.0) {
-            return Err(Error::argument(format!(
-                "time {first} lies before the start of the run: leave it out"
-            )));
+            refuse!("time {first} lies before the start of the run: leave it out");
         }
         if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
-            return Err(Error::argument(format!(
+            refuse!(
                 "time {} does not come after {}: give increasing times",
-                pair[1], pair[0]
-            )));
+                pair[1],
+                pair[0]
+            );
         }
         run::run(&self.equations, past, inputs, times, task)
     }

@@ -17,19 +17,17 @@ pub struct Term {
 
 impl Term {
     pub(super) fn check(&self, name: &str, rows: usize, columns: usize) -> Result<(), Error> {
-        if !(self.delay.is_finite() && self.delay >= 0.0) {
-            return Err(Error::argument(format!(
-                "delay {} of {name}: give a finite number of seconds, zero or more",
-                self.delay
-            )));
-        }
-        if self.matrix.len() != rows * columns {
-            return Err(Error::argument(format!(
-                "{name} with delay {} s has {} entries, not {rows} x {columns}",
-                self.delay,
-                self.matrix.len()
-            )));
-        }
+        refuse_if!(
+            !(self.delay.is_finite() && self.delay >= 0.0),
+            "delay {} of {name}: give a finite number of seconds, zero or more",
+            self.delay
+        );
+        refuse_if!(
+            self.matrix.len() != rows * columns,
+            "{name} with delay {} s has {} entries, not {rows} x {columns}",
+            self.delay,
+            self.matrix.len()
+        );
         finite(name, &self.matrix)
     }
 }

@@ -85,18 +85,16 @@ pub fn chain_abscissa(h: &QuasiPolynomial) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quasipoly::make;
 
     fn chain(rows: &[&[f64]], delays: &[f64]) -> f64 {
-        QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec())
-            .map_or(f64::NAN, |h| chain_abscissa(&h))
+        chain_abscissa(&make(rows, delays))
     }
 
     #[test]
     fn only_neutral_and_difference_equations_have_chains() {
-        assert_eq!(
-            chain(&[&[0.0, 1.0], &[1.0]], &[0.0, 1.0]),
-            f64::NEG_INFINITY
-        );
+        let retarded = chain(&[&[0.0, 1.0], &[1.0]], &[0.0, 1.0]);
+        assert_eq!(retarded, f64::NEG_INFINITY);
         assert_eq!(chain(&[&[1.0], &[0.0, 1.0]], &[0.0, 1.0]), f64::INFINITY);
     }
 

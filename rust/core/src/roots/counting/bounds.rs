@@ -259,11 +259,7 @@ pub(crate) fn left_edge(h: &QuasiPolynomial, height: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn make(rows: &[&[f64]], delays: &[f64]) -> QuasiPolynomial {
-        QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec())
-            .unwrap_or_else(|_| QuasiPolynomial::zero())
-    }
+    use crate::quasipoly::make;
 
     #[test]
     fn the_radius_is_close_to_the_least_one() {

@@ -66,10 +66,10 @@ impl Cell {
     ) -> Result<Self, Error> {
         let around = edges.into_iter().fold(Turn::default(), Turn::then);
         let unit = if symmetric { PI } else { TAU };
-        let count = around.revolutions(unit).ok_or(Error::Contour {
-            place: Complex64::new(re.1, im.1),
-            distance: UNDECIDED_SHARE * (re.1 - re.0),
-        })?;
+        let count = around.revolutions(unit).ok_or(Error::contour(
+            Complex64::new(re.1, im.1),
+            UNDECIDED_SHARE * (re.1 - re.0),
+        ))?;
         Ok(Self {
             re,
             im,

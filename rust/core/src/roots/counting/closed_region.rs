@@ -81,12 +81,11 @@ pub(crate) fn closed_sides(
     if re.0.is_infinite() {
         re.0 = bounds::left_edge(h, height);
     }
-    if !(re.0.is_finite() && re.1.is_finite()) {
-        return Err(Error::argument(
-            "no bound for the roots within the open side was found in double precision: close \
-             the region",
-        ));
-    }
+    refuse_if!(
+        !(re.0.is_finite() && re.1.is_finite()),
+        "no bound for the roots within the open side was found in double precision: close \
+         the region"
+    );
     Ok(Region { re, im })
 }
 

@@ -186,8 +186,8 @@ pub(crate) fn half_plane(walker: &mut Walker<'_>, sigma: f64) -> Result<u64, Err
     arc.then(skipped)
         .then(chord)
         .revolutions(PI)
-        .ok_or(Error::Contour {
-            place: Complex64::new(sigma, 0.0),
-            distance: UNDECIDED_SHARE * radius,
-        })
+        .ok_or(Error::contour(
+            Complex64::new(sigma, 0.0),
+            UNDECIDED_SHARE * radius,
+        ))
 }

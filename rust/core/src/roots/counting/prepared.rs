@@ -38,11 +38,10 @@ impl Prepared {
         let (smallest, largest) = sizes().fold((f64::INFINITY, 0.0f64), |(low, high), c| {
             (low.min(c), high.max(c))
         });
-        if largest == 0.0 {
-            return Err(Error::argument(
-                "the zero function: every s is a root, there is nothing to count",
-            ));
-        }
+        refuse_if!(
+            largest == 0.0,
+            "the zero function: every s is a root, there is nothing to count"
+        );
         // Exponents and powers of two are exact.
         let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));
         // The factor is applied in two steps, because 2^1074 itself overflows.
@@ -77,10 +76,7 @@ impl Prepared {
             return Ok(0);
         }
         if re.0 == 0.0 || re.1 == 0.0 {
-            return Err(Error::Contour {
-                place: Complex64::ZERO,
-                distance: f64::MIN_POSITIVE,
-            });
+            return Err(Error::contour(Complex64::ZERO, f64::MIN_POSITIVE));
         }
         Ok(self.zeros)
     }

@@ -67,10 +67,7 @@ pub(crate) fn survey_real(
         walker.pause()?;
         let middle = Complex64::new(low + 0.5 * (high - low), 0.0);
         if walker.probe.evaluations() - begun > limit {
-            return Err(Error::Contour {
-                place: middle,
-                distance: high - low,
-            });
+            return Err(Error::contour(middle, high - low));
         }
         // The middle is rounded, so that the halves differ in length.
         let r = (high - middle.re).max(middle.re - low);
@@ -116,10 +113,10 @@ pub(crate) fn survey_real(
             continue;
         }
         let Some(cut) = place_to_cut(walker, low, high) else {
-            return Err(Error::Contour {
-                place: middle,
-                distance: 2.0 * (high - low).max(f64::EPSILON * modulus(middle)),
-            });
+            return Err(Error::contour(
+                middle,
+                2.0 * (high - low).max(f64::EPSILON * modulus(middle)),
+            ));
         };
         parts.extend([(cut, (high, at_high)), ((low, at_low), cut)]);
     }

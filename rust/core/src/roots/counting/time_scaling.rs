@@ -104,10 +104,9 @@ impl TimeScaling {
     /// An error in the given unit.
     pub(crate) fn explained(&self, error: Error) -> Error {
         match error {
-            Error::Contour { place, distance } => Error::Contour {
-                place: place / self.unit,
-                distance: distance / self.unit,
-            },
+            Error::Contour { place, distance } => {
+                Error::contour(place / self.unit, distance / self.unit)
+            }
             Error::CountMismatch {
                 counted,
                 found,

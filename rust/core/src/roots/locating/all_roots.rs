@@ -128,10 +128,7 @@ pub(crate) fn locate(walker: &mut impl Seek, cell: Cell) -> Result<Vec<Disc>, Er
             && center.im + radius < cell.im.1
             && clear_below;
         if !inside {
-            return Err(Error::Contour {
-                place: center,
-                distance: 2.0 * radius,
-            });
+            return Err(Error::contour(center, 2.0 * radius));
         }
     }
     Ok(within)

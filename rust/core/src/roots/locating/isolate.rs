@@ -362,10 +362,10 @@ impl<'w, W: Seek> Search<'w, W> {
             across.hypot(along) <= radius + 4.0 * f64::EPSILON * center.norm()
         };
         if let Some(disc) = self.found.iter().find(reaches) {
-            return Error::Contour {
-                place: disc.center,
-                distance: 4.0 * (disc.radius + f64::EPSILON * disc.center.norm()),
-            };
+            return Error::contour(
+                disc.center,
+                4.0 * (disc.radius + f64::EPSILON * disc.center.norm()),
+            );
         }
         let found = self.found.iter().filter(|disc| cell.holds(disc.center));
         Error::CountMismatch {

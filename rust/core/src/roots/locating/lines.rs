@@ -512,12 +512,11 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                     } else {
                         sigma + f64::abs(aside) * distance
                     };
-                    if distance > MOST_ASIDE * self.first_step {
-                        return Err(Error::argument(format!(
-                            "the roots right of Re s = {sigma} cannot be counted: the numbers of this \
-                             equation differ too much in size for double precision"
-                        )));
-                    }
+                    refuse_if!(
+                        distance > MOST_ASIDE * self.first_step,
+                        "the roots right of Re s = {sigma} cannot be counted: the numbers of this \
+                         equation differ too much in size for double precision"
+                    );
                     if attempt >= MAX_ASIDE {
                         return Err(error);
                     }

@@ -31,5 +31,6 @@ pub(crate) use newton::Outcome;
 pub(crate) use rightmost::{first, leading};
 pub use rightmost::{rightmost, spectral_abscissa, unstable_and_rightmost};
 pub use sensitivity::sensitivity;
+pub(crate) use stable::is_none;
 pub use stable::is_stable;
 pub(crate) use unstable::{balances, leads_right, rightmost_first};

@@ -42,17 +42,15 @@ const MAX_WANTED: usize = 10_000;
 /// # Ok::<(), deadtime::Error>(())
 /// ```
 pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, Error> {
-    if n == 0 || n > MAX_WANTED {
-        return Err(Error::argument(format!(
-            "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots"
-        )));
-    }
-    if h.kind() == Kind::Advanced {
-        return Err(Error::argument(
-            "an advanced equation has roots arbitrarily far to the right: no root is the \
-             rightmost; the term with the highest power of s must not be delayed more than others",
-        ));
-    }
+    refuse_if!(
+        n == 0 || n > MAX_WANTED,
+        "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots"
+    );
+    refuse_if!(
+        h.kind() == Kind::Advanced,
+        "an advanced equation has roots arbitrarily far to the right: no root is the \
+         rightmost; the term with the highest power of s must not be delayed more than others"
+    );
     match TimeScaling::of(h) {
         None => search(&Prepared::new(h)?, n, None, task),
         Some(scaling) => search(&Prepared::new(&scaling.h)?, n, None, task)

@@ -42,11 +42,7 @@ pub fn sensitivity(
     terms: &[(f64, u32)],
     task: &Task,
 ) -> Result<(Complex64, Vec<Complex64>), Error> {
-    if !near.is_finite() {
-        return Err(Error::argument(format!(
-            "root {near}: give a finite number"
-        )));
-    }
+    refuse_if!(!near.is_finite(), "root {near}: give a finite number");
     let root = simple_root(h, near, task)?;
     let mut probe = Probe::new(h);
     probe.refer_to_dominant(root);
@@ -91,25 +87,22 @@ fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Comp
                 ),
                 None => format!("rounding errors exceed the function near {place}"),
             };
-            Err(Error::argument(format!(
+            refuse!(
                 "the root {near} is not simple: {many}. A multiple root has no derivative, it \
                  splits when a coefficient changes"
-            )))
+            )
         }
-        _ => Err(Error::argument(format!(
+        _ => refuse!(
             "{near} is no root, or too far from one to tell which: give a root as `roots` or \
              `rightmost` lists it"
-        ))),
+        ),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn make(rows: &[&[f64]], delays: &[f64]) -> Result<QuasiPolynomial, Error> {
-        QuasiPolynomial::new(rows.iter().map(|r| r.to_vec()).collect(), delays.to_vec())
-    }
+    use crate::quasipoly::make;
 
     #[test]
     fn a_chain_root_far_out_moves_as_finite_differences_say() -> Result<(), Error> {
@@ -117,30 +110,26 @@ mod tests {
         let task = Task::new();
         let near = Complex64::new(-19.586_391_650_761_6, 2_308.174_365_039_91);
         let step = 1e-4;
-        let (up, _) = sensitivity(&at(2.0 + step)?, near, &[], &task)?;
-        let (down, _) = sensitivity(&at(2.0 - step)?, near, &[], &task)?;
-        let (_, slopes) = sensitivity(&at(2.0)?, near, &[(0.36, 0)], &task)?;
+        let (up, _) = sensitivity(&at(2.0 + step), near, &[], &task)?;
+        let (down, _) = sensitivity(&at(2.0 - step), near, &[], &task)?;
+        let (_, slopes) = sensitivity(&at(2.0), near, &[(0.36, 0)], &task)?;
         let wanted = (up - down) / (2.0 * step);
-        assert!(
-            slopes
-                .iter()
-                .all(|s| (s - wanted).norm() < 1e-7 * wanted.norm())
-        );
+        let room = 1e-7 * wanted.norm();
+        assert!(slopes.iter().all(|s| (s - wanted).norm() < room));
         Ok(())
     }
 
     #[test]
-    fn multiple_roots_and_other_places_are_refused() -> Result<(), Error> {
-        let double = make(&[&[-1.0, 1.0], &[1.0]], &[0.0, 1.0])?;
+    fn multiple_roots_and_other_places_are_refused() {
+        let double = make(&[&[-1.0, 1.0], &[1.0]], &[0.0, 1.0]);
         for near in [Complex64::ZERO, Complex64::new(1e-9, 0.0)] {
             let refused = sensitivity(&double, near, &[], &Task::new());
             assert!(matches!(refused, Err(Error::Argument(m)) if m.contains("2 roots")));
         }
-        let cubed = make(&[&[0.0, 0.0, 0.0, 1.0]], &[0.0])?;
+        let cubed = make(&[&[0.0, 0.0, 0.0, 1.0]], &[0.0]);
         let refused = sensitivity(&cubed, Complex64::ZERO, &[], &Task::new());
         assert!(matches!(refused, Err(Error::Argument(m)) if m.contains("3 roots")));
         let far = sensitivity(&double, Complex64::new(3.0, 1.0), &[], &Task::new());
         assert!(matches!(far, Err(Error::Argument(m)) if m.contains("no root")));
-        Ok(())
     }
 }

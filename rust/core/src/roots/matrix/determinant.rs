@@ -9,7 +9,7 @@ use super::walker::{MAX_EVALUATIONS, MatrixWalker};
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::counting::{Cell, Closed, EDGE_MARGIN};
 use crate::roots::locating::{
-    Effort, Spectrum, all_discs, balances, first, half_plane_discs, leading, leads_right,
+    Effort, Spectrum, all_discs, balances, first, half_plane_discs, is_none, leading, leads_right,
     rightmost_first,
 };
 use crate::roots::region::Region;
@@ -104,12 +104,11 @@ fn close(
     let Region { mut re, mut im } = if mirrored { region.mirrored() } else { *region };
     let open = [re.0, re.1, im.0, im.1].iter().any(|x| x.is_infinite());
     if open {
-        if re.0.is_infinite() && system.longest() > 0.0 {
-            return Err(Error::argument(
-                "the real part is open to the left: close it, far enough left delays make \
-                 infinitely many roots",
-            ));
-        }
+        refuse_if!(
+            re.0.is_infinite() && system.longest() > 0.0,
+            "the real part is open to the left: close it, far enough left delays make \
+             infinitely many roots"
+        );
         let least = LEAST_RADIUS * system.rate();
         let radius = EDGE_MARGIN * Leading::new(system)?.radius(re.0, task)?.max(least);
         re = (re.0.max(-radius), re.1.min(radius));
@@ -206,11 +205,10 @@ pub fn count_right_of(
 /// # Errors
 /// [`Error::Argument`] for n = 0 or an E that cannot be inverted; those of [`roots`].
 pub fn rightmost(system: &CharacteristicMatrix, n: usize, task: &Task) -> Result<RootSet, Error> {
-    if n == 0 || n > MAX_WANTED {
-        return Err(Error::argument(format!(
-            "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots of a matrix"
-        )));
-    }
+    refuse_if!(
+        n == 0 || n > MAX_WANTED,
+        "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots of a matrix"
+    );
     check_regular(system)?;
     let prepared = Prepared::new(system)?;
     if system.longest() == 0.0 {
@@ -233,12 +231,11 @@ pub fn spectral_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<f
     let set = rightmost(system, 1, task)?;
     let isolated = set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re);
     let abscissa = isolated.max(chain_abscissa(system, task)?.1);
-    if abscissa == f64::NEG_INFINITY {
-        return Err(Error::argument(
-            "no line that could be counted has a root to its right: the numbers of this system \
-             differ too much in size for double precision; choose another unit of time",
-        ));
-    }
+    refuse_if!(
+        abscissa == f64::NEG_INFINITY,
+        "no line that could be counted has a root to its right: the numbers of this system \
+         differ too much in size for double precision; choose another unit of time"
+    );
     Ok(abscissa)
 }
 
@@ -302,11 +299,7 @@ pub fn is_stable(system: &CharacteristicMatrix, task: &Task) -> Result<bool, Err
             count_right_of(system, 0.0, task)
         }
     };
-    match number {
-        Ok(number) => Ok(number == 0),
-        Err(Error::Contour { .. }) => Ok(false),
-        Err(error) => Err(error),
-    }
+    is_none(number)
 }
 
 /// A function whose coefficients are the norms of the matrices. Its roots have about the size of

@@ -189,10 +189,10 @@ impl Leading {
         } else if self.difference.is_trivial() {
             Err(beyond())
         } else {
-            Err(Error::argument(format!(
+            refuse!(
                 "the half plane right of Re s = {sigma} holds infinitely many roots, or cannot be \
                  shown to hold finitely many: it must lie right of the chains (chain_abscissa)"
-            )))
+            )
         }
     }
 }

@@ -69,18 +69,16 @@ impl CharacteristicMatrix {
         a: Vec<(f64, Vec<Vec<f64>>)>,
     ) -> Result<Self, Error> {
         let size = e.len();
-        if size == 0 || size > MAX_STATES {
-            return Err(Error::argument(format!(
-                "{size} states: give at least 1 and at most {MAX_STATES}"
-            )));
-        }
+        refuse_if!(
+            size == 0 || size > MAX_STATES,
+            "{size} states: give at least 1 and at most {MAX_STATES}"
+        );
         let mut delays = vec![0.0];
         for (delay, matrix) in n.iter().chain(&a) {
-            if !(delay.is_finite() && *delay >= 0.0) {
-                return Err(Error::argument(format!(
-                    "a delay of {delay} s: give finite ones, not below 0"
-                )));
-            }
+            refuse_if!(
+                !(delay.is_finite() && *delay >= 0.0),
+                "a delay of {delay} s: give finite ones, not below 0"
+            );
             // A matrix of zeros adds no delay.
             if matrix.iter().flatten().any(|x| *x != 0.0) {
                 delays.push(delay + 0.0);
@@ -95,23 +93,21 @@ impl CharacteristicMatrix {
             .chain(n.iter().map(|(delay, m)| (*delay, m, true)))
             .chain(a.iter().map(|(delay, m)| (*delay, m, false)));
         for (delay, matrix, is_slope) in all {
-            if matrix.len() != size || matrix.iter().any(|row| row.len() != size) {
-                return Err(Error::argument(format!(
-                    "a matrix is not {size} by {size}, as E is"
-                )));
-            }
+            refuse_if!(
+                matrix.len() != size || matrix.iter().any(|row| row.len() != size),
+                "a matrix is not {size} by {size}, as E is"
+            );
             let group = if is_slope { &mut slopes } else { &mut values };
             let Some(target) = place(delay).and_then(|place| group.get_mut(place)) else {
                 continue;
             };
             for (sums, row) in target.iter_mut().zip(matrix) {
                 for (sum, x) in sums.iter_mut().zip(row) {
-                    if *x != 0.0 && !USABLE.contains(&x.abs()) {
-                        return Err(Error::argument(format!(
-                            "an entry of {x:e}: entries other than zero must lie between 1e-100 \
-                             and 1e100 in modulus; choose other units"
-                        )));
-                    }
+                    refuse_if!(
+                        *x != 0.0 && !USABLE.contains(&x.abs()),
+                        "an entry of {x:e}: entries other than zero must lie between 1e-100 \
+                         and 1e100 in modulus; choose other units"
+                    );
                     *sum += if is_slope { *x } else { -x };
                 }
             }
@@ -143,12 +139,11 @@ impl CharacteristicMatrix {
             let entries = rows.iter().flatten().flat_map(|term| &term.entries);
             entries.into_iter().any(|entry| entry.column == column)
         };
-        if rows.iter().any(Vec::is_empty) || !(0..size).all(used) {
-            return Err(Error::argument(
-                "the determinant of the characteristic matrix is zero for every s: a row or a \
-                 column of E, N and A together is zero",
-            ));
-        }
+        refuse_if!(
+            rows.iter().any(Vec::is_empty) || !(0..size).all(used),
+            "the determinant of the characteristic matrix is zero for every s: a row or a \
+             column of E, N and A together is zero"
+        );
         Ok(Self { rows, delays, rate })
     }
 

@@ -116,10 +116,7 @@ impl<'a> MatrixWalker<'a> {
         self.evaluations += 1;
         self.work += 20 * size * size * size + 1000;
         if self.evaluations > self.eager_limit {
-            return Err(Error::Contour {
-                place: Complex64::ZERO,
-                distance: 0.0,
-            });
+            return Err(Error::contour(Complex64::ZERO, 0.0));
         }
         if self.work < CHECK_EVERY {
             return Ok(());

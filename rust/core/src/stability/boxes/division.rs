@@ -113,20 +113,18 @@ pub fn proved_boxes(
 
 /// The indices of the parameters that vary, after a check of the ranges.
 pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>, Error> {
-    if ranges.len() != family.names().len() {
-        return Err(Error::argument(format!(
-            "{} ranges for {} parameters ({}): give one range for each parameter",
-            ranges.len(),
-            family.names().len(),
-            family.names().join(", ")
-        )));
-    }
+    refuse_if!(
+        ranges.len() != family.names().len(),
+        "{} ranges for {} parameters ({}): give one range for each parameter",
+        ranges.len(),
+        family.names().len(),
+        family.names().join(", ")
+    );
     for (name, (low, high)) in family.names().iter().zip(ranges) {
-        if !(low.is_finite() && high.is_finite() && (high - low).is_finite() && low <= high) {
-            return Err(Error::argument(format!(
-                "{name} from {low} to {high}: the ends of a range must be finite and in order"
-            )));
-        }
+        refuse_if!(
+            !(low.is_finite() && high.is_finite() && (high - low).is_finite() && low <= high),
+            "{name} from {low} to {high}: the ends of a range must be finite and in order"
+        );
     }
     family.check_delays(ranges)?;
     let varying: Vec<usize> = ranges
@@ -135,13 +133,12 @@ pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>
         .filter(|(_, (low, high))| low < high)
         .map(|(index, _)| index)
         .collect();
-    if varying.len() > MOST_PARAMETERS {
-        return Err(Error::argument(format!(
-            "{} parameters vary ({}): boxes have up to {MOST_PARAMETERS}, give the others values",
-            varying.len(),
-            family.names().join(", ")
-        )));
-    }
+    refuse_if!(
+        varying.len() > MOST_PARAMETERS,
+        "{} parameters vary ({}): boxes have up to {MOST_PARAMETERS}, give the others values",
+        varying.len(),
+        family.names().join(", ")
+    );
     Ok(varying)
 }
 
@@ -325,22 +322,11 @@ mod tests {
         let proved = corners.zip(&boxes.unstable).filter(|(_, n)| **n != UNKNOWN);
         for ((low, high), unstable) in proved.step_by(every) {
             for corner in 0..(1 << count) {
-                let values: Vec<f64> = (0..count)
-                    .map(|i| {
-                        if corner >> i & 1 == 0 {
-                            low[i]
-                        } else {
-                            high[i]
-                        }
-                    })
-                    .collect();
+                let ends = |i: usize| [low[i], high[i]][corner >> i & 1];
+                let values: Vec<f64> = (0..count).map(ends).collect();
                 let h = family.at(&values).unwrap();
-                assert_eq!(
-                    judge(&h, Specification::default(), false, &Task::new())
-                        .unwrap()
-                        .unstable,
-                    *unstable
-                );
+                let cell = judge(&h, Specification::default(), false, &Task::new());
+                assert_eq!(cell.unwrap().unstable, *unstable);
             }
         }
     }
@@ -406,14 +392,8 @@ mod tests {
     fn the_radius_is_that_of_the_closed_form() {
         // Kv = 0: stable for Kp T < π/2. The radius is where both parameters have grown by it.
         let point = [2.0, 0.0, 0.36];
-        let found = stability_radius(
-            &velocity(),
-            &point,
-            &[2.0, 0.0, 0.36],
-            (1e-6, 100_000),
-            &Task::new(),
-        )
-        .unwrap();
+        let limits = (1e-6, 100_000);
+        let found = stability_radius(&velocity(), &point, &point, limits, &Task::new()).unwrap();
         let truth = (0.5 * std::f64::consts::PI / 0.72).sqrt() - 1.0;
         assert!(found.radius <= truth && truth <= found.upper);
         assert!(found.upper <= found.radius * (1.0 + 2e-6));

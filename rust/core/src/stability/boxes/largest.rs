@@ -45,11 +45,10 @@ pub fn largest_stable_box(
     let varying = check(family, ranges)?;
     if let Some(point) = around {
         let inside = |((low, high), value): (&(f64, f64), &f64)| low <= value && value <= high;
-        if point.len() != ranges.len() || !ranges.iter().zip(point).all(inside) {
-            return Err(Error::argument(
-                "the point that the box has to contain lies outside the ranges",
-            ));
-        }
+        refuse_if!(
+            point.len() != ranges.len() || !ranges.iter().zip(point).all(inside),
+            "the point that the box has to contain lies outside the ranges"
+        );
     }
     match varying.len() {
         0 | 1 => search::<1>(family, ranges, &varying, around, tol, task),

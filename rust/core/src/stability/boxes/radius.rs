@@ -84,30 +84,25 @@ pub fn stability_radius(
     (tol, boxes): (f64, usize),
     task: &Task,
 ) -> Result<Radius, Error> {
-    if scales.len() != point.len() {
-        return Err(Error::argument(format!(
-            "{} scales for {} parameters: give one for each parameter",
-            scales.len(),
-            point.len()
-        )));
-    }
+    refuse_if!(
+        scales.len() != point.len(),
+        "{} scales for {} parameters: give one for each parameter",
+        scales.len(),
+        point.len()
+    );
     if let Some(scale) = scales.iter().find(|s| !(s.is_finite() && **s >= 0.0)) {
-        return Err(Error::argument(format!(
-            "scale {scale}: scales must be finite and not negative"
-        )));
+        refuse!("scale {scale}: scales must be finite and not negative");
     }
     let cell = judge(&family.at(point)?, Specification::default(), false, task)?;
-    if cell.unstable != 0 {
-        return Err(Error::argument(
-            "the member at this point is not stable, or too close to the edge of stability to \
-             tell: start from a stable one",
-        ));
-    }
-    if scales.iter().all(|scale| *scale == 0.0) {
-        return Err(Error::argument(
-            "all scales are 0: give the parameters that may move a scale above 0",
-        ));
-    }
+    refuse_if!(
+        cell.unstable != 0,
+        "the member at this point is not stable, or too close to the edge of stability to \
+         tell: start from a stable one"
+    );
+    refuse_if!(
+        scales.iter().all(|scale| *scale == 0.0),
+        "all scales are 0: give the parameters that may move a scale above 0"
+    );
     let floored = |index: usize| {
         let slope = |delay: &crate::stability::family::Affine| delay.slopes.get(index).copied();
         family

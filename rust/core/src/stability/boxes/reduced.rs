@@ -192,15 +192,12 @@ impl<'a, const D: usize> Reduced<'a, D> {
             }
         }
         let rounding = f64::EPSILON * self.digits;
-        if sums
-            .iter()
-            .all(|(_, sum, size)| sum.abs() <= rounding * size)
-        {
-            return Err(Error::argument(
-                "s = 0 is a root for all values of the parameters, so that no member is stable: \
-                 cancel the factor s to judge the other roots",
-            ));
-        }
+        refuse_if!(
+            sums.iter()
+                .all(|(_, sum, size)| sum.abs() <= rounding * size),
+            "s = 0 is a root for all values of the parameters, so that no member is stable: \
+             cancel the factor s to judge the other roots"
+        );
         Ok(())
     }
 }

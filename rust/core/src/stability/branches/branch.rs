@@ -286,13 +286,11 @@ impl Branches {
 mod tests {
     use super::*;
     use crate::lambertw::lambertw;
-    use crate::quasipoly::QuasiPolynomial;
+    use crate::quasipoly::make;
 
     #[test]
     fn branches_of_lambert_w_are_followed() {
-        let a = QuasiPolynomial::new(vec![vec![0.0, 1.0]], vec![0.0]).unwrap();
-        let b = QuasiPolynomial::new(vec![vec![1.0]], vec![1.0]).unwrap();
-        let plane = Plane::new(&a, &b);
+        let plane = Plane::new(&make(&[&[0.0, 1.0]], &[0.0]), &make(&[&[1.0]], &[1.0]));
         for cells in [100, 1000] {
             let points: Vec<f64> = (0..=cells)
                 .map(|index| 0.5 + 9.5 * f64::from(index) / f64::from(cells))
@@ -316,9 +314,7 @@ mod tests {
     #[test]
     fn a_double_root_is_not_passed() {
         // At k = 1/e the first two roots of s + k e^(−s) meet.
-        let a = QuasiPolynomial::new(vec![vec![0.0, 1.0]], vec![0.0]).unwrap();
-        let b = QuasiPolynomial::new(vec![vec![1.0]], vec![1.0]).unwrap();
-        let plane = Plane::new(&a, &b);
+        let plane = Plane::new(&make(&[&[0.0, 1.0]], &[0.0]), &make(&[&[1.0]], &[1.0]));
         let points: Vec<f64> = (0..100)
             .map(|index| 0.3 + 0.002 * f64::from(index))
             .collect();

@@ -111,16 +111,12 @@ mod tests {
 
     use super::*;
     use crate::lambertw::lambertw;
-    use crate::quasipoly::QuasiPolynomial;
-    use crate::simd::Columns;
-    use crate::simd::Instructions;
-    use crate::simd::sweep_on;
+    use crate::quasipoly::make;
+    use crate::simd::{Columns, Instructions, sweep_on};
 
     /// s + k e^(−s), whose roots are W_j(−k).
     fn plane() -> Plane {
-        let a = QuasiPolynomial::new(vec![vec![0.0, 1.0]], vec![0.0]).unwrap();
-        let b = QuasiPolynomial::new(vec![vec![1.0]], vec![1.0]).unwrap();
-        Plane::new(&a, &b)
+        Plane::new(&make(&[&[0.0, 1.0]], &[0.0]), &make(&[&[1.0]], &[1.0]))
     }
 
     #[test]
@@ -136,18 +132,10 @@ mod tests {
             let around = plane.around(start, 0.2).unwrap();
             let [error, slope_error, bend] = around.bounds(k);
             let (center, within) = (around.center, 0.5 * around.radius);
-            let element = [
-                start.re,
-                start.im,
-                k,
-                error,
-                slope_error,
-                bend,
-                center.re,
-                center.im,
-                within,
-            ];
-            for (row, value) in arguments.iter_mut().zip(element) {
+            let place = [start.re, start.im, k];
+            let bounds = [error, slope_error, bend];
+            let element = [place, bounds, [center.re, center.im, within]];
+            for (row, value) in arguments.iter_mut().zip(element.concat()) {
                 row[column] = value;
             }
             roots.push(root);

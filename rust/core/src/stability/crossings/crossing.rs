@@ -60,22 +60,22 @@ const CLOSE_LENGTHS: f64 = 0.7;
 /// of the last trial.
 const TRIALS: (f64, f64) = (1.6, 0.125);
 
-/// A point where roots cross the line, or may cross it.
+/// A point where roots cross the edge of a specification, or may cross it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Crossing {
-    /// The imaginary part of the root, 1/s.
-    pub(crate) omega: f64,
-    /// The best value of k.
-    pub(crate) gain: f64,
+pub struct Crossing {
+    /// The imaginary part of the root, zero or positive, 1/s.
+    pub omega: f64,
+    /// The best value of the gain.
+    pub gain: f64,
     /// An interval that holds it.
-    pub(crate) low: f64,
+    pub low: f64,
     /// Its other end.
-    pub(crate) high: f64,
-    /// Roots that move to the right as k grows minus those that move to the left; `None` where it
-    /// is not known whether any cross at all.
-    pub(crate) jump: Option<i32>,
-    /// B there, where ω = 0.
-    pub(crate) slope_at_zero: Option<f64>,
+    pub high: f64,
+    /// Roots that move to the right as the gain grows minus those that move to the left; `None`
+    /// where it is not known whether any cross at all.
+    pub jump: Option<i32>,
+    /// The slope of the family in the gain at s = 0, where ω = 0.
+    pub slope_at_zero: Option<f64>,
 }
 
 /// What a point proves of its neighbourhood.

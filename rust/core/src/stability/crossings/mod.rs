@@ -8,8 +8,8 @@ mod one_gain;
 mod pencil;
 mod row;
 
-pub(crate) use crossing::Crossing;
+pub use crossing::Crossing;
+pub use one_gain::crossings_along;
 pub(crate) use one_gain::radius_of_members;
-pub use one_gain::{AxisCrossing, crossings_along};
 pub(crate) use pencil::{sizes, united};
 pub(crate) use row::{Members, Row};

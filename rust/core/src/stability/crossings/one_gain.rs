@@ -27,22 +27,6 @@ const ROOM: f64 = 1e-9;
 /// Relative error of four roundings.
 const SLACK: f64 = 2.0 * f64::EPSILON;
 
-/// A value of the gain at which roots cross the imaginary axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxisCrossing {
-    /// The gain.
-    pub gain: f64,
-    /// An interval that holds it.
-    pub low: f64,
-    /// Its other end.
-    pub high: f64,
-    /// Imaginary part of the root, zero or positive, 1/s.
-    pub omega: f64,
-    /// Roots that move to the right as the gain grows minus those that move to the left; `None`
-    /// where it is not known whether any cross at all.
-    pub jump: Option<i32>,
-}
-
 /// All values in `range` of the parameter with index `parameter` at which the member of `family`
 /// has a root on the imaginary axis, by increasing frequency. `values` holds the other parameters.
 ///
@@ -73,7 +57,7 @@ pub fn crossings_along(
     parameter: usize,
     range: (f64, f64),
     task: &Task,
-) -> Result<Vec<AxisCrossing>, Error> {
+) -> Result<Vec<Crossing>, Error> {
     let name = family.names().get(parameter).map_or("", String::as_str);
     let mut ranges: Vec<(f64, f64)> = values.iter().map(|value| (*value, *value)).collect();
     if let Some(place) = ranges.get_mut(parameter) {
@@ -81,9 +65,7 @@ pub fn crossings_along(
     }
     family.check_delays(&ranges)?;
     let Some((constant, slope)) = family.split(parameter) else {
-        return Err(Error::argument(format!(
-            "{name} does not enter only as a factor of terms"
-        )));
+        refuse!("{name} does not enter only as a factor of terms");
     };
     let mut bare = values.to_vec();
     if let Some(value) = bare.get_mut(parameter) {
@@ -93,11 +75,10 @@ pub fn crossings_along(
     if b.is_zero() {
         return Ok(Vec::new());
     }
-    if at_zero(&a) == 0.0 && at_zero(&b) == 0.0 {
-        return Err(Error::argument(format!(
-            "a root stays at s = 0 whatever {name} is: divide the equation by s"
-        )));
-    }
+    refuse_if!(
+        at_zero(&a) == 0.0 && at_zero(&b) == 0.0,
+        "a root stays at s = 0 whatever {name} is: divide the equation by s"
+    );
     let top = radius_of_members(&a, &b, range, name)?;
     if top == 0.0 {
         return Ok(Vec::new());
@@ -112,22 +93,12 @@ pub fn crossings_along(
         None => None,
     };
     let Some(found) = found else {
-        return Err(Error::argument(format!(
+        refuse!(
             "the crossings over {name} are beyond double precision: a root may stay on the \
              imaginary axis whatever {name} is, or coefficients differ by too many decades"
-        )));
+        );
     };
-    Ok(found.iter().map(axis_crossing).collect())
-}
-
-fn axis_crossing(crossing: &Crossing) -> AxisCrossing {
-    AxisCrossing {
-        gain: crossing.gain,
-        low: crossing.low,
-        high: crossing.high,
-        omega: crossing.omega,
-        jump: crossing.jump,
-    }
+    Ok(found)
 }
 
 /// h(0).
@@ -169,19 +140,17 @@ pub(crate) fn radius_of_members(
     }
     let (others, rest) = (sizes.get(..degree).unwrap_or_default(), sizes.get(degree));
     let (leading, rest) = (leading.unwrap_or(0.0), rest.copied().unwrap_or(0.0));
-    if leading == 0.0 {
-        return Err(Error::argument(format!(
-            "the coefficient of the highest power of s without further delay vanishes for some {name} of the \
-             range: choose a range in which it keeps its sign"
-        )));
-    }
+    refuse_if!(
+        leading == 0.0,
+        "the coefficient of the highest power of s without further delay vanishes for some {name} of the \
+         range: choose a range in which it keeps its sign"
+    );
     let excess = leading * (1.0 - ROOM) - rest * (1.0 + ROOM);
-    if excess.is_nan() || excess <= 0.0 {
-        return Err(Error::argument(format!(
-            "the equation is neutral, and for some {name} of the range chains of infinitely many roots \
-             may reach the imaginary axis: choose a smaller range"
-        )));
-    }
+    refuse_if!(
+        excess.is_nan() || excess <= 0.0,
+        "the equation is neutral, and for some {name} of the range chains of infinitely many roots \
+         may reach the imaginary axis: choose a smaller range"
+    );
     Ok(exceeding_radius(others, excess))
 }
 

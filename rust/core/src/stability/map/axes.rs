@@ -20,9 +20,7 @@ impl Axis<'_> {
     /// [`Error::Argument`] where a point is not finite.
     pub(crate) fn range(&self) -> Result<Option<(f64, f64)>, Error> {
         if let Some(point) = self.points.iter().find(|point| !point.is_finite()) {
-            return Err(Error::argument(format!(
-                "{point} on an axis: its points must be finite"
-            )));
+            refuse!("{point} on an axis: its points must be finite");
         }
         let low = self.points.iter().copied().fold(f64::INFINITY, f64::min);
         let high = self
@@ -41,12 +39,12 @@ impl Axis<'_> {
 pub(crate) fn check_parameters(family: &Family, axes: [Axis<'_>; 2]) -> Result<(), Error> {
     let count = family.names().len();
     let [first, second] = axes;
-    if first.parameter == second.parameter || first.parameter.max(second.parameter) >= count {
-        return Err(Error::argument(format!(
-            "axes along parameters {} and {} of {count}: a map needs two different ones",
-            first.parameter, second.parameter
-        )));
-    }
+    refuse_if!(
+        first.parameter == second.parameter || first.parameter.max(second.parameter) >= count,
+        "axes along parameters {} and {} of {count}: a map needs two different ones",
+        first.parameter,
+        second.parameter
+    );
     Ok(())
 }
 

@@ -40,6 +40,12 @@ struct Arm {
 }
 
 impl Arm {
+    /// The order of their ends.
+    fn by_frequency(&self, other: &Self) -> std::cmp::Ordering {
+        let omega = |arm: &Self| arm.last().map_or(0.0, |last| last.omega);
+        omega(self).total_cmp(&omega(other))
+    }
+
     fn last(&self) -> Option<&Vertex> {
         self.vertices.last()
     }
@@ -131,10 +137,7 @@ pub(crate) fn join(rows: &[Vec<Crossing>], range: (f64, f64)) -> Vec<Vec<Vertex>
         going.extend(fresh.map(|(vertex, _)| Arm {
             vertices: vec![*vertex],
         }));
-        going.sort_by(|a, b| {
-            let omega = |arm: &Arm| arm.last().map_or(0.0, |last| last.omega);
-            omega(a).total_cmp(&omega(b))
-        });
+        going.sort_by(Arm::by_frequency);
         arms = going;
     }
     done.extend(arms.into_iter().map(|arm| arm.vertices));
@@ -194,10 +197,7 @@ fn closest<T>(
 
 /// Curves that end in the same row, two arms of opposite directions joined where they meet.
 fn turned(mut ended: Vec<Arm>, scale: (f64, f64)) -> Vec<Vec<Vertex>> {
-    ended.sort_by(|a, b| {
-        let omega = |arm: &Arm| arm.last().map_or(0.0, |last| last.omega);
-        omega(a).total_cmp(&omega(b))
-    });
+    ended.sort_by(Arm::by_frequency);
     let mut curves = Vec::with_capacity(ended.len());
     let mut rest = ended.into_iter().peekable();
     while let Some(mut arm) = rest.next() {

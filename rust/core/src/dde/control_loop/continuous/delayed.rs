@@ -194,22 +194,14 @@ impl Orders {
     /// Order of the break of the command where w breaks with order `arriving` and the reference may
     /// jump.
     fn of_command(&self, arriving: Order, jumps: bool) -> Order {
-        let passed = Self::pass(arriving, self.command_is_direct);
-        if jumps {
-            passed.min(self.reference_in_command)
-        } else {
-            passed
-        }
+        let jump = jumps.then_some(self.reference_in_command);
+        Self::pass(arriving, self.command_is_direct).min(jump.unwrap_or(SMOOTH))
     }
 
     /// Order of the break of the output, likewise.
     fn of_output(&self, arriving: Order, jumps: bool) -> Order {
-        let passed = Self::pass(arriving, self.output_is_direct);
-        if jumps {
-            passed.min(self.reference_in_output)
-        } else {
-            passed
-        }
+        let jump = jumps.then_some(self.reference_in_output);
+        Self::pass(arriving, self.output_is_direct).min(jump.unwrap_or(SMOOTH))
     }
 
     fn pass(arriving: Order, direct: bool) -> Order {

@@ -93,11 +93,7 @@ pub(super) fn run<S: Scalar>(
                 }
             }
             let v = (dot(&closed.k, &x) + closed.m * S::from(r)).value();
-            mode = match limit.map(S::value) {
-                Some(limit) if v > limit => Mode::High,
-                Some(limit) if v < -limit => Mode::Low,
-                _ => Mode::Free,
-            };
+            mode = limit.map_or(Mode::Free, |limit| Mode::of(v, limit.value()));
         }
         let held = match mode {
             Mode::Free => None,
@@ -188,18 +184,17 @@ impl<S: Scalar> Closed<S> {
         let equations = plant.equations();
         let denominator = S::from(1.0) - equations.l;
         let sign = denominator.value();
-        if sign == 0.0 || (sign < 0.0 && plant.limit().is_some()) {
-            return Err(Error::argument(format!(
-                "without a delay the command depends on itself with gain L = {}, which {}: give \
-                 the loop a delay or filter the derivative",
-                equations.l.value(),
-                if sign == 0.0 {
-                    "no command satisfies"
-                } else {
-                    "several limited commands satisfy"
-                }
-            )));
-        }
+        refuse_if!(
+            sign == 0.0 || (sign < 0.0 && plant.limit().is_some()),
+            "without a delay the command depends on itself with gain L = {}, which {}: give \
+             the loop a delay or filter the derivative",
+            equations.l.value(),
+            if sign == 0.0 {
+                "no command satisfies"
+            } else {
+                "several limited commands satisfy"
+            }
+        );
         let k: Vec<S> = equations.k.iter().map(|&k| k / denominator).collect();
         let m = equations.m / denominator;
         let n = equations.states();

@@ -52,14 +52,7 @@ pub(super) fn stretches<S: Scalar>(u: &Series<S>, limit: f64, out: &mut Vec<Stre
         start: 0.0,
         end: 1.0,
     };
-    let (mut low, mut high) = (u.coefficients[0].value(), u.coefficients[0].value());
-    for c in u.terms()[1..].iter().map(|c| c.value()) {
-        if c > 0.0 {
-            high += c;
-        } else {
-            low += c;
-        }
-    }
+    let (low, high) = u.range();
     if high <= limit && low >= -limit {
         return out.push(whole(Mode::Free));
     }

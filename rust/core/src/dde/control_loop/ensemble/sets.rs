@@ -36,13 +36,8 @@ pub struct Sets<'a> {
 
 impl<'a> Sets<'a> {
     /// Number of sets.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.rows.len() / width(self.states)
-    }
-
-    /// Is there no set?
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     pub(super) fn row(&self, set: usize) -> Result<Row<'a>, Error> {

@@ -130,21 +130,22 @@ pub fn run(
         inputs.push(u);
         for (i, (node, row)) in formula.nodes.iter().zip(formula.rows).enumerate() {
             stage.copy_from_slice(&x);
-            for (weight, slope) in row.iter().zip(slopes.chunks_exact(n.max(1))) {
-                for (value, k) in stage.iter_mut().zip(slope) {
-                    *value += h * weight * k;
-                }
-            }
+            advance(&mut stage, h, row, &slopes);
             let slope = &mut slopes[i * n..(i + 1) * n];
             simulation.slope(&stage, k, *node, slope);
         }
-        for (weight, slope) in formula.weights.iter().zip(slopes.chunks_exact(n.max(1))) {
-            for (value, k) in x.iter_mut().zip(slope) {
-                *value += h * weight * k;
-            }
-        }
+        advance(&mut x, h, formula.weights, &slopes);
     }
     Ok((outputs, inputs))
+}
+
+/// Add the weighted slopes over a step of length h.
+fn advance(x: &mut [f64], h: f64, weights: &[f64], slopes: &[f64]) {
+    for (weight, slope) in weights.iter().zip(slopes.chunks_exact(x.len().max(1))) {
+        for (value, k) in x.iter_mut().zip(slope) {
+            *value += h * weight * k;
+        }
+    }
 }
 
 /// The signals at one instant.
@@ -297,35 +298,32 @@ fn check(blocks: &Blocks, settings: &Settings, rest: &Rest) -> Result<(), Error>
         && blocks.controller_reference.len() == m
         && blocks.controller_output.len() == m
         && rest.state.len() == n + m;
-    if !fits {
-        return Err(Error::argument(format!(
-            "the matrices of {n} plant and {m} controller states, or the {} initial states, do \
-             not fit together",
-            rest.state.len()
-        )));
-    }
-    if !(settings.step > 0.0 && settings.step.is_finite()) {
-        return Err(Error::argument(format!(
-            "step={} s: give a step above zero",
-            settings.step
-        )));
-    }
-    if !(settings.delay >= 0.0 && settings.delay.is_finite()) {
-        return Err(Error::argument(format!(
-            "delay={} s: give zero or more",
-            settings.delay
-        )));
-    }
-    if settings.delay == 0.0 && blocks.plant_direct != 0.0 {
-        return Err(Error::argument(format!(
-            "without a delay, a plant that passes its command straight to its output (D={}) makes \
-             an algebraic loop, which fixed steps cannot run: use the exact simulation",
-            blocks.plant_direct
-        )));
-    }
-    if settings.sample_steps == Some(0) {
-        return Err(Error::argument("the sample time is shorter than a step"));
-    }
+    refuse_if!(
+        !fits,
+        "the matrices of {n} plant and {m} controller states, or the {} initial states, do \
+         not fit together",
+        rest.state.len()
+    );
+    refuse_if!(
+        !(settings.step > 0.0 && settings.step.is_finite()),
+        "step={} s: give a step above zero",
+        settings.step
+    );
+    refuse_if!(
+        !(settings.delay >= 0.0 && settings.delay.is_finite()),
+        "delay={} s: give zero or more",
+        settings.delay
+    );
+    refuse_if!(
+        settings.delay == 0.0 && blocks.plant_direct != 0.0,
+        "without a delay, a plant that passes its command straight to its output (D={}) makes \
+         an algebraic loop, which fixed steps cannot run: use the exact simulation",
+        blocks.plant_direct
+    );
+    refuse_if!(
+        settings.sample_steps == Some(0),
+        "the sample time is shorter than a step"
+    );
     if settings.steps > MOST_STEPS {
         return Err(Error::TooMuch {
             what: "the run in fixed steps",

@@ -104,11 +104,11 @@ impl<'a> Rows<'a> {
         } else if data.len() == width * cells {
             width
         } else {
-            return Err(Error::argument(format!(
+            refuse!(
                 "{name} has {} elements: give {width} for all cells or {} for {cells} cells",
                 data.len(),
                 width * cells
-            )));
+            );
         };
         Ok(Self { data, width, step })
     }

@@ -28,13 +28,11 @@ pub(crate) fn run<S: Scalar>(
 ) -> Result<Trajectory<S>, Error> {
     let equations = plant.equations();
     let timing = Timing::new(plant.delay(), sample_time);
-    let columns = [equations.b.as_slice(), equations.e.as_slice()];
-    let hold = |h: S| Propagator::new(&equations.a, &columns, h);
     let mut walk = Walk {
         plant,
         timing,
-        early: hold(timing.early),
-        late: hold(timing.late),
+        early: equations.over(timing.early),
+        late: equations.over(timing.late),
         commands: Commands::new(start),
         x: start.state.clone(),
         scratch: start.state.clone(),
@@ -203,11 +201,8 @@ impl<S: Scalar> Walk<'_, S> {
     /// Advance x by a step of any length under constant w.
     fn jump(&mut self, h: S, w: S) {
         let equations = self.plant.equations();
-        Propagator::new(&equations.a, &[&equations.b, &equations.e], h).apply(
-            &self.x,
-            &[w, self.held],
-            &mut self.scratch,
-        );
+        let over = equations.over(h);
+        over.apply(&self.x, &[w, self.held], &mut self.scratch);
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 
@@ -236,11 +231,7 @@ impl<S: Scalar> Walk<'_, S> {
             if h.is_nothing() {
                 return equations.output(x, w);
             }
-            Propagator::new(&equations.a, &[&equations.b, &equations.e], h).apply(
-                x,
-                &[w, held],
-                scratch,
-            );
+            equations.over(h).apply(x, &[w, held], scratch);
             equations.output(scratch, w)
         });
     }

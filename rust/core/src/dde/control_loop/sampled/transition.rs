@@ -119,9 +119,7 @@ pub fn balanced_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error> {
 /// The transition matrix, its sample and the sample time.
 fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
     let Some(sample_time) = plant.sample_time() else {
-        return Err(Error::argument(
-            "a continuous loop has no transition matrix: give it a sample_time",
-        ));
+        refuse!("a continuous loop has no transition matrix: give it a sample_time");
     };
     let equations = plant.equations();
     check_size(equations.states(), plant.delay(), sample_time)?;

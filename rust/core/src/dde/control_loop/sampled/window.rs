@@ -66,7 +66,7 @@ impl Window {
             step,
             steps,
             rows,
-            over_step: Propagator::new(&equations.a, &[&equations.b, &equations.e], step),
+            over_step: equations.over(step),
         }
     }
 

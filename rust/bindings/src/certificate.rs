@@ -1,54 +1,10 @@
-//! What `deadtime::roots` gives: sets of roots, certificates, sensitivities.
+//! Certificates of `deadtime::roots`: the parts of a proved count.
 
 use deadtime::roots;
 use num_complex::Complex64;
-use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
-use crate::arrays::column;
-
 type Range = (f64, f64);
-
-/// Roots with discs that are proved to hold them.
-#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
-pub(crate) struct RootSet {
-    roots: Py<PyArray1<Complex64>>,
-    multiplicities: Py<PyArray1<i64>>,
-    radii: Py<PyArray1<f64>>,
-    resolved: Py<PyArray1<bool>>,
-    counted: u64,
-    region: (Range, Range),
-}
-
-impl RootSet {
-    pub(crate) fn new(py: Python<'_>, set: roots::RootSet) -> PyResult<Self> {
-        let multiplicities = column(&set.multiplicities, |number| i64::from(*number))?;
-        Ok(Self {
-            roots: set.roots.into_pyarray(py).unbind(),
-            multiplicities: multiplicities.into_pyarray(py).unbind(),
-            radii: set.radii.into_pyarray(py).unbind(),
-            resolved: set.resolved.into_pyarray(py).unbind(),
-            counted: set.counted,
-            region: (set.region.re, set.region.im),
-        })
-    }
-}
-
-/// A root and its derivative by each of the coefficients that were asked for.
-#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
-pub(crate) struct Sensitivity {
-    root: Complex64,
-    coefficients: Py<PyArray1<Complex64>>,
-}
-
-impl Sensitivity {
-    pub(crate) fn new(py: Python<'_>, root: Complex64, coefficients: Vec<Complex64>) -> Self {
-        Self {
-            root,
-            coefficients: coefficients.into_pyarray(py).unbind(),
-        }
-    }
-}
 
 /// A straight line without a root.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]

@@ -11,12 +11,7 @@ import typer
 from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.comparisons import estimates_table
-from deadtime._cli.show import (
-    console,
-    print_json,
-    print_table,
-    save_figure,
-)
+from deadtime._cli.show import print_json, print_points, print_table, print_text, save_figure
 from deadtime.estimation import Comparison, Method, compare_methods, estimate_delay
 from deadtime.estimation._estimate import JOINT, METHODS, automatic_method
 from deadtime.estimation._plots import estimate_axes, plot_estimate, plot_fits
@@ -24,12 +19,10 @@ from deadtime.estimation.methods._overshoot import OvershootMap
 from deadtime.estimation.methods._waveform import NoisePath
 from deadtime.recordings import read_recording
 
-__all__ = ["estimate_delays"]
-
 CHOICES = ("all", "auto", *METHODS)
 
 
-def estimate_delays(
+def command(
     files: opt.Files,
     kp: Annotated[
         list[float],
@@ -104,7 +97,7 @@ def estimate_delays(
     if as_json:
         print_json(fit.to_dict())
     else:
-        console.print(fit.summary(), highlight=False, markup=False, soft_wrap=True)
+        print_text(fit.summary(), wrapped=False)
 
 
 def _chosen(method: str | None, number: int, options: dict[str, Any]) -> str:
@@ -148,6 +141,5 @@ def _show_all(comparison: Comparison, plot: Path | None, as_json: bool) -> None:
         )
         return
     print_table(estimates_table(comparison))
-    console.print("in brackets: taken as given; sum: delay and lag", style="dim")
-    for sentence in comparison.explanation():
-        console.print(f"• {sentence}", highlight=False, markup=False)
+    print_text("in brackets: taken as given; sum: delay and lag", "dim")
+    print_points(comparison.explanation())

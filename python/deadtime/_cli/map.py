@@ -7,36 +7,36 @@ from typing import Annotated, Literal
 
 import numpy as np
 import typer
-from rich import box
 from rich.table import Table
 
 from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
-    console,
     counted,
     print_json,
     print_table,
+    print_text,
+    results_table,
     save_figure,
 )
 from deadtime.loops import ControlLoop
 from deadtime.roots import Crossings, crossings, delay_margin
 from deadtime.stability import stability_map
 
-__all__ = ["map_gains"]
-
-Ends = tuple[float, float]
 Proof = Literal["curves", "cells"]
 Gains = Literal["Kp", "Kv"]
+
+#: What is printed of crossings as JSON.
+CROSSINGS = ("parameter", "values", "omega", "direction", "counts", "unlisted")
 
 #: Boundaries of a map that are printed.
 SHOWN_CURVES = 4
 
 
-def map_gains(
+def command(
     delay: opt.Delay,
-    kp: Annotated[Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
-    kv: Annotated[Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
+    kp: Annotated[opt.Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
+    kv: Annotated[opt.Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
     plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     lag: opt.Lag = 0.0,
@@ -50,7 +50,7 @@ def map_gains(
         float, typer.Option(help="Stable: every root decays at least so fast, 1/s.")
     ] = 0.0,
     damping: Annotated[
-        Ends | None,
+        opt.Ends | None,
         typer.Option(
             help="And: least damping ratio, of roots that decay slower than this rate, 1/s."
         ),
@@ -68,7 +68,10 @@ def map_gains(
     as_json: opt.As_json = False,
 ) -> None:
     """Map which gains of a PV controller are stable, with the boundary and the best of them."""
-    loop = opt.pv_loop(delay, gain, lag, sample_time, None, filter, plant)
+    # The gains are varied: any that are not zero will do.
+    loop = opt.described_loop(
+        1.0, 0.1, delay, gain, lag, sample_time=sample_time, corner=filter, plant=plant
+    )
     with counted("mapping", shape[0] * shape[1], quiet=as_json) as progress:
         chart = stability_map(
             loop,
@@ -99,49 +102,38 @@ def map_gains(
                 "abscissa": None if counts and not loop.is_sampled else chart.abscissa,
                 "status": chart.status,
                 "boundaries": [
-                    {
-                        **curve.values,
-                        "omega": curve.omega,
-                        "crossing": curve.crossing,
-                        "along": curve.along,
-                    }
+                    {**curve.values, **_attributes(curve, "omega", "crossing", "along")}
                     for curve in curves
                 ],
                 "best": best,
                 "best_abscissa": abscissa,
                 "best_delay_margin": margin,
-                "crossings": None
-                if crossed is None
-                else {
-                    "parameter": crossed.parameter,
-                    "values": crossed.values,
-                    "omega": crossed.omega,
-                    "direction": crossed.direction,
-                    "counts": crossed.counts,
-                    "unlisted": crossed.unlisted,
-                },
+                "crossings": None if crossed is None else _attributes(crossed, *CROSSINGS),
             }
         )
         return
     cells = chart.stable.size
     share = float(np.mean(chart.stable))
-    console.print(f"{cells} cells, {100 * share:.1f} % stable", highlight=False)
+    print_text(f"{cells} cells, {100 * share:.1f} % stable")
     for curve in curves[:SHOWN_CURVES]:
         ends = f"{curve.omega.min():.4g} to {curve.omega.max():.4g} rad/s"
-        console.print(f"boundary of {len(curve)} points, omega {ends}", highlight=False)
+        print_text(f"boundary of {len(curve)} points, omega {ends}")
     if len(curves) > SHOWN_CURVES:
-        console.print(f"and {len(curves) - SHOWN_CURVES} shorter boundaries", highlight=False)
+        print_text(f"and {len(curves) - SHOWN_CURVES} shorter boundaries")
     if best is not None:
         gains = ", ".join(f"{name} = {value:.4g}" for name, value in best.items())
         further = "infinite" if margin == np.inf else f"{margin:.4g} s"
-        console.print(
+        print_text(
             f"most stable cell: {gains}, spectral abscissa {abscissa:.4g} 1/s; its delay margin is "
             f"{further}",
-            highlight=False,
-            soft_wrap=True,
+            wrapped=False,
         )
     if crossed is not None:
         print_table(_crossings_table(crossed))
+
+
+def _attributes(found: object, *names: str) -> dict[str, object]:
+    return {name: getattr(found, name) for name in names}
 
 
 def _crossings_along(
@@ -162,10 +154,7 @@ def _crossings_along(
 
 
 def _crossings_table(crossed: Crossings) -> Table:
-    table = Table(box=box.SIMPLE_HEAD)
     heads = (crossed.parameter, "omega / (rad/s)", "become unstable", "unstable above")
-    for head in heads:
-        table.add_column(head, justify="right")
     places = zip(crossed.values, crossed.omega, crossed.direction, strict=True)
     rows = [
         (float(value), f"{value:.10g}", f"{omega:.6g}", f"{direction:+d}" if direction else "?")
@@ -175,10 +164,9 @@ def _crossings_table(crossed: Crossings) -> Table:
     rows += [(edge, f"{edge:.6g}", "", "") for edge in edges]
     low = crossed.range[0]
     rows = [(low, f"{low:.6g}", "", ""), *sorted(rows)]
-    for (_, *shown), count in zip(rows, crossed.counts, strict=True):
-        table.add_row(*shown, _told(count))
-    return table
+    counted_rows = zip(rows, crossed.counts, strict=True)
+    return results_table(heads, [(*shown, _unstable(count)) for (_, *shown), count in counted_rows])
 
 
-def _told(count: int) -> str:
+def _unstable(count: int) -> str:
     return str(count) if count >= 0 else "not listed" if count == -1 else "?"

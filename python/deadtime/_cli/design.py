@@ -8,30 +8,27 @@ import typer
 
 from deadtime._base.validation import finite
 from deadtime._cli import options as opt
-from deadtime._cli.show import console, print_json, save_figure, stages
+from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime.tuning import Design
 from deadtime.tuning import design as find_design
 
-__all__ = ["design_gains"]
-
-Ends = tuple[float, float]
 Objective = Literal["abscissa", "damping", "settling_time", "overshoot"]
 Kind = Literal["P", "PV", "PD", "PI", "PID"]
 
 CONTROLLERS: dict[str, type[Controller]] = {"P": P, "PV": PV, "PD": PD, "PI": PI, "PID": PID}
 
 
-def design_gains(
+def command(
     delay: opt.Delay,
     delay_to: Annotated[
         float | None, typer.Option(help="Upper end of the delay, if it is an interval, s.")
     ] = None,
     controller: Annotated[Kind, typer.Option(help="Kind of controller.")] = "PV",
-    kp: Annotated[Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
-    kv: Annotated[Ends | None, typer.Option(help="Range of the velocity gain.")] = None,
-    ki: Annotated[Ends | None, typer.Option(help="Range of the integral gain.")] = None,
-    kd: Annotated[Ends | None, typer.Option(help="Range of the derivative gain.")] = None,
+    kp: Annotated[opt.Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
+    kv: Annotated[opt.Ends | None, typer.Option(help="Range of the velocity gain.")] = None,
+    ki: Annotated[opt.Ends | None, typer.Option(help="Range of the integral gain.")] = None,
+    kd: Annotated[opt.Ends | None, typer.Option(help="Range of the derivative gain.")] = None,
     fix: Annotated[
         list[str] | None, typer.Option(help="A gain that is given, such as Kp=2; repeatable.")
     ] = None,
@@ -58,7 +55,10 @@ def design_gains(
     """Find the gains that are best in the worst case, within margins."""
     if choose_filter and filter is not None:
         raise ValueError("--filter gives the corner and --choose-filter asks for it: take one")
-    loop = opt.pv_loop(delay, gain, lag, sample_time, limit, filter, plant)
+    # The gains are varied: any that are not zero will do.
+    loop = opt.described_loop(
+        1.0, 0.1, delay, gain, lag, sample_time=sample_time, limit=limit, corner=filter, plant=plant
+    )
     low = loop.specification.known_delay
     in_plant = low - delay
     high = low if delay_to is None else delay_to + in_plant
@@ -88,9 +88,9 @@ def design_gains(
         choice = found.filter_choice
         save_figure(found.plot() if choice is None else choice.plot(), plot)
     if as_json:
-        print_json(_told(found))
+        print_json(_as_dict(found))
         return
-    console.print(found.summary(), highlight=False, markup=False, soft_wrap=True)
+    print_text(found.summary(), wrapped=False)
 
 
 def _gain(text: str) -> tuple[str, float]:
@@ -105,7 +105,7 @@ def _gain(text: str) -> tuple[str, float]:
     return name.strip(), finite(name.strip(), value)
 
 
-def _told(found: Design) -> dict[str, object]:
+def _as_dict(found: Design) -> dict[str, object]:
     choice = found.filter_choice
     return {
         "gains": found.gains,

@@ -1,30 +1,17 @@
-"""Checks of what a fit can determine: free parameters, distinguishability, standard errors."""
+"""Checks of what a fit can determine: excitation, free parameters, distinguishability, errors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.loops import ControlLoop
+from deadtime.loops import ControlLoop, Integrator
 from deadtime.recordings import Recording
 from deadtime.recordings._recording import MINIMUM_SAMPLES
-
-__all__ = [
-    "LOOP_PARAMETERS",
-    "VEHICLE_PARAMETERS",
-    "check_distinguishable",
-    "check_response",
-    "check_setpoint_active",
-    "checked_names",
-    "embedded",
-    "excited",
-    "independent_samples",
-    "lag_name",
-    "standard_errors",
-]
 
 Array = NDArray[np.float64]
 
@@ -47,6 +34,16 @@ F_TEST_LEVEL = 1e-4
 #: test. Above it, autocorrelation reduces the number of samples.
 MOSTLY_EXPLAINED = 0.5
 
+#: A constant reference excites the loop if it differs from the initial output by at least so many
+#: standard deviations of the noise.
+AWAY = 5.0
+
+#: A fitted gain below so many standard errors is indistinguishable from zero.
+LEAST_GAIN = 3.0
+
+#: Residuals below this share of the output's range count as rounding.
+ROUNDING = 1e-9
+
 
 def checked_names(
     free: Sequence[str], loop: ControlLoop, known: tuple[str, ...] = VEHICLE_PARAMETERS
@@ -68,6 +65,22 @@ def checked_names(
     if "delay" not in free and loop.delay is None:
         raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
     return tuple(name for name in known if name in free)
+
+
+def integrator_of(loop: ControlLoop, method: str) -> Integrator:
+    """The plant of the loop, which has to be an integrator."""
+    if not isinstance(loop.plant, Integrator):
+        raise ValueError(
+            f"the {method} method is for an Integrator, the loop has a "
+            f"{type(loop.plant).__name__}: use method='waveform'"
+        )
+    return loop.plant
+
+
+def check_delay_free(names: Sequence[str], method: str) -> None:
+    """Refuse a known delay, for a method that searches it."""
+    if "delay" not in names:
+        raise ValueError(f"the {method} method estimates the delay: keep it among `free`")
 
 
 def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
@@ -146,17 +159,84 @@ def embedded(cov: Array, loose: list[int], size: int) -> Array:
     return full
 
 
-def lag_name(names: Sequence[str]) -> str:
-    """The parameter that acts like a delay: ``time_constant`` where it is fitted, else ``lag``."""
-    return "time_constant" if "time_constant" in names else "lag"
-
-
 def standard_errors(names: tuple[str, ...], cov: Array) -> dict[str, float]:
     """Standard errors of `names`, and of ``delay+lag`` where the delay is among them."""
     errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
     if "delay" in names:
-        slow = lag_name(names)
+        # What acts like a delay.
+        slow = "time_constant" if "time_constant" in names else "lag"
         total = np.array([1.0 if name in ("delay", slow) else 0.0 for name in names])
         count = len(names)
         errors[f"delay+{slow}"] = float(np.sqrt(total @ cov[:count, :count] @ total))
     return errors
+
+
+def check_moves(output: Array, command: Array | None = None) -> None:
+    """Refuse a constant command, and a constant output."""
+    if command is not None and float(np.ptp(command)) == 0.0:
+        raise NotIdentifiableError(
+            f"the command is {command[0]:g} throughout the window: it does not excite the vehicle; "
+            "choose a window in which the command changes"
+        )
+    if float(np.ptp(output)) == 0.0:
+        raise NotIdentifiableError(
+            f"the output is {output[0]:g} throughout the window: the vehicle did not move; choose "
+            "another window, and check the column"
+        )
+
+
+def check_excitation(data: Recording, numbers: int, *, in_motion: bool = False) -> None:
+    """Refuse a window without excitation, or in which the output does not move.
+
+    A window with rows before it (`in_motion`) has to contain a step; a whole recording may begin
+    with one.
+    """
+    steps = data.steps()
+    noise = float(np.median(np.abs(np.diff(data.output)))) / 0.6745 / math.sqrt(2.0)
+    away = abs(float(data.reference[0] - data.output[0]))
+    at_rest = away <= max(AWAY * noise, ROUNDING * float(np.ptp(data.output)))
+    if not steps and (in_motion or at_rest):
+        raise NotIdentifiableError(
+            f"the reference is {data.reference[0]:g} throughout the window: it does not excite the "
+            "loop; choose a window with a step"
+        )
+    left = len(data) - (steps[0].index if steps else 0)
+    if left < 2 * (numbers + 1):
+        raise NotIdentifiableError(
+            f"{left} samples after the step are too few for {numbers} parameters and an initial "
+            "output: widen the window"
+        )
+    check_moves(data.output)
+
+
+def start_and_span(data: Recording) -> tuple[float, float]:
+    """Output before the first step, and the time from that step to the end, s.
+
+    If the reference is constant, the step is taken to be at the first sample.
+    """
+    steps = data.steps()
+    rest = data.output[: max(1, steps[0].index)] if steps else data.output[:1]
+    begin = steps[0].time if steps else data.time[0]
+    return float(rest.mean()), float(data.time[-1] - begin)
+
+
+def check_gain(values: Mapping[str, float], errors: Mapping[str, float]) -> None:
+    """Refuse a fitted gain that may be zero: any delay would then fit as well."""
+    if "gain" in values and abs(values["gain"]) < LEAST_GAIN * errors["gain"]:
+        raise NotIdentifiableError(
+            f"the gain comes out at {values['gain']:.2g} ± {errors['gain']:.2g}, which may be "
+            "zero: the output does not respond to the input, or the noise hides the response; "
+            "check columns and units"
+        )
+
+
+def check_ends(names: Sequence[str], point: Array, low: Array, high: Array) -> None:
+    """Refuse a fit at a bound of its search; a delay or lag of zero is a valid result."""
+    for name, value, least, most in zip(names, point, low, high, strict=False):
+        for end in (most,) if name in ("delay", "lag") else (least, most):
+            if np.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
+                raise NotIdentifiableError(
+                    f"the fit ends at a {name} of {end:g}, a bound of its search: the output is "
+                    "no response of such a loop to this reference; check columns, signs, units "
+                    "and gains, and choose a window around one step"
+                )
