@@ -229,8 +229,8 @@ def test_the_core_knows_nothing_of_python():
 
 
 def test_the_wire_formats_stand_alone():
-    # The crate that reads bytes from a network has no unsafe code and no panics. thiserror writes the
-    # texts of its errors while it is compiled, and is no part of what runs.
+    # The crate that reads bytes from a network has no unsafe code and no panics. thiserror writes
+    # the texts of its errors while it is compiled, and is no part of what runs.
     manifest = tomllib.loads((WIRE_FORMATS / "Cargo.toml").read_text(encoding="utf-8"))
     assert manifest["dependencies"].keys() <= {"thiserror"}
     table_of_contents = (WIRE_FORMATS / "src" / "lib.rs").read_text(encoding="utf-8")

@@ -327,7 +327,7 @@ def minimise(
         x_scale=model.scale[moving],
         xtol=tolerance,
         ftol=tolerance,
-        gtol=tolerance,
+        gtol=None,  # an absolute bound, in units of the output squared
         max_nfev=EVALUATIONS,
     )
     point = base + free @ found.x

@@ -83,7 +83,7 @@ def _descend(lines: Lines, names: tuple[str, ...], start: Values) -> tuple[Value
         x_scale=[abs(start["gain"]) if name == "gain" else lines.sample_time for name in names],
         xtol=1e-13,
         ftol=1e-13,
-        gtol=1e-13,
+        gtol=None,  # an absolute bound, in units of the output squared
         max_nfev=100,
     )
     point = {name: float(value) for name, value in zip(names, found.x, strict=True)}

@@ -219,7 +219,7 @@ class _Fit(Fitted):
             x_scale="jac",
             xtol=1e-11,
             ftol=1e-13,
-            gtol=1e-13,
+            gtol=None,  # an absolute bound, in units of the output squared
             max_nfev=100,
         )
         delay = float(solution.x[0])

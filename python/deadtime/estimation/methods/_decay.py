@@ -162,7 +162,7 @@ def _tail_rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
         return np.asarray(point[0] * np.exp(-point[1] * time) - left)
 
     found = least_squares(
-        misfit, [left[0], max(guess, 1e-3)], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14
+        misfit, [left[0], max(guess, 1e-3)], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=None
     )
     height, rate = float(found.x[0]), float(found.x[1])
     decays = np.exp(-rate * time)

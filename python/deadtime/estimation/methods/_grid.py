@@ -294,7 +294,7 @@ class _Problem(SimulatedModel):
             x_scale=self.scale[loose],
             xtol=1e-12,
             ftol=1e-12,
-            gtol=1e-12,
+            gtol=None,  # an absolute bound, in units of the output squared
             max_nfev=60,
         )
         return at(np.asarray(found.x))
