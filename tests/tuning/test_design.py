@@ -184,7 +184,7 @@ def test_estimates_of_margins_are_close_to_the_exact_ones(loop):
 def test_a_gain_margin_at_half_the_sampling_rate_is_estimated(share):
     # Without a delay the pole 1 - Kp Ts leaves the circle at -1.
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.0, sample_time=0.065)
-    problem = posed(loop, dtm.P)
+    problem = posed(loop, dtm.P(1.0))
     gains = np.array([[share / 0.065]])
     found = MarginEstimate(problem).of(gains, problem.corners)[0]
     assert found[0] == pytest.approx(2.0 / share, rel=1e-9)
