@@ -11,6 +11,7 @@ from deadtime.estimation.methods._gcc import _whitener
 from deadtime.estimation.models._held import HeldResponse
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 from scipy.stats import kstest
 from step_recordings import (
     CASES,
@@ -214,13 +215,17 @@ def test_recordings_without_a_response_to_the_command_are_refused(method):
     assert refused >= 38
 
 
-def test_the_significance_of_two_coefficients_has_a_closed_form():
-    # For two coefficients and f degrees of freedom p is (least/none)^(f/2).
-    samples, numbers, none = 90, 4, 3.0
-    least = none * F_TEST_LEVEL ** (2.0 / (samples - numbers))
-    _check_response(0.999 * least, none, samples, numbers)
-    with pytest.raises(dtm.NotIdentifiableError, match="no more than with noise"):
-        _check_response(1.001 * least, none, samples, numbers)
+def test_the_significance_of_the_command_has_a_closed_form():
+    # For two coefficients and f degrees of freedom p is (least/none)^(f/2), for four
+    # x^(f/2) (1 + f/2 (1 - x)) with x = least/none.
+    freedom, none = 86, 3.0
+    two = F_TEST_LEVEL ** (2.0 / freedom)
+    half = freedom / 2.0
+    four = brentq(lambda x: x**half * (1.0 + half * (1.0 - x)) - F_TEST_LEVEL, 1e-6, 1.0)
+    for tested, share in ((2, two), (4, four)):
+        _check_response(0.999 * none * share, none, freedom, tested)
+        with pytest.raises(dtm.NotIdentifiableError, match="no more than with noise"):
+            _check_response(1.001 * none * share, none, freedom, tested)
 
 
 def test_options_are_checked():

@@ -20,6 +20,7 @@ import random
 import re
 import resource
 import shutil
+import signal
 import sys
 import tempfile
 import traceback
@@ -225,6 +226,7 @@ def verdict(tree: Path, tests: list[str], seconds: int) -> tuple[str, str]:
         code = BROKEN
         try:
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+            signal.alarm(10 * seconds)  # ends a test that waits for ever
             os.chdir(tree)
             # The package of the copy, not the one that is installed.
             os.environ["PYTHONPATH"] = str(tree / "python")

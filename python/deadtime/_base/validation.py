@@ -123,7 +123,8 @@ def whole_number(
     except TypeError as error:
         raise TypeError(f"{name}={value!r}: give a whole number{otherwise}") from error
     if not least <= number < limit:
-        raise ValueError(f"{name}={number}: give a whole number of at least {least}{otherwise}")
+        bound = f"at least {least}" if number < least else f"at most {limit - 1}"
+        raise ValueError(f"{name}={number}: give a whole number of {bound}{otherwise}")
     return number
 
 

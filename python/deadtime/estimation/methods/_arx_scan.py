@@ -94,12 +94,12 @@ class ARXScan(Method):
                 )
             gain = float(loop.parameters["gain"])
             samples, losses, none = _held_scan(read, float(np.sign(gain)), least)
-            numbers, best = 2, float(losses[least:].min())
+            numbers, tested, best = 2, 2, float(losses[least:].min())
         else:
-            numbers = self.na + self.nb
+            numbers, tested = self.na + self.nb, self.nb
             losses, best, none = _scan(data.output - data.output[0], read, self.na, self.nb, least)
             samples = float(least + np.argmin(losses[least:]))
-        _check_response(best, none, data.output.size, numbers)
+        _check_response(best, none, data.output.size - numbers, tested)
         delay = max(0.0, samples * read.sample_time - (read.late if self.fractional else 0.0))
         order = "the plant inverted" if self.fractional else f"na={self.na}, nb={self.nb}"
         return read_off_estimate(
@@ -265,13 +265,13 @@ def _held_scan(read: InputOutput, sign: float, least: int) -> tuple[float, Array
     return best + fitted(best)[1], losses, none
 
 
-def _check_response(least: float, none: float, samples: int, numbers: int) -> None:
-    """Refuse where the command improves the model no more than noise would."""
+def _check_response(least: float, none: float, freedom: int, tested: int) -> None:
+    """Refuse where the command, with `tested` coefficients, improves no more than noise would."""
     from scipy import special
 
-    freedom = max(1, samples - numbers)
-    ratio = (none - least) / 2.0 / max(least / freedom, 1e-300)
-    if float(special.fdtrc(2, freedom, max(ratio, 0.0))) > F_TEST_LEVEL:
+    freedom = max(1, freedom)
+    ratio = (none - least) / tested / max(least / freedom, 1e-300)
+    if float(special.fdtrc(tested, freedom, max(ratio, 0.0))) > F_TEST_LEVEL:
         raise NotIdentifiableError(
             f"with the command the loss falls from {none:.3g} to {least:.3g}, no more than "
             "with noise: the output is no response to this command, or the noise hides it; check "
