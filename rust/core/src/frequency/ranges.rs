@@ -39,6 +39,11 @@ const REAL: f64 = 1e-6;
 /// Part of the way to where chains of roots reach the axis that is searched for all crossings.
 const BEFORE_CHAINS: f64 = 0.99;
 
+/// Part of the way from a stable value to where chains of roots reach the axis by which the last
+/// value tried stays short of it. Larger: crossings next to the end are missed; smaller: stability
+/// is harder to decide there.
+const SHORT_OF_CHAINS: f64 = 1e-9;
+
 /// Halvings between a stable value and the one at which chains of roots reach the axis.
 const HALVINGS: u32 = 60;
 
@@ -257,7 +262,7 @@ impl<'a> Search<'a> {
         if !is_stable(stable)? {
             return Ok(stable);
         }
-        let mut end = free - 1e-9 * (free - stable);
+        let mut end = free - SHORT_OF_CHAINS * (free - stable);
         if is_stable(end)? {
             return Ok(free);
         }

@@ -11,6 +11,16 @@ use num_complex::Complex64;
 use crate::Error;
 use crate::roots::RootSet;
 
+/// Covers the rounding errors of the length of the edge within a disc.
+const ENLARGED: f64 = 1.0 + 1e-9;
+
+/// Least length of a piece within a disc, relative to its radius, because a piece must not be empty.
+/// Larger: more of the edge is followed in vain; smaller: rounding may make a piece empty.
+const LEAST_LENGTH: f64 = 1e-3;
+
+/// Rounding error of the distance of a root from the edge, relative to its modulus.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// Least damping ratio of the roots right of −`horizon`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Damping {
@@ -43,10 +53,10 @@ impl Piece {
     /// The t up to which |s| is at most `radius`, or slightly more: |s| grows along the edge.
     pub(super) fn within(&self, radius: f64) -> f64 {
         let lean = self.from.re * self.along.re + self.from.im * self.along.im;
-        let (start, end) = (self.from.norm(), radius * (1.0 + 1e-9));
+        let (start, end) = (self.from.norm(), radius * ENLARGED);
         let square = lean * lean + (end - start) * (end + start);
         // A line that the disc does not reach still has its point on the real axis.
-        (square.max(0.0).sqrt() - lean).max(1e-3 * radius)
+        (square.max(0.0).sqrt() - lean).max(LEAST_LENGTH * radius)
     }
 }
 
@@ -122,7 +132,7 @@ impl Specification {
         for ((root, radius), multiplicity) in
             set.roots.iter().zip(&set.radii).zip(&set.multiplicities)
         {
-            let rounding = 8.0 * f64::EPSILON * root.norm();
+            let rounding = ROUNDING * root.norm();
             let beyond = |distance: f64| match distance {
                 d if d > radius + rounding => Some(true),
                 d if d < -radius - rounding => Some(false),

@@ -37,6 +37,13 @@ const FIRST_SAMPLES: u32 = 256;
 /// Covers the rounding errors of weights.
 const ENLARGED: f64 = 1.0 + 1e-9;
 
+/// Covers the rounding errors of the weights in the Lipschitz constant.
+const LIPSCHITZ_ENLARGED: f64 = 1.0 + 1e-12;
+
+/// Part of the least sample that the bound has to keep. Larger: more samples, smaller radii; smaller:
+/// the reverse.
+const KEPT: f64 = 0.5;
+
 /// Is the difference part, of period 2π/`base`, proved to have no zero with Re s ≥ `sigma`?
 fn is_free(
     difference: &QuasiPolynomial,
@@ -114,7 +121,7 @@ pub(crate) fn height_by_period(
     if !is_free(&difference, base, sigma, task)? {
         return Ok(None);
     }
-    let weight = |delay: &f64| exp_above(-delay * sigma) * (1.0 + 1e-12);
+    let weight = |delay: &f64| exp_above(-delay * sigma) * LIPSCHITZ_ENLARGED;
     let terms = difference.coefficients().iter().flatten();
     let lipschitz: f64 = terms
         .zip(difference.delays())
@@ -135,7 +142,7 @@ pub(crate) fn height_by_period(
             })
             .fold(f64::INFINITY, f64::min);
         let bound = least - SAMPLE_SPACING * step * lipschitz;
-        if bound > 0.5 * least {
+        if bound > KEPT * least {
             return Ok(height(h, sigma, bound));
         }
         samples *= 4;

@@ -22,6 +22,23 @@ use crate::{Error, Task};
 
 const MARGIN: f64 = 1.0 + 1e-9;
 
+/// Covers the rounding errors of a bound from below.
+const SHRUNK: f64 = 1.0 - 1e-9;
+
+/// Larger than what squares lose in underflow.
+const FLOOR: f64 = 1e-150;
+
+/// Rounding errors of an entry of C, apart from one for each term, and those for each unit of σ τ,
+/// which the exponential carries.
+const ENTRY_ROUNDINGS: f64 = 8.0;
+const EXPONENT_ROUNDINGS: f64 = 4.0;
+
+/// Rounding error of a trace, for each row of a matrix of norm up to 2.
+const TRACE_ROUNDING: f64 = 1e-15;
+
+/// Rounding error of a logarithm, relative to one more than its modulus.
+const LOG_ROUNDING: f64 = 1e-15;
+
 /// Upper limit on the angles that are searched; with more of them, only norms are compared.
 const MAX_ANGLES: usize = 3;
 
@@ -36,6 +53,29 @@ const SAMPLE_SQUARINGS: u32 = 13;
 /// Upper limit on the operations for one line (bounds the time).
 const MAX_WORK: f64 = 1e9;
 
+/// Operations for each complex multiplication and addition of a squaring, and those that it costs
+/// whatever its size. Larger: the work on a line ends earlier; smaller: it takes longer.
+const PRODUCT_COST: f64 = 8.0;
+const FIXED_COST: f64 = 3000.0;
+
+/// Norm of a power below which the inverse is bounded. Larger: fewer squarings, worse bounds;
+/// smaller: more squarings.
+const CONTRACTED: f64 = 0.999_999;
+
+/// Norm of a power, or of the product over them, at which squaring ends, before anything overflows.
+/// Larger: useless squarings; smaller: boxes are halved although further squarings would do.
+const MOST_NORM: f64 = 1e60;
+
+/// Error of a power at which squaring ends, because an error above 1 only grows. Larger: useless
+/// squarings; smaller than 1: boxes are halved although further squarings would do.
+const MOST_OFF: f64 = 4.0;
+
+/// Part of its modulus by which the upper end of the bisection for the norm bound is raised, so that
+/// it lies above the zero in spite of rounding, and the least modulus that this part refers to.
+/// Larger: a bound that is farther off after the bisection; smaller: rounding counts.
+const HEADROOM: f64 = 1e-9;
+const LEAST_ABSCISSA: f64 = 1e-9;
+
 /// Samples of each angle, by the number of angles.
 const SAMPLES: [usize; 4] = [1, 48, 14, 8];
 
@@ -43,13 +83,28 @@ const SAMPLES: [usize; 4] = [1, 48, 14, 8];
 /// further one is four times as large.
 const LOWER_GAP: f64 = 1e-13;
 
+/// Distance below the estimate at which the search for a lower bound ends, relative to the rates.
+/// Larger: more attempts in vain; smaller: poor lower bounds are missed.
+const LAST_LOWER_GAP: f64 = 10.0;
+
+/// Factor from one distance to the next, above and below the estimate. Larger: fewer attempts, wider
+/// enclosures; smaller: the reverse.
+const GAP_GROWTH: f64 = 4.0;
+
 /// First distance above the estimate at which an upper bound is tried, by the number of angles.
 /// With more angles a proof close to the chains costs more.
 const UPPER_GAPS: [f64; 4] = [1e-10, 1e-5, 1e-3, 1e-2];
 
+/// The same for more angles than are listed, which `MAX_ANGLES` does not admit.
+const OTHER_UPPER_GAP: f64 = 0.1;
+
 /// Largest distance from the norm bound at which chains are searched for, in units of one over the
 /// longest delay.
 const FARTHEST: f64 = 1e3;
+
+/// Factor on the steps down from the norm bound where there is no estimate. Larger: fewer proofs,
+/// worse bounds; smaller: the reverse.
+const STEP_GROWTH: f64 = 2.0;
 
 /// Upper limit on the steps of the estimate.
 const MAX_STEPS: usize = 30;
@@ -65,6 +120,10 @@ const ARRIVED: f64 = 1e-13;
 
 /// First and last step of the search for angles, rad.
 const ANGLE_STEPS: (f64, f64) = (0.1, 1e-7);
+
+/// Factor on that step where no angle improves. Larger: more evaluations; smaller: more moves with
+/// each step.
+const ANGLE_SHRINKAGE: f64 = 0.25;
 
 /// The difference part of a neutral system.
 #[derive(Debug, Clone)]
@@ -134,7 +193,9 @@ impl Difference {
             for (target, x) in sum.im.iter_mut().zip(&matrix.re) {
                 *target += im * x;
             }
-            let rounding = 8.0 + self.terms.len() as f64 + 4.0 * (sigma * delay).abs();
+            let rounding = ENTRY_ROUNDINGS
+                + self.terms.len() as f64
+                + EXPONENT_ROUNDINGS * (sigma * delay).abs();
             lost += weight * (loss + rounding * ROUNDING * norm) * MARGIN;
         }
         (sum, lost)
@@ -179,7 +240,7 @@ impl Difference {
             let off: Vec<f64> = norms.iter().skip(1).zip(&one.half).map(moved).collect();
             let (bound, spent) =
                 inverse_bound(matrix, lost + off.iter().sum::<f64>() * MARGIN, squarings);
-            work -= f64::from(spent + 1) * (8.0 * n * n * n + 3000.0);
+            work -= f64::from(spent + 1) * (PRODUCT_COST * n * n * n + FIXED_COST);
             match bound {
                 Some(bound) => most = most.max(bound),
                 None if free == 0 || work < 0.0 => return Ok(None),
@@ -230,7 +291,7 @@ impl Difference {
                 / count
         };
         let (mut low, mut high) = (bound(-log(count)), bound(0.0));
-        high += 1e-9 * high.abs().max(1e-9);
+        high += HEADROOM * high.abs().max(LEAST_ABSCISSA);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if sum(middle) * MARGIN < 1.0 {
@@ -256,23 +317,27 @@ impl Difference {
         let rate = 1.0 / self.longest();
         let mut lower = f64::NEG_INFINITY;
         let mut gap = LOWER_GAP * (rate + guess.abs());
-        while gap < 10.0 * (rate + guess.abs()) {
+        while gap < LAST_LOWER_GAP * (rate + guess.abs()) {
             let (matrix, lost) = self.at(guess - gap, &angles);
             if log_radius_below(matrix, lost) >= 0.0 {
                 lower = guess - gap;
                 break;
             }
-            gap *= 4.0;
+            gap *= GAP_GROWTH;
         }
         if self.angles() > MAX_ANGLES {
             return Ok((lower, top));
         }
-        let mut gap = UPPER_GAPS.get(self.angles()).copied().unwrap_or(0.1) * rate;
+        let mut gap = UPPER_GAPS
+            .get(self.angles())
+            .copied()
+            .unwrap_or(OTHER_UPPER_GAP)
+            * rate;
         while guess + gap < top {
             if self.inverse_bound(guess + gap, task)?.is_some() {
                 return Ok((lower, guess + gap));
             }
-            gap *= 4.0;
+            gap *= GAP_GROWTH;
         }
         Ok((lower, top))
     }
@@ -287,7 +352,7 @@ impl Difference {
                 break;
             }
             best -= step;
-            step *= 2.0;
+            step *= STEP_GROWTH;
         }
         Ok(best)
     }
@@ -392,7 +457,7 @@ impl Difference {
                 }
             }
             if !improved {
-                step *= 0.25;
+                step *= ANGLE_SHRINKAGE;
             }
         }
         best
@@ -421,7 +486,7 @@ fn norm(matrix: &Rows) -> f64 {
     }
     let tallest = columns.iter().fold(0.0f64, |a, b| a.max(*b));
     // The last summand covers what squares lose in underflow.
-    ((largest * tallest).sqrt() * MARGIN).min(frobenius(matrix)) + 1e-150
+    ((largest * tallest).sqrt() * MARGIN).min(frobenius(matrix)) + FLOOR
 }
 
 fn square(matrix: &Rows) -> Rows {
@@ -454,10 +519,10 @@ fn inverse_bound(mut matrix: Rows, mut off: f64, squarings: u32) -> (Option<f64>
     for step in 0..=squarings {
         let size = norm(&matrix);
         let whole = (size + off) * MARGIN;
-        if whole < 0.999_999 {
+        if whole < CONTRACTED {
             return (Some(product / (1.0 - whole) * MARGIN), step);
         }
-        if !(whole < 1e60 && product < 1e60 && off < 4.0) || step == squarings {
+        if !(whole < MOST_NORM && product < MOST_NORM && off < MOST_OFF) || step == squarings {
             return (None, step);
         }
         product *= (1.0 + whole) * MARGIN;
@@ -517,10 +582,10 @@ fn log_radius_below(matrix: Rows, lost: f64) -> f64 {
             let trace: Complex64 = (0..matrix.size).map(|i| matrix.get(i, i)).sum();
             // A change of the matrix changes the trace by at most n times the spectral norm of the
             // change.
-            let least = (trace.norm() - n * off * MARGIN) * (1.0 - 1e-9) - 1e-15 * n;
+            let least = (trace.norm() - n * off * MARGIN) * SHRUNK - TRACE_ROUNDING * n;
             if least > 0.0 {
                 let value = (exponent * LN_2 + log(least / n)) / power;
-                best = best.max(value - 1e-15 * (1.0 + value.abs()));
+                best = best.max(value - LOG_ROUNDING * (1.0 + value.abs()));
             }
         },
     );

@@ -41,6 +41,12 @@ const CLEAR: f64 = 0.02;
 /// Covers the rounding errors of the sums and products in a bound.
 const MARGIN: f64 = 1.0 + 1e-9;
 
+/// Covers the rounding errors of a bound from below.
+const SHRUNK: f64 = 1.0 - 1e-9;
+
+/// Rounding errors, for each row, of sums over all rows and of angles.
+const ROW_ROUNDINGS: f64 = 16.0;
+
 /// Larger than every effect of underflow on a row.
 const FLOOR: f64 = 1e-150;
 
@@ -55,6 +61,32 @@ const RESOLVED: f64 = 0.1;
 
 /// Ratio of the bounds of a reach at which the search for it ends.
 const CLOSE_LENGTHS: f64 = 0.9;
+
+/// First length tried, in units of one over the spread. Close to `MOST`, because the spread often
+/// decides; larger: it holds less often, smaller: it is farther below the reach.
+const FIRST_LENGTH: f64 = 0.7;
+
+/// Largest part of the upper bound that is doubled, like the lower bound, where the first length is
+/// outside the bounds. Larger: it holds less often; smaller: it is farther below the reach.
+const DOUBLED_PART: f64 = 0.4;
+
+/// Factor on the upper bound while no length holds. Larger: more tries until one holds; smaller: more
+/// tries back up to the reach.
+const SHRINKAGE: f64 = 0.25;
+
+/// Ratio of the bounds above which the lower one is doubled; below it, their mean is tried. Larger:
+/// fewer tries if the reach is far above the lower bound; smaller: fewer if it is close to it.
+const FAR_APART: f64 = 8.0;
+
+/// Upper bound of a reach at which the search for it ends, because products would underflow.
+const SHORTEST: f64 = 1e-300;
+
+/// Least |1 + κ δ| along a step, because the bounds are divided by it. Larger: shorter steps;
+/// smaller: its own rounding error counts.
+const LEAST_COMMON: f64 = 1e-3;
+
+/// Largest |κ δ|² of a step, because products would overflow.
+const MOST_COMMON: f64 = 1e200;
 
 /// Points, in units of the rate. A matrix that is not singular everywhere is regular in double
 /// precision at one of them.
@@ -168,8 +200,8 @@ impl LocalEnclosure {
             .iter()
             .filter_map(|c| system.delays().get(*c))
             .sum();
-        let error =
-            2.0 * (size.sqrt() * residual + residual * residual) + 16.0 * (size + 2.0) * ROUNDING;
+        let error = 2.0 * (size.sqrt() * residual + residual * residual)
+            + ROW_ROUNDINGS * (size + 2.0) * ROUNDING;
         Some(Self {
             s,
             angle: angle(direction.im, direction.re),
@@ -205,10 +237,10 @@ impl LocalEnclosure {
             if low > 0.0 && !holds(low) {
                 continue;
             }
-            let mut guess = most.min(0.7 / expansion.spread.max(1.0 / f64::MAX));
+            let mut guess = most.min(FIRST_LENGTH / expansion.spread.max(1.0 / f64::MAX));
             if !(guess > low && guess < high) {
                 guess = if low > 0.0 {
-                    low.min(0.4 * high) * 2.0
+                    low.min(DOUBLED_PART * high) * 2.0
                 } else {
                     0.5 * high
                 };
@@ -219,12 +251,12 @@ impl LocalEnclosure {
                 } else {
                     high = guess;
                 }
-                if low > CLOSE_LENGTHS * high || high < 1e-300 {
+                if low > CLOSE_LENGTHS * high || high < SHORTEST {
                     break;
                 }
                 guess = if low == 0.0 {
-                    0.25 * high
-                } else if high > 8.0 * low {
+                    SHRINKAGE * high
+                } else if high > FAR_APART * low {
                     2.0 * low
                 } else {
                     (low * high).sqrt()
@@ -259,8 +291,8 @@ impl LocalEnclosure {
         } else {
             0.0
         };
-        let least = modulus(Complex64::ONE + common * place) * (1.0 - 1e-9);
-        if !(least > 1e-3 && square < 1e200) {
+        let least = modulus(Complex64::ONE + common * place) * SHRUNK;
+        if !(least > LEAST_COMMON && square < MOST_COMMON) {
             return false;
         }
         let (mut squares, mut trace) = (0.0, 0.0);
@@ -285,7 +317,7 @@ impl LocalEnclosure {
             squares += row * row;
             trace += own;
         }
-        let rounding = 16.0 * self.size * ROUNDING * (1.0 + square.sqrt());
+        let rounding = ROW_ROUNDINGS * self.size * ROUNDING * (1.0 + square.sqrt());
         let whole = self.residual + length * expansion.spread + squares.sqrt();
         let trace = self.size.sqrt() * self.residual + length * expansion.trace + trace + rounding;
         whole * MARGIN <= MOST * least && trace * MARGIN <= MOST_TRACE * least
@@ -393,7 +425,7 @@ impl Sum {
         let apart = |x: &Complex64| (x - common).norm_sqr();
         let diagonal: f64 = self.diagonal.iter().map(apart).sum();
         let sums: f64 = self.diagonal.iter().map(|x| modulus(*x)).sum();
-        let rounding = 16.0 * size * ROUNDING * (sums + size * modulus(common));
+        let rounding = ROW_ROUNDINGS * size * ROUNDING * (sums + size * modulus(common));
         Expansion {
             common,
             spread: ((self.off + diagonal).sqrt() + self.lost.sqrt() + rounding) * MARGIN,

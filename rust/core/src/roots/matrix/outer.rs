@@ -22,6 +22,27 @@ const MARGIN: f64 = 1.0 + 1e-9;
 /// Power iterations for the weights of the norm.
 const ITERATIONS: usize = 40;
 
+/// Larger than every effect of underflow on an entry of a product with F.
+const FLOOR: f64 = 1e-250;
+
+/// Largest norm of Y with which F counts as an inverse. Larger: matrices closer to singular ones
+/// are accepted; smaller: the bounds stay tighter.
+const LARGEST_RESIDUAL: f64 = 0.5;
+
+/// Lower limit on an image in the power iteration, because a row of M may have slopes alone.
+const LEAST_IMAGE: f64 = 1e-300;
+
+/// Part of the weights that each power iteration keeps, because they could otherwise alternate.
+/// Larger: they settle more slowly; smaller: alternation dies out more slowly.
+const KEPT: f64 = 0.1;
+
+/// Least weight, relative to the largest one. Larger: worse bounds where rows differ much in size;
+/// smaller: quotients may underflow or overflow.
+const LEAST_WEIGHT: f64 = 1e-30;
+
+/// Least radius, because all roots may be at 0.
+const LEAST_RADIUS: f64 = 1e-100;
+
 /// F times the matrices of a system, by delay, with bounds on the moduli of their entries.
 #[derive(Debug, Clone)]
 pub(super) struct Leading {
@@ -67,7 +88,7 @@ impl Leading {
             let loss = (n as f64 + 2.0) * ROUNDING;
             for row in &mut moduli {
                 for bound in row {
-                    *bound = *bound * loss + 1e-250;
+                    *bound = *bound * loss + FLOOR;
                 }
             }
             (found, moduli)
@@ -104,7 +125,7 @@ impl Leading {
                 }
             }
         }
-        if frobenius(&unit) > 0.5 {
+        if frobenius(&unit) > LARGEST_RESIDUAL {
             return Err(singular());
         }
         Ok(Self {
@@ -155,12 +176,12 @@ impl Leading {
                 .iter()
                 .zip(&on_slope)
                 .zip(&y)
-                .map(|((a, b), y)| a + b * a.max(1e-300) + 0.1 * y)
+                .map(|((a, b), y)| a + b * a.max(LEAST_IMAGE) + KEPT * y)
                 .collect();
             let top = next.iter().fold(0.0f64, |a, b| a.max(*b));
             // The weights never differ by much, so that the bounds themselves do not underflow or
             // overflow.
-            y = next.iter().map(|x| (x / top).max(1e-30)).collect();
+            y = next.iter().map(|x| (x / top).max(LEAST_WEIGHT)).collect();
         }
         let norm = |matrix: &[Vec<f64>], y: &[f64]| {
             let quotient = |(a, b): (&f64, &f64)| a / b;
@@ -185,7 +206,7 @@ impl Leading {
             best = inverse * frobenius(&values) * MARGIN;
         }
         if best.is_finite() {
-            Ok(best.max(1e-100))
+            Ok(best.max(LEAST_RADIUS))
         } else if self.difference.is_trivial() {
             Err(beyond())
         } else {

@@ -37,8 +37,36 @@ const MAX_STEPS: usize = 40;
 /// Error of the arithmetic of one step, relative to the angles that occur in it.
 const STEP_ERROR: f64 = 16.0 * f64::EPSILON;
 
+/// Summands of the error of a step, apart from one for each row.
+const OTHER_SUMMANDS: f64 = 8.0;
+
+/// Shortest distance from a point that the arithmetic resolves, relative to its modulus. Larger:
+/// wider discs, fewer attempts; smaller: attempts that cannot succeed.
+const RESOLUTION: f64 = 4.0 * f64::EPSILON;
+
+/// Covers the rounding error of the length of a step.
+const ENLARGED: f64 = 1.0 + 1e-12;
+
+/// Covers the rounding errors of two reaches, which have to overlap.
+const OVERLAP: f64 = 1.0 + 1e-9;
+
 /// Evaluations spent on a small square before a larger one is tried.
 const EAGER_LIMIT: u64 = 1000;
+
+/// Factors from one square to the next, and to the next after one that took too many evaluations.
+/// Larger: fewer squares, wider discs; smaller: the reverse.
+const SQUARE_GROWTH: f64 = 3.0;
+const FAST_GROWTH: f64 = 9.0;
+
+/// Distance from the real axis, in halves of a side, up to which a square is made symmetric about
+/// it. Larger: squares of pairs that could be told apart; smaller: edges next to the axis.
+const NEAR_AXIS: f64 = 1.5;
+
+/// Slightly above √2: the half-diagonal of a square, in halves of its side.
+const HALF_DIAGONAL: f64 = 1.4143;
+
+/// Rounding error of the corners of a square, relative to the modulus of its centre.
+const CORNER_ROUNDING: f64 = 2.0 * f64::EPSILON;
 
 /// Points next to a root that are tried before a line counts as blocked.
 const MOST_UNCLEAR: u32 = 5;
@@ -51,6 +79,14 @@ const LEAST_SIZE: f64 = 1e-3;
 
 /// Upper limit on the distances at which a line is proved to be free of roots.
 const MAX_ASIDE: usize = 40;
+
+/// First of these distances, as a multiple of Newton's step, because the root is about that far
+/// away. Larger: the advice moves a line farther than it has to; smaller: more attempts.
+const BEYOND_ROOT: f64 = 2.0;
+
+/// Factor from one of these distances to the next. Larger: fewer attempts, advice to move a line
+/// farther; smaller: the reverse.
+const ASIDE_GROWTH: f64 = 4.0;
 
 /// Upper limit on the lengths tried for one step.
 const MAX_STEP_ATTEMPTS: usize = 60;
@@ -141,12 +177,12 @@ impl<'a> MatrixWalker<'a> {
 
     /// The error for a line that cannot be proved to be free of roots at `place`.
     fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
-        let mut distance = 4.0 * f64::EPSILON * modulus(place).max(LEAST_SIZE * self.system.rate());
+        let mut distance = RESOLUTION * modulus(place).max(LEAST_SIZE * self.system.rate());
         // The point itself may be free of roots, and the root as far away as Newton's step leads.
         if let Some(here) = LocalEnclosure::tried(self.system, place) {
             let correction = modulus(here.correction);
             if correction.is_finite() {
-                distance = distance.max(2.0 * correction);
+                distance = distance.max(BEYOND_ROOT * correction);
             }
         }
         for _ in 0..MAX_ASIDE {
@@ -157,7 +193,7 @@ impl<'a> MatrixWalker<'a> {
             if clear {
                 break;
             }
-            distance *= 4.0;
+            distance *= ASIDE_GROWTH;
         }
         Ok(Error::Contour { place, distance })
     }
@@ -187,9 +223,9 @@ impl<'a> MatrixWalker<'a> {
                 break;
             }
             if let Some(ahead) = self.enclosure(next)? {
-                let gone = modulus(next - here.s) * (1.0 + 1e-12);
+                let gone = modulus(next - here.s) * ENLARGED;
                 let back = ahead.reach(-along, gone);
-                if back.length + reach.length >= gone * (1.0 + 1e-9) || reach.length >= gone {
+                if back.length + reach.length >= gone * OVERLAP || reach.length >= gone {
                     *stretch = (STRETCHES.0 * *stretch).min(STRETCH);
                     // As far from the end of either reach as possible.
                     let part = reach.length / (reach.length + back.length);
@@ -213,13 +249,12 @@ impl<'a> MatrixWalker<'a> {
     /// The smallest square about `z` in which the number of roots can be proved, not 0.
     fn square(&mut self, z: Complex64, most: f64) -> Result<Option<Disc>, Error> {
         let size = self.system.size() as f64;
-        let mut half =
-            4.0 * f64::EPSILON * size.sqrt() * modulus(z).max(LEAST_SIZE * self.system.rate());
-        let mut growth = 3.0;
+        let mut half = RESOLUTION * size.sqrt() * modulus(z).max(LEAST_SIZE * self.system.rate());
+        let mut growth = SQUARE_GROWTH;
         while half < most {
             if self.enclosure(z + half)?.is_some() {
                 // A square that would meet the real axis is made symmetric about it.
-                let symmetric = z.im.abs() <= 1.5 * half;
+                let symmetric = z.im.abs() <= NEAR_AXIS * half;
                 let (center, im) = if symmetric {
                     (Complex64::new(z.re, 0.0), (0.0, half))
                 } else {
@@ -229,9 +264,9 @@ impl<'a> MatrixWalker<'a> {
                 self.eager_limit = self.evaluations + EAGER_LIMIT;
                 let cell = Cell::new(self, (center.re - half, center.re + half), im, symmetric);
                 growth = if self.evaluations > self.eager_limit {
-                    9.0
+                    FAST_GROWTH
                 } else {
-                    3.0
+                    SQUARE_GROWTH
                 };
                 self.eager_limit = u64::MAX;
                 match cell {
@@ -239,7 +274,7 @@ impl<'a> MatrixWalker<'a> {
                         return Ok(u32::try_from(cell.count).ok().map(|multiplicity| Disc {
                             center: Complex64::new(center.re, center.im.abs()),
                             // The half-diagonal, enlarged by the rounding errors of the corners.
-                            radius: half * 1.4143 + 2.0 * f64::EPSILON * modulus(center),
+                            radius: half * HALF_DIAGONAL + CORNER_ROUNDING * modulus(center),
                             isolation: half,
                             multiplicity,
                         }));
@@ -291,7 +326,7 @@ impl Walk for MatrixWalker<'_> {
             angle: 0.0,
             slack: here.error,
         };
-        let summands = self.system.size() as f64 + 8.0;
+        let summands = self.system.size() as f64 + OTHER_SUMMANDS;
         let mut stretch = STRETCH;
         // Newton's corrections at the last two points: a local minimum indicates a root.
         let mut before = (f64::INFINITY, f64::INFINITY);
@@ -364,7 +399,7 @@ impl Seek for MatrixWalker<'_> {
             slow = if fold > 1.0 { 0.0 } else { ratio };
             last = step;
             let next = z - step * fold;
-            let small = modulus(step) <= 4.0 * f64::EPSILON * modulus(z);
+            let small = modulus(step) <= RESOLUTION * modulus(z);
             if small || !here.is_resolved() {
                 let end = if window(next) && modulus(step) < LAST_STEP * modulus(z) {
                     next
