@@ -1,5 +1,6 @@
 """Settings of the property-based tests, and what several test files share."""
 
+import os
 import signal
 
 import pytest
@@ -10,6 +11,11 @@ from hypothesis import settings
 settings.register_profile("default", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
 settings.load_profile("default")
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One process more than processors: some tests wait for a flight or a network."""
+    return (os.cpu_count() or 1) + 1
 
 
 @pytest.fixture

@@ -34,6 +34,7 @@ def running(pid):
     return True
 
 
+@pytest.mark.survey
 def test_the_whole_experiment_in_virtual_time(tmp_path):
     folder = tmp_path / "new" / "flight"
     done = run_fly("--virtual-time", "--folder", folder, "--seed", 3, "--json")

@@ -114,6 +114,7 @@ def test_a_margin_that_is_asked_for_is_there_exactly(loop, required):
         assert best.proved == ("stable", name)
 
 
+@pytest.mark.survey
 def test_the_best_gains_within_margins_by_brute_force():
     best = dtm.design(SAMPLED, controller=SMOOTH, gain_margin=5.0, phase_margin=72.0)
     Kp, Kv = (
@@ -314,6 +315,7 @@ def test_a_search_by_simulation_keeps_gains_off_zero():
     assert survey.off_zero(np.array([0.0, -0.5, 0.5]))[0][0] == 0.0
 
 
+@pytest.mark.survey
 def test_the_settling_time_is_that_of_the_simulated_loop():
     best = dtm.design(SAMPLED, objective="settling_time")
     settled = best.loop.step_response().info()["settling_time"]
@@ -327,6 +329,7 @@ def test_the_settling_time_is_that_of_the_simulated_loop():
     assert 0.5 < best.step_info["time_at_limit"] < 1.5
 
 
+@pytest.mark.survey
 def test_the_fastest_settling_along_one_gain():
     best = dtm.design(SAMPLED, controller=SMOOTH, fixed={"Kp": 2.0}, objective="settling_time")
     Kv = np.linspace(-0.1, 0.8, 2001)
@@ -346,6 +349,7 @@ def test_a_step_that_the_limit_forbids_is_refused():
         )
 
 
+@pytest.mark.survey
 def test_the_step_matters_where_there_is_a_limit():
     small = dtm.design(SAMPLED, objective="settling_time", amplitude=0.1, controller=SMOOTH)
     large = dtm.design(SAMPLED, objective="settling_time", amplitude=2.0, controller=SMOOTH)
