@@ -2,7 +2,8 @@
 
 Both get the same loops, alternated in one process. python-control has no delays, so it gets the
 delay as a Padé approximant of order 5 or 20, which is made beforehand and not timed. The error is
-that of its gain margin relative to the proved one. Run ``python benches/peers/margins.py [--quick]``.
+that of its gain margin relative to the proved one.
+Run ``python benches/peers/margins.py [--quick]``.
 """
 
 from __future__ import annotations
