@@ -14,7 +14,7 @@
 //! Rounding: an entry of G carries u (16 + m + 8 |d| (|x| + |y|)) Σ (|s| |N| + |A|) e^(−x d),
 //! derived as in `quasipoly::probe` but for e^(−x d), from which a power of two is taken (3 u |d x|
 //! in the exponent); a row of products with R at most as many u more as it has entries. Both are in
-//! `loss`.
+//! `loss`. Every statement here is about the same bound f and its rounding, so they share a file.
 
 use std::f64::consts::LN_2;
 
