@@ -14,6 +14,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array
 from deadtime.estimation.fit._profile import Profile, floor_of
 from deadtime.estimation.fit._residuals import Whiteness
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -43,6 +44,52 @@ class CramerRaoBound(ReadOnlyArrays):
     free: tuple[str, ...]
     noise: float
     stderr: dict[str, float]
+
+
+@dataclass(frozen=True)
+class FlightNoise:
+    """The noise of a recording, as it was fitted.
+
+    Attributes
+    ----------
+    white : float
+        Standard deviation of the white noise of the sensor, in the unit of the output.
+    air : float
+        Standard deviation of what moves the plant beside the command, such as moving air, in the
+        unit of the command times the gain; zero where there is none.
+    air_time : float
+        Its time constant, s.
+    trim : float
+        Constant input beside the command, in the same unit as the air.
+    sensor : float
+        Standard deviation of the coloured noise of the sensor.
+    sensor_time : float
+        Its time constant, s.
+    left_out : int
+        Rows that were left out as outliers.
+    """
+
+    white: float
+    air: float = 0.0
+    air_time: float = math.inf
+    trim: float = 0.0
+    sensor: float = 0.0
+    sensor_time: float = 0.0
+    left_out: int = 0
+
+    def __str__(self) -> str:
+        parts = [f"white noise of {self.white:.3g}"]
+        if self.air:
+            parts.append(f"air of {self.air:.3g} over {self.air_time:.2g} s")
+        if self.trim:
+            parts.append(f"trim of {self.trim:.3g}")
+        if self.sensor:
+            parts.append(
+                f"coloured sensor noise of {self.sensor:.3g} over {self.sensor_time:.2g} s"
+            )
+        if self.left_out:
+            parts.append(f"{self.left_out} rows left out as outliers")
+        return ", ".join(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +149,8 @@ class DelayEstimate(ReadOnlyArrays):
     others : tuple of FittedRun
         The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
         the first.
+    noise : FlightNoise or None
+        The noise that was fitted beside the plant, where the method does that.
     """
 
     method: str
@@ -118,7 +167,8 @@ class DelayEstimate(ReadOnlyArrays):
     uncalibrated: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
     others: tuple[FittedRun, ...] = ()
-    _profile: Profile | None = None
+    noise: FlightNoise | None = None
+    _profile: Profile | LikelihoodProfile | None = None
 
     @property
     def runs(self) -> tuple[FittedRun, ...]:
@@ -271,6 +321,11 @@ class DelayEstimate(ReadOnlyArrays):
             "adequate": self.adequate,
             "message": self.message,
         }
+        if self.noise is not None:
+            found["noise_model"] = {
+                name: value if math.isfinite(value) else None
+                for name, value in vars(self.noise).items()
+            }
         if self.uncalibrated:
             found["no_interval_because"] = self.uncalibrated
         return found | dict(self.details)

@@ -5,6 +5,7 @@ mod boxes;
 mod certificate;
 mod dde;
 mod errors;
+mod estimation;
 mod fixed_step;
 mod frequency;
 mod matrix;
@@ -36,6 +37,8 @@ mod _deadtime {
     use super::dde::{LoopResponse, PyLinearLoop, on_samples};
     #[pymodule_export]
     use super::fixed_step::{FixedStepResponse, fixed_step_run};
+    #[pymodule_export]
+    use super::estimation::{FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise};
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,

@@ -10,6 +10,7 @@ pub mod error;
 
 pub mod dde;
 pub mod elementary;
+pub mod estimation;
 pub mod frequency;
 pub mod lambertw;
 pub mod memory;

@@ -58,6 +58,10 @@ class Profile:
     widening: Mapping[str, float]
     preferred: str = ""
 
+    def freedom_of(self, name: str) -> float:
+        """Degrees of freedom of the quantile for a quantity."""
+        return float(self.freedom)
+
     def statistic(self, name: str, value: float) -> float:
         """The squared t for which `value` is the end of an interval."""
         increase = max(0.0, self.cost(name, value) - self.best)

@@ -30,7 +30,12 @@ from deadtime.estimation.data._checks import (
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.fit._least_squares import Minimum, Model, minimise
 from deadtime.estimation.fit._profile import Profile, ProfileCost
-from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime.estimation.fit._residuals import (
+    Whiteness,
+    robust_covariance,
+    white_covariance,
+    whiteness_of,
+)
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -121,15 +126,9 @@ def concluded(
     loose = [i for i, label in enumerate(labels) if label not in held and not fixed[i]]
     jacobian, residuals = found.jacobian, -found.misfit
     check_distinguishable(jacobian[:, loose], [labels[i] for i in loose])
-    whiteness = whiteness_of(residuals, count, model.sizes)
-    outputs = [part.recording.output for part in fitted]
+    whiteness = check_fit(model, found, fitted)
+    exact = is_exact(model, found, fitted)
     pieces = np.split(residuals, np.cumsum(model.sizes)[:-1])
-    for output, piece, weight in zip(outputs, pieces, model.weights, strict=True):
-        check_response(output, piece / weight, count, whiteness.autocorrelation)
-    exact = all(
-        float(np.max(np.abs(piece))) <= ROUNDING * weight * float(np.ptp(output))
-        for piece, output, weight in zip(pieces, outputs, model.weights, strict=True)
-    )
     white = embedded(white_covariance(jacobian[:, loose], residuals), loose, len(labels))
     spread = white
     if not (whiteness.white or exact):
@@ -164,6 +163,25 @@ def concluded(
             widening=_widening(values, errors, plain),
             preferred=reason,
         ),
+    )
+
+
+def check_fit(model: Model, found: Minimum, fitted: Sequence[Run]) -> Whiteness:
+    """Refuse outputs that are hardly better explained than by a constant; test the residuals."""
+    count = len(model.names)
+    whiteness = whiteness_of(-found.misfit, count, model.sizes)
+    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
+    for part, piece, weight in zip(fitted, pieces, model.weights, strict=True):
+        check_response(part.recording.output, piece / weight, count, whiteness.autocorrelation)
+    return whiteness
+
+
+def is_exact(model: Model, found: Minimum, fitted: Sequence[Run]) -> bool:
+    """Whether all that is left is rounding."""
+    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
+    return all(
+        float(np.max(np.abs(piece))) <= ROUNDING * weight * float(np.ptp(part.recording.output))
+        for piece, part, weight in zip(pieces, fitted, model.weights, strict=True)
     )
 
 

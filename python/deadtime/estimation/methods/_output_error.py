@@ -29,7 +29,18 @@ from deadtime.estimation.data._simulated import (
     moves_between_rows,
 )
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
-from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.likelihood._rows import FlightRows, HeldCommands, with_missing
+from deadtime.estimation.methods._conclusion import (
+    check_fit,
+    concluded,
+    is_exact,
+    without_vanishing,
+)
+from deadtime.estimation.methods._flight_conclusion import (
+    concluded_flight,
+    fitted_flight,
+    gain_is_certain,
+)
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.models._held import Path, path_of
 from deadtime.loops import ControlLoop
@@ -91,31 +102,39 @@ def estimate_from_commands(
     models = [_model(run, names, initial_output, computed) for run in runs]
     model, found = solve_jointly(models)
     found = without_vanishing(model, found)
-    longest = min(LONGEST * one.span for one in models)
-    delay = dict(zip(names, found.point.tolist(), strict=False)).get("delay", 0.0)
-    if delay >= longest * (1.0 - 1e-3):
-        raise NotIdentifiableError(
-            f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is "
-            "no response to this command; check columns and units, or choose a longer window"
-        )
     sources = {one.source for one in models}
-    message = f"least squares over {', '.join(names)} on the response to the command"
+    message = f"over {', '.join(names)} on the response to the command"
     if computed:
         message += " computed from the recorded output, on whose noise the controller acts"
     elif sources != {"logged"}:
         message += ", which was not logged but computed from reference and output"
-    start = found.point[len(names) :] if initial_output is None else [initial_output]
-    return concluded(
-        method,
-        model,
-        found,
-        [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)],
-        message=message,
-        details={
-            "initial_output": float(start[0]),
-            "command": " or ".join(sorted(sources)),
-            **({"noise": "loop"} if computed else {}),
-        },
+    details = {
+        "command": " or ".join(sorted(sources)),
+        **({"noise": "loop"} if computed else {}),
+    }
+    fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
+    if is_exact(model, found, fitted):
+        start = found.point[len(names) :] if initial_output is None else [initial_output]
+        details["initial_output"] = float(start[0])
+        return concluded(
+            method, model, found, fitted, message=f"least squares {message}", details=details
+        )
+    first = {**models[0].known, **dict(zip(names, found.point.tolist(), strict=False))}
+    rows = [one.rows(initial_output) for one in models]
+    profile = fitted_flight(names, fitted, rows, first)
+    longest = min(LONGEST * one.span for one in models)
+    if "delay" in names and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
+        raise NotIdentifiableError(
+            f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is "
+            "no response to this command; check columns and units, or choose a longer window"
+        )
+    if not gain_is_certain(profile):
+        check_fit(model, found, fitted)
+    details["initial_output"] = (
+        initial_output if initial_output is not None else profile.initial_output
+    )
+    return concluded_flight(
+        method, names, fitted, profile, models[0].known, f"maximum likelihood {message}", details
     )
 
 
@@ -126,6 +145,19 @@ class _Model(ModelOfOne):
     path: Path
     known: Mapping[str, float]
     source: str
+    commands: HeldCommands
+
+    def rows(self, initial_output: float | None) -> FlightRows:
+        """The rows for the likelihood."""
+        return FlightRows(
+            time=self.recording.time,
+            output=self.recording.output - (initial_output or 0.0),
+            used=np.ones(len(self.recording), dtype=bool),
+            command_time=self.commands.time,
+            command=self.commands.command,
+            unknown=self.commands.unknown,
+            offset=initial_output is None,
+        )
 
     @cached_property
     def span(self) -> float:
@@ -234,9 +266,11 @@ def _model(
             "widen the window"
         )
     check_moves(data.output, command)
+    commands = with_missing(recording, loop, command)
     return _Model(
         recording=data,
-        path=path_of(loop.plant, recording.time[: rows.stop], command),
+        path=path_of(loop.plant, commands.time, commands.command),
+        commands=commands,
         names=names,
         known={"delay": 0.0, "gain": 1.0, **loop.parameters},
         offset=initial_output,

@@ -159,7 +159,7 @@ def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
 
     profile = fit._profile
     if profile is not None and profile.preferred:
-        quantile = float(special.stdtrit(profile.freedom, 0.5 + level / 2.0)) ** 2
+        quantile = float(special.stdtrit(profile.freedom_of(name), 0.5 + level / 2.0)) ** 2
         return profile.statistic(name, truth) <= quantile
     low, high = fit.ci(level, name)
     return low <= truth <= high

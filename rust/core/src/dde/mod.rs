@@ -10,7 +10,7 @@
 
 pub mod control_loop;
 mod limits;
-mod propagator;
+pub(crate) mod propagator;
 mod scalar;
 pub mod spectral;
 pub mod system;

@@ -1,0 +1,1 @@
+"""Maximum likelihood under the noise of a flight: air, trim, coloured and white sensor noise."""

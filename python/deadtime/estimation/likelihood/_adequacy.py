@@ -1,0 +1,132 @@
+"""Is the model adequate? Tests of a fit under the noise of a flight, each at the 1 % level.
+
+White residuals are not enough: the air can take the place of a lag that the plant lacks, and the
+whitened residuals stay white. Beside their whiteness, these are tested:
+
+* a further lag beside the noise: the likelihood ratio, half its distribution at zero (Self & Liang
+  1987);
+* a delay that is constant over the window: the cumulated score of the delay is a Brownian bridge
+  over its information (Nyblom 1989);
+* noise that does not grow with the speed of the output, as it does where time stamps are not the
+  times of the samples (Breusch & Pagan 1979).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._deadtime import PlantNumbers
+from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
+from deadtime.estimation.likelihood._search import NoiseFit
+
+Array = NDArray[np.float64]
+
+#: Starts of the further lag, in rows.
+FURTHER = (0.7, 3.0)
+
+#: The further lag that counts as none, in rows.
+NONE = 1e-3
+
+#: Largest difference of the cumulated score at the 1 % level (Kolmogorov).
+BRIDGE = 1.628
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """What the tests say.
+
+    Attributes
+    ----------
+    whiteness : Whiteness
+        Of the whitened residuals.
+    further_lag : float
+        The further lag that makes the recordings likeliest, s.
+    reasons : tuple of str
+        Why the model is not adequate; empty where it is.
+    """
+
+    whiteness: Whiteness
+    further_lag: float
+    reasons: tuple[str, ...]
+
+
+def tested(fit: NoiseFit, numbers: int) -> Adequacy:
+    """Test a fit of so many `numbers`."""
+    used = [rows.used for rows in fit.runs]
+    whitened = [part.whitened[mask] for part, mask in zip(fit.parts, used, strict=True)]
+    whiteness = whiteness_of(np.concatenate(whitened), numbers, [piece.size for piece in whitened])
+    reasons = []
+    if not whiteness.white:
+        reasons.append(
+            "the residuals are not white beside the fitted noise (lag-1 autocorrelation "
+            f"{whiteness.autocorrelation:.2f})"
+        )
+    further, p_value = further_lag(fit)
+    if p_value < SIGNIFICANCE:
+        reasons.append(
+            f"a further lag of {further:.3g} s makes the recording likelier: the plant lacks it"
+        )
+    for index, part in enumerate(fit.parts):
+        where = f" in recording {index + 1}" if len(fit.parts) > 1 else ""
+        if part.score.size and bridge(part.score, part.whitened) > BRIDGE:
+            reasons.append(f"the delay is not constant over the window{where}")
+        mask = used[index]
+        if grows_with_speed(part.whitened[mask], part.rate[mask]) < SIGNIFICANCE:
+            reasons.append(
+                f"the noise grows with the speed of the output{where}, as where time stamps are "
+                "not the times of the samples"
+            )
+    return Adequacy(whiteness, further, tuple(reasons))
+
+
+def further_lag(fit: NoiseFit) -> tuple[float, float]:
+    """The likeliest further lag, s, and the probability of such a ratio without one."""
+    from scipy import special
+
+    richer = replace(fit, model=replace(fit.model, extra=fit.model.extra + 1))
+    likelihood = richer.likelihood
+    between = float(np.median(np.diff(fit.runs[0].time)))
+    name = f"lag {len(fit.model.free_lags)}"
+    one = fit.numbers
+    without = likelihood.held(
+        PlantNumbers(one.delay, [*one.lags, NONE * between], one.noise, fit.gain),
+        name,
+        NONE * between,
+    )
+    best = without
+    noises = [one.noise]
+    if any(noise.air > 0.0 for noise in one.noise):
+        noises.append([type(noise)() for noise in one.noise])
+    for noise in noises:
+        for lag in FURTHER:
+            moved = PlantNumbers(
+                max(one.delay - lag * between, 0.0), [*one.lags, lag * between], noise, fit.gain
+            )
+            best = min(best, likelihood.fit(moved), key=lambda found: found.objective)
+    ratio = max(0.0, without.objective - best.objective)
+    return best.lags[-1], 0.5 * float(special.chdtrc(1, ratio)) if ratio > 0.0 else 1.0
+
+
+def bridge(score: Array, whitened: Array) -> float:
+    """Largest cumulated score of the delay, over its information."""
+    path = np.cumsum(score * whitened)
+    share = np.cumsum(score**2)
+    return float(np.max(np.abs(path - share * path[-1])))
+
+
+def grows_with_speed(whitened: Array, rate: Array) -> float:
+    """Probability of squares that grow so much with the squared speed, for equal variances."""
+    from scipy import special
+
+    squares, speed = whitened**2, rate**2
+    speed = speed - speed.mean()
+    power = float(speed @ speed)
+    if power == 0.0:
+        return 1.0
+    slope = float(speed @ squares) / power
+    # The variance of the square of a Gaussian of variance one is two.
+    return float(0.5 * special.erfc(slope * math.sqrt(power) / math.sqrt(2.0) / math.sqrt(2.0)))

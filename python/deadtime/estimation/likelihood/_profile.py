@@ -1,0 +1,219 @@
+"""Intervals of the profile likelihood, with the degrees of freedom of the noise.
+
+−2 ln L rises by m ln(1 + t²/m) where a quantity is held at the end of its interval, m the rows less
+the unknowns of the mean. The quantile t is that of Student's distribution with as many degrees of
+freedom as the variance of the quantity is known with (Satterthwaite 1946; Kenward & Roger 1997):
+slow air is seen a few times in a flight, however many rows there are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._deadtime import PlantNumbers, RowNoise
+from deadtime.estimation.likelihood._search import NoiseFit, with_noise
+
+Array = NDArray[np.float64]
+
+#: Step of difference quotients in the logarithms of the numbers of the noise.
+LOG_STEP = 0.1
+
+#: Least curvature of the likelihood in them: its range is bounded, whatever the recording says.
+LEAST_CURVATURE = 0.25
+
+#: A held fit that is lower than the best by this much is another, better minimum.
+BETTER = 0.02
+
+#: Most restarts from better minima that intervals find.
+RESTARTS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class LikelihoodProfile:
+    """The profile of one fit.
+
+    Attributes
+    ----------
+    fit : NoiseFit
+    names : mapping of str to str
+        The kernel's name of each quantity.
+    known : float
+        Lags that are in the kernel's sum but not in that of the estimate, s.
+    """
+
+    fit: NoiseFit
+    names: Mapping[str, str]
+    preferred: str = "the noise is fitted"
+    _ends: dict[tuple[str, float], tuple[float, float]] = field(default_factory=dict)
+
+    @cached_property
+    def centre(self) -> PlantNumbers:
+        """The fit with its gain, from which one quantity is moved."""
+        one = self.fit.numbers
+        return PlantNumbers(one.delay, one.lags, one.noise, self.fit.gain, objective=one.objective)
+
+    @property
+    def initial_output(self) -> float:
+        """The fitted output at the start of the first recording."""
+        model = self.fit.model
+        return self.fit.parts[0].linear["gain" in model.names and len(self.fit.runs) == 1]
+
+    @cached_property
+    def rows(self) -> int:
+        """Rows less unknowns of the mean."""
+        return sum(part.freedom for part in self.fit.parts)
+
+    @cached_property
+    def stderr(self) -> dict[str, float]:
+        """Standard errors for the fitted noise."""
+        cov = common_covariance(self.fit)
+        return {name: math.sqrt(w @ cov @ w) for name, w in self._weights.items()}
+
+    @cached_property
+    def _weights(self) -> dict[str, Array]:
+        """Each quantity as a sum of the common numbers: gain, delay, lags."""
+        model = self.fit.model
+        order = [name for name in ("gain", "delay") if name in model.names]
+        order += [f"lag {i}" for i, free in enumerate(model.free_lags) if free]
+        found = {}
+        for name, kernel in self.names.items():
+            wanted = order if kernel == "total" else [kernel]
+            found[name] = np.array(
+                [
+                    float(one in wanted and not (kernel == "total" and one == "gain"))
+                    for one in order
+                ]
+            )
+        return found
+
+    @cached_property
+    def freedom(self) -> dict[str, float]:
+        """Degrees of freedom of the variance of each quantity."""
+        return degrees_of_freedom(self.fit, self._weights, self.rows)
+
+    def freedom_of(self, name: str) -> float:
+        """Degrees of freedom of the quantile for a quantity."""
+        return self.freedom[name]
+
+    def rise(self, name: str, level: float) -> float:
+        """The rise of −2 ln L at the ends of an interval."""
+        from scipy import special
+
+        quantile = float(special.stdtrit(self.freedom[name], 0.5 + level / 2))
+        return self.rows * math.log1p(quantile**2 / self.rows)
+
+    def statistic(self, name: str, value: float) -> float:
+        """The squared t for which `value` is the end of an interval."""
+        held = self.fit.likelihood.held(self.centre, self.names[name], value)
+        rise = max(0.0, held.objective - self.centre.objective)
+        return self.rows * math.expm1(rise / self.rows)
+
+    def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
+        """Ends of the interval around the fitted `value`."""
+        key = (name, level)
+        if key not in self._ends:
+            self._ends[key], _ = self.ends(name, level)
+        return self._ends[key]
+
+    def ends(self, name: str, level: float) -> tuple[tuple[float, float], PlantNumbers]:
+        """The interval, and the lowest minimum that was seen on the way."""
+        kernel = self.names[name]
+        floor = -math.inf if kernel == "gain" else 0.0
+        if kernel.startswith("lag"):
+            floor = 1e-3 * float(np.median(np.diff(self.fit.runs[0].time)))
+        rise = self.rise(name, level)
+        reach = max(self.stderr[name] * math.sqrt(rise), 1e-9)
+        found, lowest = [], self.centre
+        for sign in (-1.0, 1.0):
+            end, low = self.fit.likelihood.end(self.centre, kernel, sign * reach, rise, floor)
+            found.append(0.0 if end == floor and kernel != "gain" else end)
+            lowest = min(lowest, low, key=lambda one: one.objective)
+        return (found[0], found[1]), lowest
+
+
+def profile_of(fit: NoiseFit, names: Mapping[str, str], level: float = 0.95) -> LikelihoodProfile:
+    """The profile of the best minimum: intervals may find a better one than the search."""
+    profile = LikelihoodProfile(fit, names)
+    for _ in range(RESTARTS):
+        better = None
+        for name in names:
+            profile._ends[name, level], lowest = profile.ends(name, level)
+            if lowest.objective < profile.centre.objective - BETTER:
+                better = lowest
+                break
+        if better is None:
+            break
+        profile = LikelihoodProfile(fit.moved(fit.likelihood.fit(better)), names)
+    return profile
+
+
+def common_covariance(fit: NoiseFit) -> Array:
+    """Covariance of the numbers that all recordings share: gain, delay, lags."""
+    blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in fit.parts]
+    if len(blocks) == 1:
+        return blocks[0]
+    return np.asarray(np.linalg.inv(sum(np.linalg.inv(block) for block in blocks)))
+
+
+def _common(inverse: Array, linear: int, fit: NoiseFit) -> Array:
+    """The block of the common numbers."""
+    size = math.isqrt(inverse.size)
+    square = inverse.reshape(size, size)
+    own = list(range(linear, size))
+    if "gain" in fit.model.names and len(fit.runs) == 1:
+        own = [0, *own]
+    return square[np.ix_(own, own)]
+
+
+def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -> dict[str, float]:
+    """ν = 2/var(ln V) of the variance V of each quantity, over the numbers of the noise."""
+    base = fit.numbers.noise
+    places = [
+        (run, part)
+        for run, noise in enumerate(base)
+        for part in ("air_time", "air", "sensor_time", "sensor")
+        if (noise.air if part.startswith("air") else noise.sensor) > 0.0
+    ]
+    if not places:
+        return dict.fromkeys(weights, float(rows))
+
+    def at(steps: Mapping[int, float]) -> tuple[float, dict[str, float]]:
+        noise = [
+            {name: getattr(one, name) for name in ("air_time", "air", "sensor_time", "sensor")}
+            for one in base
+        ]
+        for place, step in steps.items():
+            run, part = places[place]
+            noise[run][part] *= math.exp(step)
+        numbers = with_noise(fit.numbers, [RowNoise(**one) for one in noise])
+        moved = fit.moved(numbers)
+        cov = common_covariance(moved)
+        value = sum(part.objective for part in moved.parts)
+        return value, {name: math.log(max(w @ cov @ w, 1e-300)) for name, w in weights.items()}
+
+    h, count = LOG_STEP, len(places)
+    middle, _ = at({})
+    hessian = np.zeros((count, count))
+    slopes = {name: np.zeros(count) for name in weights}
+    single = {}
+    for i in range(count):
+        single[i] = higher, lower = at({i: h}), at({i: -h})
+        hessian[i, i] = (higher[0] - 2.0 * middle + lower[0]) / h**2
+        for name in weights:
+            slopes[name][i] = (higher[1][name] - lower[1][name]) / (2.0 * h)
+    for i in range(count):
+        for j in range(i):
+            both = at({i: h, j: h})[0]
+            mixed = both - single[i][0][0] - single[j][0][0] + middle
+            hessian[i, j] = hessian[j, i] = mixed / h**2
+    values, vectors = np.linalg.eigh(0.5 * hessian)
+    spread = (vectors / np.maximum(values, LEAST_CURVATURE)) @ vectors.T
+    return {
+        name: float(2.0 / (2.0 / rows + slope @ spread @ slope)) for name, slope in slopes.items()
+    }

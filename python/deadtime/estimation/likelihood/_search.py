@@ -1,0 +1,267 @@
+"""Search of plant and noise: starts, and which parts of the noise the recording has.
+
+The likelihood has local minima over the delay, and others where the air takes the place of what
+the plant lacks. A grid over delay and lag, without air and with strong air, gives the starts. Trim,
+air and coloured sensor noise are kept where Akaike's criterion asks for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
+from deadtime.estimation.likelihood._rows import FlightRows
+from deadtime.loops import FirstOrder, Integrator, Plant
+
+Array = NDArray[np.float64]
+
+#: Longest delay of the search, as a share of the window.
+LONGEST = 0.6
+
+#: Steps of the grid over the delay: in rows, and as a share of the delay; most rows for a grid.
+GRID_STEP, GRID_GROWTH, GRID_ROWS = 1.0, 0.1, 5000
+
+#: Lags of the grid, in rows.
+LAGS = (0.5, 3.0, 8.0)
+
+#: Deviations of the air in the grid, and where it is added to a fit without: white deviations a
+#: row. Its time constant there, as a share of the window.
+STRONG_AIR, WEAK_AIR, AIR_TIME = 0.65, 0.02, 0.13
+
+#: The same for plants that do not integrate, in white deviations.
+STRONG_INPUT, WEAK_INPUT = 3.0, 0.3
+
+#: Local minima of the grid that are refined, for each noise.
+REFINED = 2
+
+#: Start of the coloured sensor noise: white deviations, and rows.
+SENSOR, SENSOR_TIME = 1.0, 2.0
+
+#: Akaike's price of a number of the noise; that of the air counts as one, because none at all is
+#: at its bound.
+PRICE = 2.0
+
+
+@dataclass(frozen=True)
+class PlantModel:
+    """A plant as the kernel takes it: num/den of unit gain behind lags.
+
+    Attributes
+    ----------
+    num, den : tuple of float
+        Descending powers of s.
+    lag_names : tuple of str
+        Names of the lags.
+    lags : tuple of float
+        Their values, s.
+    names : tuple of str
+        What is fitted.
+    extra : int
+        Further lags, not of the plant, that are tried.
+    """
+
+    num: tuple[float, ...]
+    den: tuple[float, ...]
+    lag_names: tuple[str, ...]
+    lags: tuple[float, ...]
+    names: tuple[str, ...]
+    extra: int = 0
+
+    @classmethod
+    def of(cls, plant: Plant, names: tuple[str, ...]) -> PlantModel:
+        """The plant with `names` free."""
+        if isinstance(plant, Integrator):
+            used = ("lag",) if "lag" in names or plant.lag else ()
+            return cls((1.0,), (1.0, 0.0), used, (plant.lag,)[: len(used)], names)
+        if isinstance(plant, FirstOrder):
+            return cls((1.0,), (1.0,), ("time_constant",), (plant.time_constant,), names)
+        num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
+        return cls(tuple(map(float, num)), tuple(map(float, den)), (), (), names)
+
+    @property
+    def free_lags(self) -> list[bool]:
+        """Which of the lags are fitted."""
+        return [name in self.names for name in self.lag_names] + [True] * self.extra
+
+    @property
+    def integrates(self) -> bool:
+        """Whether a constant input lets the output grow."""
+        return len(self.den) > 1 and self.den[-1] == 0.0
+
+    def likelihood(self, runs: Sequence[FlightRows], trim: bool) -> FlightLikelihood:
+        """The likelihood of these recordings, with or without trim."""
+        longest = min(LONGEST * float(run.time[-1] - run.time[0]) for run in runs)
+        return FlightLikelihood(
+            self.num,
+            self.den,
+            [run._replace(trim=trim) for run in runs],
+            delay="delay" in self.names,
+            gain="gain" in self.names,
+            lags=self.free_lags,
+            zero=False,
+            longest=longest,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFit:
+    """Plant and noise that make the recordings likeliest.
+
+    Attributes
+    ----------
+    model : PlantModel
+    runs : tuple of FlightRows
+    trim : bool
+        Whether there is a constant input besides the command.
+    numbers : PlantNumbers
+    """
+
+    model: PlantModel
+    runs: tuple[FlightRows, ...]
+    trim: bool
+    numbers: PlantNumbers
+
+    @cached_property
+    def likelihood(self) -> FlightLikelihood:
+        """The likelihood that was maximised."""
+        return self.model.likelihood(self.runs, self.trim)
+
+    @cached_property
+    def parts(self) -> list[RowLikelihood]:
+        """The likelihood of each recording at the maximum."""
+        return [self.likelihood.at(run, self.numbers) for run in range(len(self.runs))]
+
+    @property
+    def criterion(self) -> float:
+        """Akaike's criterion, from the plain likelihood: fits with and without trim compare."""
+        total = 0.0
+        for rows, part, noise in zip(self.runs, self.parts, self.numbers.noise, strict=True):
+            count = int(np.sum(rows.used))
+            total += count * np.log(part.variance * part.freedom / count) + part.log_det
+            total += PRICE * (self.trim + (noise.air > 0.0) + 2 * (noise.sensor > 0.0))
+        return float(total)
+
+    @property
+    def gain(self) -> float:
+        """The gain at the maximum."""
+        return self.parts[0].gain
+
+    def moved(self, numbers: PlantNumbers) -> NoiseFit:
+        """The same at other numbers."""
+        return replace(self, numbers=numbers)
+
+
+def with_noise(numbers: PlantNumbers, noise: Sequence[RowNoise]) -> PlantNumbers:
+    """The same plant under other noise."""
+    return PlantNumbers(numbers.delay, numbers.lags, noise, numbers.gain)
+
+
+def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers) -> NoiseFit:
+    """The likeliest plant and noise, from the least squares fit `first` and a grid."""
+    runs = tuple(runs)
+    quiet = [RowNoise()] * len(runs)
+    weak, strong = _airs(model, runs)
+    found = []
+    starts = _grid(model, runs, first, (quiet, strong))
+    for trim in (False, True) if model.integrates else (False,):
+        likelihood = model.likelihood(runs, trim)
+        calm = likelihood.fit(with_noise(first, quiet))
+        for start in starts[0]:
+            calm = min(calm, likelihood.fit(start), key=_objective)
+        moving = likelihood.fit(with_noise(calm, weak))
+        for start in starts[1]:
+            moving = min(moving, likelihood.fit(start), key=_objective)
+        found += [NoiseFit(model, runs, trim, one) for one in (calm, moving)]
+    best = min(found, key=_criterion)
+    return min([best, *_with_sensor(best)], key=_criterion)
+
+
+def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
+    """The fit with coloured sensor noise beside the air and in its place."""
+    found = []
+    for keeps_air in (True, False):
+        noise = [
+            RowNoise(
+                one.air_time,
+                one.air if keeps_air else 0.0,
+                SENSOR_TIME * float(np.median(np.diff(rows.time))),
+                SENSOR,
+            )
+            for one, rows in zip(best.numbers.noise, best.runs, strict=True)
+        ]
+        if keeps_air and not any(one.air > 0.0 for one in best.numbers.noise):
+            continue
+        found.append(best.moved(best.likelihood.fit(with_noise(best.numbers, noise))))
+    return found
+
+
+def _objective(numbers: PlantNumbers) -> float:
+    return numbers.objective
+
+
+def _criterion(fit: NoiseFit) -> float:
+    return fit.criterion
+
+
+def _airs(model: PlantModel, runs: Sequence[FlightRows]) -> list[list[RowNoise]]:
+    """Weak and strong air for each recording."""
+    found = []
+    for a_row, flat in ((WEAK_AIR, WEAK_INPUT), (STRONG_AIR, STRONG_INPUT)):
+        noise = []
+        for rows in runs:
+            between = float(np.median(np.diff(rows.time)))
+            size = a_row / between if model.integrates else flat
+            noise.append(RowNoise(AIR_TIME * float(rows.time[-1] - rows.time[0]), size))
+        found.append(noise)
+    return found
+
+
+def _grid(
+    model: PlantModel,
+    runs: tuple[FlightRows, ...],
+    first: PlantNumbers,
+    noises: Sequence[list[RowNoise]],
+) -> list[list[PlantNumbers]]:
+    """For each noise the likeliest points of a grid over delay and lag."""
+    rows = runs[0]
+    if "delay" not in model.names or rows.time.size > GRID_ROWS:
+        return [[with_noise(first, noise)] for noise in noises]
+    likelihood = model.likelihood(runs, False)
+    between = float(np.median(np.diff(rows.time)))
+    delays = [0.0]
+    while delays[-1] < LONGEST * float(rows.time[-1] - rows.time[0]):
+        delays.append(delays[-1] + max(GRID_STEP * between, GRID_GROWTH * delays[-1]))
+    starts = []
+    for noise in noises:
+        minima: list[PlantNumbers] = []
+        for lags in _grid_lags(model, between):
+            points = [PlantNumbers(delay, lags, noise, first.gain) for delay in delays]
+            values = np.array([likelihood.objective(point) for point in points])
+            padded = np.r_[np.inf, values, np.inf]
+            places = np.flatnonzero((values <= padded[:-2]) & (values <= padded[2:]))
+            minima += [
+                PlantNumbers(delays[i], lags, noise, first.gain, objective=float(values[i]))
+                for i in places
+            ]
+        starts.append(sorted(minima, key=_objective)[:REFINED])
+    return starts
+
+
+def _grid_lags(model: PlantModel, between: float) -> list[list[float]]:
+    free = model.free_lags
+    if not any(free):
+        return [list(model.lags)]
+    signs = [*np.sign(model.lags), *[1.0] * model.extra]
+    known = [*model.lags, *[0.0] * model.extra]
+    return [
+        [
+            float((sign or 1.0) * lag * between) if is_free else value
+            for is_free, sign, value in zip(free, signs, known, strict=True)
+        ]
+        for lag in LAGS
+    ]

@@ -1,0 +1,184 @@
+"""Turn the likeliest plant and noise of recordings into an estimate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._deadtime import PlantNumbers, RowNoise
+from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun, FlightNoise
+from deadtime.estimation.data._checks import LEAST_GAIN
+from deadtime.estimation.likelihood._adequacy import Adequacy, tested
+from deadtime.estimation.likelihood._profile import (
+    LikelihoodProfile,
+    common_covariance,
+    profile_of,
+)
+from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
+from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, fit_noise
+from deadtime.estimation.methods._method import Run
+
+Array = NDArray[np.float64]
+
+#: A lag below so many times its lower bound is none.
+NO_LAG = 2.0
+
+#: Rounds of leaving out outliers.
+ROUNDS = 3
+
+
+def fitted_flight(
+    names: tuple[str, ...],
+    runs: Sequence[Run],
+    rows: Sequence[FlightRows],
+    first: Mapping[str, float],
+) -> LikelihoodProfile:
+    """The likeliest plant and noise, without outliers, and the profile of it."""
+    model = PlantModel.of(runs[0].loop.plant, names)
+    start = _start(model, first, rows)
+    fit = fit_noise(model, rows, start)
+    for _ in range(ROUNDS):
+        found = [
+            is_outlier(part.whitened, one.used)
+            for part, one in zip(fit.parts, fit.runs, strict=True)
+        ]
+        if not any(np.any(rows) for rows in found):
+            break
+        kept = tuple(
+            one._replace(used=one.used & ~outliers)
+            for one, outliers in zip(fit.runs, found, strict=True)
+        )
+        fit = fit_noise(model, kept, fit.numbers)
+    kernel = {"delay": "delay", "gain": "gain"}
+    kernel |= {name: f"lag {i}" for i, name in enumerate(model.lag_names)}
+    wanted = {name: kernel[name] for name in names}
+    if "delay" in names:
+        slow = "time_constant" if "time_constant" in names else "lag"
+        wanted[f"delay+{slow}"] = "total" if slow in names else "delay"
+    return profile_of(fit, wanted)
+
+
+def _start(
+    model: PlantModel, first: Mapping[str, float], rows: Sequence[FlightRows]
+) -> PlantNumbers:
+    """The kernel's numbers for a least squares fit; a lag of zero becomes a short one."""
+    least = 0.5 * float(np.median(np.diff(rows[0].time)))
+    delay, lags = first["delay"], []
+    for name, free in zip(model.lag_names, model.free_lags, strict=True):
+        lag = first[name]
+        if free and abs(lag) < least:
+            delay, lag = max(0.0, delay - least + lag), least
+        lags.append(lag)
+    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first["gain"])
+
+
+def concluded_flight(
+    method: str,
+    names: tuple[str, ...],
+    runs: Sequence[Run],
+    profile: LikelihoodProfile,
+    known: Mapping[str, float],
+    message: str,
+    details: Mapping[str, Any],
+) -> DelayEstimate:
+    """Make the estimate of a fit."""
+    fit = profile.fit
+    values = _values(fit, names, known)
+    adequacy = tested(fit, len(names))
+    cov = common_covariance(fit)
+    order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
+    place = [order.index(name) for name in names]
+    noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
+    fitted = tuple(
+        FittedRun(run.recording, run.loop.replace(**values), part.residuals)
+        for run, part in zip(runs, fit.parts, strict=True)
+    )
+    held = [name for name in names if name in ("lag", "delay") and values[name] == 0.0]
+    stderr = {name: 0.0 if name in held else error for name, error in profile.stderr.items()}
+    labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
+    labels += ("trim",) * fit.trim
+    return DelayEstimate(
+        method=method,
+        loop=fitted[0].loop,
+        free=names,
+        stderr=stderr,
+        cov=cov[np.ix_(place, place)],
+        crb=CramerRaoBound(labels, noise[0].white, dict(stderr)),
+        recording=fitted[0].recording,
+        residuals=fitted[0].residuals,
+        whiteness=adequacy.whiteness,
+        adequate=not adequacy.reasons,
+        message=_message(message, names, held, noise, adequacy, runs[0]),
+        details=dict(details),
+        others=fitted[1:],
+        noise=noise[0],
+        _profile=profile,
+    )
+
+
+def _values(fit: NoiseFit, names: tuple[str, ...], known: Mapping[str, float]) -> dict[str, float]:
+    """The fitted parameters of the loop; a lag at its lower bound is none."""
+    numbers = fit.numbers
+    least = NO_LAG * 1e-3 * float(np.median(np.diff(fit.runs[0].time)))
+    found = {"delay": numbers.delay, "gain": fit.gain}
+    for name, lag in zip(fit.model.lag_names, numbers.lags, strict=True):
+        if name == "lag" and lag <= least:
+            found["delay"], lag = found["delay"] + lag, 0.0
+        found[name] = lag
+    found["delay"] = max(0.0, found["delay"])
+    return {name: found[name] for name in names} | {
+        "delay": found["delay"] if "delay" in names else known["delay"]
+    }
+
+
+def _noise_of(fit: NoiseFit, run: int) -> FlightNoise:
+    part, one, rows = fit.parts[run], fit.numbers.noise[run], fit.runs[run]
+    white = math.sqrt(part.variance)
+    trim = 0.0
+    if fit.trim:
+        place = ("gain" in fit.model.names and len(fit.runs) == 1) + rows.offset
+        trim = part.linear[place]
+    return FlightNoise(
+        white=white,
+        air=white * one.air,
+        air_time=one.air_time if one.air > 0.0 else math.inf,
+        trim=trim,
+        sensor=white * one.sensor,
+        sensor_time=one.sensor_time if one.sensor > 0.0 else 0.0,
+        left_out=int(np.sum(~rows.used)),
+    )
+
+
+def gain_is_certain(profile: LikelihoodProfile) -> bool:
+    """Whether the gain is fitted and far from zero."""
+    if "gain" not in profile.names:
+        return False
+    return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * profile.stderr["gain"]
+
+
+def _message(
+    done: str,
+    names: tuple[str, ...],
+    held: list[str],
+    noise: Sequence[FlightNoise],
+    adequacy: Adequacy,
+    run: Run,
+) -> str:
+    text = f"{done}; {noise[0]}"
+    if held:
+        text += f"; the {' and '.join(held)} came out at zero, its bound"
+    if adequacy.reasons:
+        text += f"; not adequate: {'; '.join(adequacy.reasons)}{_advice(names, run)}"
+    return text
+
+
+def _advice(names: Sequence[str], run: Run) -> str:
+    """Advice for a model that is not adequate."""
+    slow = [name for name in ("lag", "time_constant") if name in run.loop.parameters]
+    if slow and slow[0] not in names:
+        return f" (try free=('delay', 'gain', '{slow[0]}'))"
+    return " (try a window around one step, a smaller step, or another plant)"

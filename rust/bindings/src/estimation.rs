@@ -1,0 +1,288 @@
+//! Bindings of `deadtime::estimation`.
+
+use deadtime::estimation::{
+    Commands, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity, Rows, Timing,
+};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays::{converted, owned};
+use crate::runtime::run_here;
+
+type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
+
+/// The rows of one recording.
+#[derive(FromPyObject)]
+struct RecordedRows<'py> {
+    time: Floats<'py>,
+    output: Floats<'py>,
+    used: PyReadonlyArrayDyn<'py, bool>,
+    command_time: Floats<'py>,
+    command: Floats<'py>,
+    unknown: Vec<(f64, f64)>,
+    offset: bool,
+    trim: bool,
+}
+
+impl RecordedRows<'_> {
+    fn rows(&self) -> PyResult<Rows> {
+        let rows = Rows {
+            time: owned(&self.time)?,
+            output: owned(&self.output)?,
+            used: owned(&self.used)?,
+            commands: Commands {
+                time: owned(&self.command_time)?,
+                value: owned(&self.command)?,
+                unknown: self.unknown.clone(),
+            },
+            offset: self.offset,
+            trim: self.trim,
+        };
+        converted(rows.checked())
+    }
+}
+
+/// The noise of one recording, in deviations of the white noise.
+#[pyclass(frozen, get_all, from_py_object, module = "deadtime._deadtime")]
+#[derive(Clone)]
+pub(crate) struct RowNoise {
+    air_time: f64,
+    air: f64,
+    sensor_time: f64,
+    sensor: f64,
+}
+
+#[pymethods]
+impl RowNoise {
+    #[new]
+    #[pyo3(signature = (air_time=1.0, air=0.0, sensor_time=1.0, sensor=0.0))]
+    fn new(air_time: f64, air: f64, sensor_time: f64, sensor: f64) -> Self {
+        Self {
+            air_time,
+            air,
+            sensor_time,
+            sensor,
+        }
+    }
+}
+
+/// One set of numbers of plant and noise.
+#[pyclass(frozen, get_all, from_py_object, module = "deadtime._deadtime")]
+#[derive(Clone)]
+pub(crate) struct PlantNumbers {
+    delay: f64,
+    lags: Vec<f64>,
+    zero: f64,
+    gain: f64,
+    noise: Vec<RowNoise>,
+    objective: f64,
+}
+
+#[pymethods]
+impl PlantNumbers {
+    #[new]
+    #[pyo3(signature = (delay, lags, noise, gain=1.0, zero=0.0, objective=f64::INFINITY))]
+    fn new(
+        delay: f64,
+        lags: Vec<f64>,
+        noise: Vec<RowNoise>,
+        gain: f64,
+        zero: f64,
+        objective: f64,
+    ) -> Self {
+        Self {
+            delay,
+            lags,
+            zero,
+            gain,
+            noise,
+            objective,
+        }
+    }
+}
+
+impl PlantNumbers {
+    fn fit(&self) -> Fit {
+        let noise = self.noise.iter().map(|one| Noise {
+            air_time: one.air_time,
+            air: one.air,
+            sensor_time: one.sensor_time,
+            sensor: one.sensor,
+        });
+        Fit {
+            point: Point {
+                timing: Timing::Total(self.delay + self.lags.iter().sum::<f64>()),
+                lags: self.lags.clone(),
+                zero: self.zero,
+                gain: self.gain,
+                noise: noise.collect(),
+            },
+            objective: self.objective,
+        }
+    }
+
+    fn from_fit(fit: &Fit) -> Self {
+        let noise = fit.point.noise.iter().map(|one| RowNoise {
+            air_time: one.air_time,
+            air: one.air,
+            sensor_time: one.sensor_time,
+            sensor: one.sensor,
+        });
+        Self {
+            delay: fit.point.delay(),
+            lags: fit.point.lags.clone(),
+            zero: fit.point.zero,
+            gain: fit.point.gain,
+            noise: noise.collect(),
+            objective: fit.objective,
+        }
+    }
+}
+
+/// The likelihood of one recording at one set of numbers.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct RowLikelihood {
+    objective: f64,
+    log_det: f64,
+    variance: f64,
+    freedom: usize,
+    gain: f64,
+    linear: Vec<f64>,
+    inverse: Py<PyArray1<f64>>,
+    score: Py<PyArray1<f64>>,
+    whitened: Py<PyArray1<f64>>,
+    residuals: Py<PyArray1<f64>>,
+    rate: Py<PyArray1<f64>>,
+}
+
+impl RowLikelihood {
+    fn new(py: Python<'_>, found: Evaluation) -> Self {
+        let array = |values: Vec<f64>| values.into_pyarray(py).unbind();
+        Self {
+            objective: found.objective,
+            log_det: found.log_det,
+            variance: found.variance,
+            freedom: found.freedom,
+            gain: found.gain,
+            linear: found.linear,
+            inverse: array(found.inverse),
+            score: array(found.score),
+            whitened: array(found.whitened),
+            residuals: array(found.residuals),
+            rate: array(found.rate),
+        }
+    }
+}
+
+/// Recordings of one plant, with what is unknown about it.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct FlightLikelihood {
+    model: Model,
+}
+
+#[pymethods]
+impl FlightLikelihood {
+    #[new]
+    #[pyo3(signature = (num, den, runs, *, delay, gain, lags, zero, longest))]
+    #[expect(clippy::too_many_arguments)]
+    fn new(
+        num: Vec<f64>,
+        den: Vec<f64>,
+        runs: Vec<RecordedRows<'_>>,
+        delay: bool,
+        gain: bool,
+        lags: Vec<bool>,
+        zero: bool,
+        longest: f64,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            model: Model {
+                plant: converted(Plant::new(&num, &den))?,
+                runs: runs.iter().map(RecordedRows::rows).collect::<PyResult<_>>()?,
+                free: Free {
+                    delay,
+                    gain,
+                    lags,
+                    zero,
+                },
+                longest,
+            },
+        })
+    }
+
+    /// The likelihood of one recording.
+    fn at(&self, py: Python<'_>, run: usize, numbers: &PlantNumbers) -> PyResult<RowLikelihood> {
+        let point = numbers.fit().point;
+        let found = run_here(py, |task| self.model.at(run, &point, None, true, task))?;
+        Ok(RowLikelihood::new(py, found))
+    }
+
+    /// −2 ln L of all recordings.
+    fn objective(&self, py: Python<'_>, numbers: &PlantNumbers) -> PyResult<f64> {
+        let point = numbers.fit().point;
+        run_here(py, |task| self.model.objective(&point, None, task))
+    }
+
+    /// The maximum from a starting point.
+    fn fit(&self, py: Python<'_>, start: &PlantNumbers) -> PyResult<PlantNumbers> {
+        let mut start = start.fit().point;
+        if !self.model.free.delay {
+            start.timing = Timing::Delay(start.delay());
+        }
+        let found = run_here(py, |task| self.model.fit(&start, None, task))?;
+        Ok(PlantNumbers::from_fit(&found))
+    }
+
+    /// The maximum with one quantity at a value, from a fit near it.
+    fn held(
+        &self,
+        py: Python<'_>,
+        near: &PlantNumbers,
+        quantity: &str,
+        value: f64,
+    ) -> PyResult<PlantNumbers> {
+        let (near, quantity) = (self.known(near), read(quantity)?);
+        let found = run_here(py, |task| self.model.held(&near, quantity, value, task))?;
+        Ok(PlantNumbers::from_fit(&found))
+    }
+
+    /// The end of an interval, and the lowest point seen on the way.
+    fn end(
+        &self,
+        py: Python<'_>,
+        best: &PlantNumbers,
+        quantity: &str,
+        reach: f64,
+        rise: f64,
+        floor: f64,
+    ) -> PyResult<(f64, PlantNumbers)> {
+        let (best, quantity) = (self.known(best), read(quantity)?);
+        let (end, lowest) = run_here(py, |task| {
+            self.model.end(&best, quantity, reach, rise, floor, task)
+        })?;
+        Ok((end, PlantNumbers::from_fit(&lowest)))
+    }
+}
+
+impl FlightLikelihood {
+    fn known(&self, numbers: &PlantNumbers) -> Fit {
+        let mut fit = numbers.fit();
+        if !self.model.free.delay {
+            fit.point.timing = Timing::Delay(fit.point.delay());
+        }
+        fit
+    }
+}
+
+fn read(quantity: &str) -> PyResult<Quantity> {
+    Ok(match quantity {
+        "delay" => Quantity::Delay,
+        "total" => Quantity::Total,
+        "gain" => Quantity::Gain,
+        _ => match quantity.strip_prefix("lag ").and_then(|i| i.parse().ok()) {
+            Some(i) => Quantity::Lag(i),
+            None => return Err(PyValueError::new_err(format!("quantity {quantity:?}"))),
+        },
+    })
+}

@@ -1,0 +1,77 @@
+//! What moves the output besides the command: air through the plant, coloured noise of the sensor.
+//!
+//! Each is an Ornstein–Uhlenbeck process, w′ = −w/τ + q ξ. Its limits are a random walk (τ → ∞) and
+//! white noise (τ → 0 at constant q τ).
+
+use super::plant::PlantSpace;
+use crate::Error;
+
+/// Where a disturbance enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Entry {
+    /// At the input of the plant, as moving air does.
+    Input,
+    /// At the measurement.
+    Output,
+}
+
+/// An Ornstein–Uhlenbeck process with its stationary distribution at the first row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disturbance {
+    /// Where it enters.
+    pub entry: Entry,
+    /// Time constant τ, s.
+    pub time_constant: f64,
+    /// Standard deviation of the stationary process, in standard deviations of the white noise.
+    pub deviation: f64,
+}
+
+/// The joint equations of plant and disturbances: x′ = A x + G ξ, y = C x.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Joint {
+    pub(super) a: Vec<f64>,
+    /// G Gᵀ.
+    pub(super) noise: Vec<f64>,
+    pub(super) c: Vec<f64>,
+    /// Covariance at the first row: the plant's own states are at rest.
+    pub(super) start: Vec<f64>,
+}
+
+impl Joint {
+    pub(super) fn new(plant: &PlantSpace, disturbances: &[Disturbance]) -> Result<Self, Error> {
+        let states = plant.b.len();
+        let n = states + disturbances.len();
+        let mut a = vec![0.0; n * n];
+        let mut c = plant.c.clone();
+        let (mut noise, mut start) = (vec![0.0; n * n], vec![0.0; n * n]);
+        for (row, own) in a.chunks_exact_mut(n).zip(plant.a.chunks_exact(states.max(1))) {
+            for (place, value) in row.iter_mut().zip(own) {
+                *place = *value;
+            }
+        }
+        for (index, one) in (states..n).zip(disturbances) {
+            refuse_if!(
+                !(one.time_constant > 0.0 && one.deviation >= 0.0),
+                "a disturbance with time constant {} s and deviation {}: give a time constant \
+                 above zero and a deviation of at least zero",
+                one.time_constant,
+                one.deviation
+            );
+            let rate = 1.0 / one.time_constant;
+            let variance = one.deviation * one.deviation;
+            for (row, b) in a.chunks_exact_mut(n).zip(&plant.b) {
+                if one.entry == Entry::Input {
+                    row[index] = *b;
+                }
+            }
+            a[index * n + index] = -rate;
+            noise[index * n + index] = 2.0 * rate * variance;
+            start[index * n + index] = variance;
+            c.push(match one.entry {
+                Entry::Input => plant.d,
+                Entry::Output => 1.0,
+            });
+        }
+        Ok(Self { a, noise, c, start })
+    }
+}

@@ -1,0 +1,29 @@
+//! Likelihood of recordings under the noise of a flight: moving air, trim, coloured and white
+//! sensor noise.
+//!
+//! ```text
+//! y(t) = b + g F(t − T) + g_t R(t) + air through the plant + coloured noise + white noise,
+//! ```
+//!
+//! F is the response of the plant of unit gain to the commands as they were held, R its response
+//! to a constant input (trim). Gain, offset and trim are linear and eliminated exactly (`likelihood`), the
+//! variance of the white noise too; delay, lags and the numbers of the noise are searched (`search`,
+//! `fit`), and intervals are those of the profile (`profile`).
+
+mod disturbance;
+mod fit;
+mod likelihood;
+mod orthogonal;
+mod path;
+mod plant;
+mod profile;
+mod propagation;
+mod search;
+mod whiten;
+
+pub use disturbance::{Disturbance, Entry};
+pub use fit::{Fit, Free, Model, Point, Timing};
+pub use likelihood::{Commands, Evaluation, Gain, Noise, Rows, Values};
+pub use plant::{Plant, PlantSpace};
+pub use profile::Quantity;
+pub use whiten::{Whitened, whiten};

@@ -1,0 +1,176 @@
+//! Plants with lags in front: 1/(T₁ s + 1) … (z s + 1)/(T_m s + 1) · num(s)/den(s).
+//!
+//! The lags come first, the last of them with the zero; num/den follows in its controllable
+//! canonical form. A lag of zero has no state.
+
+use crate::Error;
+
+/// A plant x′ = A x + B u, y = C x + D u; A row-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlantSpace {
+    /// Shape (n, n).
+    pub a: Vec<f64>,
+    /// Shape (n,).
+    pub b: Vec<f64>,
+    /// Shape (n,).
+    pub c: Vec<f64>,
+    /// Direct part.
+    pub d: f64,
+}
+
+/// The given part of a plant, of unit gain: num(s)/den(s), proper.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plant {
+    /// Numerator over the leading coefficient of den, ascending, as long as den.
+    num: Vec<f64>,
+    /// Denominator, monic, ascending.
+    den: Vec<f64>,
+}
+
+impl Plant {
+    /// From coefficients in descending powers of s.
+    ///
+    /// # Errors
+    ///
+    /// For a denominator that is empty or zero, and a numerator of a higher degree.
+    pub fn new(num: &[f64], den: &[f64]) -> Result<Self, Error> {
+        let lead = den.iter().position(|c| *c != 0.0);
+        let Some(den) = lead.map(|lead| &den[lead..]) else {
+            refuse!("the denominator of the plant is zero")
+        };
+        let num = &num[num.iter().position(|c| *c != 0.0).unwrap_or(num.len())..];
+        refuse_if!(
+            num.len() > den.len(),
+            "the numerator of the plant has degree {} and the denominator {}",
+            num.len() - 1,
+            den.len() - 1
+        );
+        let monic = |part: &[f64]| part.iter().rev().map(|c| c / den[0]).collect::<Vec<f64>>();
+        let mut numerator = monic(num);
+        numerator.resize(den.len(), 0.0);
+        Ok(Self {
+            num: numerator,
+            den: monic(den),
+        })
+    }
+
+    /// Does a constant input let the output grow without end?
+    pub fn integrates(&self) -> bool {
+        self.den.len() > 1 && self.den[0] == 0.0
+    }
+
+    /// The plant behind these lags, s, the last of them with the zero (`zero` s + 1).
+    pub fn space(&self, lags: &[f64], zero: f64) -> PlantSpace {
+        let lags: Vec<f64> = lags.iter().copied().filter(|lag| *lag != 0.0).collect();
+        let (count, order) = (lags.len(), self.den.len() - 1);
+        let n = count + order;
+        let mut a = vec![0.0; n * n];
+        let mut b = vec![0.0; n];
+        // The signal before the next part: `from` times the states, and `direct` times the input.
+        let (mut from, mut direct) = (vec![0.0; n], 1.0);
+        for (i, lag) in lags.iter().enumerate() {
+            let rate = 1.0 / lag;
+            for (place, from) in a[i * n..(i + 1) * n].iter_mut().zip(&from) {
+                *place = rate * from;
+            }
+            a[i * n + i] -= rate;
+            b[i] = rate * direct;
+            let through = if i + 1 == count { zero * rate } else { 0.0 };
+            from.iter_mut().for_each(|from| *from *= through);
+            direct *= through;
+            from[i] += 1.0 - through;
+        }
+        let last = self.num[order];
+        let mut c: Vec<f64> = from.iter().map(|from| last * from).collect();
+        for i in 0..order {
+            let row = (count + i) * n;
+            if i + 1 < order {
+                a[row + count + i + 1] = 1.0;
+            } else {
+                for (place, from) in a[row..row + n].iter_mut().zip(&from) {
+                    *place = *from;
+                }
+                b[count + i] = direct;
+                for j in 0..order {
+                    a[row + count + j] -= self.den[j];
+                }
+            }
+            c[count + i] += self.num[i] - last * self.den[i];
+        }
+        PlantSpace {
+            a,
+            b,
+            c,
+            d: last * direct,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use num_complex::Complex64;
+
+    use super::*;
+
+    /// C (s − A)⁻¹ B + D by Cramer's rule on two or three states.
+    fn transfer(space: &PlantSpace, s: Complex64) -> Complex64 {
+        let n = space.b.len();
+        let mut m: Vec<Vec<Complex64>> = (0..n)
+            .map(|i| {
+                (0..n)
+                    .map(|j| s * f64::from(u8::from(i == j)) - space.a[i * n + j])
+                    .chain([Complex64::from(space.b[i])])
+                    .collect()
+            })
+            .collect();
+        for i in 0..n {
+            let pivot = (i..n)
+                .max_by(|x, y| m[*x][i].norm().total_cmp(&m[*y][i].norm()))
+                .unwrap_or(i);
+            m.swap(i, pivot);
+            for k in 0..n {
+                if k != i {
+                    let factor = m[k][i] / m[i][i];
+                    for j in i..=n {
+                        let take = factor * m[i][j];
+                        m[k][j] -= take;
+                    }
+                }
+            }
+        }
+        (0..n)
+            .map(|i| m[i][n] / m[i][i] * space.c[i])
+            .sum::<Complex64>()
+            + space.d
+    }
+
+    #[test]
+    fn the_state_space_has_the_transfer_function() {
+        let s = Complex64::new(0.3, 1.7);
+        let plants: [(&[f64], &[f64]); 4] = [
+            (&[1.0], &[1.0, 0.0]),
+            (&[1.0], &[1.0]),
+            (&[0.15265, 5.1529], &[1.0, 5.82, 0.0]),
+            (&[2.0, 1.0, 3.0], &[2.0, 0.4, 4.0]),
+        ];
+        for (num, den) in plants {
+            let value = |c: &[f64]| c.iter().fold(Complex64::ZERO, |sum, c| sum * s + c);
+            for lags in [&[] as &[f64], &[0.2], &[0.3, 0.0, 0.1]] {
+                let zero = if lags.is_empty() { 0.0 } else { 0.25 };
+                let mut expected = value(num) / value(den) * (zero * s + 1.0);
+                for lag in lags {
+                    expected /= lag * s + 1.0;
+                }
+                let space = Plant::new(num, den).map(|plant| plant.space(lags, zero));
+                let found = space.map(|space| transfer(&space, s));
+                assert!(found.is_ok_and(|found| (found - expected).norm() < 1e-13));
+            }
+        }
+    }
+
+    #[test]
+    fn improper_and_empty_plants_are_refused() {
+        assert!(Plant::new(&[1.0, 0.0], &[1.0]).is_err());
+        assert!(Plant::new(&[1.0], &[0.0]).is_err());
+    }
+}
