@@ -49,6 +49,7 @@ impl RecordedRows<'_> {
 pub(crate) struct RowNoise {
     air_time: f64,
     air: f64,
+    behind: bool,
     sensor_time: f64,
     sensor: f64,
 }
@@ -56,14 +57,19 @@ pub(crate) struct RowNoise {
 #[pymethods]
 impl RowNoise {
     #[new]
-    #[pyo3(signature = (air_time=1.0, air=0.0, sensor_time=1.0, sensor=0.0))]
-    fn new(air_time: f64, air: f64, sensor_time: f64, sensor: f64) -> Self {
+    #[pyo3(signature = (air_time=1.0, air=0.0, behind=false, sensor_time=1.0, sensor=0.0))]
+    fn new(air_time: f64, air: f64, behind: bool, sensor_time: f64, sensor: f64) -> Self {
         Self {
             air_time,
             air,
+            behind,
             sensor_time,
             sensor,
         }
+    }
+
+    fn __getnewargs__(&self) -> (f64, f64, bool, f64, f64) {
+        (self.air_time, self.air, self.behind, self.sensor_time, self.sensor)
     }
 }
 
@@ -100,6 +106,17 @@ impl PlantNumbers {
             objective,
         }
     }
+
+    fn __getnewargs__(&self) -> (f64, Vec<f64>, Vec<RowNoise>, f64, f64, f64) {
+        (
+            self.delay,
+            self.lags.clone(),
+            self.noise.clone(),
+            self.gain,
+            self.zero,
+            self.objective,
+        )
+    }
 }
 
 impl PlantNumbers {
@@ -107,6 +124,7 @@ impl PlantNumbers {
         let noise = self.noise.iter().map(|one| Noise {
             air_time: one.air_time,
             air: one.air,
+            behind: one.behind,
             sensor_time: one.sensor_time,
             sensor: one.sensor,
         });
@@ -126,6 +144,7 @@ impl PlantNumbers {
         let noise = fit.point.noise.iter().map(|one| RowNoise {
             air_time: one.air_time,
             air: one.air,
+            behind: one.behind,
             sensor_time: one.sensor_time,
             sensor: one.sensor,
         });

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._search import NoiseFit
 
 Array = NDArray[np.float64]
@@ -30,6 +31,9 @@ FURTHER = (0.7, 3.0)
 
 #: The further lag that counts as none, in rows.
 NONE = 1e-3
+
+#: Level at which a further lag may not move delay and lag together out of their interval.
+MOVES = 0.05
 
 #: Largest difference of the cumulated score at the 1 % level (Kolmogorov).
 BRIDGE = 1.628
@@ -54,8 +58,9 @@ class Adequacy:
     reasons: tuple[str, ...]
 
 
-def tested(fit: NoiseFit, numbers: int) -> Adequacy:
+def tested(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -> Adequacy:
     """Test a fit of so many `numbers`."""
+    fit = profile.fit
     used = [rows.used for rows in fit.runs]
     whitened = [part.whitened[mask] for part, mask in zip(fit.parts, used, strict=True)]
     whiteness = whiteness_of(np.concatenate(whitened), numbers, [piece.size for piece in whitened])
@@ -65,10 +70,16 @@ def tested(fit: NoiseFit, numbers: int) -> Adequacy:
             "the residuals are not white beside the fitted noise (lag-1 autocorrelation "
             f"{whiteness.autocorrelation:.2f})"
         )
-    further, p_value = further_lag(fit)
+    richer, p_value = further_lag(fit)
+    further = richer.lags[-1]
     if p_value < SIGNIFICANCE:
         reasons.append(
             f"a further lag of {further:.3g} s makes the recording likelier: the plant lacks it"
+        )
+    elif p_value < MOVES and not _holds(profile, richer.delay + sum(richer.lags), level):
+        reasons.append(
+            f"a further lag of {further:.3g} s would move delay and lag together to "
+            f"{richer.delay + sum(richer.lags):.3g} s, out of their interval"
         )
     for index, part in enumerate(fit.parts):
         where = f" in recording {index + 1}" if len(fit.parts) > 1 else ""
@@ -83,8 +94,17 @@ def tested(fit: NoiseFit, numbers: int) -> Adequacy:
     return Adequacy(whiteness, further, tuple(reasons))
 
 
-def further_lag(fit: NoiseFit) -> tuple[float, float]:
-    """The likeliest further lag, s, and the probability of such a ratio without one."""
+def _holds(profile: LikelihoodProfile, total: float, level: float) -> bool:
+    """Whether the interval of delay and lags together holds a value."""
+    name = next((name for name in profile.names if name.startswith("delay+")), None)
+    if name is None:
+        return True
+    low, high = profile.interval(name, total, 0.0, level)
+    return low <= total <= high
+
+
+def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
+    """The likeliest numbers with a further lag, and the probability of such a ratio without."""
     from scipy import special
 
     richer = replace(fit, model=replace(fit.model, extra=fit.model.extra + 1))
@@ -108,7 +128,7 @@ def further_lag(fit: NoiseFit) -> tuple[float, float]:
             )
             best = min(best, likelihood.fit(moved), key=lambda found: found.objective)
     ratio = max(0.0, without.objective - best.objective)
-    return best.lags[-1], 0.5 * float(special.chdtrc(1, ratio)) if ratio > 0.0 else 1.0
+    return best, 0.5 * float(special.chdtrc(1, ratio)) if ratio > 0.0 else 1.0
 
 
 def bridge(score: Array, whitened: Array) -> float:

@@ -27,6 +27,12 @@ LOG_STEP = 0.1
 #: Least curvature of the likelihood in them: its range is bounded, whatever the recording says.
 LEAST_CURVATURE = 0.25
 
+#: Fewest degrees of freedom: fewer are a failure of the parabola, not of the recording.
+LEAST_FREEDOM = 4.0
+
+#: The numbers of the noise of one recording.
+PARTS = ("air_time", "air", "behind", "sensor_time", "sensor")
+
 #: A held fit that is lower than the best by this much is another, better minimum.
 BETTER = 0.02
 
@@ -51,6 +57,9 @@ class LikelihoodProfile:
     names: Mapping[str, str]
     preferred: str = "the noise is fitted"
     _ends: dict[tuple[str, float], tuple[float, float]] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return LikelihoodProfile, (self.fit, self.names, self.preferred, self._ends)
 
     @cached_property
     def centre(self) -> PlantNumbers:
@@ -184,10 +193,7 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
         return dict.fromkeys(weights, float(rows))
 
     def at(steps: Mapping[int, float]) -> tuple[float, dict[str, float]]:
-        noise = [
-            {name: getattr(one, name) for name in ("air_time", "air", "sensor_time", "sensor")}
-            for one in base
-        ]
+        noise = [{name: getattr(one, name) for name in PARTS} for one in base]
         for place, step in steps.items():
             run, part = places[place]
             noise[run][part] *= math.exp(step)
@@ -215,5 +221,6 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
     values, vectors = np.linalg.eigh(0.5 * hessian)
     spread = (vectors / np.maximum(values, LEAST_CURVATURE)) @ vectors.T
     return {
-        name: float(2.0 / (2.0 / rows + slope @ spread @ slope)) for name, slope in slopes.items()
+        name: max(LEAST_FREEDOM, float(2.0 / (2.0 / rows + slope @ spread @ slope)))
+        for name, slope in slopes.items()
     }

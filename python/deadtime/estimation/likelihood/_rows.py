@@ -36,6 +36,9 @@ ALIKE = 0.2
 #: rows. Half a window of the median that spikes are measured from, in rows.
 SPIKE, MOST_SPIKES, HALF_WINDOW = 6.0, 0.15, 2
 
+#: A row that repeats the one before says nothing where the output moves by so many robust deviations.
+STALE = 2.0
+
 #: Median absolute deviation of a Gaussian, and the least robust deviation as a share of the plain.
 MAD, LEAST_ROBUST = 0.6745, 0.1
 
@@ -125,16 +128,31 @@ def _law(recording: Recording, loop: ControlLoop, command: Array):  # type: igno
 
 def spikes(residuals: Array) -> NDArray[np.bool_]:
     """Rows of these residuals that are outliers: far from the median of their neighbours."""
-    n = residuals.size
+    away, robust = _from_neighbours(residuals)
+    found = np.abs(away) > SPIKE * robust if robust > 0.0 else np.zeros(away.size, dtype=bool)
+    if np.sum(found) > MOST_SPIKES * away.size:
+        return np.zeros(away.size, dtype=bool)
+    return found
+
+
+def repeated(output: Array, residuals: Array) -> NDArray[np.bool_]:
+    """Rows that repeat the output of the row before while the fitted output moves on.
+
+    Links repeat the last sample when none arrived. The controller acts on such a row, but it says
+    nothing new of the output.
+    """
+    _, robust = _from_neighbours(residuals)
+    moved = np.abs(np.diff(output - residuals))
+    return np.r_[False, (np.diff(output) == 0.0) & (moved > STALE * robust)]
+
+
+def _from_neighbours(residuals: Array) -> tuple[Array, float]:
+    """Difference from the median of the rows around, and its robust deviation."""
     padded = np.pad(residuals, HALF_WINDOW, mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_WINDOW + 1)
-    away = residuals - np.median(around, axis=1)
+    away = np.asarray(residuals - np.median(around, axis=1))
     robust = float(np.median(np.abs(away[away != 0.0]))) / MAD if np.any(away) else 0.0
-    robust = max(robust, LEAST_ROBUST * float(np.std(away)))
-    found = np.abs(away) > SPIKE * robust if robust > 0.0 else np.zeros(n, dtype=bool)
-    if np.sum(found) > MOST_SPIKES * n:
-        return np.zeros(n, dtype=bool)
-    return found
+    return away, max(robust, LEAST_ROBUST * float(np.std(away)))
 
 
 def is_outlier(whitened: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -42,9 +42,9 @@ REFINED = 2
 #: Start of the coloured sensor noise: white deviations, and rows.
 SENSOR, SENSOR_TIME = 1.0, 2.0
 
-#: Akaike's price of a number of the noise; that of the air counts as one, because none at all is
-#: at its bound.
-PRICE = 2.0
+#: Price of a number of the noise (Akaike 1974); that of the air counts as one, because none at all
+#: is at its bound. Trim is dearer: on a calm flight it would cost accuracy.
+PRICE, PRICE_OF_TRIM = 2.0, 4.0
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,12 @@ class NoiseFit:
         for rows, part, noise in zip(self.runs, self.parts, self.numbers.noise, strict=True):
             count = int(np.sum(rows.used))
             total += count * np.log(part.variance * part.freedom / count) + part.log_det
-            total += PRICE * (self.trim + (noise.air > 0.0) + 2 * (noise.sensor > 0.0))
+            total += PRICE * ((noise.air > 0.0) + 2 * (noise.sensor > 0.0))
+            total += PRICE_OF_TRIM * self.trim
         return float(total)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return NoiseFit, (self.model, self.runs, self.trim, self.numbers)
 
     @property
     def gain(self) -> float:
@@ -173,12 +177,19 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
         calm = likelihood.fit(with_noise(first, quiet))
         for start in starts[0]:
             calm = min(calm, likelihood.fit(start), key=_objective)
-        moving = likelihood.fit(with_noise(calm, weak))
-        for start in starts[1]:
-            moving = min(moving, likelihood.fit(start), key=_objective)
-        found += [NoiseFit(model, runs, trim, one) for one in (calm, moving)]
+        found.append(NoiseFit(model, runs, trim, calm))
+        airy = [with_noise(calm, weak), *starts[1]]
+        for behind in (False, True) if any(model.free_lags) or any(model.lags) else (False,):
+            tried = [likelihood.fit(_entering(start, behind)) for start in airy]
+            found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)
     return min([best, *_with_sensor(best)], key=_criterion)
+
+
+def _entering(numbers: PlantNumbers, behind: bool) -> PlantNumbers:
+    """The same with air that enters behind the lags, or before."""
+    noise = [RowNoise(one.air_time, one.air, behind) for one in numbers.noise]
+    return with_noise(numbers, noise)
 
 
 def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
@@ -189,6 +200,7 @@ def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
             RowNoise(
                 one.air_time,
                 one.air if keeps_air else 0.0,
+                one.behind,
                 SENSOR_TIME * float(np.median(np.diff(rows.time))),
                 SENSOR,
             )

@@ -88,7 +88,7 @@ def concluded_flight(
     """Make the estimate of a fit."""
     fit = profile.fit
     values = _values(fit, names, known)
-    adequacy = tested(fit, len(names))
+    adequacy = tested(profile, len(names))
     cov = common_covariance(fit)
     order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
     place = [order.index(name) for name in names]

@@ -29,7 +29,13 @@ from deadtime.estimation.data._simulated import (
     moves_between_rows,
 )
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
-from deadtime.estimation.likelihood._rows import FlightRows, HeldCommands, with_missing
+from deadtime.estimation.likelihood._rows import (
+    FlightRows,
+    HeldCommands,
+    repeated,
+    spikes,
+    with_missing,
+)
 from deadtime.estimation.methods._conclusion import (
     check_fit,
     concluded,
@@ -120,7 +126,11 @@ def estimate_from_commands(
             method, model, found, fitted, message=f"least squares {message}", details=details
         )
     first = {**models[0].known, **dict(zip(names, found.point.tolist(), strict=False))}
-    rows = [one.rows(initial_output) for one in models]
+    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
+    rows = [
+        one.rows(initial_output, -piece / weight)
+        for one, piece, weight in zip(models, pieces, model.weights, strict=True)
+    ]
     profile = fitted_flight(names, fitted, rows, first)
     longest = min(LONGEST * one.span for one in models)
     if "delay" in names and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
@@ -147,12 +157,13 @@ class _Model(ModelOfOne):
     source: str
     commands: HeldCommands
 
-    def rows(self, initial_output: float | None) -> FlightRows:
-        """The rows for the likelihood."""
+    def rows(self, initial_output: float | None, residuals: Array) -> FlightRows:
+        """The rows for the likelihood, without those that `residuals` show to be of no use."""
+        useless = spikes(residuals) | repeated(self.recording.output, residuals)
         return FlightRows(
             time=self.recording.time,
             output=self.recording.output - (initial_output or 0.0),
-            used=np.ones(len(self.recording), dtype=bool),
+            used=~useless,
             command_time=self.commands.time,
             command=self.commands.command,
             unknown=self.commands.unknown,

@@ -40,6 +40,7 @@ from deadtime.estimation.data._checks import (
 )
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.estimation.methods._output_error import estimate_from_commands
@@ -134,8 +135,10 @@ class Waveform(Method):
 def _unlikelihood(fit: DelayEstimate) -> float:
     """Negative log likelihood, but for a constant, of Gaussian noise of unknown size.
 
-    Residuals are taken as no smaller than rounding.
+    Residuals are taken as no smaller than rounding. Further numbers of the noise have their price.
     """
+    if isinstance(fit._profile, LikelihoodProfile):
+        return 0.5 * fit._profile.fit.criterion
     total = 0.0
     for one in fit.runs:
         scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))

@@ -11,6 +11,8 @@ use crate::Error;
 pub enum Entry {
     /// At the input of the plant, as moving air does.
     Input,
+    /// Behind the lags of the plant, as air does that moves the vehicle itself.
+    BehindLags,
     /// At the measurement.
     Output,
 }
@@ -59,18 +61,18 @@ impl Joint {
             );
             let rate = 1.0 / one.time_constant;
             let variance = one.deviation * one.deviation;
-            for (row, b) in a.chunks_exact_mut(n).zip(&plant.b) {
-                if one.entry == Entry::Input {
-                    row[index] = *b;
-                }
+            let (drive, direct) = match one.entry {
+                Entry::Input => (Some(&plant.b), plant.d),
+                Entry::BehindLags => (Some(&plant.behind), plant.behind_direct),
+                Entry::Output => (None, 1.0),
+            };
+            for (row, b) in a.chunks_exact_mut(n).zip(drive.into_iter().flatten()) {
+                row[index] = *b;
             }
             a[index * n + index] = -rate;
             noise[index * n + index] = 2.0 * rate * variance;
             start[index * n + index] = variance;
-            c.push(match one.entry {
-                Entry::Input => plant.d,
-                Entry::Output => 1.0,
-            });
+            c.push(direct);
         }
         Ok(Self { a, noise, c, start })
     }

@@ -329,6 +329,7 @@ impl Model {
 const QUIET: Noise = Noise {
     air_time: 1.0,
     air: 0.0,
+    behind: false,
     sensor_time: 1.0,
     sensor: 0.0,
 };
